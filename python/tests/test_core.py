@@ -111,7 +111,7 @@ def test_a_second_run_chooses_the_start_covariance(c4: pyhoid.Record) -> None:
     )
     plain = pyhoid.track(c4, "rpem", nk=29, nd=1, every=10, **text)
     assert updated.covariance_choice is None and not np.array_equal(updated["b0"], plain["b0"])
-    with pytest.raises(pyhoid.OptionError, match="belongs to validate"):
+    with pytest.raises(pyhoid.OptionError, match="applies only with validate"):
         pyhoid.track(c4, "rpem", nk=29, nd=1, update_covariance=True)
     with pytest.raises(pyhoid.OptionError, match="one of the two"):
         pyhoid.track(c4, "rpem", nk=29, nd=1, covariance=0.1, validate=second)

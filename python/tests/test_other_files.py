@@ -29,7 +29,7 @@ def test_packed_text(run: Path) -> None:
         pyhoid.read(packed, input="q")
     data = packed.read_bytes()
     packed.write_bytes(data[: len(data) // 2])
-    with pytest.raises(pyhoid.FormatError, match="cut or damaged"):
+    with pytest.raises(pyhoid.FormatError, match="truncated or damaged"):
         pyhoid.read(packed)
     with pytest.raises(pyhoid.FileMissingError, match="no such file"):
         pyhoid.read(run.with_name("none.csv.gz"))

@@ -83,7 +83,7 @@ def test_damaged_pickles_are_refused(fit: pyhoid.Fit, c1: pyhoid.Record) -> None
     trace = pyhoid.track(c1.span(0, 20), "rls", nk=29, every=100)
     answers, call = trace.__getstate__()["answers"], trace.__dict__["_call"]
     strange = _pickling.Recalled(answers, call._replace(records=(pyhoid.simulate("C1", seed=99),)))
-    with pytest.raises(pyhoid.DataError, match="cannot be made again"):
+    with pytest.raises(pyhoid.DataError, match="cannot be reproduced"):
         strange._native()
     parts = dict(c1.__reduce__()[1][0])
     parts["u"] = np.full(len(c1), np.nan)

@@ -1,4 +1,4 @@
-//! A task that runs in parallel with another.
+//! Tasks that run in parallel with other tasks.
 
 use std::{
     env,
@@ -9,8 +9,8 @@ use std::{
 
 use crate::process::target_directory;
 
-/// A task of this program in a separate process. Its output is kept until the task is awaited, so that it does not mix
-/// with that of another.
+/// A task of this program in a separate process. Its output is stored until the task has ended, so that it does not mix
+/// with the output of other tasks.
 pub struct Background {
     name: &'static str,
     child: Child,
@@ -34,7 +34,7 @@ impl Background {
         Ok(Self { name, child, said })
     }
 
-    /// Waits for its end and shows its output.
+    /// Waits for the end of the task and prints its output.
     pub fn end(mut self) -> Result<(), String> {
         let name = self.name;
         let status = self.child.wait().map_err(|e| format!("cargo xtask {name}: {e}"))?;
@@ -46,7 +46,7 @@ impl Background {
     }
 }
 
-/// A running task is killed after another has failed.
+/// Kills a task that is still running, for example after another task has failed.
 impl Drop for Background {
     fn drop(&mut self) {
         let _ = self.child.kill();

@@ -1,4 +1,4 @@
-//! Number of passed tests, over crates and the Python package.
+//! Number of tests over all crates and the Python package.
 
 /// Numbers of passed, failed and skipped tests.
 #[derive(Debug, Default, PartialEq)]

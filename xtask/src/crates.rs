@@ -1,8 +1,8 @@
-//! Rules for the dependencies of the workspace, with all features, by `cargo metadata`: licences, unwanted crates, one
-//! version of each, and a limited number.
+//! Rules for the dependencies of the workspace with all features, checked by `cargo metadata`: licences, unwanted
+//! crates, one version of each crate, and a limited number of crates.
 //!
-//! A licence expression is one of SPDX (Annex D: `OR` binds less than `AND`, that less than `WITH`), with the `/` of
-//! older manifests for `OR`. Advisories need the network and are examined by the hosted workflows.
+//! A licence is an SPDX expression (Annex D: `WITH` binds more tightly than `AND`, and `AND` more tightly than `OR`);
+//! the `/` of older manifests means `OR`. Security advisories need the network and are checked by the hosted workflows.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,7 +25,7 @@ const ALLOWED: [&str; 11] = [
     "Zlib",
 ];
 
-/// Unwanted crates, by name or by the start of a name that ends with `*`, with reasons.
+/// Unwanted crates with reasons. A `*` at the end or the start of a name matches all names with that prefix or suffix.
 const BANNED: [(&str, &str); 16] = [
     (
         "*-sys",
@@ -59,7 +59,7 @@ const TOLERATED: [(&str, &str); 5] = [
     ),
 ];
 
-/// Crates with several versions, and the dependents of the older ones. Each version is built.
+/// Crates that are permitted in several versions: number of versions, and the reason.
 const SEVERAL: [(&str, usize, &str); 9] = [
     ("bitflags", 2, "png, of resvg: feature pdf-png"),
     ("getrandom", 3, "const-random and ahash, of parquet"),
@@ -76,8 +76,8 @@ const SEVERAL: [(&str, usize, &str); 9] = [
     ("syn", 2, "zerocopy and windows-core, and the test of imports"),
 ];
 
-/// Maximum size of the tree of `hoid-cli` on Linux, including its own crates: another crate needs a
-/// reason, and a line in the table of dependencies of ARCHITECTURE.md.
+/// Maximum number of crates in the dependency tree of `hoid-cli` on Linux, including the crates of hoid. A further
+/// crate needs a reason and a row in the table of dependencies of ARCHITECTURE.md.
 const MOST_CRATES: usize = 155;
 
 /// Checks all rules.
@@ -132,7 +132,7 @@ fn packages(metadata: &Value) -> Vec<Package> {
             name: text(&value["name"])?,
             version: text(&value["version"])?,
             licence: text(&value["license"]),
-            // The entries of the workspace have none.
+            // Crates of the workspace have no source and are omitted.
             source: text(&value["source"])?,
         })
     };
@@ -140,7 +140,7 @@ fn packages(metadata: &Value) -> Vec<Package> {
     all.into_iter().flatten().filter_map(package).collect()
 }
 
-/// Problems with the origin of a crate and its licence.
+/// Returns the problem with the origin or the licence of a crate; `None` if there is none.
 fn licence_of(package: &Package) -> Option<String> {
     let Package {
         name, version, source, ..
@@ -165,7 +165,7 @@ fn licence_of(package: &Package) -> Option<String> {
     }
 }
 
-/// True if an expression permits the distribution of the crate; none if it cannot be parsed.
+/// True if a licence expression permits the distribution of the crate; `None` if it cannot be parsed.
 fn allows(expression: &str) -> Option<bool> {
     let spaced = expression.replace('/', " OR ").replace('(', " ( ").replace(')', " ) ");
     let words: Vec<&str> = spaced.split_whitespace().collect();
@@ -219,7 +219,7 @@ fn take(rest: &mut &[&str], word: &str) -> bool {
     }
 }
 
-/// Reason why a crate is unwanted.
+/// Returns the reason why a crate is unwanted; `None` if it is not.
 fn ban_of(package: &Package) -> Option<String> {
     let name = package.name.as_str();
     if TOLERATED.iter().any(|(known, _)| *known == name) {
@@ -239,7 +239,7 @@ fn ban_of(package: &Package) -> Option<String> {
     Some(format!("{name} {} is banned: {why}", package.version))
 }
 
-/// Crates with more versions than stated, and outdated statements.
+/// Returns the crates with more versions than permitted, and outdated entries of [`SEVERAL`].
 fn several(packages: &[Package]) -> Vec<String> {
     let mut versions: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
     for package in packages {

@@ -1,7 +1,7 @@
-//! The kernel on bare processors: built for Cortex-M4F and RISC-V, run under QEMU, and compared digit by digit with the
-//! host and with `hoid track`.
+//! The kernel on microcontrollers: built for Cortex-M4F and RISC-V, run under QEMU, and compared digit by digit with
+//! the host and with `hoid track`.
 //!
-//! Missing programs are reported and skipped, with the command that installs them.
+//! If a program is missing, the step is skipped and the command that installs the program is reported.
 
 use std::{
     env, fs,
@@ -11,14 +11,14 @@ use std::{
 
 use crate::process::{AS_TESTS, cargo, installed_targets, output, target_directory};
 
-/// The target that is run, and the one that is only built.
+/// Target that is built and run; `RISC_V` is only built.
 pub const CORTEX: &str = "thumbv7em-none-eabihf";
 const RISC_V: &str = "riscv32imac-unknown-none-elf";
-/// Length of the run under QEMU by default, s: QEMU runs at a fiftieth of the host's speed.
+/// Default length of the run under QEMU, s; QEMU runs at a fiftieth of the host's speed.
 const SHORT_S: usize = 15;
 const RATE_HZ: usize = 100;
 
-/// Builds, runs and compares; `--all` runs the whole 82 s under QEMU too.
+/// Builds and runs the kernel and compares the results; `--all` runs the whole 82 s under QEMU as well.
 pub fn embedded(arguments: &[String]) -> Result<(), String> {
     let all = match arguments {
         [] => false,
@@ -74,7 +74,7 @@ pub fn embedded(arguments: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-/// The trace of `hoid track` for a run of C4, whose e and u are written to `run.csv`.
+/// Returns the trace of `hoid track` for a run of C4, and writes its e and u to `run.csv`.
 fn tracked(target: &Path, directory: &Path) -> Result<String, String> {
     cargo(&AS_TESTS, &[])?;
     let hoid = || {
@@ -104,7 +104,7 @@ fn tracked(target: &Path, directory: &Path) -> Result<String, String> {
     read("trace.csv")
 }
 
-/// Keeps the first seconds of the samples.
+/// Shortens a file of samples to the first [`SHORT_S`] seconds.
 fn shorten(file: &Path) -> Result<(), String> {
     let said = |e: std::io::Error| format!("{}: {e}", file.display());
     let text = fs::read_to_string(file).map_err(said)?;
@@ -116,7 +116,7 @@ fn shorten(file: &Path) -> Result<(), String> {
     fs::write(file, kept).map_err(said)
 }
 
-/// The named columns of a table whose comments start with `#`.
+/// Returns the named columns of a table whose comment lines start with `#`.
 fn columns(table: &str, names: &[&str]) -> Result<Vec<Vec<String>>, String> {
     let mut lines = table.lines().filter(|line| !line.starts_with('#'));
     let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
@@ -135,7 +135,7 @@ fn columns(table: &str, names: &[&str]) -> Result<Vec<Vec<String>>, String> {
     Ok(lines.map(row).collect())
 }
 
-/// Checks that each output line equals one of the trace, to the last digit.
+/// Checks that each output line equals a row of the trace to the last digit.
 fn compared(place: &str, told: &str, track: &str) -> Result<(), String> {
     let table: Vec<&str> = told.lines().filter(|line| !line.starts_with('#')).collect();
     let names: Vec<&str> = table.first().copied().unwrap_or_default().split(',').collect();

@@ -1,4 +1,4 @@
-//! The libraries for C: built, and installed so that pkg-config and CMake find them.
+//! The libraries for C, built and installed so that pkg-config and CMake find them:
 //!
 //! ```text
 //! include/hoid.h
@@ -8,7 +8,7 @@
 //! share/hoid/examples/
 //! ```
 //!
-//! The folder may be moved: no file in it contains its path.
+//! The folder may be moved, because no file in it contains its path.
 
 use std::{
     env, fs,
@@ -18,7 +18,7 @@ use std::{
 
 use crate::process::{AS_TESTS, SHIPPED, cargo, output, run};
 
-/// System libraries that a program needs with the static library.
+/// System libraries that a program linked with the static library needs.
 const SYSTEM_LIBRARIES: &str = if cfg!(target_os = "linux") {
     "-lpthread -ldl -lm -lgcc_s"
 } else {
@@ -37,7 +37,7 @@ const EXAMPLES: [&str; 7] = [
 
 const USAGE: &str = "usage: cargo xtask ffi [--dev] [--out DIR] | --header | --check";
 
-/// Builds the libraries, generates the header, or checks that other tools find them.
+/// Builds the libraries, generates the header, or checks that pkg-config and CMake find them.
 pub fn ffi(arguments: &[String]) -> Result<(), String> {
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let target = target_directory();
@@ -69,7 +69,7 @@ fn target_directory() -> PathBuf {
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), |named| root().join(named))
 }
 
-/// Writes the header from the sources.
+/// Generates the header from the sources.
 fn header() -> Result<(), String> {
     run(Command::new("cbindgen")
         .args([
@@ -113,7 +113,7 @@ fn build(profile: &str, out: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// File names as built, and as installed.
+/// Returns the file names of the libraries as built and as installed.
 fn libraries() -> Vec<(&'static str, &'static str)> {
     if cfg!(windows) {
         vec![
@@ -154,7 +154,7 @@ fn pkg_config(version: &str) -> String {
     )
 }
 
-/// The targets `hoid::hoid` (shared) and `hoid::static`.
+/// Returns the CMake configuration with the targets `hoid::hoid` (shared) and `hoid::static`.
 fn cmake() -> String {
     let [shared, fixed] = if cfg!(windows) {
         ["hoid.dll", "hoid.lib"]
@@ -185,7 +185,8 @@ fn cmake() -> String {
     )
 }
 
-/// A version is compatible with older ones of the same major version (of the same minor version for 0).
+/// Returns the CMake version file. A version satisfies requests for older versions with the same major version (with
+/// the same minor version if the major version is 0).
 fn cmake_version(version: &str) -> String {
     let mut parts = version.split('.');
     let same = match (parts.next(), parts.next()) {
@@ -215,7 +216,7 @@ fn is_here(program: &str) -> bool {
     there
 }
 
-/// Runs a built example on three samples.
+/// Runs a built example on three samples and checks the number of output lines.
 fn tried(program: &Path, libraries: &Path) -> Result<(), String> {
     let shown = program.display();
     let input = program.with_extension("txt");
@@ -234,7 +235,7 @@ fn tried(program: &Path, libraries: &Path) -> Result<(), String> {
     }
 }
 
-/// Builds the C example with pkg-config, with the shared and with the static library.
+/// Builds the C example with pkg-config, once with the shared and once with the static library.
 fn found_by_pkg_config(out: &Path) -> Result<(), String> {
     if !(is_here("pkg-config") && is_here("cc")) {
         return Ok(());

@@ -1,7 +1,8 @@
-//! The page of `hoid lab`: check that the built file corresponds to its sources, tests in a browser, the page without a
-//! server, and the studies that need a browser: a long session (`hour.mjs`), operators in real time (`real.mjs`).
+//! The page of `hoid lab`: a check that the built file corresponds to its sources, tests in a browser, the page without
+//! a server, and the studies that need a browser: a long session (`hour.mjs`) and operators in real time (`real.mjs`).
 //!
-//! All of them need npm, and those that load a page a browser; missing programs are reported and skipped.
+//! All these tasks need npm, and those that load a page need a browser. If a program is missing, the task is skipped
+//! and a message is printed.
 
 use std::{
     env, fs,
@@ -14,10 +15,10 @@ use crate::{
     processors::webassembly,
 };
 
-/// The studies in a browser in real time: their names, and their scripts in `browser-test`.
+/// The studies that run in a browser in real time: their names and their scripts in `browser-test`.
 pub const STUDIES: [(&str, &str); 2] = [("lab-hour", "hour.mjs"), ("lab-real", "real.mjs")];
 
-/// Checks the built page, then tests it in a browser, finally for a minute in real time.
+/// Checks the built page, tests it in a browser, and finally runs it for a minute in real time.
 pub fn lab() -> Result<(), String> {
     if !npm_is_there()? {
         return Ok(());
@@ -31,7 +32,7 @@ pub fn lab() -> Result<(), String> {
     in_browser("dev", "hour.mjs", &["1".to_owned()])
 }
 
-/// Builds the page without a server: one file with an experiment and the tracker.
+/// Builds the page without a server, as one file with an experiment and the tracker.
 pub fn alone(arguments: &[String]) -> Result<(), String> {
     let (mut config, mut out) = (None, None);
     let mut rest = arguments.iter();
@@ -55,13 +56,13 @@ pub fn alone(arguments: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-/// Builds that page with the kernel of a profile and returns its path; nothing if the WebAssembly target is not
-/// installed.
+/// Builds the page without a server, with the kernel in a given profile, and returns its path; `None` if the
+/// WebAssembly target is not installed.
 fn page_alone(profile: &str, config: Option<&Path>, out: &Path) -> Result<Option<PathBuf>, String> {
     let Some(kernel) = webassembly(profile)? else {
         return Ok(None);
     };
-    // With the features of the tests, as already compiled.
+    // The features are those of the tests, so that nothing is compiled again.
     cargo(&["build", "--workspace", "--example", "tables"], &[])?;
     let program = target_directory().join("debug/examples");
     let told = output(Command::new(program.join(format!("tables{}", env::consts::EXE_SUFFIX))).args(config))?;
@@ -75,13 +76,13 @@ fn page_alone(profile: &str, config: Option<&Path>, out: &Path) -> Result<Option
     Ok(Some(out.to_owned()))
 }
 
-/// Path of a build product.
+/// Returns the path of a file in the folder of the built page.
 fn built(name: &str) -> PathBuf {
     let folder = target_directory().join("lab-page");
     absolute(folder.join(name)).unwrap_or_else(|_| folder.join(name))
 }
 
-/// Runs one of the studies, with its arguments.
+/// Runs one of the browser studies with its arguments.
 pub fn study(script: &str, arguments: &[String]) -> Result<(), String> {
     if npm_is_there()? {
         in_browser("release", script, arguments)?;
@@ -89,7 +90,7 @@ pub fn study(script: &str, arguments: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-/// Installs the tools for building and testing the page; false if there is no npm, which is reported.
+/// Installs the tools for building and testing the page. If npm is missing, prints a message and returns false.
 fn npm_is_there() -> Result<bool, String> {
     let there = npm(&["--version"]).stdout(Stdio::null()).stderr(Stdio::null()).status();
     if !there.is_ok_and(|status| status.success()) {
@@ -126,7 +127,7 @@ fn npm(arguments: &[&str]) -> Command {
     command
 }
 
-/// Path of the built program.
+/// Returns the path of the built program `hoid`.
 fn program(folder: &str) -> PathBuf {
     target_directory()
         .join(folder)

@@ -1,23 +1,23 @@
 //! The development tasks of the project.
 //!
-//! | command | does |
+//! | command | task |
 //! |---|---|
-//! | `cargo xtask test` | all tests of the workspace, those of the documentation included, then those of the Python package |
-//! | `cargo xtask python [ARGUMENT...]` | the tests of the Python package alone, arguments for pytest |
-//! | `cargo xtask check` | formatting, crates that are used, lints, documentation of the crates and the book, as continuous integration does |
-//! | `cargo xtask crates` | licences, bans and versions of the crates that are used, alone (module `crates`) |
-//! | `cargo xtask words [--book]` | the words that prose does not use, in sources, or in the book, alone (module `words`) |
-//! | `cargo xtask book` | the book in `docs/`, into `docs/book/` (needs mdbook) |
-//! | `cargo xtask lab` | that the page of `hoid lab` is what its sources build, and the page in a browser (module `lab`) |
-//! | `cargo xtask lab-page [--config FILE] [--out FILE]` | the page of `hoid lab` as one file that needs no program after it, into `target/lab-page/` |
-//! | `cargo xtask embedded [--all]` | the kernel on bare processors, with the digits of the host (module `embedded`) |
-//! | `cargo xtask ffi [--dev] [--out DIR]` | the libraries for C with header, pkg-config file, CMake package and examples, into `target/ffi/`; `--header` makes the header again, `--check` builds the examples by them (module `ffi`) |
-//! | `cargo xtask miri [ARGUMENT...]` | the boundary to C under Miri, arguments for its tests (module `miri`) |
-//! | `cargo xtask places [--dry or --dev]` | one run through every place in which hoid runs, as the table of the page "In your simulator" (module `places`) |
-//! | `cargo xtask bench [OPTION...]` | the tasks of `research/notes/speed-peers.md` next to the peers that are installed, or how cost grows (module `bench`) |
-//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `design-errors`, `faults`, `faults-clean`, `tracker-faults`, `mutations`, `bombs`, `hostile`, `kills`, `full-disks`, `latency`, `lab`, `lab-hour`, `lab-real`, `challenge`, `challenge-people` |
+//! | `cargo xtask test` | all tests of the workspace, including the documentation tests, then those of the Python package |
+//! | `cargo xtask python [ARGUMENT...]` | only the tests of the Python package; the arguments are passed to pytest |
+//! | `cargo xtask check` | formatting, dependencies, lints, documentation of the crates, and the book, as in continuous integration |
+//! | `cargo xtask crates` | only the licences, bans and versions of the dependencies (module `crates`) |
+//! | `cargo xtask words [--book]` | only the check for words that prose must not use, in the sources or in the book (module `words`) |
+//! | `cargo xtask book` | builds the book in `docs/` into `docs/book/` (needs mdbook) |
+//! | `cargo xtask lab` | checks that the built page of `hoid lab` corresponds to its sources, and tests it in a browser (module `lab`) |
+//! | `cargo xtask lab-page [--config FILE] [--out FILE]` | builds the page of `hoid lab` as one file that works without a server, into `target/lab-page/` |
+//! | `cargo xtask embedded [--all]` | runs the kernel on microcontrollers and compares its digits with those of the host (module `embedded`) |
+//! | `cargo xtask ffi [--dev] [--out DIR]` | builds the libraries for C with header, pkg-config file, CMake package and examples into `target/ffi/`; `--header` generates the header, `--check` builds the examples with them (module `ffi`) |
+//! | `cargo xtask miri [ARGUMENT...]` | runs the tests of the C boundary under Miri; the arguments are passed to the tests (module `miri`) |
+//! | `cargo xtask places [--dry or --dev]` | runs every interface of hoid once, and writes the table of the page "In your simulator" (module `places`) |
+//! | `cargo xtask bench [OPTION...]` | compares the tasks of `research/notes/speed-peers.md` with the installed peers, or measures how the cost grows (module `bench`) |
+//! | `cargo xtask slow NAME [ARGUMENT...]` | runs a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `little-noise`, `intersample-coverage`, `inputs-coverage`, `design-errors`, `tracker-faults`, `mutations`, `bombs`, `long-csv`, `step-time`, `hostile`, `kills`, `full-disks`, `latency`, `lab`, `lab-hour`, `lab-real`, `challenge`, `challenge-people` |
 //!
-//! Almost only the standard library is used: a task must start at once on a new machine.
+//! Little more than the standard library is used, because a task must start at once on a new machine.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod background;
@@ -77,8 +77,8 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs all tests, passing further arguments on to `cargo test`, and prints their number over all
-/// crates and the Python package, whose tests are skipped if the arguments select tests of Rust.
+/// Runs all tests, passes further arguments on to `cargo test`, and prints the number of tests in all crates and the
+/// Python package. With arguments, which select tests of Rust, the tests of the Python package are skipped.
 fn test(arguments: &[String]) -> Result<(), String> {
     let mut command = cargo_command();
     command.args(["test", "--workspace", "--no-fail-fast"]).args(arguments);
@@ -90,7 +90,8 @@ fn test(arguments: &[String]) -> Result<(), String> {
         let mut required = Some(required.end());
         let mut built = Ok(None);
         let status = each_line(&mut command, |line| {
-            // Not before the first test runs: until then cargo blocks other builds, and they block it.
+            // The build must not start before the first test runs: until then the two cargo processes would block each
+            // other.
             if let Some(required) = required.take() {
                 built = required.and_then(|()| Background::begin(python::BUILD).map(Some));
             }
@@ -117,9 +118,9 @@ struct Slow {
     name: &'static str,
     package: &'static str,
     example: &'static str,
-    /// The package whose program is run.
+    /// The package whose program the study runs.
     program: Option<&'static str>,
-    /// `release`; `dev` for detecting overflow, as in the tests; the shipped profile if times are reported.
+    /// Build profile: `release`; `dev` to detect overflow, as in the tests; the shipped profile if times are reported.
     profile: &'static str,
 }
 
@@ -174,7 +175,7 @@ const SLOW: [Slow; 19] = [
     slow_of("challenge-people", "hoid-challenge", "challenge_people"),
 ];
 
-/// Runs one of them, with its arguments.
+/// Runs one of the slow studies with its arguments.
 fn slow(arguments: &[String]) -> Result<(), String> {
     let names = || {
         let all = SLOW.iter().map(|slow| slow.name);

@@ -1,11 +1,11 @@
-//! The generated passages of pages of the book and of `research/notes`.
+//! Generated passages in pages of the book and of `research/notes`.
 
 use std::{fs, path::Path};
 
-/// Writes a text between the markers of its passage in a page of the book; a dry run leaves the page unchanged.
+/// Writes a text between the markers of its passage in a page; a dry run leaves the page unchanged.
 ///
 /// # Errors
-/// A page that cannot be read or written, or without these markers.
+/// The reason, if the page cannot be read or written, or does not contain these markers.
 pub fn write(page: &str, passage: &str, text: &str, dry: bool) -> Result<(), String> {
     if dry {
         return Ok(());

@@ -1,8 +1,9 @@
-//! All interfaces of hoid: one run through each, with its digits compared with those of `hoid track`, the time per
-//! sample and the size of the shipped files, as a table between the markers of the page "In your simulator".
+//! All interfaces of hoid: one run through each. The digits are compared with those of `hoid track`, and the time per
+//! sample and the size of the shipped files are measured. The table is written between the markers of the page "In your
+//! simulator".
 //!
-//! The interfaces are in `python/tests/places`, which the tests run too (`test_places.py`); here their requirements are
-//! built with the profile of shipped programs. A missing program is a row of the table that reports it.
+//! The interfaces are in `python/tests/places`, which is also run by the tests (`test_places.py`). Here their
+//! requirements are built with the profile of shipped programs. If a program is missing, a row of the table reports it.
 
 use std::{env, process::Command};
 
@@ -15,7 +16,7 @@ use crate::{
 
 const PAGE: &str = "guides/simulators.md";
 
-/// Measures; `--dry` leaves the page unchanged, `--dev` uses the builds of the tests and leaves the page unchanged too.
+/// Measures all interfaces. `--dry` leaves the page unchanged; so does `--dev`, which uses the builds of the tests.
 pub fn places(arguments: &[String]) -> Result<(), String> {
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let (shipped, dry) = match words.as_slice() {

@@ -1,4 +1,4 @@
-//! Commands run by the tasks: their output, and their error messages.
+//! Execution of commands for the tasks: their output and their error messages.
 
 use std::{
     env,
@@ -7,7 +7,7 @@ use std::{
     process::{Command, ExitStatus, Stdio},
 };
 
-/// Runs a command, and prints and passes on each line of its output.
+/// Runs a command; prints each line of its output and passes it to `show`.
 pub fn each_line(command: &mut Command, mut show: impl FnMut(&str)) -> Result<ExitStatus, String> {
     let shown = format!("{command:?}");
     let cannot_run = |error: std::io::Error| format!("cannot run {shown}: {error}");
@@ -49,21 +49,21 @@ pub fn output(command: &mut Command) -> Result<String, String> {
     }
 }
 
-/// The profile of shipped programs, libraries and wheels.
+/// Profile of the shipped programs, libraries and wheels.
 pub const SHIPPED: &str = "shipped";
 
-/// Arguments of the builds for chores: of the same features as the tests, so that nothing is compiled twice. Not
-/// `--lib`: the module of Python is compiled by maturin, under settings of its own. The test brings the libraries for
-/// C, into the folder `deps`.
+/// Arguments of the builds for tasks other than tests: the same features as for the tests, so that nothing is compiled
+/// twice. `--lib` is not included, because maturin compiles the Python module with its own settings. Building the test
+/// `symbols` also builds the libraries for C, in the folder `deps`.
 pub const AS_TESTS: [&str; 6] = ["build", "--workspace", "--bins", "--examples", "--test", "symbols"];
 
-/// The target directory of cargo.
+/// Returns the target directory of cargo.
 pub fn target_directory() -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), |named| root.join(named))
 }
 
-/// The installed targets of Rust; none without rustup.
+/// Returns the installed targets of Rust; empty without rustup.
 pub fn installed_targets() -> Vec<String> {
     let told = output(Command::new("rustup").args(["target", "list", "--installed"])).unwrap_or_default();
     told.lines().map(str::to_owned).collect()

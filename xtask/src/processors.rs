@@ -8,11 +8,11 @@ use crate::{
 };
 
 const WASM: &str = "wasm32-unknown-unknown";
-/// Variable that informs `places` that these builds are up to date.
+/// Environment variable that informs `places` that these builds are up to date.
 pub const BUILT: &str = "HOID_PLACES_BUILT";
 
-/// Builds the C ABI for WebAssembly by this profile and the kernel for a Cortex-M4 by `release`, as its own chore does;
-/// each where its target is installed.
+/// Builds the C ABI for WebAssembly with this profile and the kernel for a Cortex-M4 with `release`, as the task
+/// `embedded` does. A target that is not installed is skipped.
 pub fn other_processors(profile: &str) -> Result<(), String> {
     if is_there(CORTEX) {
         cargo(&["build", "--release", "-p", "hoid-embedded", "--target", CORTEX], &[])?;
@@ -21,7 +21,7 @@ pub fn other_processors(profile: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Builds the C ABI for WebAssembly with this profile and returns its path; nothing if the target is not installed.
+/// Builds the C ABI for WebAssembly with this profile and returns its path; `None` if the target is not installed.
 pub fn webassembly(profile: &str) -> Result<Option<PathBuf>, String> {
     if !is_there(WASM) {
         return Ok(None);
@@ -36,14 +36,15 @@ pub fn webassembly(profile: &str) -> Result<Option<PathBuf>, String> {
         "--target",
         WASM,
     ];
-    // With the profile of the tests including its symbols, otherwise build scripts would be compiled again.
+    // Only the shipped profile is stripped; the profile of the tests keeps its symbols, otherwise build scripts would
+    // be compiled again.
     let stripped = format!("profile.{SHIPPED}.strip=true");
     cargo(&[&build[..], &["--config", &stripped]].concat(), &[])?;
     let folder = if profile == "dev" { "debug" } else { profile };
     Ok(Some(target_directory().join(WASM).join(folder).join("hoid_ffi.wasm")))
 }
 
-/// True if a target is installed; otherwise that is reported.
+/// True if a target is installed; otherwise a message is printed.
 fn is_there(target: &str) -> bool {
     let there = installed_targets().iter().any(|one| one == target);
     if !there {

@@ -1,11 +1,10 @@
-//! The tests of the Python package: a new virtual environment, the wheel, pytest.
+//! Tests of the Python package: a new virtual environment, the wheel, and pytest.
 //!
-//! The wheel is built with the profile and in the target folder of the tests, so that nothing is
-//! compiled twice; the test requirements come from PyPI. `HOID_PYTHON` gives an interpreter other
-//! than `python3`.
+//! The wheel is built with the profile and in the target folder of the tests, so that nothing is compiled twice; the
+//! requirements of the tests are installed from PyPI. `HOID_PYTHON` gives an interpreter other than `python3`.
 //!
-//! `cargo xtask test` does the first two steps next to those of Rust (module `beside`): what they need is not what
-//! compiles and tests Rust, and both leave a processor idle at times.
+//! `cargo xtask test` runs the first two steps in parallel with the tests of Rust (module `background`), because they
+//! need different resources and each leaves a processor idle at times.
 
 use std::{
     env, fs,
@@ -19,7 +18,8 @@ use crate::{
     processors::{BUILT, other_processors},
 };
 
-/// Names of the tasks that `cargo xtask test` runs in parallel.
+/// Name of the task that creates the environment; `BUILD` is the name of the task that builds the wheel. `cargo xtask
+/// test` runs both in parallel with the tests of Rust.
 pub const REQUIRE: &str = "python-require";
 pub const BUILD: &str = "python-build";
 
@@ -33,14 +33,14 @@ pub fn test(arguments: &[String]) -> Result<Counts, String> {
     pytest(arguments)
 }
 
-/// Creates a new environment with all requirements of the tests except the wheel: does not need Rust.
+/// Creates a new environment with all requirements of the tests except the wheel; Rust is not needed.
 pub fn require() -> Result<(), String> {
     begin(Wheel::OfTests).map(|_| ())
 }
 
-/// Builds the wheel and all programs that its tests run, and installs it after `require`.
+/// Builds the wheel and all programs that its tests run, and installs the wheel after `require`.
 pub fn build() -> Result<(), String> {
-    // The same command line as that of the tests, for comparison, and the examples of the book.
+    // This builds the command-line program as for the tests of Rust, for comparison, and the examples of the book.
     cargo(&[&AS_TESTS[..], &["--quiet"]].concat(), &[])?;
     other_processors("dev")?;
     install(Wheel::OfTests)
@@ -74,14 +74,14 @@ pub fn pytest(arguments: &[String]) -> Result<Counts, String> {
 /// Build profile of the wheel and its requirements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wheel {
-    /// As compiled by the tests, with their requirements.
+    /// The profile of the tests, with the requirements of the tests.
     OfTests,
-    /// As shipped, with the requirements of the interfaces.
+    /// The profile of shipped wheels, with the requirements of the interfaces.
     Shipped,
 }
 
 impl Wheel {
-    /// Folder of its environment.
+    /// Folder of the virtual environment.
     fn folder(self) -> PathBuf {
         target_directory().join("python").join(match self {
             Self::OfTests => "venv",
@@ -97,7 +97,7 @@ impl Wheel {
         })
     }
 
-    /// The optional requirements of the package (`[project.optional-dependencies]`) installed with it.
+    /// Name of the optional requirements (`[project.optional-dependencies]`) that are installed with the package.
     const fn extra(self) -> &'static str {
         match self {
             Self::OfTests => "test",
@@ -106,15 +106,15 @@ impl Wheel {
     }
 }
 
-/// Creates a new environment with the package and returns its interpreter. The tests need the workspace to be built
-/// before.
+/// Creates a new environment with the package and returns its interpreter. The tests require that the workspace was
+/// built before.
 pub fn environment(wheel: Wheel) -> Result<PathBuf, String> {
     begin(wheel)?;
     install(wheel)?;
     Ok(wheel.python())
 }
 
-/// Creates a new environment with the requirements of the wheel and its tests.
+/// Creates a new environment with the requirements for building the wheel and for its tests.
 fn begin(wheel: Wheel) -> Result<(), String> {
     fresh_environment(&wheel.folder())?;
     let project = package()?.join("pyproject.toml");
@@ -127,7 +127,7 @@ fn begin(wheel: Wheel) -> Result<(), String> {
     pip(&wheel.python(), &[others, &required].concat())
 }
 
-/// The requirements of an extra of a project, in the format of pip.
+/// Returns the optional requirements of a project under the name `extra`, in the format of pip.
 fn requirements<'a>(project: &'a str, extra: &str) -> Vec<&'a str> {
     let extras = project
         .split_once("[project.optional-dependencies]")
@@ -136,7 +136,7 @@ fn requirements<'a>(project: &'a str, extra: &str) -> Vec<&'a str> {
         .split_once(&format!("\n{extra} = ["))
         .map_or("", |(_, rest)| rest);
     let mut found = Vec::new();
-    // Every other part is in quotes, where brackets belong to a requirement: `dask[distributed]`.
+    // Every second part is in quotes, where brackets belong to a requirement, such as `dask[distributed]`.
     for (number, part) in list.split('"').enumerate() {
         match number % 2 {
             1 => found.push(part),
@@ -173,7 +173,7 @@ fn install(wheel: Wheel) -> Result<(), String> {
     pip(&python, &[&format!("{}[{}]", built.display(), wheel.extra())])
 }
 
-/// The folder of the package.
+/// Returns the folder of the Python package.
 pub fn package() -> Result<PathBuf, String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent();
     Ok(root.ok_or("the folder of xtask has no parent")?.join("python"))
@@ -190,7 +190,7 @@ fn fresh_environment(directory: &Path) -> Result<(), String> {
     })
 }
 
-/// An interpreter that is recent enough.
+/// Returns a Python interpreter that is recent enough.
 fn interpreter() -> Result<String, String> {
     let named = env::var("HOID_PYTHON").ok();
     let names: Vec<String> = match named {

@@ -1,15 +1,16 @@
-//! Words that comments, help texts, messages and the book do not use.
+//! Words that comments, help texts, messages and the book must not use.
 //!
-//! The readers are control engineers. The words of [`BANNED`] made sentences that they would rewrite: metaphors of
-//! speaking, standing and believing, nouns out of questions, old forms. Each has its replacement in the table, which the
-//! check prints with file and line. Code spans (in backticks) and format arguments are not prose.
+//! The readers are control engineers. The words in [`BANNED`] occurred in sentences that such readers would rewrite:
+//! metaphors of speaking, standing and believing, nouns made from questions, and archaic words. The table contains a
+//! replacement for each word, which the check prints with file and line. Code spans (in backticks) and format arguments
+//! are not prose.
 //!
-//! `cargo xtask check` applies the list to comments and texts of Rust and Python sources; `cargo xtask words --book` to the
-//! pages of the book, the README and ARCHITECTURE.md.
+//! `cargo xtask check` applies the list to comments and string literals of Rust and Python sources, `cargo xtask words
+//! --book` to the pages of the book, the README and ARCHITECTURE.md.
 
 use std::{fs, path::Path, process::Command};
 
-/// A word or phrase in lower case, and its replacement.
+/// Words and phrases in lower case, with their replacements.
 const BANNED: [(&str, &str); 48] = [
     ("foretell", "predict"),
     ("foretells", "predicts"),
@@ -61,16 +62,16 @@ const BANNED: [(&str, &str); 48] = [
     ("what is supposed", "the prior"),
 ];
 
-/// Files with words of the list, and the reasons.
+/// Files that may contain words of the list, with the reasons.
 const EXCEPTIONS: [(&str, &str); 2] = [
     ("xtask/src/words.rs", "the list itself"),
     ("crates/hoid-thesis/src/claims/", "quotations"),
 ];
 
-/// Checks comments and texts of the sources.
+/// Checks comments and string literals of the sources.
 ///
 /// # Errors
-/// The words with file and line.
+/// The words found, with file and line.
 pub fn check() -> Result<(), String> {
     let of_sources = |path: &str| path.ends_with(".rs") || path.ends_with(".py") || path.ends_with(".pyi");
     report(&hits(of_sources)?)
@@ -79,7 +80,7 @@ pub fn check() -> Result<(), String> {
 /// Checks the book, the README and ARCHITECTURE.md.
 ///
 /// # Errors
-/// The words with file and line.
+/// The words found, with file and line.
 pub fn check_book() -> Result<(), String> {
     let of_book = |path: &str| {
         path == "README.md" || path == "ARCHITECTURE.md" || path.starts_with("docs/src/") && path.ends_with(".md")
@@ -125,7 +126,7 @@ fn hits(counts: impl Fn(&str) -> bool) -> Result<Vec<String>, String> {
     Ok(found)
 }
 
-/// The banned words of a line of prose.
+/// Returns the banned words in a line of prose, with their replacements.
 fn banned_in(prose: &str) -> Vec<(&'static str, &'static str)> {
     let words: Vec<String> = without_code(prose)
         .to_lowercase()
@@ -157,7 +158,8 @@ fn without_code(line: &str) -> String {
     prose
 }
 
-/// Comments and texts with a blank, by line. A code block of a documentation comment is not prose.
+/// Returns the comments and the string literals that contain a space, by line. Code blocks in documentation comments
+/// are not prose.
 fn of_rust(text: &str) -> Vec<(usize, String)> {
     let (mut prose, mut in_text, mut in_block) = (Vec::new(), false, false);
     for (number, line) in (1..).zip(text.lines()) {
@@ -188,7 +190,7 @@ fn of_rust(text: &str) -> Vec<(usize, String)> {
                     }
                     part.clear();
                 }
-                // A quotation mark as a character.
+                // This is a quotation mark in a character literal.
                 '"' if before == '\'' => {}
                 '"' => in_text = true,
                 '/' if !in_text && characters.peek() == Some(&'/') => {
@@ -206,7 +208,7 @@ fn of_rust(text: &str) -> Vec<(usize, String)> {
     prose
 }
 
-/// Comments and texts in triple quotes, by line.
+/// Returns comments and strings in triple quotes, by line.
 fn of_python(text: &str) -> Vec<(usize, String)> {
     let (mut prose, mut in_text) = (Vec::new(), false);
     for (number, line) in (1..).zip(text.lines()) {
@@ -221,7 +223,7 @@ fn of_python(text: &str) -> Vec<(usize, String)> {
     prose
 }
 
-/// The lines outside code blocks.
+/// Returns the lines outside code blocks.
 fn of_markdown(text: &str) -> Vec<(usize, String)> {
     let mut in_block = false;
     let mut prose = Vec::new();

@@ -1,41 +1,42 @@
-//! Reliability of each answer of a result: the response, crossover and phase margin, each parameter.
+//! Reliability of each answer of a result: the response, the crossover, the phase margin and each parameter.
 //!
-//! A finding against the data or the fit counts against all answers. In addition, an answer can be undetermined by
-//! itself: a parameter that the data do not determine, a crossover whose interval contains zero. The level of the whole
-//! result is that of the requested answers: a result whose delay is undetermined is trustworthy for a request for the
-//! crossover, and not determined for a request for the delay. By default the response is requested, and an undetermined
-//! loop is a doubt.
+//! A finding against the data or the fit counts against all answers. In addition, an individual answer may be
+//! undetermined, such as a parameter that the data do not determine, or a crossover whose interval contains zero. The
+//! level of the result depends only on the requested answers: a result whose delay is undetermined is trustworthy if
+//! the crossover is requested, and not determined if the delay is requested. By default the response is requested, and
+//! an undetermined crossover or margin gives a warning.
 
 use hoid_ident::{Fit, GreyBoxFit, SigmoidFit, diagnostics::is_open, family::FamilyFit};
 use hoid_model::{ContinuousTransferFunction, Finding, Verdict, operator_family::PARAMETERS, uncertainty::Estimate};
 
 use crate::AnalysisError;
 
-/// The response of the person.
+/// Name of the answer for the response of the person.
 pub const RESPONSE: &str = "response";
-/// Crossover frequency and phase margin of the loop.
+/// Names of the answers for the crossover frequency and the phase margin of the loop.
 pub const LOOP: [&str; 2] = ["crossover", "phase_margin"];
-/// Kind of the finding that makes a single answer undetermined.
+/// Kind of the finding that an individual answer is undetermined.
 const OPEN: &str = "open-answer";
-/// Largest standard errors of a determined crossover, as a fraction of its value, and of a determined margin, deg.
+/// Largest standard errors at which the crossover (relative to its value) and the phase margin (in deg) count as
+/// determined.
 const LARGEST_ERRORS: [f64; 2] = [0.5, 30.0];
 
-/// An answer, and the reason why it is undetermined.
+/// An answer, and the reason why it is undetermined, if it is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answered {
-    /// `response`, `crossover`, `phase_margin`, or the name of a parameter.
+    /// Name of the answer: `response`, `crossover`, `phase_margin`, or the name of a parameter.
     pub name: String,
-    /// Reason why the data do not determine it, if they do not.
+    /// Reason why the data do not determine the answer; `None` if they do.
     pub open: Option<Finding>,
 }
 
-/// A fit that judges each of its answers.
+/// A fit that judges each of its answers separately.
 pub trait Answers {
-    /// Returns all answers, with this controlled element.
+    /// Returns all answers, for the given controlled element.
     fn answers(&self, element: Option<&ContinuousTransferFunction>) -> Vec<Answered>;
 }
 
-/// Returns the names of the requested answers.
+/// Checks the names of the requested answers and returns them in their standard form.
 ///
 /// # Errors
 /// [`AnalysisError::Options`] for an unknown name.
@@ -60,9 +61,9 @@ pub fn asked_for(names: &[String]) -> Result<Vec<String>, AnalysisError> {
     names.iter().map(one).collect()
 }
 
-/// Returns the verdict on the requested answers, from the findings of the fit and of its answers; by default on the
-/// response, with doubts of the loop.
-pub fn judged(verdict: Verdict, answers: &[Answered], asked: &[String]) -> Verdict {
+/// Adds the findings on the requested answers to the verdict on the fit. By default the response is requested, and an
+/// undetermined crossover or margin adds a warning.
+pub fn with_answers(verdict: Verdict, answers: &[Answered], asked: &[String]) -> Verdict {
     let of = |name: &str| answers.iter().find(|answer| answer.name == name);
     let open: Vec<Finding> = if asked.is_empty() {
         let is_told = |finding: &Finding| matches!(finding.kind, "no-crossover" | "unstable-loop");
@@ -72,41 +73,42 @@ pub fn judged(verdict: Verdict, answers: &[Answered], asked: &[String]) -> Verdi
     } else {
         let wanted = asked.iter().filter_map(|name| match of(name) {
             Some(answer) => answer.open.clone(),
-            None => Some(open(format!("{name} is not one of the answers of this result"))),
+            None => Some(undetermined(format!("{name} is not one of the answers of this result"))),
         });
         wanted.collect()
     };
     verdict.append(open)
 }
 
-/// Returns the verdict on one answer: the findings of the fit as a whole, and the reason why this answer is
+/// Returns the verdict on one answer: the findings on the fit as a whole, and the reason why this answer is
 /// undetermined.
 pub fn of_answer(verdict: &Verdict, answer: &Answered) -> Verdict {
     let whole = verdict.findings().iter().filter(|finding| finding.kind != OPEN);
     Verdict::of(whole.chain(&answer.open).cloned().collect())
 }
 
-fn open(message: String) -> Finding {
+fn undetermined(message: String) -> Finding {
     Finding::undetermined(OPEN, message)
 }
 
 fn answered(name: &str, why: Option<String>) -> Answered {
     Answered {
         name: name.to_owned(),
-        open: why.map(open),
+        open: why.map(undetermined),
     }
 }
 
 /// An estimate with its 95 % interval.
 type Measured = (Estimate, Option<(f64, f64)>);
 
-/// Crossover and margin, `None` for those that the loop does not have, with their intervals.
+/// Judges the crossover and the phase margin of a loop, given with their intervals; `None` for a quantity that does not
+/// exist.
 fn of_loop(measures: [Option<Measured>; 2]) -> impl Iterator<Item = Answered> {
     let words = ["the crossover", "the phase margin"];
     (0..2).map(move |k| {
         let why = match measures[k] {
             None => Some(format!(
-                "{} is not determined: the gain of the loop does not cross one from above",
+                "{} is not determined: the gain of the loop does not cross 1 from above",
                 words[k]
             )),
             Some((value, interval)) => {
@@ -157,7 +159,7 @@ impl Answers for SigmoidFit {
     }
 }
 
-/// For polynomials: the response, and the operator that they represent.
+/// Returns the answers of a polynomial fit: the response, and the parameters of the operator that it represents.
 pub(crate) fn of_operator(fit: &Fit) -> Vec<Answered> {
     let mut all = vec![answered(RESPONSE, None)];
     if let Ok(operator) = fit.operator() {
@@ -184,7 +186,7 @@ mod tests {
         ];
         let level = |asked: &[&str]| {
             let asked: Vec<String> = asked.iter().map(|name| (*name).to_owned()).collect();
-            judged(Verdict::of(Vec::new()), &answers, &asked).level
+            with_answers(Verdict::of(Vec::new()), &answers, &asked).level
         };
         assert_eq!(level(&[]), VerdictLevel::Trustworthy);
         assert_eq!(level(&["response"]), VerdictLevel::Trustworthy);
@@ -193,7 +195,7 @@ mod tests {
         // A finding against the whole result counts against each answer; an undetermined answer counts only against
         // itself.
         let whole = Verdict::of(vec![Finding::doubt("leverage", "few samples")]);
-        let asked = judged(whole, &answers, &["tau_e".to_owned()]);
+        let asked = with_answers(whole, &answers, &["tau_e".to_owned()]);
         assert_eq!(of_answer(&asked, &answers[0]).level, VerdictLevel::Doubtful);
         assert_eq!(of_answer(&asked, &answers[1]).level, VerdictLevel::NotDetermined);
     }

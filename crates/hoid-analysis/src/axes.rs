@@ -1,16 +1,16 @@
-//! Several axes of one recording: the operator of each, and the coupling between them.
+//! Several axes in one recording: the operator of each axis, and the coupling between axes.
 //!
-//! A person who controls roll and pitch closes two loops, `u_x = Y_x e_x + C_xy e_y + n_x`. Each operator is identified
-//! from its own error and control as if it were alone. The coupling C_xy is then tested as the response of u_x to the
-//! error of the other axis, in addition to that to its own (D. T. McRuer and D. K. Schmidt, *J. Guidance, Control, and
-//! Dynamics* 13 (1990) 348-355).
+//! A person who controls roll and pitch closes two loops, `u_x = Y_x e_x + C_xy e_y + n_x`. Each operator is first
+//! identified from its own error and control, as if the other axis did not exist. The coupling C_xy is then tested as
+//! an additional response of u_x to the error of the other axis (D. T. McRuer and D. K. Schmidt, *J. Guidance, Control,
+//! and Dynamics* 13 (1990) 348-355).
 //!
-//! **Lines.** Targets that excite both axes at the same frequencies move e_x and e_y together, so that an operator
-//! whose form lacks something looks like a coupling. The excitations of the axes must therefore be recorded, and each
-//! must have its own lines; otherwise the coupling is reported as not tested.
+//! **Lines.** If targets excite both axes at the same frequencies, e_x and e_y are correlated, and a deficient form of
+//! the operator looks like a coupling. The excitations of the axes must therefore be recorded and have different lines;
+//! otherwise the coupling is reported as not tested.
 //!
-//! **Level.** Both directions of all pairs of axes are tests: a coupling is reported if its probability by chance is
-//! below .01 divided by their number (Bonferroni).
+//! **Level.** Each pair of axes is tested in both directions: a coupling is reported if its p-value is below .01
+//! divided by the number of tests (Bonferroni).
 
 use std::str::FromStr;
 
@@ -24,9 +24,9 @@ use serde_json::{Map, Value, json};
 
 use crate::{AnalysisError, Excitation, Identification, Identified, Recordings, json};
 
-/// Probability by chance below which any coupling is reported.
+/// Familywise significance level for reporting a coupling.
 const BY_CHANCE: f64 = 0.01;
-/// Relative difference below which two lines are the same.
+/// Relative difference below which two lines count as equal.
 const SAME_LINE: f64 = 1e-3;
 /// Value of `kind` in JSON.
 pub const AXES: &str = "axes";
@@ -54,46 +54,46 @@ impl FromStr for AxisPair {
                 excitation: rest.first().map(|&name| name.to_owned()),
             }),
             _ => Err(format!(
-                "found {text:?}, expected error and control of an axis, such as ex,ux, or with its excitation, such as \
-                 ex,ux,rx"
+                "found {text:?}, expected error and control of an axis, such as ex,ux, optionally with its excitation, \
+                 such as ex,ux,rx"
             )),
         }
     }
 }
 
-/// The operator of an axis.
+/// An axis with its operator and couplings.
 #[derive(Debug, Clone)]
 pub struct Axis {
-    /// Its signals.
+    /// Signals of the axis.
     pub pair: AxisPair,
-    /// The operator.
+    /// Operator of the axis.
     pub identified: Identified,
-    /// The responses of its control to the errors of the other axes.
+    /// Responses of the control of this axis to the errors of the other axes.
     pub couplings: Vec<Coupling>,
 }
 
-/// A response of the control of an axis to the error of another.
+/// A response of the control of one axis to the error of another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coupling {
     /// Column of the error of the other axis.
     pub input: String,
-    /// Probability of such a response by chance, or the reason why it was not tested.
+    /// p-value of the response, or the reason why it was not tested.
     pub p_value: Result<f64, String>,
-    /// Whether there is a response.
+    /// Whether the response is significant.
     pub responds: bool,
 }
 
-/// Identifies the operator of each axis from its recordings, and tests the couplings.
+/// Identifies the operator of each axis from the recordings of the axis, and tests the couplings.
 ///
 /// # Errors
-/// As [`check_axes`], and [`AnalysisError`] if an axis has no result.
+/// The errors of [`check_axes`]; [`AnalysisError`] if an axis has no result.
 pub fn axes(identification: &Identification, mut all: Vec<(AxisPair, Recordings)>) -> Result<Vec<Axis>, AnalysisError> {
     let pairs: Vec<AxisPair> = all.iter().map(|(pair, _)| pair.clone()).collect();
     check_axes(identification, &pairs)?;
     for x in 0..all.len() {
         for y in (0..all.len()).filter(|y| *y != x) {
             let name = &pairs[y].input;
-            // An expression such as r-y is not a column of the records.
+            // The value of an expression such as r-y is not a channel of the other records.
             if all[x].1.records.iter().any(|record| record.channel(name).is_none()) {
                 let other = all[y].1.records.clone();
                 with_error(&mut all[x].1.records, name, &other)?;
@@ -124,14 +124,15 @@ pub fn axes(identification: &Identification, mut all: Vec<(AxisPair, Recordings)
     Ok(found)
 }
 
-/// Checks the axes, before anything is read.
+/// Checks the axes before any file is read.
 ///
 /// # Errors
-/// [`AnalysisError::Options`] for fewer than two axes, a column that two of them share, and further inputs.
+/// [`AnalysisError::Options`] if there are fewer than two axes, if two axes share a column, or if there are further
+/// inputs.
 pub fn check_axes(identification: &Identification, pairs: &[AxisPair]) -> Result<(), AnalysisError> {
     let refuse = |reason: String| Err(AnalysisError::Options { reason });
     if pairs.len() < 2 {
-        return refuse("pair: found one axis, expected two or more; for one give input and output".to_owned());
+        return refuse("pair: found one axis, expected two or more; for one axis give input and output".to_owned());
     }
     for (k, pair) in pairs.iter().enumerate() {
         let shares = |other: &&AxisPair| other.input == pair.input || other.output == pair.output;
@@ -148,7 +149,7 @@ pub fn check_axes(identification: &Identification, pairs: &[AxisPair]) -> Result
     Ok(())
 }
 
-/// Adds the error of another axis to the records that lack it.
+/// Adds the error of another axis to the records that do not contain it.
 fn with_error(records: &mut [Record], name: &str, other: &[Record]) -> Result<(), AnalysisError> {
     for (record, of) in records.iter_mut().zip(other) {
         if record.channel(name).is_none() && record.len() == of.len() {
@@ -159,7 +160,7 @@ fn with_error(records: &mut [Record], name: &str, other: &[Record]) -> Result<()
     Ok(())
 }
 
-/// Tests whether the control of an axis responds to the error of another.
+/// Tests whether the control of an axis responds to the error of another axis.
 fn coupling(
     asked: &Identification,
     identified: &Identified,
@@ -185,7 +186,8 @@ fn coupling(
     }
 }
 
-/// Returns the reason why the excitations of two axes do not separate their errors.
+/// Checks that the excitations of two axes have different lines; the error is the reason why their responses cannot be
+/// separated.
 fn separate(records: &[Record], pair: &AxisPair, other: &AxisPair, period_s: Option<f64>) -> Result<(), String> {
     let (Some(own), Some(of_other)) = (&pair.excitation, &other.excitation) else {
         return Err("the excitation is not given for both axes, as in ex,ux,rx".to_owned());
@@ -213,7 +215,7 @@ fn separate(records: &[Record], pair: &AxisPair, other: &AxisPair, period_s: Opt
 }
 
 impl Axis {
-    /// Returns the verdict on the operator of the axis, with a note for each coupling.
+    /// Returns the verdict on the operator of the axis, with a note for each significant coupling.
     pub fn verdict(&self) -> Verdict {
         let notes = self
             .couplings
@@ -233,10 +235,10 @@ impl Axis {
     }
 }
 
-/// Returns the axes as a JSON object: the result of each with its couplings.
+/// Returns the axes as a JSON object: the result of each axis with its couplings.
 ///
 /// # Errors
-/// As the JSON of an operator.
+/// The errors of converting an operator to JSON.
 pub fn axes_json(all: &[Axis]) -> Result<Map<String, Value>, AnalysisError> {
     let coupling = |coupling: &Coupling| {
         json!({

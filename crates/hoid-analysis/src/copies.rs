@@ -1,7 +1,7 @@
-//! Runs that are given twice.
+//! Detection of runs that are given twice.
 //!
-//! Standard errors come from the scatter between runs: a copy adds no information, and the errors of a result would be
-//! too small by up to the square root of two.
+//! Standard errors are computed from the scatter between runs. A copy adds no information, but would reduce the
+//! reported errors by a factor of up to the square root of two.
 
 use hoid_model::Record;
 

@@ -1,8 +1,10 @@
-//! From recordings to a describing function and its verdict: repaired, decimated, over whole periods.
+//! Estimation of a describing function and its verdict from recordings, which are repaired, decimated and cut to whole
+//! periods.
 //!
-//! The offset of a channel is a phase of a periodic signal: it is not removed by moving rows, which would cost the
-//! last whole period, but applied to the ratio at each line ([`without_offsets`]). The same holds for the shift of the
-//! input by which a decimation accounts for its hold: a ratio of samples has no hold.
+//! For a periodic signal the offset of a channel is a phase shift. It is not removed by shifting rows, which would cost
+//! the last whole period, but by correcting the ratio at each line ([`without_offsets`]). The same applies to the shift
+//! of the input by which a decimation accounts for its hold, since a ratio of Fourier coefficients of samples involves
+//! no hold.
 //!
 //! [`without_offsets`]: crate::without_offsets
 
@@ -16,35 +18,37 @@ use crate::{
     AnalysisError, offset::late_samples, quality::Of, reading::Reading, recordings::Recordings, settings::Setting,
 };
 
-/// Options of a description of recordings.
+/// Options for the estimation of a describing function from recordings.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Describing {
-    /// Excitation, lines, period, element, span. Its offset, in samples of the recordings, is added to the offsets.
+    /// Excitation, lines, period, controlled element, span. The offset given here, in samples of the recordings, is
+    /// added to the offsets of the channels.
     pub options: DescriptionOptions,
-    /// Offsets of channels by their names, which were not removed in reading.
+    /// Offsets by channel that were not removed in reading.
     pub offsets: BTreeMap<String, Offset>,
     /// Treatment of faults of the recordings.
     pub faults: FaultHandling,
-    /// Whether a high rate is lowered.
+    /// Whether a high sampling rate is reduced.
     pub rate: Decimation,
 }
 
-/// The described response.
+/// A describing function with its recordings and settings.
 #[derive(Debug, Clone)]
 pub struct Described {
-    /// The describing function; its verdict includes the findings of the recordings.
+    /// The describing function; its verdict includes the findings on the recordings.
     pub found: Description,
-    /// The recordings that were described.
+    /// The recordings used for the estimation.
     pub data: Recordings,
-    /// The settings that were used.
+    /// The settings used.
     pub settings: Vec<Setting>,
 }
 
 impl Describing {
-    /// Repairs the recordings, decimates them, describes them and forms the verdict.
+    /// Repairs and decimates the recordings, estimates their describing function and forms the verdict.
     ///
     /// # Errors
-    /// [`AnalysisError`] if there is no result: no lines, no whole period, no such channel.
+    /// [`AnalysisError`] if there is no result, for example because there are no lines, no whole period or no such
+    /// channel.
     pub fn run(&self, recordings: Recordings) -> Result<Described, AnalysisError> {
         let read = recordings.repaired(self.faults, Of::Person)?;
         let first = read.records.first().ok_or(AnalysisError::NoRecordings)?;

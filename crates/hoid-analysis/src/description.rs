@@ -1,4 +1,4 @@
-//! The describing function of recordings that accompanies a fit: at the lines of the excitation, over whole periods.
+//! The describing function that accompanies a fit: at the lines of the excitation, over whole periods.
 
 use hoid_ident::{
     IdentError,
@@ -17,17 +17,17 @@ use crate::{
 /// Channel with the recorded disturbance or target.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Excitation {
-    /// The first of the common names whose power is in lines.
+    /// The first of the channels with a common name whose power is concentrated in lines.
     #[default]
     Found,
-    /// None: no fit at lines.
+    /// No channel: no describing function is computed.
     Nothing,
-    /// This channel: if it has no lines the result reports it.
+    /// The named channel; if it has no lines, the result reports this.
     Named(String),
 }
 
 impl Excitation {
-    /// Reads the user's text: a channel or `none`; found automatically if not specified.
+    /// Interprets the text of the user: a channel or `none`; without a text the channel is found automatically.
     pub fn of_text(text: Option<&str>) -> Self {
         match text {
             None => Self::Found,
@@ -36,7 +36,7 @@ impl Excitation {
         }
     }
 
-    /// Returns the named channel.
+    /// Returns the named channel, if there is one.
     pub fn named(&self) -> Option<&str> {
         match self {
             Self::Named(name) => Some(name),
@@ -46,12 +46,12 @@ impl Excitation {
 }
 
 impl Recordings {
-    /// Computes the describing function of the recordings. If an offset has cost rows, so that less than whole periods
-    /// are left, they are read again without it: it is a phase of a periodic signal. `None` if no excitation is
-    /// wanted.
+    /// Computes the describing function of the recordings. If rows were cut for an offset, so that the periods are no
+    /// longer complete, the recordings are read again without the offset; for a periodic signal it is a phase shift,
+    /// which is corrected at the lines. `None` if no excitation is requested.
     ///
     /// # Errors
-    /// [`AnalysisError`] if there are no lines, or the files cannot be read again.
+    /// [`AnalysisError`] if there are no lines, or if the files cannot be read again.
     pub fn described(
         &self,
         excitation: &Excitation,
@@ -65,7 +65,7 @@ impl Recordings {
             excitation: excitation.named().map(str::to_owned),
             period_s,
             offset_samples,
-            // The offset is part of reading.
+            // Detrending, if requested, has already been applied in reading.
             detrend: Detrend::None,
             ..DescriptionOptions::default()
         };
@@ -83,7 +83,7 @@ impl Recordings {
         let again = repaired_alike(again.records, handling)?;
         let late = again.first().map_or(Ok(0.0), |r| late_samples(r, &offsets))?;
         let ts_s = again.first().map_or(1.0, |r| r.sample_time().s());
-        // At the rate of the fit.
+        // The records are decimated to the sampling rate of the fit.
         let used_s = self.records.first().map_or(ts_s, |r| r.sample_time().s());
         let factor = (used_s / ts_s).round().max(1.0) as usize;
         let unmoved = again
@@ -94,7 +94,8 @@ impl Recordings {
     }
 }
 
-/// Returns the excitation for a fit that also uses the lines: a missing channel is an error only if the user named it.
+/// Returns the describing function for a fit that also uses the lines. A missing channel is an error only if the user
+/// named it.
 pub(crate) fn of_lines(
     described: &Result<Option<Description>, AnalysisError>,
     excitation: &Excitation,

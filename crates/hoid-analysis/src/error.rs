@@ -1,4 +1,4 @@
-//! Reasons why an analysis gives no result.
+//! Reasons why an analysis has no result.
 
 use std::path::Path;
 
@@ -9,49 +9,50 @@ use thiserror::Error;
 
 use crate::look::{OtherColumns, other_columns};
 
-/// Reason why an analysis gives no result.
+/// Reason why an analysis has no result.
 #[derive(Debug, Error)]
 pub enum AnalysisError {
-    /// A recording is given twice.
+    /// A recording that is given twice.
     #[error(
-        "{first} and {second} hold the same samples of e and u; runs of one person must be different recordings: give each once"
+        "{first} and {second} hold the same samples of e and u; runs of one person must be different recordings: give \
+         each recording once"
     )]
     SameSamples {
-        /// Name of the first.
+        /// Name of the first recording.
         first: String,
-        /// Name of the second.
+        /// Name of the second recording.
         second: String,
     },
-    /// A file without the requested columns, which contains them under other names.
+    /// A file without the requested columns, in which the signals have other names.
     #[error(transparent)]
     OtherColumns(Box<OtherColumns>),
-    /// A column that is in another of the files.
+    /// A column that is missing in one file but exists in another.
     #[error(
-        "{file} has no column {missing}, but {other} has: each file is taken as a separate recording. If they are \
+        "{file} has no column {missing}, but {other} has it: each file is taken as a separate recording. If they are \
          parts of one recording, join them by time, in Python with pandas.merge(pandas.read_csv(\"{file}\"), \
          pandas.read_csv(\"{other}\"), on=\"t\", how=\"outer\").sort_values(\"t\").to_csv(\"joined.csv\", \
          index=False), and read joined.csv with --sparse e=linear,u=linear --resample"
     )]
     InAnotherFile {
-        /// The file without the column.
+        /// Name of the file without the column.
         file: String,
-        /// The column.
+        /// Name of the column.
         missing: String,
-        /// The file that has it.
+        /// Name of the file that contains the column.
         other: String,
     },
-    /// An offset of a channel that does not exist.
+    /// An offset for a channel that does not exist.
     #[error("--offset: there is no channel {name:?}; the record has {known}, and e and u represent input and output")]
     NoSuchChannel {
         /// The requested name.
         name: String,
-        /// The names that exist.
+        /// Names of the existing channels.
         known: String,
     },
     /// Options that contradict each other or the model.
     #[error("{reason}")]
     Options {
-        /// The value found, the value expected, and the remedy.
+        /// The value found, the expected value, and the remedy.
         reason: String,
     },
     /// A text that is not a result.
@@ -59,23 +60,23 @@ pub enum AnalysisError {
         "this is not a result of a fit: {found}; expected the output of to_json of this version, or of identify --json"
     )]
     NotAResult {
-        /// The value found.
+        /// Description of the contents found.
         found: String,
     },
-    /// An option that does not fit the estimator, or does not have this value.
+    /// An option with an invalid value, or one that does not apply to the estimator.
     #[error("{name}: {reason}")]
     Option {
-        /// Its name in the registry.
+        /// Name of the option in the registry.
         name: &'static str,
-        /// The value found, the value expected, and the remedy.
+        /// The value found, the expected value, and the remedy.
         reason: String,
     },
-    /// An option of other estimators.
+    /// An option that belongs to other estimators.
     #[error("{name} belongs to {}{instead}", .of.join(", "))]
     Misplaced {
-        /// Its name in the registry.
+        /// Name of the option in the registry.
         name: &'static str,
-        /// The estimators that have it.
+        /// Names of the estimators that have the option.
         of: Vec<&'static str>,
         /// The option to use instead.
         instead: &'static str,
@@ -89,7 +90,7 @@ pub enum AnalysisError {
     /// A file cannot be read.
     #[error(transparent)]
     Io(#[from] IoError),
-    /// A record cannot be made.
+    /// A record cannot be created from the data.
     #[error(transparent)]
     Model(#[from] ModelError),
 }
@@ -104,7 +105,8 @@ impl From<IdentError> for AnalysisError {
 }
 
 impl AnalysisError {
-    /// Error for a file that cannot be read, with the columns to request if it does not have the requested ones.
+    /// Creates the error for a file that cannot be read. If the requested columns are missing, the error contains the
+    /// columns to request.
     pub fn of_reading(error: IoError, path: &Path, options: &ReadOptions) -> Self {
         match other_columns(&error, path, options) {
             Some(others) => Self::OtherColumns(Box::new(others)),

@@ -1,4 +1,4 @@
-//! From files to recordings: columns, span, units, alignment, and masked parts.
+//! Reading of files as recordings: columns, span, units, alignment, and masked rows.
 
 use std::path::{Path, PathBuf};
 
@@ -12,10 +12,10 @@ use crate::{
 };
 
 impl Reading {
-    /// Reads the files; each file that was read is reported, with remarks for the user.
+    /// Reads the files; a callback receives each record read, for example to show notes to the user.
     ///
     /// # Errors
-    /// The errors of reading; [`AnalysisError::OtherColumns`] for a file in which error and control have other names.
+    /// The errors of reading; [`AnalysisError::OtherColumns`] if error and control have other names in a file.
     pub fn files(
         &self,
         paths: &[PathBuf],
@@ -30,7 +30,7 @@ impl Reading {
             for read in reads {
                 told(path, &read);
                 let (record, account) = with_account(read);
-                // The label of a trial ends in its name, that of a segment in its span.
+                // The label of a trial ends with the name of the trial, the label of a segment with its span.
                 let stem = path.file_stem().map_or(0, |stem| stem.to_string_lossy().len());
                 let span = record.label().get(stem..).filter(|_| parts).unwrap_or_default();
                 all.push(format!("{}{span}", path.display()), record, account);
@@ -43,7 +43,7 @@ impl Reading {
         Ok(all)
     }
 
-    /// Reads one file: its record, or the records between the masked parts.
+    /// Reads one file: its record, or the records between masked rows.
     ///
     /// # Errors
     /// As [`Reading::files`].
@@ -52,7 +52,7 @@ impl Reading {
             .map_err(|error| AnalysisError::of_reading(error, path, &self.options))
     }
 
-    /// Reads the record of one file, which holds one trial.
+    /// Reads the record of a file that contains one trial.
     ///
     /// # Errors
     /// As [`Reading::files`].
@@ -61,7 +61,7 @@ impl Reading {
             .map_err(|error| AnalysisError::of_reading(error, path, &self.options))
     }
 
-    /// Reads one file without masked parts.
+    /// Reads one file without masking.
     ///
     /// # Errors
     /// As [`Reading::files`].
@@ -79,8 +79,8 @@ impl Reading {
     }
 }
 
-/// Error for a column that is in another of the files: the signals of an eye tracker and a stick, each with its own
-/// rate, are not two recordings.
+/// Returns the error for a column that is in another of the files. The signals of an eye tracker and of a stick, each
+/// with its own rate, for example, are not two recordings.
 fn in_another_file(error: AnalysisError, path: &Path, paths: &[PathBuf]) -> AnalysisError {
     let AnalysisError::Io(IoError::NoSuchColumn { missing, .. }) = &error else {
         return error;

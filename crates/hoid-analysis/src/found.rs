@@ -1,5 +1,5 @@
-//! Findings in a recording in a common form: faults that were searched for, and problems of channels and of the time.
-//! JSON and Python show this list.
+//! Findings on a recording in a common form: faults found by the fault search, and problems of channels and of the
+//! time. JSON and Python present this list.
 
 use hoid_io::QualityIssue;
 use hoid_model::Fault;
@@ -7,28 +7,28 @@ use serde::Serialize;
 
 use crate::recordings::Account;
 
-/// Something that was found in a recording.
+/// A fault or a problem found in a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FoundFault {
-    /// Name of its kind.
+    /// Name of the kind of fault.
     pub kind: &'static str,
-    /// The channel; empty for all channels and for the time.
+    /// Name of the channel; empty if the fault concerns all channels or the time.
     pub channel: String,
-    /// Time of its first sample, s; `None` without a time.
+    /// Time of the first sample of the fault, s; `None` if the fault has no location in time.
     #[serde(rename = "from")]
     pub from_s: Option<f64>,
-    /// Time of the sample after its last, s.
+    /// Time of the sample after the last one of the fault, s.
     #[serde(rename = "to")]
     pub to_s: Option<f64>,
     /// Number of samples.
     pub samples: usize,
-    /// Size, in the unit of its kind.
+    /// Size, in the unit that belongs to the kind.
     pub size: f64,
-    /// Size in robust standard deviations, for kinds with a statistic.
+    /// Size in robust standard deviations, for kinds that have a test statistic.
     pub deviations: Option<f64>,
     /// The action taken.
     pub action: &'static str,
-    /// Description: a sentence without a full stop.
+    /// Description as a sentence without a full stop.
     pub words: String,
 }
 
@@ -49,7 +49,7 @@ impl From<&Fault> for FoundFault {
 }
 
 impl From<&QualityIssue> for FoundFault {
-    /// The fault spans the issue from its first occurrence to its last.
+    /// The fault extends from the first to the last location of the issue.
     fn from(issue: &QualityIssue) -> Self {
         Self {
             kind: issue.kind.name(),
@@ -66,7 +66,7 @@ impl From<&QualityIssue> for FoundFault {
 }
 
 impl Account {
-    /// Returns everything that was found in the recording.
+    /// Returns all faults and problems found in the recording.
     pub fn found(&self) -> Vec<FoundFault> {
         let faults = self.faults.iter().map(FoundFault::from);
         faults.chain(self.quality_issues.iter().map(FoundFault::from)).collect()

@@ -1,26 +1,26 @@
-//! Options of the identification of a model from recordings.
+//! Options for identifying a model from recordings.
 
 use hoid_ident::family::FamilyEstimator;
 use hoid_model::{ContinuousTransferFunction, Decimation, FaultHandling};
 
 use crate::description::Excitation;
 
-/// Options of the identification of a model from recordings: by default of the operator of a person.
+/// Options for identifying a model from recordings; by default the operator of a person.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identification<E = FamilyEstimator> {
-    /// The estimator. Its excitation and period are those below.
+    /// The estimator. Its excitation and period are replaced by the fields below.
     pub estimator: E,
     /// The channel of the recorded disturbance or target.
     pub excitation: Excitation,
-    /// Its period, s; found from its lines if it is not given.
+    /// Period of the excitation, s; determined from its lines if `None`.
     pub period_s: Option<f64>,
     /// Treatment of faults of the recordings.
     pub faults: FaultHandling,
-    /// Whether a high rate is lowered.
+    /// Whether a high sampling rate is reduced.
     pub rate: Decimation,
-    /// The controlled element: adds the loop to the verdict.
+    /// Controlled element; if it is given, the verdict includes the loop.
     pub controlled_element: Option<ContinuousTransferFunction>,
-    /// The answers that the verdict is about ([`crate::Answers`]); by default the response and the loop.
+    /// Names of the answers to which the verdict refers ([`crate::Answers`]); by default the response and the loop.
     pub answers: Vec<String>,
 }
 
@@ -31,7 +31,7 @@ impl Default for Identification {
 }
 
 impl<E> Identification<E> {
-    /// Returns the defaults with this estimator.
+    /// Returns default options for this estimator.
     pub fn of(estimator: E) -> Self {
         Self {
             estimator,

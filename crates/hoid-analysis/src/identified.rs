@@ -1,4 +1,4 @@
-//! From recordings to a result of any batch estimator: the steps in their order, and the findings.
+//! Identification with any batch estimator: the processing steps from recordings to a result, and the findings.
 
 use std::fmt;
 
@@ -17,18 +17,18 @@ use crate::{
     settings::Setting,
 };
 
-/// An identified model.
+/// An identified model, with its verdict and data.
 #[derive(Debug, Clone)]
 pub struct Identified<F = FamilyFit> {
-    /// The result.
+    /// Result of the fit.
     pub fit: F,
-    /// The final verdict on it.
+    /// Final verdict on the result.
     pub verdict: Verdict,
-    /// The recordings that were fitted, without their means if these were removed, and their processing.
+    /// The fitted recordings and their processing; their means are removed if this was requested.
     pub data: Recordings,
-    /// The describing function that accompanies the fit.
+    /// The describing function that accompanies the fit, if there is one.
     pub described: Option<Description>,
-    /// The settings that were used.
+    /// Settings used in the identification.
     pub settings: Vec<Setting>,
     /// The controlled element, if it is known.
     pub controlled_element: Option<ContinuousTransferFunction>,
@@ -37,20 +37,20 @@ pub struct Identified<F = FamilyFit> {
     pub(crate) rate: Decimation,
     pub(crate) counts_samples: bool,
     pub(crate) taken_out: Detrend,
-    /// The object from which it was read, if it was.
+    /// JSON object from which the result was read; `None` for a new result.
     pub(crate) written: Option<Map<String, Value>>,
 }
 
-/// Fit of a model to a recording that was not used in the estimation.
+/// Goodness of fit of a model on a recording that was not used in the estimation.
 #[derive(Debug, Clone)]
 pub struct Validated {
-    /// The recording.
+    /// Name of the recording.
     pub name: String,
     /// Goodness of fit.
     pub quality: GoodnessOfFit,
 }
 
-/// Identifies the operator of a person from their runs, with the defaults.
+/// Identifies the operator of a person from the runs of the person, with default settings.
 ///
 /// # Errors
 /// As [`Identification::run`].
@@ -59,7 +59,7 @@ pub fn identify(records: &[Record]) -> Result<Identified, AnalysisError> {
 }
 
 impl<E: BatchEstimator> Identification<E> {
-    /// Repairs the recordings, fits, makes a second fit as a check, and forms the verdict.
+    /// Repairs the recordings, fits the model, makes a second fit as a check, and forms the verdict.
     ///
     /// # Errors
     /// [`AnalysisError`] if there is no result. A doubtful result is not an error: see [`Identified::verdict`].
@@ -71,7 +71,7 @@ impl<E: BatchEstimator> Identification<E> {
         let mut data = recordings
             .repaired(self.faults, E::OF)?
             .at_rate(self.rate, counts_samples)?;
-        // Before the fit, which removes the response to further inputs from u.
+        // The controlled element is checked before the fit, which removes the response to further inputs from u.
         let element = data.element_finding(self.controlled_element.as_ref(), self.excitation.named());
         let Fitted {
             mut fit,
@@ -85,7 +85,7 @@ impl<E: BatchEstimator> Identification<E> {
         let response = (E::OF == Of::Person).then(|| response(&data.records)).flatten();
         let verdict = verdict.prepend(response.and_then(|found| found.finding()));
         let verdict = verdict.append(element);
-        let verdict = answers::judged(verdict, &fit.answers(self.controlled_element.as_ref()), &self.answers);
+        let verdict = answers::with_answers(verdict, &fit.answers(self.controlled_element.as_ref()), &self.answers);
         E::judged(&mut fit, &verdict);
         let reading = data.source.as_ref().map(|source| &source.reading);
         let by_default = Identification::of(self.estimator.by_default());
@@ -124,10 +124,10 @@ impl<F: Answers> Identified<F> {
 }
 
 impl Identified {
-    /// Returns VAF and NRMSE over the recordings, each with its own operator.
+    /// Returns VAF and NRMSE over all recordings, where each recording is predicted by its own operator.
     ///
     /// # Errors
-    /// The errors of a prediction.
+    /// The errors of predicting the records.
     pub fn quality(&self) -> Result<GoodnessOfFit, AnalysisError> {
         let each = self.data.records.iter().enumerate();
         let validations = each.map(|(k, record)| self.fit.operator(k).polynomial_fit.validate(record));
@@ -136,7 +136,7 @@ impl Identified {
     }
 }
 
-/// The settings that all fits share, defaults included.
+/// Returns the settings common to all fits, including defaults.
 fn shared_settings<E: BatchEstimator>(how: &Identification<E>, reading: Option<&Reading>) -> Vec<Setting> {
     let (decimation, search) = (how.rate, how.estimator.search());
     let mut list = vec![Setting::new("initial state", how.estimator.initial_state())];
@@ -159,7 +159,7 @@ fn shared_settings<E: BatchEstimator>(how: &Identification<E>, reading: Option<&
 }
 
 impl fmt::Display for Identified {
-    /// Prints the verdict, and the parameters of each operator.
+    /// Prints the verdict and the parameters of each operator.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}\n\n{}", self.verdict, self.fit.title())?;
         for of in &self.fit.operators {
@@ -180,11 +180,11 @@ impl fmt::Display for Identified {
 }
 
 impl<F> Identified<F> {
-    /// Computes how well a model of the fit predicts another recording of the person, prepared as those that were
-    /// fitted.
+    /// Computes how well a model of the fit predicts another recording of the person, which is decimated and detrended
+    /// like the fitted recordings.
     ///
     /// # Errors
-    /// [`AnalysisError`] if there is none, or for one with another sample rate, or too short.
+    /// [`AnalysisError`] if there is no recording, or if it has another sampling rate or is too short.
     pub fn validated(&self, model: &Fit, other: Recordings) -> Result<Validated, AnalysisError> {
         let name = other.names.first().cloned().ok_or(AnalysisError::NoRecordings)?;
         let other = other.at_rate(self.rate, self.counts_samples)?.records.into_iter();
@@ -193,7 +193,7 @@ impl<F> Identified<F> {
         Ok(Validated { name, quality })
     }
 
-    /// True if the fit was made without the means of e and u, which leaves each record its level.
+    /// True if the means of e and u were removed before the fit, so that each record has a level of its own.
     pub fn is_without_means(&self) -> bool {
         self.taken_out == Detrend::Mean
     }

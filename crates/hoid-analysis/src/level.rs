@@ -1,4 +1,4 @@
-//! The level of recorded data: one constant of u per record, estimated with the fit.
+//! The level of recorded data: a constant of u in each record, estimated with the fit.
 
 use hoid_ident::{IdentError, level};
 use hoid_model::{Detrend, FaultHandling, Record, uncertainty::Estimate};
@@ -9,8 +9,8 @@ use crate::{
     settings::Setting,
 };
 
-/// True for recordings whose level is estimated: not if the means were removed in reading, and not if the data are
-/// kept as they are.
+/// True if the level of the recordings may be estimated. It is not estimated if the means were removed in reading, or
+/// if the data are used unchanged.
 pub(crate) fn may_have_level(recordings: &Recordings, with_input: bool, handling: FaultHandling) -> bool {
     with_input
         && handling != FaultHandling::Keep
@@ -18,7 +18,7 @@ pub(crate) fn may_have_level(recordings: &Recordings, with_input: bool, handling
         && level::may_have_level(&recordings.records)
 }
 
-/// Writes the level of each record as read, by its number, into its account.
+/// Writes the level of each record as read into its account; `of` receives the index of the record and the record.
 pub(crate) fn levels_into(
     accounts: &mut [Account],
     as_read: &[Record],
@@ -29,17 +29,17 @@ pub(crate) fn levels_into(
     }
 }
 
-/// The level of records for a model that does not change, which is fitted without it.
+/// The level of records for a model that does not change and is fitted to data without a level.
 pub(crate) struct Level {
-    /// The records with their level, if it was removed.
+    /// The records including their level; `None` if the level was not removed.
     as_read: Option<Vec<Record>>,
-    /// Part of the level of each record in addition to its mean.
+    /// Part of the level of each record that was removed in addition to its mean.
     separate_means: Vec<f64>,
 }
 
 impl Level {
-    /// Removes the level if there may be one.
-    pub(crate) fn taken_out(data: &mut Recordings, with_input: bool, handling: FaultHandling) -> Self {
+    /// Removes the level from the data if they may have one.
+    pub(crate) fn remove(data: &mut Recordings, with_input: bool, handling: FaultHandling) -> Self {
         let as_read = may_have_level(data, with_input, handling).then(|| {
             let without = level::without_level(&data.records);
             std::mem::replace(&mut data.records, without)
@@ -60,7 +60,7 @@ impl Level {
         if self.is_kept() { Detrend::None } else { Detrend::Mean }
     }
 
-    /// Removes the part of the level that a fit, with the level as an unknown, has found in addition to the means.
+    /// Removes the remaining level, which a fit with the level as an unknown has estimated in addition to the means.
     pub(crate) fn refined(
         &mut self,
         data: &mut Recordings,
@@ -79,8 +79,8 @@ impl Level {
         Ok(())
     }
 
-    /// Writes the level into the accounts, and returns it as a setting.
-    pub(crate) fn told(
+    /// Writes the level into the accounts, and returns a setting that reports it.
+    pub(crate) fn report(
         &self,
         data: &mut Recordings,
         of: impl Fn(usize, &Record) -> Option<Estimate>,
@@ -105,7 +105,7 @@ impl Recordings {
 }
 
 impl Setting {
-    /// The setting of an estimated level.
+    /// Returns the setting that reports an estimated level.
     pub(crate) fn level() -> Self {
         Self::new("level", "one constant of u per record, estimated")
     }

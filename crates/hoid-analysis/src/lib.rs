@@ -1,9 +1,9 @@
-//! From recordings to a result and its verdict, in one place for all callers.
+//! The analysis from recordings to a result and its verdict, implemented once for all callers.
 //!
-//! An estimator takes each sample as correct, and its error bars are those of its model. The reliability of a result
-//! also depends on faults of the recording and their treatment, on a second fit without suspicious samples, and on
-//! whether a person could have controlled the loop. These rules are implemented only here; command line, groups and
-//! Python parse options and show results.
+//! An estimator assumes that each sample is correct, and its error bars are valid only for its model. The reliability
+//! of a result also depends on faults of the recording and their treatment, on a second fit without suspicious samples,
+//! and on whether a person could have controlled the loop. These rules are implemented only here; the command line, the
+//! analysis of groups and Python only parse options and show results.
 //!
 //! ```text
 //! files -- Reading --> Recordings -- Identification { options }.run --> Identified { fit, verdict, data, settings }
@@ -11,22 +11,22 @@
 //!
 //! | step of [`Identification::run`] | rules |
 //! |---|---|
-//! | a file is examined, before anything is chosen | `look` |
-//! | files are read (before it) | `files`, `reading`; kept with the processing of them in `recordings` |
-//! | runs that are given twice are refused | `copies` |
-//! | faults are searched for and repaired, channels are judged | `repair`, `quality` |
-//! | a high rate is lowered | `rate` |
-//! | the describing function, where the excitation is recorded | `description`, `offset` |
-//! | the fit, a second opinion, the loop, the settings of the estimator | `estimators`: a file each |
-//! | what the recordings show | `identified`, `recordings` |
-//! | what each answer is worth, and the verdict on those that were requested | `answers` |
+//! | a file is examined before any option is chosen | `look` |
+//! | files are read (before `run` is called) | `files`, `reading`; the data and the account of their processing are in `recordings` |
+//! | runs that were given twice are refused | `copies` |
+//! | faults are searched for and repaired, the quality of the channels is judged | `repair`, `quality` |
+//! | a high sampling rate is reduced | `rate` |
+//! | the describing function is estimated, if the excitation was recorded | `description`, `offset` |
+//! | the model is fitted and checked by a second fit; the loop and the settings are added | `estimators`: one file per estimator |
+//! | the findings on the recordings are added | `identified`, `recordings` |
+//! | each answer is judged, and the verdict on the requested answers is formed | `answers` |
 //! | polynomials with several inputs | `several_inputs` |
 //! | the operators of several axes, and their coupling | `axes` |
-//! | a describing function, from recordings to its verdict | `describing` |
-//! | a recursion over a recording, from it to the verdict | `tracking` |
-//! | the level of u, the settings that all share | `level`, `settings` |
+//! | a describing function is estimated from recordings and judged | `describing` |
+//! | a recursion processes a recording, and its trace is judged | `tracking` |
+//! | the level of u; the settings common to all estimators | `level`, `settings` |
 //!
-//! Options are set as fields, or by their names from texts: `options`. All of them are listed in [`registry`].
+//! Options are set as fields, or as text by their names: `options`. [`registry`] lists all options.
 //!
 //! ```
 //! use hoid_analysis::{Identification, Recordings};

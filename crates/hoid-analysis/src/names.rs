@@ -1,11 +1,11 @@
-//! Names of the batch estimators in the [registry](crate::registry); methods of instrumental variables have their own
+//! Names of the batch estimators in the [registry](crate::registry); the instrumental-variable methods define their own
 //! names.
 
-/// The operator of a person.
+/// Operator of a person.
 pub const OPERATOR: &str = "operator";
-/// The operator with its remnant of order m as noise: a gain with a lead.
+/// Operator with a gain and a lead, whose noise model is a remnant of order m.
 pub const REMNANT: &str = "operator noise=remnant";
-/// The operator with gains that change once.
+/// Operator whose gains change once.
 pub const CHANGE: &str = "operator change=sigmoid";
-/// Polynomials by the prediction error method.
+/// Polynomials fitted by the prediction error method.
 pub const PEM: &str = "pem";

@@ -1,5 +1,5 @@
-//! A channel that was recorded late, for periodic signals: the offset is a phase, and cutting rows would leave less
-//! than whole periods.
+//! Channels that were recorded late, in the case of periodic signals: the offset is a phase shift, and cutting rows
+//! would leave incomplete periods.
 
 use std::collections::BTreeMap;
 
@@ -8,8 +8,8 @@ use hoid_model::Record;
 
 use crate::{AnalysisError, reading::Reading};
 
-/// Returns the reading without moving rows, and the offsets. If another sampling frequency is requested, which comes
-/// after the offset, the offset stays part of the reading.
+/// Returns the reading options without offsets, and the offsets. If another sampling frequency is requested, the
+/// offsets remain in the reading options, because resampling follows the alignment.
 pub fn without_offsets(reading: &Reading) -> (Reading, BTreeMap<String, Offset>) {
     let mut reading = reading.clone();
     let offsets = match reading.preparation.rate {
@@ -19,8 +19,8 @@ pub fn without_offsets(reading: &Reading) -> (Reading, BTreeMap<String, Offset>)
     (reading, offsets)
 }
 
-/// Returns the number of samples by which the output is later than the input. The offset of another channel turns only
-/// its own phase, on which no average depends.
+/// Returns the number of samples by which the output was recorded later than the input. The offset of any other channel
+/// changes only the phase of that channel, which does not affect the averages.
 ///
 /// # Errors
 /// [`AnalysisError::NoSuchChannel`].

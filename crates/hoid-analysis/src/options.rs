@@ -1,8 +1,8 @@
-//! Options of an identification by their names in the [registry](crate::registry), from texts as users write them:
-//! command line, plans and Python convert their input to that form, and none of them has its own list.
+//! Options of an identification, set as text by their names in the [registry](crate::registry): the command line, plans
+//! and Python convert their input to text, and none of them has its own list of options.
 //!
-//! An estimator declares its options next to its fields. This module has those of the analysis: the recorded
-//! excitation, the controlled element, the answers that the verdict is about, and a prior from a file.
+//! An estimator declares its options next to its fields. This module declares the options of the analysis: the recorded
+//! excitation, the controlled element, the answers to which the verdict refers, and a prior from a file.
 
 use hoid_ident::{
     family::OperatorPrior,
@@ -14,7 +14,7 @@ use crate::{
     AnalysisError, answers::asked_for, description::Excitation, identification::Identification, prior::prior_of_text,
 };
 
-/// An option of an estimator and of the analysis.
+/// An option of an estimator or of the analysis.
 pub type AnalysisOption<E> = BatchOption<Identification<E>, AnalysisError>;
 
 /// Returns the options that an estimator declares.
@@ -24,7 +24,7 @@ pub(crate) fn own<E: BatchOptions>() -> Vec<AnalysisOption<E>> {
         .collect()
 }
 
-/// Returns the options of an estimator whose prior may be the result of another fit, as JSON or in a file.
+/// Returns the options of an estimator whose prior may be the result of another fit, given as JSON or as a file.
 pub(crate) fn with_prior_of_fits<E: 'static>(
     options: Vec<AnalysisOption<E>>,
     field: Field<E, OperatorPrior>,
@@ -39,7 +39,7 @@ pub(crate) fn with_prior_of_fits<E: 'static>(
     options.into_iter().map(read).collect()
 }
 
-/// The channel of the excitation, and its period.
+/// Returns the options for the channel of the excitation and its period.
 pub(crate) fn excitation<E: 'static>() -> [AnalysisOption<E>; 2] {
     let help = "Column of the recorded disturbance or target, for the fit at its lines; none: no such fit";
     let channel = Setting::new("excitation", Kind::Channel, help).default("the first of f_t, d, r ... with lines");
@@ -59,10 +59,10 @@ pub(crate) fn excitation<E: 'static>() -> [AnalysisOption<E>; 2] {
     ]
 }
 
-/// The controlled element.
+/// Returns the option for the controlled element.
 pub(crate) fn controlled_element<E: 'static>() -> AnalysisOption<E> {
-    let help = "Controlled element in s, as 90/(s(s+6)), or NUM/DEN in descending powers of s, as 90/1,6,0: adds \
-     crossover frequency and margins";
+    let help = "Controlled element in s, such as 90/(s(s+6)), or NUM/DEN in descending powers of s, such as 90/1,6,0: \
+                adds crossover frequency and margins";
     let setting = Setting::new("controlled_element", Kind::Element, help);
     BatchOption::new(setting, |how: &mut Identification<E>, option, text| {
         let element = text.parse();
@@ -72,10 +72,10 @@ pub(crate) fn controlled_element<E: 'static>() -> AnalysisOption<E> {
     })
 }
 
-/// The answers that the verdict is about.
+/// Returns the option for the answers to which the verdict refers.
 pub(crate) fn answers<E: 'static>() -> AnalysisOption<E> {
     let help =
-        "Quantities that the verdict covers: response, crossover, phase_margin or parameters, as crossover,tau_e";
+        "Quantities that the verdict covers: response, crossover, phase_margin or parameters, such as crossover,tau_e";
     let setting = Setting::new("answers", Kind::Names, help).default("response and loop");
     BatchOption::new(setting, |how: &mut Identification<E>, option, text| {
         how.answers = asked_for(&option.read::<Vec<String>>(text)?)?;

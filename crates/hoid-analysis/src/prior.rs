@@ -1,4 +1,4 @@
-//! Prior knowledge of a person before the data, as users write it.
+//! Prior knowledge of a person, in the text form that users write.
 
 use std::path::Path;
 
@@ -7,10 +7,10 @@ use hoid_io::{IoError, is_fit_file, parse_fit, read_fit};
 
 use crate::AnalysisError;
 
-/// Reads `population`, `none`, `NAME=CENTRE:SPREAD,...`, or another fit: its file, or its JSON.
+/// Parses `population`, `none`, `NAME=CENTRE:SPREAD,...`, or another fit, given as a file or as JSON.
 ///
 /// # Errors
-/// [`AnalysisError::Option`], and for a file that cannot be read [`AnalysisError::Io`].
+/// [`AnalysisError::Option`]; [`AnalysisError::Io`] for a file that cannot be read.
 pub fn prior_of_text(text: &str) -> Result<OperatorPrior, AnalysisError> {
     let refuse = |reason: String| AnalysisError::Option { name: "prior", reason };
     let (found, source) = match text {
@@ -31,7 +31,7 @@ pub fn prior_of_text(text: &str) -> Result<OperatorPrior, AnalysisError> {
     let prior = OperatorPrior::of_parameters(parameters.map(|p| (p.name.as_str(), p.estimate, p.determined)), source)?;
     if prior.entries().is_empty() {
         return Err(refuse(format!(
-            "{source}: no parameter in it is determined and has an error"
+            "{source}: none of its parameters is determined and has an error"
         )));
     }
     Ok(prior)

@@ -1,14 +1,14 @@
-//! Findings on the quality of the channels, for any result.
+//! Findings on the quality of the channels, which concern every result.
 //!
-//! | finding | where | why |
+//! | finding | condition | consequence |
 //! |---|---|---|
 //! | `stick-at-its-end` | u at a limit of its range in more than 5 % of the samples | the intended output beyond the limit is unknown: gain and margins are biased |
-//! | `resting-stick` | u comes back to one value, exactly, in 10 % of the samples or more ([`Rest`]) | a dead zone, or control in pulses: a note, as the operator is the linear part of the response |
-//! | `coarse` | e in steps of more than .05, u of more than .15 of its deviation | rounding errors do not behave like a remnant, so intervals and bands are too narrow |
-//! | `bridged` | a gap of more than .25 s on a straight line | the line counts as tracking |
-//! | `held` | a value of a sparse column held for more than .25 s | what happened in between is unknown |
+//! | `resting-stick` | u returns to exactly the same value in at least 10 % of the samples ([`Rest`]) | a dead zone or pulsed control; only a note, since the operator is the linear part of the response |
+//! | `coarse` | quantisation step of e above .05, or of u above .15, of its standard deviation | rounding errors do not behave like a remnant, so intervals and bands are too narrow |
+//! | `bridged` | a gap longer than .25 s filled by a straight line | the line is treated as behaviour of the person |
+//! | `held` | a value of a sparse column held longer than .25 s | the signal between the logged values is unknown |
 //!
-//! Standard errors do not account for them.
+//! Standard errors do not account for these problems.
 
 use hoid_ident::faults::Rest;
 use hoid_io::{QualityIssueKind, Step};
@@ -17,19 +17,19 @@ use hoid_numerics::statistics::standard_deviation;
 
 use crate::recordings::{Account, RESTING};
 
-/// Shares of the rows at the limits of the stick, and quantisation steps of e and u divided by their deviations, beyond
-/// which a result is doubtful: clipped or rounded information is lost.
+/// Limits above which a result is doubtful, because clipping or rounding lost information: the fraction of samples at
+/// the limits of the stick, and the quantisation steps of e and u relative to their standard deviations.
 const AT_ENDS: f64 = 0.05;
 const COARSE: [f64; 2] = [0.05, 0.15];
-/// Longest gap that may be bridged by a straight line, s.
+/// Longest gap that may be filled by a straight line, s.
 const BRIDGED_S: f64 = 0.25;
 
-/// Kind of system whose record is judged.
+/// Kind of system whose records are judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Of {
-    /// A person, who responds to what they see.
+    /// A person who responds to a displayed error.
     Person,
-    /// Any system: its input may have two levels.
+    /// Any system, whose input may for example have only two levels.
     System,
 }
 
@@ -55,8 +55,8 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
         all.push(Finding::note(
             RESTING,
             format!(
-                "{output} rests at {} in {:.0} % of the samples, {} times, as a stick with a dead zone does, or one that is moved in \
-                 pulses; the operator is the linear part of the response",
+                "{output} rests at {} in {:.0} % of the samples, {} times, as if the stick had a dead zone or were \
+                 moved in pulses; the operator is the linear part of the response",
                 rest.value,
                 100.0 * rest.share,
                 rest.visits

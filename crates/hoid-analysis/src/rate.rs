@@ -1,5 +1,5 @@
-//! Sample rate at which recordings are used. If orders and delays count samples a high rate is kept, unless a factor
-//! is named.
+//! Sampling rate at which recordings are used. If orders and delays are numbers of samples, a high rate is kept unless
+//! the user gave a decimation factor.
 
 use hoid_io::Step;
 use hoid_model::{Decimation, SampleTime};
@@ -7,13 +7,13 @@ use hoid_model::{Decimation, SampleTime};
 use crate::{AnalysisError, recordings::Recordings};
 
 impl Recordings {
-    /// Decimates the recordings and records it in their accounts; for an estimator that counts samples, only if a
-    /// factor was named; never if the rate was named in reading.
+    /// Decimates the recordings and adds this step to their accounts. An estimator whose orders are numbers of samples
+    /// is decimated only by a given factor. Nothing is decimated if the user gave a sampling frequency for reading.
     ///
     /// # Errors
-    /// The errors of the decimation.
+    /// The errors of decimation.
     pub fn at_rate(mut self, decimation: Decimation, counts_samples: bool) -> Result<Self, AnalysisError> {
-        if self.settles_the_rate() {
+        if self.has_fixed_rate() {
             return Ok(self);
         }
         let decimation = if counts_samples {
@@ -29,13 +29,13 @@ impl Recordings {
         Ok(self)
     }
 
-    /// True if the rate was named in reading, and is not to be lowered again.
-    pub(crate) fn settles_the_rate(&self) -> bool {
+    /// True if the user gave a sampling frequency for reading; the rate is then not reduced further.
+    pub(crate) fn has_fixed_rate(&self) -> bool {
         let source = self.source.as_ref();
-        source.is_some_and(|source| source.reading.settles_the_rate())
+        source.is_some_and(|source| source.reading.has_fixed_rate())
     }
 
-    /// Time by which e was shifted in the decimation, for a hold that is longer than that of the recording, s.
+    /// Returns the time by which decimation shifted e to account for the longer hold, s.
     pub(crate) fn input_lead_s(&self) -> f64 {
         let mut steps = self.accounts.iter().flat_map(|account| &account.steps);
         let lead = steps.find_map(|step| match step {
@@ -45,15 +45,15 @@ impl Recordings {
         lead.unwrap_or(0.0)
     }
 
-    /// Message for a high rate that was kept because samples are counted.
+    /// Returns a message if a high rate is kept because orders are numbers of samples.
     pub fn kept_rate(&self, decimation: Decimation, counts_samples: bool) -> Option<String> {
-        let settled = self.settles_the_rate();
+        let settled = self.has_fixed_rate();
         let record = self.records.first().filter(|_| !settled)?;
         kept_rate(record.sample_time(), decimation, counts_samples)
     }
 }
 
-/// Message for a high rate that is kept because samples are counted.
+/// Returns a message if a high rate is kept because orders are numbers of samples.
 pub fn kept_rate(sample_time: SampleTime, decimation: Decimation, counts_samples: bool) -> Option<String> {
     let factor = decimation.factor(sample_time);
     let kept = counts_samples && decimation == Decimation::Auto && factor > 1;

@@ -1,19 +1,19 @@
-//! Options of reading files, kept with the data.
+//! Options for reading files, stored with the data.
 
 use std::path::PathBuf;
 
 use hoid_io::{NewRate, Preparation, QualityIssueKind, ReadOptions};
 
-/// Options of reading files.
+/// Options for reading files.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
-    /// Columns, sampling, span, repair.
+    /// Columns, sampling, span and repair.
     pub options: ReadOptions,
-    /// Units, scale, offset, rate, run-in, detrend.
+    /// Units, scale, offset, rate, run-in and detrending.
     pub preparation: Preparation,
-    /// Masked parts: the record is cut there.
+    /// Kinds of problems whose rows are masked: the record is cut at these rows.
     pub mask: Vec<QualityIssueKind>,
-    /// Shortest segment between masked samples, s.
+    /// Minimum length of a segment between masked rows, s.
     pub shortest_s: f64,
 }
 
@@ -36,8 +36,8 @@ pub(crate) struct Source {
 }
 
 impl Reading {
-    /// True if the rate was named in Hz, and is not to be lowered again.
-    pub(crate) fn settles_the_rate(&self) -> bool {
+    /// True if the user gave the rate in Hz; it is then not lowered further.
+    pub(crate) fn has_fixed_rate(&self) -> bool {
         matches!(self.preparation.rate, NewRate::Hz(_))
     }
 }

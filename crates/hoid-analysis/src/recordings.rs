@@ -1,4 +1,4 @@
-//! Recordings on their way to an estimator, with the account of their processing.
+//! Recordings before and during identification, with an account of their processing.
 
 use hoid_ident::diagnostics::recorded_element;
 use hoid_io::{QualityIssue, Step, quality_of_record};
@@ -6,42 +6,42 @@ use hoid_model::{ContinuousTransferFunction, Fault, Finding, Record, Verdict, un
 
 use crate::reading::Source;
 
-/// Kind of the note on a resting stick.
+/// Kind of the note that the stick was at rest.
 pub(crate) const RESTING: &str = "resting-stick";
 
-/// Processing of a record, and the problems of the sampling of its file.
+/// Processing of a record, and the problems found in its file.
 #[derive(Debug, Clone, Default)]
 pub struct Account {
-    /// Processing steps, in this order.
+    /// Processing steps, in the order of application.
     pub steps: Vec<Step>,
-    /// Problems of channels and of the time, as recorded.
+    /// Problems of channels and of the time in the recorded data.
     pub quality_issues: Vec<QualityIssue>,
-    /// Faults that were searched for, and their treatment.
+    /// Faults found by the fault search, and their treatment.
     pub faults: Vec<Fault>,
-    /// Findings for any result.
+    /// Findings that concern all results of the recording.
     pub findings: Vec<Finding>,
-    /// The constant of u that was estimated with the fit.
+    /// Constant level of u that was estimated with the fit.
     pub level: Option<Estimate>,
 }
 
-/// Records with their names and accounts, in the same order; a file that is cut gives several.
+/// Records with their names and accounts, in the same order; a recording that is cut becomes several.
 #[derive(Debug, Clone, Default)]
 pub struct Recordings {
-    /// Name of each: its file, and the span if it is a part of it.
+    /// Name of each record: its file, and its span if it is a segment of the recording.
     pub names: Vec<String>,
     /// The records.
     pub records: Vec<Record>,
-    /// Processing of each.
+    /// Processing of each record.
     pub accounts: Vec<Account>,
-    /// Index of the original recording of which each is a part, from 0.
+    /// For each record, index from 0 of the recording to which it belongs.
     pub origins: Vec<usize>,
-    /// Their source, to read them in another way.
+    /// Files and options of the recordings, with which they can be read again in another way.
     pub(crate) source: Option<Source>,
 }
 
 impl Recordings {
-    /// Makes recordings of records that were not read from files here, named by their labels, or else by their number.
-    /// Problems of their channels are searched for.
+    /// Creates recordings from records that were not read from files by this crate. They are named by their labels, or
+    /// by their numbers if a label is empty, and their channels are checked for problems.
     pub fn of_records(records: impl IntoIterator<Item = Record>) -> Self {
         let mut all = Self::default();
         for record in records {
@@ -64,7 +64,7 @@ impl Recordings {
         self.push_part(origin, name, record, account);
     }
 
-    /// Adds a part of a recording.
+    /// Adds a segment of a recording.
     pub(crate) fn push_part(&mut self, origin: usize, name: String, record: Record, account: Account) {
         self.origins.push(origin);
         self.names.push(name);
@@ -77,13 +77,13 @@ impl Recordings {
         self.records.len()
     }
 
-    /// True if there are none.
+    /// True if there are no recordings.
     pub fn is_empty(&self) -> bool {
         self.records.is_empty()
     }
 
-    /// Returns the findings of all recordings, for the verdict on their result. A resting stick is reported once,
-    /// since all recordings are of one stick.
+    /// Returns the findings of all recordings, for the verdict on a result. A stick at rest is reported only once,
+    /// since all recordings come from the same stick.
     pub fn findings(&self) -> Vec<Finding> {
         let several = self.names.len() > 1;
         let own = |account: &Account| account.findings.iter().filter(|f| f.kind == RESTING).count();
@@ -110,8 +110,8 @@ impl Recordings {
         all
     }
 
-    /// Returns a doubt if the recorded loop does not have the given controlled element. `excitation` is the channel of
-    /// a target or a disturbance.
+    /// Returns a warning if the recorded loop does not contain the given controlled element. `excitation` is the
+    /// channel of a target or a disturbance.
     pub(crate) fn element_finding(
         &self,
         given: Option<&ContinuousTransferFunction>,
@@ -121,7 +121,8 @@ impl Recordings {
         recorded_element(&self.records, given, excitation)?.finding(given)
     }
 
-    /// Adds the findings of the recordings to a verdict: first, since a faulty recording explains a wrong result.
+    /// Adds the findings of the recordings to a verdict. They come first, since faults of a recording may explain a
+    /// wrong result.
     pub fn judged(&self, verdict: Verdict) -> Verdict {
         let more = self.findings();
         if more.is_empty() {

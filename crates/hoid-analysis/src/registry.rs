@@ -1,8 +1,8 @@
-//! The registry of batch estimators: name, description and options of each.
+//! The registry of batch estimators: name, description and options of each estimator.
 //!
-//! Flags and help of the command line, keys of plans, keywords of Python, the page of options and the names of printed
-//! settings are made from this list. An option is in the file of its estimator
-//! ([`BatchOptions`](hoid_ident::settings::BatchOptions)), an estimator in a file of `estimators/`, and a new
+//! Flags and help texts of the command line, keys of plans, keyword arguments in Python, the page of options and the
+//! names of printed settings are generated from this list. An option is defined in the file of its estimator
+//! ([`BatchOptions`](hoid_ident::settings::BatchOptions)) and an estimator in a file of `estimators/`; a new
 //! instrumental-variable method is listed here once it is in [`IvMethod::ALL`](hoid_ident::IvMethod::ALL).
 
 use hoid_ident::{
@@ -15,7 +15,7 @@ pub use crate::names::{CHANGE, OPERATOR, PEM, REMNANT};
 
 use crate::estimators::{BatchEstimator, Polynomials};
 
-/// Returns the known properties of each batch estimator.
+/// Returns the specification of each batch estimator.
 pub fn estimators() -> Vec<MethodSpec> {
     [
         FamilyEstimator::specs(),
@@ -26,7 +26,7 @@ pub fn estimators() -> Vec<MethodSpec> {
     .concat()
 }
 
-/// Returns an option of the registry by its name.
+/// Returns the option with this name from the registry.
 pub fn estimator_setting(name: &str) -> Option<Setting> {
     estimators()
         .into_iter()

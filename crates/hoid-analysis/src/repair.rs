@@ -1,4 +1,4 @@
-//! Faults of recordings, detected and repaired before all other processing.
+//! Detection and repair of faults of recordings, before all other processing.
 
 use hoid_ident::faults::{SLOWEST_S, repair};
 use hoid_model::{FaultHandling, Finding, ModelError, Record};
@@ -10,17 +10,17 @@ use crate::{
     recordings::{Account, Recordings},
 };
 
-/// Shortest piece between two faults that is used, s: a few seconds determine no operator.
+/// Minimum length in s of a segment between two faults that is used, since a few seconds do not determine an operator.
 const SHORTEST_PIECE_S: f64 = 4.0;
-/// Largest number of levels of a step input.
+/// Maximum number of levels of a step input.
 const MOST_LEVELS: usize = 16;
 
 impl Recordings {
-    /// Repairs the faults of the recordings; a recording that is cut gives several. The account of its first part has
-    /// the findings and their consequences for any result.
+    /// Repairs the faults of the recordings; a recording that is cut becomes several. The account of its first segment
+    /// contains the findings and their consequences for all results.
     ///
     /// # Errors
-    /// [`AnalysisError::SameSamples`] for runs that are given twice.
+    /// [`AnalysisError::SameSamples`] if a run is given twice.
     pub fn repaired(self, handling: FaultHandling, of: Of) -> Result<Self, AnalysisError> {
         refuse_copies(&self)?;
         let mut all = Self {
@@ -31,13 +31,14 @@ impl Recordings {
         for (((name, record), account), origin) in one.zip(self.origins) {
             let steps = of == Of::System && steps_from_level_to_level(&record);
             let handling = match handling {
-                // A system that settles after a step is not a sensor fault: it is reported, and nothing is cut.
+                // The settling of a system after a step is not a sensor fault: it is reported, and the recording is not
+                // cut.
                 FaultHandling::Bridge | FaultHandling::Cut if steps => FaultHandling::Report,
                 as_asked => as_asked,
             };
             let mut found = repair(&record, handling)?;
             if steps || (of == Of::System && record.sample_time().s() > SLOWEST_S) {
-                // For a system, such as a furnace, this is typical.
+                // For step inputs and slow systems, such as a furnace, these findings are typical and become notes.
                 let note = |finding: Finding| Finding::note(finding.kind, finding.message);
                 found.findings = found.findings.into_iter().map(note).collect();
             }
@@ -75,7 +76,7 @@ impl Recordings {
                 } else {
                     (format!("{name}{span}"), segment.labelled(label))
                 };
-                // Each finding is reported once.
+                // Only the first segment carries the findings, so that each finding is reported once.
                 all.push_part(origin, name, segment, std::mem::take(&mut account));
             }
         }
@@ -83,7 +84,7 @@ impl Recordings {
     }
 }
 
-/// True if the input steps between a few levels, as in a step test or a binary sequence.
+/// True if the input takes only a few levels, as in a step test or a binary sequence.
 pub(crate) fn steps_from_level_to_level(record: &Record) -> bool {
     let mut levels: Vec<f64> = Vec::new();
     for value in record.input() {
@@ -97,7 +98,7 @@ pub(crate) fn steps_from_level_to_level(record: &Record) -> bool {
     levels.len() > 1
 }
 
-/// Repairs the same records, read in another way, in the same manner.
+/// Repairs the same recordings, read with other options, in the same manner.
 pub(crate) fn repaired_alike(records: Vec<Record>, handling: FaultHandling) -> Result<Vec<Record>, ModelError> {
     let mut all = Vec::with_capacity(records.len());
     for record in records {

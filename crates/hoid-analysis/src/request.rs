@@ -1,11 +1,11 @@
-//! The model to be identified, as users request it: a structure, a method, and options by their names.
+//! Requests of users for a model: structure, method, and options by name.
 //!
 //! | structure | estimator |
 //! |---|---|
-//! | none, `operator` | the operator of a person; with `noise=remnant` a gain with a lead and its remnant of order m, with `change=sigmoid` one whose gains change once |
-//! | `arx` ... `general` | polynomials, by `method` pem or instrumental variables |
+//! | none, `operator` | operator of a person; with `noise=remnant` an operator with a gain, a lead and a remnant of order m; with `change=sigmoid` an operator whose gains change once |
+//! | `arx` ... `general` | polynomials, fitted by the `method` pem or by instrumental variables |
 //!
-//! Without a structure, options that only polynomials have, such as nk, select `bj`.
+//! If no structure is given, an option that only polynomials have, such as nk, selects `bj`.
 
 use std::collections::BTreeMap;
 
@@ -19,27 +19,27 @@ use crate::{
     registry::{CHANGE, OPERATOR, PEM, REMNANT, estimators},
 };
 
-/// The model to be identified, by names and texts.
+/// Request for a model, in the form of names and texts.
 #[derive(Debug, Clone, Default)]
 pub struct Request {
-    /// The structure.
+    /// Name of the structure.
     pub structure: Option<String>,
-    /// The method: `pem`, or a method of instrumental variables.
+    /// Name of the method: `pem`, or an instrumental-variable method.
     pub method: Option<String>,
     /// Options by their names in the registry.
     pub options: BTreeMap<String, String>,
     /// Treatment of faults of the recordings.
     pub faults: FaultHandling,
-    /// Whether a high rate is lowered.
+    /// Whether a high sampling rate is reduced.
     pub rate: Decimation,
 }
 
-/// An identification that can be run.
+/// An identification that is ready to run.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ResolvedRequest {
-    /// The operator of a person, its form by evidence.
+    /// Operator of a person, whose form the evidence determines.
     Operator(Identification),
-    /// A gain with a lead, and its remnant of order m.
+    /// Operator with a gain and a lead, and a remnant of order m.
     Remnant(Identification<GreyBox>),
     /// An operator whose gains change once.
     Change(Identification<SigmoidChange>),
@@ -47,7 +47,7 @@ pub enum ResolvedRequest {
     Polynomials(Identification<Polynomials>),
 }
 
-/// Applies an expression to each kind of identification.
+/// Evaluates an expression for every kind of identification.
 macro_rules! each {
     ($asked:expr, $how:ident => $what:expr) => {
         match $asked {
@@ -60,7 +60,7 @@ macro_rules! each {
 }
 
 impl ResolvedRequest {
-    /// Returns the estimator of a name in the registry, with its defaults; `None` for another name.
+    /// Returns the estimator with this name in the registry, with default options; `None` if there is none.
     pub fn of_estimator(name: &str, structure: Structure) -> Option<Self> {
         let polynomials = |structure: Structure, method: Option<IvMethod>| {
             Self::Polynomials(Identification::of(Polynomials {
@@ -80,7 +80,7 @@ impl ResolvedRequest {
         })
     }
 
-    /// Returns the name of its estimator in the registry.
+    /// Returns the name of the estimator in the registry.
     pub fn estimator(&self) -> &'static str {
         match self {
             Self::Operator(_) => OPERATOR,
@@ -98,30 +98,30 @@ impl ResolvedRequest {
         }
     }
 
-    /// True if orders and delay count samples.
+    /// True if orders and delay are numbers of samples.
     pub fn counts_samples(&self) -> bool {
         each!(self, how => how.estimator.counts_samples())
     }
 
-    /// True if it estimates the response to an input.
+    /// True if the estimator estimates the response to an input.
     pub fn has_input(&self) -> bool {
         self.structure().is_none_or(Structure::has_input)
     }
 
-    /// Sets an option by its name; false if the estimator does not have it.
+    /// Sets an option by its name; returns false if the estimator does not have the option.
     ///
     /// # Errors
-    /// [`AnalysisError`] for a text that is not a valid value.
+    /// [`AnalysisError`] if the text is not a valid value.
     pub fn set(&mut self, name: &str, text: &str) -> Result<bool, AnalysisError> {
         each!(self, how => how.set(name, text))
     }
 }
 
 impl Request {
-    /// Resolves the request; also returns remarks on earlier names and on consequences of an option.
+    /// Resolves the request; also returns notes on earlier names and on consequences of an option.
     ///
     /// # Errors
-    /// [`AnalysisError`] for options that contradict each other, or values that do not exist.
+    /// [`AnalysisError`] for contradictory options or unknown values.
     pub fn resolve(&self) -> Result<(ResolvedRequest, Vec<String>), AnalysisError> {
         let mut notes = Vec::new();
         let mut asked = self.kind(&mut notes)?;
@@ -133,7 +133,7 @@ impl Request {
                 return Err(misplaced(name, &all));
             }
         }
-        // In the order of the registry: an option that affects others comes before them.
+        // Options are set in the order of the registry, in which an option that affects others precedes them.
         for setting in own {
             if let Some(text) = self.options.get(setting.name) {
                 asked.set(setting.name, text)?;
@@ -159,7 +159,7 @@ impl Request {
         names.iter().any(|name| self.options.contains_key(*name))
     }
 
-    /// Returns the requested kind of model, with its defaults.
+    /// Returns the requested kind of model with default options.
     fn kind(&self, notes: &mut Vec<String>) -> Result<ResolvedRequest, AnalysisError> {
         let options = |reason: String| AnalysisError::Options { reason };
         let typed = self
@@ -200,7 +200,7 @@ impl Request {
             .ok_or_else(|| options(unknown_method(estimator)))
     }
 
-    /// True if an option that only a polynomial model has is given.
+    /// True if the request contains an option that only polynomial models have.
     fn is_polynomial(&self) -> bool {
         let asks_for_operator = self.has(&["noise", "change", "remnant_order"]);
         let of_polynomials = |text: &String| {
@@ -222,7 +222,7 @@ impl Request {
                 ]))
     }
 
-    /// Returns which of the operator estimators is requested.
+    /// Returns the name of the requested operator estimator.
     fn operator(&self, typed: Option<&str>, notes: &mut Vec<String>) -> Result<&'static str, AnalysisError> {
         let said = |name: &str| self.options.get(name).map(String::as_str);
         let was = match typed {
@@ -260,7 +260,8 @@ impl Request {
     }
 }
 
-/// Error for an option of other estimators, with those that have it and the option to use instead.
+/// Creates the error for an option of other estimators, with the names of these estimators and the option to use
+/// instead.
 fn misplaced(name: &str, all: &[MethodSpec]) -> AnalysisError {
     let has = |spec: &&MethodSpec| spec.settings.iter().any(|setting| setting.name == name);
     let of: Vec<&'static str> = all.iter().filter(has).map(|spec| spec.name).collect();
@@ -282,7 +283,7 @@ fn misplaced(name: &str, all: &[MethodSpec]) -> AnalysisError {
         name: setting.name,
         of,
         instead: match name {
-            "nk" => "; else give delay in s",
+            "nk" => "; otherwise give delay in s",
             _ => "",
         },
     }

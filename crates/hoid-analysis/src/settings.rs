@@ -1,4 +1,4 @@
-//! The settings that were used, as printed: the values that the numerics received.
+//! Settings used in an analysis, as printed: the values that the computations received.
 
 use hoid_io::QualityIssueKind;
 use hoid_model::Decimation;
@@ -9,16 +9,16 @@ use crate::reading::Reading;
 /// A setting and its value as text.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Setting {
-    /// Its name.
+    /// Name of the setting.
     pub name: String,
     /// The value in use.
     pub value: String,
-    /// True if it differs from the default, and was therefore given.
+    /// True if the value differs from the default and was therefore given by the user.
     pub given: bool,
 }
 
 impl Setting {
-    /// A setting with its default.
+    /// Creates a setting that is marked as a default.
     pub fn new(name: impl Into<String>, value: impl Into<String>) -> Self {
         Self {
             name: name.into(),
@@ -27,13 +27,13 @@ impl Setting {
         }
     }
 
-    /// Sets whether it was given.
+    /// Sets whether the user gave the value.
     #[must_use]
     pub fn given(self, given: bool) -> Self {
         Self { given, ..self }
     }
 
-    /// Marks settings as given if they differ from the defaults.
+    /// Marks the settings whose values differ from the defaults as given.
     pub fn against(all: Vec<Self>, by_default: &[Self]) -> Vec<Self> {
         let is_default = |one: &Self| {
             by_default
@@ -50,7 +50,7 @@ impl Setting {
 }
 
 impl Reading {
-    /// Returns how records are read, defaults included.
+    /// Returns the options with which records are read, including defaults.
     pub fn settings(&self, decimation: Decimation) -> Vec<Setting> {
         Setting::against(self.rows(decimation), &Self::default().rows(Decimation::default()))
     }
@@ -99,7 +99,7 @@ impl Reading {
         list
     }
 
-    /// Returns the masked parts.
+    /// Returns the setting for masked rows, if any are masked.
     pub(crate) fn masked(&self) -> Option<Setting> {
         let kinds: Vec<&str> = self.mask.iter().map(|kind: &QualityIssueKind| kind.name()).collect();
         (!kinds.is_empty()).then(|| {

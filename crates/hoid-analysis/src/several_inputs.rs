@@ -1,6 +1,6 @@
-//! Polynomial models with several inputs: from texts and recordings to a result and its verdict.
+//! Polynomial models with several inputs, from text options and recordings to a result and its verdict.
 //!
-//! Orders are one number for all inputs (`nb=2`), or one for each (`nb=2,3`), as is nk.
+//! An order, or the delay nk, is one number for all inputs (`nb=2`) or one number per input (`nb=2,3`).
 
 use hoid_ident::{
     family::{ChannelRole, SeenChannel},
@@ -17,25 +17,25 @@ use crate::{
     settings::Setting,
 };
 
-/// Frequencies of the responses, as a share of the Nyquist frequency.
+/// Frequencies at which responses are given, as fractions of the Nyquist frequency.
 const RESPONSE_AT: [f64; 12] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.035, 0.05, 0.1, 0.2, 0.35, 0.5, 0.9];
-/// Least distance of a determined coefficient from zero, in standard errors.
+/// Minimum distance from zero, in standard errors, at which a coefficient counts as determined.
 const LEAST_ERRORS: f64 = 2.0;
 
 /// A fit with several inputs, and its verdict.
 #[derive(Debug, Clone)]
 pub struct SeveralInputsResult {
-    /// The fit.
+    /// Fit of the model with several inputs.
     pub fit: SeveralInputsFit,
-    /// Role of each further input for the person.
+    /// Role of each further input in the task of the person.
     pub roles: Vec<ChannelRole>,
-    /// Its verdict.
+    /// Verdict on the fit.
     pub verdict: Verdict,
-    /// The recordings that were fitted.
+    /// The fitted recordings.
     pub data: Recordings,
 }
 
-/// Builds the model of a structure with these orders, `na=2,nb=2,3`, and delays, `29,12`, for these inputs.
+/// Builds a model from its structure, its orders (such as `na=2,nb=2,3`), its delays (such as `29,12`) and its inputs.
 ///
 /// # Errors
 /// [`AnalysisError::Options`] for invalid orders.
@@ -92,7 +92,7 @@ pub fn several_inputs(
         Some([one]) => Ok(vec![*one; count]),
         Some(values) if values.len() == count => Ok(values.to_vec()),
         Some(values) => Err(options(format!(
-            "orders: {name} has {} numbers for {count} inputs; give one for all, or one for each",
+            "orders: {name} has {} numbers for {count} inputs; give one number for all inputs, or one for each input",
             values.len()
         ))),
     };
@@ -100,7 +100,7 @@ pub fn several_inputs(
         None => Ok(default),
         Some([one]) => Ok(*one),
         Some(values) => Err(options(format!(
-            "orders: {name} has {} numbers, expected one",
+            "orders: {name} has {} numbers, expected one number",
             values.len()
         ))),
     };
@@ -132,11 +132,12 @@ pub fn several_inputs(
     Ok(model)
 }
 
-/// Returns the role of each further input, from a text `r=motion,y=output`; those that it does not name are targets.
+/// Parses the roles of the further inputs from text such as `r=motion,y=output`; inputs that the text does not name are
+/// targets.
 ///
 /// # Errors
-/// [`AnalysisError::Options`] for a text that is not a role, of something that is not a further input, or with a preview
-/// or form, which polynomials do not have.
+/// [`AnalysisError::Options`] if the text is not a role, names something other than a further input, or gives a preview
+/// or a form, which polynomials do not have.
 pub fn roles(further: &[String], text: &str) -> Result<Vec<ChannelRole>, AnalysisError> {
     let options = |reason: String| AnalysisError::Options { reason };
     let mut all = vec![ChannelRole::default(); further.len()];
@@ -163,7 +164,7 @@ pub fn roles(further: &[String], text: &str) -> Result<Vec<ChannelRole>, Analysi
 }
 
 impl SeveralInputsResult {
-    /// Repairs the recordings, fits, and forms the verdict.
+    /// Repairs the recordings, fits the model and forms the verdict.
     ///
     /// # Errors
     /// [`AnalysisError`] if there is no result.

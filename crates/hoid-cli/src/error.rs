@@ -16,25 +16,25 @@ use crate::{
     interrupt,
 };
 
-/// Errors of commands.
+/// An error that ends a command.
 #[derive(Debug, Error)]
 pub enum CliError {
     /// The arguments are contradictory or invalid.
     #[error("{0}")]
     Usage(String),
-    /// A file with columns other than those requested, and the command that names them.
+    /// The file does not have the requested columns; the message contains the command that names its columns.
     #[error("{0}")]
     OtherColumns(String),
-    /// A stream that cannot be read, parsed or written.
+    /// A stream cannot be read, parsed or written.
     #[error("{0}")]
     Stream(String),
-    /// A result that could not be printed.
+    /// The result could not be printed.
     #[error("standard output cannot be written: {0}; the requested output is missing or truncated: free space for it")]
     Output(std::io::Error),
-    /// A printed result for which the data do not determine the requested quantity.
+    /// The result was printed, but the data do not determine the requested quantity.
     #[error("the data do not determine the requested quantity: {0}")]
     NotDetermined(String),
-    /// Interrupted work that can be resumed.
+    /// The work was interrupted and can be resumed.
     #[error("{0}")]
     Stopped(String),
     #[error(transparent)]
@@ -55,17 +55,17 @@ pub enum CliError {
     Sim(#[from] SimError),
     #[error(transparent)]
     Report(#[from] ReportError),
-    /// An experiment that cannot be set up or shown.
+    /// An experiment of the lab cannot be set up or shown.
     #[cfg(feature = "lab")]
     #[error(transparent)]
     Lab(Box<hoid_lab::LabError>),
-    /// A reproduction that failed.
+    /// The reproduction of the thesis failed.
     #[error(transparent)]
     Thesis(#[from] ThesisError),
 }
 
 impl From<AnalysisError> for CliError {
-    /// Options that contradict each other or the data are usage errors.
+    /// Converts the error; options that contradict each other or the data are usage errors.
     fn from(error: AnalysisError) -> Self {
         match error {
             AnalysisError::Ident(error) => Self::Ident(error),
@@ -91,7 +91,7 @@ impl From<AnalysisError> for CliError {
     }
 }
 
-/// An option as the user types it.
+/// Returns an option as the user types it.
 fn typed(name: &str) -> String {
     match estimator_setting(name) {
         Some(setting) => format!("--{}", flag(setting.name)),
@@ -101,7 +101,7 @@ fn typed(name: &str) -> String {
 
 #[cfg(feature = "lab")]
 impl From<hoid_lab::LabError> for CliError {
-    /// An invalid configuration is a usage error.
+    /// Converts the error; an invalid configuration is a usage error.
     fn from(error: hoid_lab::LabError) -> Self {
         match error {
             hoid_lab::LabError::Config { .. } => Self::Usage(error.to_string()),
@@ -111,7 +111,7 @@ impl From<hoid_lab::LabError> for CliError {
 }
 
 impl CliError {
-    /// Converts problems with options, before anything is read.
+    /// Converts a problem with options that was found before anything was read.
     pub fn of_options(error: AnalysisError) -> Self {
         match error {
             AnalysisError::Ident(IdentError::BadOption {
@@ -123,7 +123,7 @@ impl CliError {
         }
     }
 
-    /// Error for the verdict of a printed result.
+    /// Returns an error if the verdict of a printed result requires one.
     ///
     /// # Errors
     /// [`CliError::NotDetermined`] if the data do not determine the requested quantity.
@@ -137,7 +137,8 @@ impl CliError {
         }
     }
 
-    /// 2 for usage errors, 1 for data and tasks without a result, 128 plus the number after a signal.
+    /// Returns the exit code: 2 for usage errors, 1 if the data or the task give no result, 128 plus the number of the
+    /// signal after a signal.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_)

@@ -1,11 +1,11 @@
-//! An operator of the family that corresponds to polynomials, as text.
+//! Text output for an operator of the family that corresponds to given polynomials.
 
 use hoid::ident::family::{FamilyConversion, PoleRole};
 use hoid::model::{GainUnit, NotConvertible};
 
 use crate::text;
 
-/// A conversion, or the reason why there is none.
+/// A conversion to an operator of the family, or the reason why it is not possible.
 pub type Converted = Result<FamilyConversion, NotConvertible>;
 
 /// Formats a conversion as a table and sentences.

@@ -1,8 +1,8 @@
-//! Interrupts: Ctrl-C and, if the system has them, SIGTERM and SIGHUP, which end a command without
-//! truncated files. SIGXFSZ (a limit of the size of files) becomes a write error.
+//! Interrupts: Ctrl-C and, where the system has them, SIGTERM and SIGHUP end a command without leaving truncated files.
+//! SIGXFSZ (the limit on file size) becomes a write error.
 //!
-//! By default output in progress is removed and the program ends with 128 plus the number of the
-//! signal. A command that can be stopped, or reports at its end, sets its own handler.
+//! By default, files in progress are removed, and the program ends with 128 plus the number of the signal. A command
+//! that can be stopped, or that prints a report at its end, sets its own handler.
 
 use std::sync::{
     Mutex, MutexGuard, PoisonError,
@@ -16,10 +16,10 @@ static HANDLER: Mutex<Option<Handler>> = Mutex::new(None);
 static LAST: AtomicI32 = AtomicI32::new(SIGINT);
 const SIGINT: i32 = 2;
 
-/// From now on, an interrupt ends the program with cleanup. Without this the system ends the
-/// program, and the next one removes its partial output.
+/// From this call on, an interrupt removes partial output before it ends the program. Without this call the system ends
+/// the program, and the next run removes its partial output.
 pub fn catch() {
-    // If interrupts cannot be caught the command runs all the same.
+    // If interrupts cannot be caught, the command runs without this handling.
     let _ = listen(|signal| {
         LAST.store(signal, Ordering::Relaxed);
         match answer().as_mut() {
@@ -29,18 +29,18 @@ pub fn catch() {
     });
 }
 
-/// Sets another handler of interrupts. It is called on a separate thread.
+/// Sets another handler of interrupts, which is called on a separate thread.
 pub fn on_interrupt(new: impl FnMut(i32) + Send + 'static) {
     *answer() = Some(Box::new(new));
 }
 
-/// Ends the program; output in progress to a file is removed.
+/// Ends the program and removes files that are still being written.
 pub fn end(code: i32) -> ! {
     hoid::io::remove_unfinished_files();
     std::process::exit(code)
 }
 
-/// The exit code after an interrupt, by the convention of shells.
+/// Returns the exit code after an interrupt, by the convention of shells.
 pub fn exit_code() -> i32 {
     128 + LAST.load(Ordering::Relaxed)
 }
@@ -56,10 +56,10 @@ fn listen(heard: impl Fn(i32) + Send + 'static) -> std::io::Result<()> {
         flag,
         iterator::Signals,
     };
-    // A signal with a handler does not end the program: the write returns EFBIG.
+    // With a handler, the signal does not end the program: the write returns EFBIG.
     flag::register(SIGXFSZ, std::sync::Arc::default())?;
     let mut signals = Signals::new([SIGINT, SIGTERM])?;
-    // As `nohup` requires.
+    // `nohup` requires that an ignored SIGHUP stays ignored.
     if !is_ignored(SIGHUP) {
         signals.add_signal(SIGHUP)?;
     }
@@ -74,7 +74,7 @@ fn listen(heard: impl Fn(i32) + Send + 'static) -> Result<(), ctrlc::Error> {
     ctrlc::set_handler(move || heard(SIGINT))
 }
 
-/// True if the program was started with a signal ignored, if Linux reports it; otherwise false.
+/// True if Linux reports that the signal was ignored when the program started; false on other systems.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

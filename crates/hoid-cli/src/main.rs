@@ -1,9 +1,9 @@
 //! The command line `hoid`. Only this crate prints: results to standard output, everything else to
 //! standard error.
 //!
-//! Exit code 0: success; 1: the data or the task give no result, or it cannot be written; 2: usage error; 128 plus the
-//! number of a signal. `args` defines the arguments, `commands` contains one file per command; `json` and `text` are
-//! the two formats of a result.
+//! Exit codes: 0 for success; 1 if the data or the task give no result, or the result cannot be written; 2 for a usage
+//! error; 128 plus the number of the signal after a signal. `args` defines the arguments, `commands` contains one file
+//! per command; `json` and `text` are the two formats of a result.
 
 mod args;
 mod commands;
@@ -36,7 +36,7 @@ fn main() -> ExitCode {
         .and_then(|matches| Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command)));
     let cli = match parsed {
         Ok(cli) => cli,
-        // Help and version are results as well.
+        // Help and version texts are printed like results.
         Err(said) if !said.use_stderr() => return exit(output::printed(said.print())),
         Err(wrong) => wrong.exit(),
     };
@@ -65,7 +65,7 @@ fn main() -> ExitCode {
 }
 
 fn exit(outcome: Result<(), CliError>) -> ExitCode {
-    output::tell_notices();
+    output::print_notices();
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -1,4 +1,4 @@
-//! Parsing of orders and starts of `hoid track` and `hoid stream`.
+//! Parsing of orders and start values for `hoid track` and `hoid stream`.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use hoid::ident::{
 
 use crate::error::CliError;
 
-/// The given orders; the delay is separate.
+/// Returns the given orders; the delay may be given by a separate option.
 pub fn named_orders(orders: Option<&str>, nk: Option<&DelayRange>) -> Result<NamedOrders, CliError> {
     let read = orders.filter(|text| !text.trim().is_empty()).map(NamedOrders::read);
     let all = match read {
@@ -31,7 +31,7 @@ pub fn named_orders(orders: Option<&str>, nk: Option<&DelayRange>) -> Result<Nam
     Ok(all)
 }
 
-/// Parses `name=number,name=number`, each name once.
+/// Parses `name=number,name=number`; each name may occur only once.
 pub fn parse_numbers(text: &str) -> Result<Vec<(String, f64)>, String> {
     named_pairs(text)
         .map_err(|expected| format!("expected {expected}"))?
@@ -43,7 +43,7 @@ pub fn parse_numbers(text: &str) -> Result<Vec<(String, f64)>, String> {
         .collect()
 }
 
-/// Parses a start `f1=..,b0=..`, each coefficient once.
+/// Parses start values such as `f1=..,b0=..`; each coefficient may occur only once.
 pub fn start(text: &str) -> Result<BTreeMap<String, f64>, CliError> {
     let numbers = parse_numbers(text).map_err(|reason| CliError::Usage(format!("--start: {reason}")))?;
     Ok(numbers.into_iter().collect())

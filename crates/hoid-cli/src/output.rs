@@ -1,6 +1,5 @@
-//! Standard output and standard error. If a reader closes the pipe early (`hoid ... | head`), the
-//! command continues with its files, and nothing is reported. Any other write error, such as a full
-//! disk, is an error.
+//! Standard output and standard error. If the reader closes the pipe early (`hoid ... | head`), the command still
+//! writes its files, and nothing is reported. Any other write error, such as a full disk, is reported as an error.
 
 use std::{
     io::{self, ErrorKind, IsTerminal, Write},
@@ -22,13 +21,12 @@ use crate::error::CliError;
 /// Writes a result to standard output.
 ///
 /// # Errors
-/// [`CliError::Output`] for errors that the operating system reports, except for a pipe closed by
-/// its reader.
+/// [`CliError::Output`] for an error reported by the operating system, except for a pipe closed by its reader.
 pub fn print(text: &str) -> Result<(), CliError> {
     printed(io::stdout().lock().write_all(text.as_bytes()))
 }
 
-/// Writes a page of text to standard output, with its sentences wrapped at the width of the screen.
+/// Writes a page of text to standard output, with sentences wrapped at the width of the screen.
 ///
 /// # Errors
 /// As [`print`].
@@ -40,8 +38,7 @@ pub fn show(page: &str) -> Result<(), CliError> {
     }
 }
 
-/// The page with its verdict in colour, for a terminal that supports colours unless `NO_COLOR` is
-/// set.
+/// Returns the page with its verdict in colour if the terminal supports colours and `NO_COLOR` is not set.
 fn coloured(page: &str) -> String {
     let colour = |level| match level {
         VerdictLevel::Trustworthy => AnsiColor::Green,
@@ -60,11 +57,11 @@ fn coloured(page: &str) -> String {
         .unwrap_or_else(|| page.to_owned())
 }
 
-/// Minimum and maximum width of a page: below, words are cut; above, lines are hard to follow.
+/// Minimum and maximum width of a page: narrower lines would split words, wider lines are hard to read.
 const WIDTHS: (usize, usize) = (60, 110);
 
-/// Width of the screen in columns: `COLUMNS`, otherwise that of the terminal; `None` for a page in a
-/// file, whose lines are not wrapped.
+/// Returns the width of the screen in columns: `COLUMNS`, otherwise the width of the terminal; `None` if the output
+/// goes to a file, whose lines are not wrapped.
 pub fn width() -> Option<usize> {
     let told = std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok());
     let asked = || {
@@ -74,8 +71,7 @@ pub fn width() -> Option<usize> {
     told.or_else(asked).map(|columns| columns.clamp(WIDTHS.0, WIDTHS.1))
 }
 
-/// Wraps the sentences of a page; tables keep their width. Continuation lines of a list item are
-/// indented.
+/// Wraps the sentences of a page; tables keep their width. The continuation lines of a list item are indented.
 fn wrapped(page: &str, width: usize) -> String {
     let mut text = String::with_capacity(page.len() + page.len() / 16);
     for line in page.split_inclusive('\n') {
@@ -105,18 +101,18 @@ fn wrapped(page: &str, width: usize) -> String {
     text
 }
 
-/// Remarks to be printed after the result, each with the files that it concerns.
+/// Remarks that will be printed after the result, each with the files that it concerns.
 static NOTICES: Mutex<Vec<(String, Vec<String>)>> = Mutex::new(Vec::new());
 
 /// Prefix of a warning.
 const WARNING: &str = "warning: ";
 
-/// Keeps a warning, like [`notice`].
+/// Stores a warning until the result is printed, as [`notice`] does for a remark.
 pub fn warning(of: &str, words: &str) {
     notice(of, format!("{WARNING}{words}"));
 }
 
-/// Keeps a remark until the result is printed; a remark on several files is printed once.
+/// Stores a remark until the result is printed. A remark that concerns several files is printed once.
 pub fn notice(of: &str, words: String) {
     let mut all = NOTICES.lock().unwrap_or_else(PoisonError::into_inner);
     match all.iter_mut().find(|(known, _)| *known == words) {
@@ -126,8 +122,8 @@ pub fn notice(of: &str, words: String) {
     }
 }
 
-/// Writes the kept remarks to standard error.
-pub fn tell_notices() {
+/// Writes the stored remarks to standard error.
+pub fn print_notices() {
     let all = std::mem::take(&mut *NOTICES.lock().unwrap_or_else(PoisonError::into_inner));
     for (words, files) in all {
         let (kind, words) = words
@@ -142,7 +138,7 @@ pub fn tell_notices() {
     }
 }
 
-/// Result of a write to standard output.
+/// Converts the result of a write to standard output.
 ///
 /// # Errors
 /// As [`print`].
@@ -160,17 +156,17 @@ pub fn printed(written: io::Result<()>) -> Result<(), CliError> {
 static READER_LEFT: AtomicBool = AtomicBool::new(false);
 
 /// True if the reader of standard output has closed the pipe.
-pub fn reader_left() -> bool {
+pub fn pipe_closed() -> bool {
     READER_LEFT.load(Ordering::Relaxed)
 }
 
 /// Writes a warning, a note or an error to standard error.
 pub fn message(text: &str) {
-    // If even standard error is closed there is no place for a message.
+    // If standard error is closed too, the message is lost.
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
-/// A progress bar on standard error with rate and remaining time; hidden if standard error is not a
+/// Returns a progress bar on standard error with rate and remaining time; it is hidden if standard error is not a
 /// terminal.
 pub fn progress(total: usize, what: &str) -> ProgressBar {
     let bar = ProgressBar::new(total as u64);
@@ -183,8 +179,8 @@ pub fn progress(total: usize, what: &str) -> ProgressBar {
     bar
 }
 
-/// Runs a long computation and shows the elapsed time on standard error, with a bar and the remaining time once the
-/// computation reports progress. Shows nothing if standard error is not a terminal.
+/// Runs a long computation and shows the elapsed time on standard error. Once the computation reports progress, a bar
+/// and the remaining time are also shown. Nothing is shown if standard error is not a terminal.
 pub fn watched<T>(what: &'static str, work: impl FnOnce() -> T) -> T {
     let bar = ProgressBar::new_spinner().with_message(what);
     if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}, {elapsed}") {

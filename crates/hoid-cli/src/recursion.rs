@@ -1,4 +1,4 @@
-//! From the options of `hoid track` and `hoid stream` to those of the library.
+//! Converts the options of `hoid track` and `hoid stream` to those of the library.
 
 use std::path::Path;
 
@@ -15,13 +15,13 @@ use crate::{
     orders, output,
 };
 
-/// The option that may be a file.
+/// Name of the option whose value may be a file.
 const PRIOR: &str = "prior";
 
-/// The requested recursion.
+/// Returns the requested recursion.
 ///
 /// # Errors
-/// [`CliError::Usage`].
+/// [`CliError::Usage`] if an option is invalid.
 pub fn request(args: &RecursionArgs) -> Result<TrackRequest, CliError> {
     let delay = DelayRange::given(args.nk.as_ref(), args.delay);
     Ok(TrackRequest {
@@ -41,7 +41,7 @@ pub fn request(args: &RecursionArgs) -> Result<TrackRequest, CliError> {
     })
 }
 
-/// The requested recursion over a record.
+/// Returns the requested recursion over a record.
 ///
 /// # Errors
 /// As [`request`].
@@ -65,8 +65,8 @@ pub fn choose(plan: &TrackPlan, span: &Record) -> Result<(TrackOptions, Option<C
     searching(plan, |each| plan.choose(span, each))
 }
 
-/// Runs a computation that selects the open orders of a plan, with a progress display; `work` calls its argument after
-/// every candidate.
+/// Runs a computation that selects the open orders of a plan, with a progress display. `work` must call its argument
+/// after every candidate.
 pub fn searching<T>(plan: &TrackPlan, work: impl FnOnce(&(dyn Fn() + Sync)) -> T) -> T {
     if plan.is_settled() {
         return work(&|| {});
@@ -78,10 +78,10 @@ pub fn searching<T>(plan: &TrackPlan, work: impl FnOnce(&(dyn Fn() + Sync)) -> T
     done
 }
 
-/// The method with a given name; for an earlier name, the present one is reported.
+/// Returns the method with a given name. If the name is an earlier one, the current name is reported.
 ///
 /// # Errors
-/// An unknown name of a method.
+/// [`CliError::Usage`] for an unknown name.
 pub fn method_of(name: &str) -> Result<Method, CliError> {
     if let Some((_, renamed)) = survey::renamed(name) {
         output::notice("", format!("note: {renamed}"));
@@ -89,10 +89,10 @@ pub fn method_of(name: &str) -> Result<Method, CliError> {
     Ok(survey::method(name)?)
 }
 
-/// The method with the given options.
+/// Returns the method with the given options.
 ///
 /// # Errors
-/// [`CliError::Usage`] for an option of another method, or an invalid value.
+/// [`CliError::Usage`] if an option belongs to another method or a value is invalid.
 fn method(args: &RecursionArgs) -> Result<Method, CliError> {
     let usage = |name: &str, text: &str| CliError::Usage(format!("--{} {text}", flag(name)));
     let mut method = method_of(&args.method)?;
@@ -115,7 +115,7 @@ fn method(args: &RecursionArgs) -> Result<Method, CliError> {
     Ok(method)
 }
 
-/// The file of `--prior`, if it is one.
+/// Returns the path given by `--prior`, if its value is a file.
 pub fn prior_file(args: &RecursionArgs) -> Option<&Path> {
     let prior = args.settings.given().find(|(name, _)| *name == PRIOR);
     prior

@@ -1,5 +1,5 @@
-//! Pages and types generated from the registry of methods: the book's page of options and the
-//! keywords of the Python package.
+//! Pages and types generated from the registry of methods: the page of options in the book, and the keywords of the
+//! Python package.
 //!
 //! `HOID_UPDATE_DOCS=1 cargo test -p hoid-cli` updates them.
 
@@ -9,7 +9,7 @@ use hoid::survey::registry;
 
 use crate::args::as_text;
 
-/// The type of a value as text.
+/// Returns the type of a value as text.
 fn kind_as_text(kind: Kind) -> String {
     match kind {
         Kind::Flag => "flag".to_owned(),
@@ -37,14 +37,16 @@ fn kind_as_text(kind: Kind) -> String {
     }
 }
 
-/// The page of the book.
+/// Returns the page of options for the book.
 fn options_page(methods: &[MethodSpec]) -> String {
-    let mut page = "# Options of estimators and recursive methods\n\nThe recursive methods come first, the batch estimators after them. An option of a \
-                    recursive method is a flag of `hoid track` and `hoid stream` (with hyphens), a key of an estimator in a plan, and a keyword \
-                    of `pyhoid.track` and `pyhoid.Tracker`. In a plan a range of times carries its unit (`track_delay_s`); in Python `lambda` \
-                    is called `forgetting_factor`. An option of a batch estimator is a flag of `hoid identify` and a keyword of \
-                    `pyhoid.identify` (where `orders` are `na`, `nb`, ...). Options of `operator`, of one that changes and of the \
-                    instrumental-variable methods are keys of an estimator in a plan too.\n"
+    let mut page = "# Options of estimators and recursive methods\n\nThe recursive methods come first, the batch \
+                    estimators after them. An option of a recursive method is a flag of `hoid track` and `hoid stream` \
+                    (with hyphens), a key of an estimator in a plan, and a keyword of `pyhoid.track` and \
+                    `pyhoid.Tracker`. In a plan a range of times carries its unit (`track_delay_s`); in Python \
+                    `lambda` is called `forgetting_factor`. An option of a batch estimator is a flag of `hoid \
+                    identify` and a keyword of `pyhoid.identify` (where `orders` are `na`, `nb`, ...). Options of \
+                    `operator`, with or without a change, and of the instrumental-variable methods are also keys of an \
+                    estimator in a plan.\n"
         .to_owned();
     for spec in methods.iter().chain(&estimators()) {
         let structures: Vec<&str> = spec.structures.iter().map(|structure| structure.name()).collect();
@@ -76,7 +78,7 @@ fn options_page(methods: &[MethodSpec]) -> String {
     page
 }
 
-/// The keyword in Python, where lambda is reserved.
+/// Returns the keyword of an option in Python, where `lambda` is reserved.
 fn keyword(name: &str) -> &str {
     match name {
         "lambda" => "forgetting_factor",
@@ -115,7 +117,7 @@ fn quoted(words: &[&str]) -> String {
         .join(", ")
 }
 
-/// Lines of at most 96 columns, each after `indent`.
+/// Wraps a text into lines of at most 96 columns, each indented by `indent`.
 fn wrapped(text: &str, indent: &str) -> String {
     let mut lines = vec![indent.to_owned()];
     for word in text.split_whitespace() {
@@ -130,14 +132,14 @@ fn wrapped(text: &str, indent: &str) -> String {
     lines.join("\n")
 }
 
-/// The options of some methods, each once, with the methods that have it.
+/// The options of several methods; each option occurs once, with the methods that have it.
 struct Keywords<'a> {
     settings: Vec<(&'a Setting, Vec<&'a str>)>,
     methods: usize,
 }
 
 impl<'a> Keywords<'a> {
-    /// The options of the methods, except those that Python has in another form.
+    /// Collects the options of the methods, except those that Python has in a different form.
     fn of(methods: &'a [MethodSpec], without: &[&str]) -> Self {
         let mut settings: Vec<(&Setting, Vec<&str>)> = Vec::new();
         for spec in methods {
@@ -166,7 +168,7 @@ impl<'a> Keywords<'a> {
         format!("{}.{of}", setting.help)
     }
 
-    /// The class of types.
+    /// Returns the Python class that contains the types of the keywords.
     fn typed(&self, class: &str, doc: &str) -> String {
         let mut text = format!("\n\nclass {class}(TypedDict, total=False):\n    \"\"\"{doc}\"\"\"\n");
         for (setting, of) in &self.settings {
@@ -188,7 +190,7 @@ impl<'a> Keywords<'a> {
         text
     }
 
-    /// The paragraphs of a doc string.
+    /// Returns the paragraphs of a docstring that describe the keywords.
     fn listed(&self, name: &str, function: &str) -> String {
         let paragraphs: Vec<String> = self
             .settings
@@ -209,7 +211,7 @@ impl<'a> Keywords<'a> {
     }
 }
 
-/// The keywords of the Python package.
+/// Returns the module with the keywords of the Python package.
 fn python_settings(methods: &[MethodSpec], batch: &[MethodSpec]) -> String {
     let names: Vec<&str> = methods.iter().map(|spec| spec.name).collect();
     let structures = hoid::model::Structure::ALL.map(|structure| structure.name());
@@ -220,7 +222,7 @@ fn python_settings(methods: &[MethodSpec], batch: &[MethodSpec]) -> String {
             .collect::<String>()
     };
     let recursive = Keywords::of(methods, &[]);
-    // The orders have their own keywords there.
+    // In Python, the orders have their own keywords.
     let batch = Keywords::of(batch, &["orders"]);
     let methods_text: Vec<String> = methods
         .iter()

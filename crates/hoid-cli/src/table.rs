@@ -1,7 +1,8 @@
-//! Tables of text: three rules, as in print, and limited to the width of the screen.
+//! Text tables with three horizontal rules, as in print, limited to the width of the screen.
 //!
-//! On a narrow screen cells are wrapped between words, never within a word or a number with its error. A table that is
-//! still too wide becomes a list for each row, and a time series a transposed table with as many times as fit.
+//! On a narrow screen, cells are wrapped between words, never within a word or between a number and its error. If a
+//! table is still too wide, each row becomes a list; a time series becomes a transposed table with as many times as
+//! fit.
 
 use std::fmt;
 
@@ -9,7 +10,7 @@ use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle
 
 use crate::output;
 
-/// Three rules, as in print.
+/// Three horizontal rules, as in print.
 const STYLE: TableStyle = {
     let rule = LineStyle::none().fill('─').junction('─');
     TableStyle::new()
@@ -17,19 +18,19 @@ const STYLE: TableStyle = {
         .header_separator(rule)
         .bottom_border(rule)
 };
-/// Blanks to the left and right of a cell.
+/// Number of blanks on both sides of a cell together.
 const PADDING: usize = 2;
-/// Blanks between two columns.
+/// Number of additional blanks between two columns.
 const BETWEEN: usize = 1;
-/// A blank at which lines are not broken.
+/// A blank at which a line is not wrapped.
 const FIXED_BLANK: &str = "\u{a0}";
 
 /// Rows under a header: the first column is left-aligned, the others are right-aligned.
 pub struct Rows {
     header: Vec<String>,
     rows: Vec<Vec<String>>,
-    /// True if the rows are times of a series.
-    course: bool,
+    /// True if each row belongs to one time of a series.
+    is_time_series: bool,
 }
 
 impl Rows {
@@ -37,20 +38,20 @@ impl Rows {
         Self {
             header: header.iter().map(|&name| name.to_owned()).collect(),
             rows: Vec::new(),
-            course: false,
+            is_time_series: false,
         }
     }
 
-    /// Marks the rows as a time series; for lack of space some rows, but not the last, may be omitted.
+    /// Marks the rows as a time series. If space is short, some rows, but not the last, may be omitted.
     pub fn into_time_series(self) -> Self {
-        Self { course: true, ..self }
+        Self { is_time_series: true, ..self }
     }
 
     pub fn add_row<T: Into<String>>(&mut self, cells: impl IntoIterator<Item = T>) {
         self.rows.push(cells.into_iter().map(Into::into).collect());
     }
 
-    /// The table for a screen of the given width; unlimited without.
+    /// Returns the table for a screen of the given width; the width is unlimited if it is `None`.
     fn on(&self, width: Option<usize>) -> String {
         let whole = self.drawn(None);
         let Some(width) = width else { return whole };
@@ -61,13 +62,14 @@ impl Rows {
         let blanks = least.len() * PADDING + least.len().saturating_sub(1) * BETWEEN;
         match least.iter().sum::<usize>() + blanks <= width {
             true => self.drawn(Some((width, &least))),
-            false => self.on_its_side(width).unwrap_or_else(|| self.as_lists()),
+            false => self.transposed(width).unwrap_or_else(|| self.as_lists()),
         }
     }
 
-    /// A time series transposed, with its times as headings, for a narrow screen; `None` if not even the last fits.
-    fn on_its_side(&self, width: usize) -> Option<String> {
-        let last = self.rows.len().checked_sub(1).filter(|_| self.course)?;
+    /// Returns a time series transposed for a narrow screen, with its times as headings; `None` if not even the last
+    /// time fits.
+    fn transposed(&self, width: usize) -> Option<String> {
+        let last = self.rows.len().checked_sub(1).filter(|_| self.is_time_series)?;
         (1..=self.rows.len()).rev().find_map(|count| {
             let picked: Vec<usize> = match count {
                 1 => vec![last],
@@ -81,7 +83,7 @@ impl Rows {
             let turned = Self {
                 header: line(0),
                 rows: (1..self.header.len()).map(line).collect(),
-                course: false,
+                is_time_series: false,
             };
             let drawn = turned.drawn(None);
             drawn.lines().all(|l| l.chars().count() <= width).then_some(drawn)
@@ -113,7 +115,7 @@ impl Rows {
         table.to_string()
     }
 
-    /// The longest word of each column.
+    /// Returns the length of the longest word in each column.
     fn least_widths(&self) -> Vec<usize> {
         let longest = |text: &String| kept_together(text).split(' ').map(|word| word.chars().count()).max();
         let of = |k: usize| {
@@ -123,7 +125,7 @@ impl Rows {
         (0..self.header.len()).map(of).collect()
     }
 
-    /// Each row as its first cell with the others below, each after its heading.
+    /// Returns each row as a list: its first cell, followed by the other cells with their headings.
     fn as_lists(&self) -> String {
         let name = self.header.iter().map(|name| name.chars().count()).max().unwrap_or(0);
         let mut lines = Vec::new();
@@ -146,7 +148,7 @@ impl fmt::Display for Rows {
     }
 }
 
-/// Joins a number and its error to one word.
+/// Joins a number and its error into one word, so that they are not separated.
 fn kept_together(text: &str) -> String {
     text.replace(" ± ", &format!("{FIXED_BLANK}±{FIXED_BLANK}"))
 }

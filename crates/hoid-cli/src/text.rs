@@ -1,4 +1,4 @@
-//! Results as tables of text.
+//! Results as text tables.
 
 use hoid::analysis::{Account, Setting};
 use hoid::ident::{
@@ -16,36 +16,39 @@ use hoid::report::numbers;
 
 use crate::table::Rows;
 
-/// Number of printed candidates of a search; all of them are in the JSON.
+/// Number of candidates of a search that are printed; the JSON contains all candidates.
 const CANDIDATES_SHOWN: usize = 8;
-/// Maximum number of faults of a record listed individually.
+/// Maximum number of faults of a record that are listed individually.
 const FAULTS_SHOWN: usize = 10;
 
-/// A table in the plain style of all output.
+/// Returns an empty table in the style common to all output.
 pub fn table(header: &[&str]) -> Rows {
     Rows::under(header)
 }
 
-/// Value and standard error as two texts with the digits that the error permits.
+/// Formats a value and its standard error with the digits that the error justifies.
 pub fn with_uncertainty(e: &Estimate) -> (String, String) {
     numbers::with_uncertainty(e.value, e.standard_error)
 }
 
-/// The verdict, for the top of the page.
+/// Formats the verdict for the top of the page.
 pub fn verdict(verdict: &Verdict) -> String {
     format!("{verdict}\n\n")
 }
 
-/// Hint at the end of the page.
+/// Hint at the end of a page that has further details.
 pub const MORE: &str = "More with -v: what else was tried, tests, every setting; --report DIR writes a page.\n";
 
-/// The same if there are only settings.
+/// Hint at the end of the page of an operator whose gains change; such a model has no report.
+pub const MORE_CHANGE: &str = "More with -v: search, residual tests, every setting; --trace FILE writes the gains.\n";
+
+/// Hint at the end of a page whose only further details are the settings.
 pub const MORE_SETTINGS: &str = "More with -v: every setting.\n";
 
-/// Maximum number of records listed by name.
+/// Maximum number of records that are listed by name.
 const RECORDS_SHOWN: usize = 4;
 
-/// The records used, and the steps applied to them.
+/// Lists the records used and the steps applied to them.
 pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbose: bool) -> String {
     let line = |((file, record), account): ((&String, &Record), &Account)| {
         let mut lines = format!(
@@ -76,7 +79,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
     };
     let mut text = String::new();
     for (k, one) in all.enumerate() {
-        // The steps applied to a record are always reported, once for identical records.
+        // The steps applied to a record are always reported; identical records share one report.
         if verbose || k < shown || !quiet(one.1) {
             text.push_str(&line(one));
         }
@@ -93,7 +96,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
     text
 }
 
-/// The constants of u estimated with the fit.
+/// Lists the constants of u that were estimated together with the fit.
 pub fn levels(files: &[String], accounts: &[Account]) -> String {
     let line = |(file, account): (&String, &Account)| {
         let level = account.level.as_ref()?;
@@ -104,7 +107,7 @@ pub fn levels(files: &[String], accounts: &[Account]) -> String {
     files.iter().zip(accounts).filter_map(line).collect()
 }
 
-/// Every option that affects the result.
+/// Lists every setting that affects the result.
 pub fn settings(settings: &[Setting]) -> String {
     let of = |given: bool| {
         let list = settings.iter().filter(|one| one.given == given);
@@ -118,7 +121,7 @@ pub fn settings(settings: &[Setting]) -> String {
     format!("\nSettings given: {}.\nBy default: {}.\n", of(true), of(false))
 }
 
-/// Orders m of the remnant tried by a grey-box fit; nothing if there was only one.
+/// Lists the orders m of the remnant that a grey-box fit tried; empty if there was only one.
 pub fn remnant_orders(grey_box: &GreyBoxFit) -> String {
     if grey_box.candidates().len() < 2 {
         return String::new();
@@ -140,7 +143,7 @@ pub fn remnant_orders(grey_box: &GreyBoxFit) -> String {
     format!("{rows}\n\n")
 }
 
-/// The operators of the records after the first, if a grey-box fit has parameters for each.
+/// Lists the operators of all records except the first, if a grey-box fit has parameters that differ between records.
 pub fn other_records(grey_box: &GreyBoxFit, files: &[String], gain: &GainUnit) -> String {
     let differs = |k: &usize| grey_box.operator_parameters(*k) != grey_box.operator_parameters(0);
     let mut text = String::new();
@@ -150,7 +153,7 @@ pub fn other_records(grey_box: &GreyBoxFit, files: &[String], gain: &GainUnit) -
     text
 }
 
-/// The coefficients of a model.
+/// Lists the coefficients of a model.
 pub fn coefficients(fit: &Fit) -> String {
     let what = if fit.is_grey_box() { "parameter" } else { "coefficient" };
     let all = fit.parameters();
@@ -158,7 +161,7 @@ pub fn coefficients(fit: &Fit) -> String {
     format!("{}\n", estimates(what, named))
 }
 
-/// Termination of the search.
+/// Describes how the search ended.
 pub fn search(fit: &Fit) -> String {
     let t = fit.termination();
     format!(
@@ -169,7 +172,7 @@ pub fn search(fit: &Fit) -> String {
     )
 }
 
-/// Problems of the model itself; usually none.
+/// Warns if the model is not stable; otherwise empty.
 pub fn instability(fit: &Fit) -> &'static str {
     if fit.model().is_stable() {
         ""
@@ -178,7 +181,7 @@ pub fn instability(fit: &Fit) -> &'static str {
     }
 }
 
-/// A p value to two digits, as a relation: a rounded 0 or 1 would be no probability of a test.
+/// Formats a p-value as a relation such as `p = 0.03`, so that it is never rounded to 0 or 1.
 pub fn p_value(p: f64) -> String {
     match p {
         p if p > 0.99 => "p > 0.99".to_owned(),
@@ -187,7 +190,7 @@ pub fn p_value(p: f64) -> String {
     }
 }
 
-/// A count as text: "1 step", "2 steps".
+/// Formats a count, such as "1 step" or "2 steps".
 pub fn counted(n: u64, what: &str) -> String {
     match n {
         1 => format!("1 {what}"),
@@ -195,7 +198,7 @@ pub fn counted(n: u64, what: &str) -> String {
     }
 }
 
-/// Share of u that the model explains, in one line.
+/// Describes in one line the share of u that the model explains.
 pub fn fit_line(fit: &Fit, q: &GoodnessOfFit) -> String {
     if fit.model().structure().has_input() {
         format!(
@@ -207,7 +210,7 @@ pub fn fit_line(fit: &Fit, q: &GoodnessOfFit) -> String {
     }
 }
 
-/// Loss and fit percentages.
+/// Lists loss and fit percentages.
 pub fn quality(fit: &Fit, q: &GoodnessOfFit) -> String {
     let variance = if fit.is_robust() {
         "square of the robust scale (median absolute residual / 0.6745)".to_owned()
@@ -238,7 +241,8 @@ pub fn quality(fit: &Fit, q: &GoodnessOfFit) -> String {
 /// Half width of a 95 % interval of a normal distribution, in standard errors.
 const NORMAL_95: f64 = 1.959_963_984_540_054;
 
-/// The ends of the 95 % interval from the standard error, with three digits; empty without one.
+/// Formats the ends of the 95 % interval that follows from the standard error, with three digits; empty without a
+/// standard error.
 pub fn interval(e: &Estimate) -> (String, String) {
     let end = |sign: f64| {
         let error = e.standard_error.filter(|error| error.is_finite());
@@ -247,12 +251,12 @@ pub fn interval(e: &Estimate) -> (String, String) {
     (end(-1.0), end(1.0))
 }
 
-/// Formats three significant digits, which suffice for an interval.
+/// Formats a value with three significant digits, which suffice for an interval.
 pub fn significant(value: f64) -> String {
     hoid::model::numbers::significant(value, 3)
 }
 
-/// `value ± standard error`.
+/// Formats an estimate as `value ± standard error`.
 pub fn plus_minus(e: &Estimate) -> String {
     match with_uncertainty(e) {
         (value, error) if error == numbers::DASH => value,
@@ -260,7 +264,7 @@ pub fn plus_minus(e: &Estimate) -> String {
     }
 }
 
-/// Name, value ± standard error, 95 % interval and unit of parameters, one row each.
+/// Returns a table of parameters, with name, value ± standard error, 95 % interval and unit in each row.
 pub fn estimates<'a>(what: &str, all: impl IntoIterator<Item = (&'a str, String, Estimate)>) -> Rows {
     let all: Vec<(&str, String, Estimate)> = all.into_iter().collect();
     let with_units = all.iter().any(|(_, unit, _)| !unit.is_empty());
@@ -275,7 +279,7 @@ pub fn estimates<'a>(what: &str, all: impl IntoIterator<Item = (&'a str, String,
     rows
 }
 
-/// The parameters of the operator, or the reason why there are none.
+/// Lists the parameters of the operator, or gives the reason why there are none.
 pub fn operator(found: &Result<OperatorEstimate, NotConvertible>, gain: &GainUnit) -> String {
     match found {
         Ok(o) => {
@@ -292,7 +296,7 @@ pub fn operator(found: &Result<OperatorEstimate, NotConvertible>, gain: &GainUni
     }
 }
 
-/// T_n and K_n, or the reason why there are none.
+/// Gives T_n and K_n, or the reason why there are none.
 pub fn remnant(found: &Result<RemnantEstimate, NotConvertible>) -> String {
     match found {
         Ok(r) => {
@@ -310,7 +314,7 @@ fn not_convertible(reason: &NotConvertible) -> String {
     format!("not convertible: {reason}")
 }
 
-/// Crossover and margins in one line.
+/// Gives crossover and margins in one line.
 pub fn margins(m: &MarginEstimates) -> String {
     let shown = |value: &Estimate, unit: &str| {
         let (value, error) = match value.standard_error {
@@ -328,16 +332,16 @@ pub fn margins(m: &MarginEstimates) -> String {
             let (crossover, margin) = (shown(crossover, "rad/s"), shown(margin, "deg"));
             format!("Crossover frequency {crossover}, phase margin {margin}")
         }
-        _ => "No crossover: the gain of the loop does not fall through one".to_owned(),
+        _ => "No crossover: the loop gain does not cross 1 from above".to_owned(),
     };
     let gain = match (&m.gain_margin_db, &m.phase_crossover_rad_s) {
         (Some(margin), Some(at)) => format!("gain margin {} at {}", shown(margin, "dB"), shown(at, "rad/s")),
-        _ => "no gain margin: the phase of the loop does not fall through -180 deg".to_owned(),
+        _ => "no gain margin: the loop phase does not cross -180 deg from above".to_owned(),
     };
     format!("{crossover}; {gain}.\n")
 }
 
-/// Crossover and margins of a known loop in one line, and each crossover if there are several.
+/// Gives crossover and margins of a known loop in one line, and each crossover if there are several.
 pub fn crossings(all: &Crossings) -> String {
     let mut line = margins(&all.margins().into());
     if all.gain.len() > 1 {
@@ -351,9 +355,9 @@ pub fn crossings(all: &Crossings) -> String {
     line
 }
 
-/// Additional properties of the loop of an estimate besides its lowest crossover: the other crossovers, the smallest
-/// phase margin, the gain margin, and instability. Nothing is reported for a stable loop with one crossover, unless
-/// requested.
+/// Describes properties of an estimated loop in addition to its lowest crossover: the other crossovers, the smallest
+/// phase margin, the gain margin, and instability. For a stable loop with one crossover the text is empty, unless
+/// `always` is set.
 pub fn loop_shape(shape: &LoopShape, always: bool) -> String {
     if !always && shape.crossovers.len() < 2 && shape.is_stable() != Some(false) {
         return String::new();
@@ -386,7 +390,7 @@ pub fn loop_shape(shape: &LoopShape, always: bool) -> String {
     format!("Of this loop: {}.\n", parts.join("; "))
 }
 
-/// Poles and zeros with their natural frequency and damping.
+/// Lists poles and zeros with their natural frequency and damping.
 pub fn roots(fit: &Fit) -> String {
     let ts = fit.model().sample_time().s();
     let mut rows = table(&["root", "real", "imaginary", "standard errors", "rad/s", "damping"]);
@@ -428,7 +432,7 @@ pub fn roots(fit: &Fit) -> String {
     format!("{rows}\n")
 }
 
-/// Residual tests, record by record.
+/// Lists the residual tests of each record.
 pub fn residual_tests(files: &[String], validations: &[Validation]) -> String {
     let mut rows = table(&["residuals of", "Ljung-Box Q", "degrees", "p", "signs"]);
     let (mut coloured, mut missed, mut feedback) = (false, false, false);
@@ -463,11 +467,11 @@ pub fn residual_tests(files: &[String], validations: &[Validation]) -> String {
         ),
         (
             missed,
-            "They follow the input at positive lags: the model misses dynamics, or has the wrong delay.\n",
+            "They are correlated with the input at positive lags: the model misses dynamics, or has the wrong delay.\n",
         ),
         (
             feedback,
-            "The input follows them (negative lags): there is feedback, as in every closed loop.\n",
+            "They are correlated with the input at negative lags: there is feedback, as in every closed loop.\n",
         ),
     ] {
         if seen {
@@ -477,7 +481,7 @@ pub fn residual_tests(files: &[String], validations: &[Validation]) -> String {
     text
 }
 
-/// Uncertainty of the delay from a search over nk: tau_e = (nk - 1) Ts.
+/// Describes the uncertainty of the delay that follows from a search over nk: tau_e = (nk - 1) Ts.
 pub fn delay(choice: &Choice) -> String {
     let ts = choice.fit.model().sample_time().s();
     let seconds = |nk: usize| significant((nk as f64 - 1.0).max(0.0) * ts);
@@ -490,7 +494,7 @@ pub fn delay(choice: &Choice) -> String {
     })
 }
 
-/// The best candidates of a search.
+/// Lists the best candidates of a search.
 pub fn candidates(choice: &Choice) -> String {
     let mut good: Vec<_> = choice
         .candidates
@@ -502,7 +506,7 @@ pub fn candidates(choice: &Choice) -> String {
         let value = |f: &hoid::ident::order_selection::CandidateFigures| f.value(choice.criterion);
         value(a.1).total_cmp(&value(b.1))
     });
-    // The default columns, and the selection criterion if it is another one.
+    // The columns are the default ones and, if it is not among them, the selection criterion.
     let decides = !matches!(choice.criterion, Criterion::Loss | Criterion::Aic | Criterion::Bic);
     let mut header = vec!["candidate", "loss", "AIC", "BIC", ""];
     if decides {
@@ -561,12 +565,11 @@ mod tests {
         );
         assert_eq!(
             margins_of(known(2.0), None),
-            "Crossover frequency 2.0000 rad/s, phase margin 2.0000 deg; no gain margin: the phase of the loop does not fall through \
-             -180 deg.\n"
+            "Crossover frequency 2.0000 rad/s, phase margin 2.0000 deg; no gain margin: the loop phase does not cross \
+             -180 deg from above.\n"
         );
         assert!(
-            margins_of(None, known(3.0))
-                .starts_with("No crossover: the gain of the loop does not fall through one; gain")
+            margins_of(None, known(3.0)).starts_with("No crossover: the loop gain does not cross 1 from above; gain")
         );
     }
 }

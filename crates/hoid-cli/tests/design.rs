@@ -29,7 +29,7 @@ fn a_design_is_judged_and_runs() {
     ];
     let said = good(at, &arguments);
     assert!(
-        said.starts_with("Expected errors of") && said.contains("With reference it takes"),
+        said.starts_with("Expected errors of") && said.contains("With reference they require"),
         "{said}"
     );
     let object = json(
@@ -106,7 +106,7 @@ fn a_difference_has_its_people_and_the_files_are_readable() {
     ];
     let page = good(at, &arguments);
     assert!(
-        page.contains("A difference in crossover of") && page.contains("error of a run"),
+        page.contains("Detecting a difference in crossover of") && page.contains("error of a run"),
         "{page}"
     );
     let object = json(at, &[&arguments[..], &["--json"]].concat());

@@ -237,8 +237,8 @@ fn wrong_preparations_are_told_in_the_users_words() {
     let directory = recorded(|_, values| vec![values]);
     let at = directory.path();
     for (options, code, words) in [
-        (&["--scale", "e=0"][..], 2, "finite and not 0"),
-        (&["--scale", "e=NaN"], 2, "finite and not 0"),
+        (&["--scale", "e=0"][..], 2, "finite nonzero factor"),
+        (&["--scale", "e=NaN"], 2, "finite nonzero factor"),
         (&["--scale", "e"], 2, "names no channel"),
         (
             &["--scale", "q=2"],

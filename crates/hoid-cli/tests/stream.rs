@@ -579,7 +579,7 @@ fn wrong_usage_and_wrong_headers() {
     }
     for (more, expected) in [
         (&["--warm-up", "5"][..], "estimates from the start"),
-        (&["--start", "nothing", "--nk", "29"], "a prior in its place"),
+        (&["--start", "nothing", "--nk", "29"], "a prior instead"),
         (&["--prior", "omega_nm=1"], "CENTRE:SPREAD"),
     ] {
         let arguments: Vec<&str> = ["stream", "--fs", "100"].iter().chain(more).copied().collect();

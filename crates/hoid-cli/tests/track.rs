@@ -511,9 +511,9 @@ fn what_does_not_fit_together_ends_with_two() {
         (&["--structure", "arx"], "bj with nb = 2"),
         (&["--structure", "grey-box"], "bj"),
         (&["--forgetting", "random-walk"], "drift K_e=.01"),
-        (&["--drift", "K_e=.1"], "forgetting = random-walk, whose option it is"),
+        (&["--drift", "K_e=.1"], "forgetting = random-walk, to which this option belongs"),
         (&["--forgetting", "random-walk", "--drift", "b0=.1"], "K_e"),
-        (&["--rate", ".1"], "forgetting = gradient, whose option it is"),
+        (&["--rate", ".1"], "forgetting = gradient, to which this option belongs"),
         (&["--forgetting", "gradient", "--rate", "3"], "between 0 and 2"),
         (&["--covariance", "-1"], "positive"),
         (&["--largest", "0"], "positive"),
@@ -524,7 +524,7 @@ fn what_does_not_fit_together_ends_with_two() {
         (&["--method", "rpem", "--bound", "omega_nm=5..30"], "--method physical"),
         (&["--bound", "K_x=5..30"], "K_e_dot"),
         (&["--method", "rls", "--track-delay", ".1...3"], "--method rpem"),
-        (&["--start", "b0=1"], "--start: it applies to a single model"),
+        (&["--start", "b0=1"], "--start: a start applies to a single model"),
         (&["--start", "b0=1", "--nk", "29"], "--start: it lacks b1"),
         (
             &[

@@ -1,7 +1,7 @@
-//! A number within its bounds.
+//! Limits a number to an interval without panicking.
 
-/// Limits a value to two bounds. A bound that is not a number has no effect, and the upper one wins if they are
-/// reversed, as in the numbers of a damaged save: [`f64::clamp`] panics there.
+/// Limits a value to an interval. A bound that is NaN has no effect. If the bounds are reversed, as they can be after
+/// loading a damaged file, the upper bound applies, whereas [`f64::clamp`] panics.
 #[inline]
 pub fn within(value: f64, [low, high]: [f64; 2]) -> f64 {
     value.max(low).min(high)

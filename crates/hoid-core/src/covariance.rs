@@ -1,11 +1,11 @@
-//! The gain of the prediction-error method: P with a rule of forgetting and a guard against windup.
+//! Gain of the prediction-error method: P with a rule of forgetting and protection against windup.
 //!
 //! The equations are in [`crate::adaptation`].
 //!
-//! **Windup.** If nothing excites a direction, forgetting alone would let P grow without limit. Each parameter in turn
-//! therefore gets a pseudo-measurement of its current value: the estimate stays constant, and
-//! `P^{-1} >= diag(1/bound_i)` up to the forgetting of one round. Its information is the part of `1/bound_i` that was
-//! forgotten since the last turn of that parameter.
+//! **Windup.** In a direction that is not excited, forgetting alone would let P grow without limit. Each parameter in
+//! turn therefore gets a pseudo-measurement of its current value: the estimate stays constant, and
+//! `P^{-1} >= diag(1/bound_i)` holds except for the forgetting since the last turn. The information of the
+//! pseudo-measurement is the part of `1/bound_i` that was forgotten since the last turn of that parameter.
 
 use crate::{
     adaptation::{Adaptation, Forgetting, ParameterStep},
@@ -13,45 +13,47 @@ use crate::{
     ud_covariance::UdCovariance,
 };
 
-/// Number of rounds of the guard within the shortest memory, as far as N allows: between two of its turns a variance
-/// grows by e^{1/4} at most.
+/// Number of rounds of pseudo-measurements within the shortest memory, if N is small enough. The variance of a
+/// parameter then grows by at most e^{1/4} between two of its turns.
 const ROUNDS_PER_MEMORY: f64 = 4.0;
-/// `psi' P psi` below which nothing is measured.
+/// `psi' P psi` below which a sample is not used as a measurement.
 const NO_EXCITATION: f64 = 1e-100;
 /// Weight of the newest sample in the mean power of psi.
 const POWER_WEIGHT: f64 = 0.01;
-/// c of the normalised gradient, relative to the largest mean power of psi.
+/// Offset c of the normalised gradient, relative to the largest mean power of psi.
 const GRADIENT_OFFSET: f64 = 0.01;
-/// Lower limit of the additional forgetting of early samples.
+/// Value below which the additional forgetting of early samples ends.
 const NO_EARLY_FORGETTING: f64 = 1e-9;
-/// Longest period of the guard in samples.
+/// Maximum number of samples between two pseudo-measurements.
 const LONGEST_PERIOD: f64 = 64.0;
 
-/// P in factors, with one rule of forgetting.
+/// P in factored form, with a rule of forgetting.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Covariance<const N: usize> {
     factors: UdCovariance<N>,
-    /// P at the start.
+    /// Initial P.
     initial: UdCovariance<N>,
     forgetting: Forgetting<N>,
-    /// Diagonal of Lambda and of its inverse, for unequal factors.
+    /// Diagonals of Lambda and of its inverse, for unequal forgetting factors.
     scales: [[f64; N]; 2],
-    /// `1/lambda` when all factors are equal, else zero.
+    /// `1/lambda` if all forgetting factors are equal, otherwise zero.
     uniform_growth: f64,
     /// Largest variance of each parameter.
     bound: [f64; N],
-    /// Information of the pseudo-measurement of each parameter, per unit of what is forgotten.
+    /// Information of the pseudo-measurement of each parameter per unit of accumulated forgetting.
     guard: [f64; N],
-    /// Accumulated forgetting since the start, now and at the last pseudo-measurement of each parameter.
+    /// Forgetting accumulated since the start: the current value, and its value at the last pseudo-measurement of each
+    /// parameter.
     forgotten: f64,
     forgotten_at_turn: [f64; N],
-    /// Additional forgetting of an early sample, and the factor by which it decays from sample to sample.
+    /// Additional forgetting of an early sample, and the factor by which it decreases from sample to sample.
     early: f64,
     early_decay: f64,
-    /// Mean power of psi, and the largest so far, for the gradient.
+    /// Mean power of psi, and its largest value so far, for the gradient method.
     power: f64,
     largest_power: f64,
-    /// Number of samples between two turns of the guard, number until the next, and index of the next parameter.
+    /// Number of samples between two pseudo-measurements, number of samples until the next one, and index of its
+    /// parameter.
     period: u32,
     until_turn: u32,
     turn: usize,
@@ -68,8 +70,8 @@ impl<const N: usize> Covariance<N> {
         self.turn = self.turn.min(N.saturating_sub(1));
     }
 
-    /// Builds the gain. `factors` is P at the start. `bound` is the largest variance of each parameter, in the units
-    /// of P; infinite if there is none.
+    /// Builds the adaptation. `factors` is the initial P. `bound` is the largest variance of each parameter in the
+    /// units of P, or infinity for no limit.
     pub fn new(factors: UdCovariance<N>, forgetting: Forgetting<N>, bound: [f64; N]) -> Self {
         let mut scales = [[1.0; N]; 2];
         let mut uniform_growth = 0.0;
@@ -116,9 +118,9 @@ impl<const N: usize> Covariance<N> {
         }
     }
 
-    /// Adds a memory that grows at the start, for a recursion that starts far from the truth: before the t-th sample P
-    /// grows additionally by `1/(1 - early decay^t)` (Ljung and Söderström, eq. 5.77). The gradients of the first
-    /// estimates are then forgotten.
+    /// Makes the memory grow from a short initial length, for a recursion that starts far from the true parameters.
+    /// Before sample t = 0, 1, ... P is additionally multiplied by `1/(1 - early decay^t)` (Ljung and Söderström, eq.
+    /// 5.77), so that the inaccurate gradients of the first estimates are forgotten.
     #[must_use]
     pub fn with_growing_memory(mut self, early: f64, decay: f64) -> Self {
         self.early = early;
@@ -126,8 +128,8 @@ impl<const N: usize> Covariance<N> {
         self
     }
 
-    /// Multiplies P by a factor: below one, the estimate moves less until the earlier data are forgotten; above one, it
-    /// moves more.
+    /// Multiplies P by a factor. With a factor below one, the estimate changes less until the earlier data are
+    /// forgotten; with a factor above one, it changes more.
     pub fn scale(&mut self, factor: f64) {
         self.factors.scale_all(factor);
     }
@@ -137,7 +139,8 @@ impl<const N: usize> Covariance<N> {
         self.factors.matrix()
     }
 
-    /// Returns the step by any rule and at any time; [`Adaptation::update`] handles the typical case.
+    /// Returns the step for any rule of forgetting, including the additional forgetting of early samples.
+    /// [`Adaptation::update`] handles the typical case itself.
     #[inline(never)]
     fn update_by_rule(&mut self, psi: &[f64; N], eps: f64, variance: f64) -> ParameterStep<N> {
         if self.early > NO_EARLY_FORGETTING {
@@ -176,10 +179,10 @@ impl<const N: usize> Covariance<N> {
         scaled(self.factors.inflate_and_update(growth, psi, 1.0), eps)
     }
 
-    /// Returns the step by the variable factor; `sum_of_squares` is N_0 sigma^2.
+    /// Returns the step with the variable forgetting factor; `sum_of_squares` is N_0 sigma^2.
     fn update_variable(&mut self, psi: &[f64; N], eps: f64, sum_of_squares: f64, smallest: f64) -> ParameterStep<N> {
-        // 1 + psi' P psi is the variance of the innovation over sigma^2. An innovation larger than this explains
-        // shortens the memory.
+        // 1 + psi' P psi is the variance of the innovation divided by sigma^2. An innovation larger than this variance
+        // explains shortens the memory.
         let denominator = 1.0 + self.factors.quadratic_form(psi);
         let gain = self.factors.measurement_update(psi, 1.0);
         let expected = denominator * sum_of_squares;
@@ -197,7 +200,7 @@ impl<const N: usize> Covariance<N> {
         let power = self.factors.quadratic_form(psi);
         let gain = self.factors.times(psi).map(|g| g / (1.0 + power));
         let beta = lambda - (1.0 - lambda) / power;
-        // Without excitation nothing is measured, and there is no direction to forget along.
+        // Without excitation there is nothing to measure and no direction in which to forget.
         if power > NO_EXCITATION && beta != 0.0 {
             self.factors.measurement_update(psi, 1.0 / beta);
         }
@@ -208,14 +211,14 @@ impl<const N: usize> Covariance<N> {
     fn update_gradient(&mut self, psi: &[f64; N], eps: f64, rate: f64) -> ParameterStep<N> {
         let power: f64 = psi.iter().map(|p| p * p).sum();
         self.power += (power - self.power) * POWER_WEIGHT;
-        // The offset keeps the step bounded where psi vanishes: rate psi/psi'psi would grow without limit.
+        // The offset keeps the step bounded when psi vanishes; rate psi/psi'psi would grow without limit.
         self.largest_power = self.largest_power.max(self.power);
         let denominator = GRADIENT_OFFSET * self.largest_power + power;
         let scale = if denominator > 0.0 { rate / denominator } else { 0.0 };
         scaled(psi.map(|p| scale * p), eps)
     }
 
-    /// Accumulates the forgetting of this sample, and at the end of a period guards the parameter whose turn it is.
+    /// Accumulates the forgetting of this sample. At the end of a period it makes the next pseudo-measurement.
     #[inline]
     fn count_forgotten(&mut self, forgotten: f64) {
         self.forgotten += forgotten;
@@ -226,12 +229,12 @@ impl<const N: usize> Covariance<N> {
         self.guard_next();
     }
 
-    /// The pseudo-measurement of the parameter whose turn it is.
+    /// Makes the pseudo-measurement of the parameter whose turn it is.
     #[inline(never)]
     fn guard_next(&mut self) {
         self.until_turn = self.period;
         if !self.factors.is_valid() {
-            // After an overflow P restarts.
+            // After an overflow P is reset to its initial value.
             self.factors.clone_from(&self.initial);
         }
         let turn = self.turn;
@@ -251,12 +254,12 @@ impl<const N: usize> Adaptation<N> for Covariance<N> {
     fn update(&mut self, psi: &[f64; N], eps: f64, _theta: &[f64; N], variance: f64) -> ParameterStep<N> {
         let exponential = matches!(self.forgetting, Forgetting::Exponential { .. });
         if !exponential || self.early > NO_EARLY_FORGETTING {
-            // A copy, so that psi can stay in registers in the typical case.
+            // The copy allows psi to stay in registers in the typical case.
             let psi = *psi;
             return self.update_by_rule(&psi, eps, variance);
         }
         let mut growth = 1.0;
-        // At 1 nothing is forgotten.
+        // With a growth of 1 nothing is forgotten.
         if self.uniform_growth != 1.0 {
             if self.uniform_growth > 0.0 {
                 growth = self.uniform_growth;
@@ -286,12 +289,12 @@ impl<const N: usize> Adaptation<N> for Covariance<N> {
     }
 }
 
-/// Samples between two turns of the guard, for the shortest memory and the number of parameters.
+/// Number of samples between two pseudo-measurements, for the shortest memory and the number of parameters.
 fn guard_period(shortest: f64, parameters: usize) -> u32 {
     (shortest / (ROUNDS_PER_MEMORY * parameters as f64)).clamp(1.0, LONGEST_PERIOD) as u32
 }
 
-/// The step `g eps`.
+/// Returns the step `g eps`.
 #[inline(always)]
 fn scaled<const N: usize>(gain: [f64; N], eps: f64) -> ParameterStep<N> {
     ParameterStep {

@@ -1,7 +1,7 @@
-//! A delay line: `y(t) = x(t - n)`, zero before the first sample.
+//! Delay line: `y(t) = x(t - n)`, zero before the first sample.
 
-/// A delay of n samples, with n the length of its memory: a slice, an array or a vector. An empty
-/// memory passes its input through.
+/// Delay of n samples, where n is the length of the memory: a slice, an array or a vector. With an empty memory the
+/// output equals the input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DelayLine<M> {
     memory: M,
@@ -17,13 +17,13 @@ impl<M: AsMut<[f64]>> crate::state::State for DelayLine<M> {
 }
 
 impl<M: AsMut<[f64]>> DelayLine<M> {
-    /// Builds the delay line at rest: the memory is filled with zeros.
+    /// Builds the delay line at rest and fills its memory with zeros.
     pub fn new(mut memory: M) -> Self {
         memory.as_mut().fill(0.0);
         Self { memory, oldest: 0 }
     }
 
-    /// Takes `x(t)` and returns `x(t - n)`, with `n` the length of the memory.
+    /// Takes `x(t)` and returns `x(t - n)`, where `n` is the length of the memory.
     #[inline]
     pub fn step(&mut self, x: f64) -> f64 {
         let memory = self.memory.as_mut();

@@ -1,26 +1,25 @@
-//! Divided differences of the exponential at two poles, from which every second-order hold follows.
+//! Divided differences of the exponential at two poles, from which the hold of every second-order system follows.
 //!
-//! Poles `z1, z2` times the time enter by their sum `s = z1 + z2` and product `q = z1 z2`. With the
+//! Two poles multiplied by the time, `z1, z2`, enter through their sum `s = z1 + z2` and product `q = z1 z2`. With the
 //! complete symmetric polynomials `h_k = s h_{k-1} - q h_{k-2}`, `h_0 = 1`,
 //!
 //! `Phi_j = sum over k of h_k/(k+j)!`: `Phi_1 = exp[z1, z2]`, `Phi_2 = exp[0, z1, z2]`, and
 //! `Phi_j = 1/j! + s Phi_{j+1} - q Phi_{j+2}`.
 //!
-//! All are entire in (s, q): complex, real and double poles, and poles at the origin, are cases of the same functions,
-//! evaluated in different ways to avoid cancellation:
+//! All Phi_j are entire functions of (s, q): complex, real and double poles, and poles at the origin, are cases of the
+//! same functions. To avoid cancellation they are evaluated in different ways:
 //!
 //! - small poles: backward recursion for the Phi_j from `Phi_j = 1/j!` (Clenshaw's summation), and the corresponding
-//!   recursion for the slopes `D_j = dPhi_j/ds`, `D_j = Phi_{j+1} + s D_{j+1} - q D_{j+2}`. No division, and no
+//!   recursion for the slopes `D_j = dPhi_j/ds`, `D_j = Phi_{j+1} + s D_{j+1} - q D_{j+2}`, with no division and no
 //!   elementary function;
-//! - other poles: with `h = s/2`, `x = h^2 - q`, `E = e^h`, `C = cosh sqrt x`,
-//!   `S = sinh sqrt x/sqrt x`, `G = dS/dx = (C - S)/(2x)`, `Phi_1 = E S`,
-//!   `q Phi_2 = 1 - E C + h E S`, `D_2 = E G`; for real poles that are far apart by the differences
-//!   themselves.
+//! - other poles: with `h = s/2`, `x = h^2 - q`, `E = e^h`, `C = cosh sqrt x`, `S = sinh sqrt x/sqrt x`,
+//!   `G = dS/dx = (C - S)/(2x)`, the formulas `Phi_1 = E S`, `q Phi_2 = 1 - E C + h E S`, `D_2 = E G`; real poles that
+//!   are far apart use the divided differences directly.
 //!
 //! Sources: N. J. Higham, *Functions of Matrices*, 2008, sections 2.4 and B.16; C. W. Clenshaw,
 //! *Mathematical Tables and Other Aids to Computation* 9, 1955, 118-120.
 
-/// Divided differences of the exponential at one pair of poles; all NaN if the pair is not finite.
+/// Divided differences of the exponential at a pair of poles; all are NaN if the pair is not finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DividedDifferences {
     /// `s = z1 + z2`.
@@ -37,14 +36,14 @@ pub struct DividedDifferences {
     pub phi2_slope: f64,
 }
 
-/// `1/n!`.
+/// Reciprocal factorials `1/n!`.
 const RECIPROCALS: [f64; 24] = reciprocal_factorials();
 
 const fn reciprocal_factorials() -> [f64; 24] {
     let mut all = [1.0; 24];
     let (mut n, mut factorial) = (1, 1.0);
     while n < all.len() {
-        // Exact up to 22!.
+        // The factorial is exact up to 22!.
         factorial *= n as f64;
         all[n] = 1.0 / factorial;
         n += 1;
@@ -53,13 +52,13 @@ const fn reciprocal_factorials() -> [f64; 24] {
 }
 
 impl DividedDifferences {
-    /// Evaluates them at the poles with this sum and product.
+    /// Evaluates the divided differences at the poles with this sum and product.
     pub fn at(sum: f64, product: f64) -> Self {
         let half = sum / 2.0;
         let x = half * half - product;
-        // At least |z|^2 of both poles: |h| + sqrt x squared is at most twice the sum of squares.
+        // Upper bound on |z|^2 of both poles: (|h| + sqrt x)^2 is at most 2 (h^2 + x).
         let size = if x < 0.0 { product } else { 2.0 * (half * half + x) };
-        // The first term left out, |z|^N/N! of the whole, is below 3e-17.
+        // The relative size |z|^N/N! of the first omitted term is below 3e-17.
         if size <= 1.0 / 64.0 {
             Self::by_series::<11>(sum, product)
         } else if size <= 0.25 {
@@ -83,8 +82,8 @@ impl DividedDifferences {
 
     /// `chi = exp[0, z1] exp[0, z2] = (1 - e^z1)(1 - e^z2)/q`.
     ///
-    /// The determinant of `I - e^A` of the companion matrix A over q: for stable poles a sum of
-    /// positive terms.
+    /// chi is the determinant of `I - e^A` divided by q, where A is the companion matrix. For stable poles it is a sum
+    /// of positive terms.
     pub fn chi(&self) -> f64 {
         self.phi1 * (self.phi1 - self.sum * self.phi2) + self.product * self.phi2 * self.phi2
     }
@@ -94,7 +93,7 @@ impl DividedDifferences {
         self.phi1 * self.phi1 - self.phi0() * self.phi2
     }
 
-    /// Clenshaw's summation from `Phi_{N+1}` down.
+    /// Evaluates the series by Clenshaw's summation, downwards from `Phi_{N+1}`.
     #[inline]
     fn by_series<const N: usize>(s: f64, q: f64) -> Self {
         let (mut phi, mut phi_above) = (RECIPROCALS[N + 1], RECIPROCALS[N + 2]);
@@ -144,7 +143,7 @@ impl DividedDifferences {
     }
 }
 
-/// `[E C, Phi_1, D_2, Phi_2]` of complex poles, `x = h^2 - q < 0`.
+/// Returns `[E C, Phi_1, D_2, Phi_2]` for complex poles, `x = h^2 - q < 0`.
 fn complex_poles(h: f64, q: f64, x: f64) -> [f64; 4] {
     let r = libm::sqrt(-x);
     let e = libm::exp(h);
@@ -156,15 +155,15 @@ fn complex_poles(h: f64, q: f64, x: f64) -> [f64; 4] {
         let phi1 = e * sin / r;
         (phi1, (mean - phi1) / (2.0 * x))
     };
-    // Here q > 2.
+    // In this branch q > 2.
     [mean, phi1, phi2_slope, (1.0 - mean + h * phi1) / q]
 }
 
-/// The same of real poles, `x >= 0`.
+/// Returns `[E C, Phi_1, D_2, Phi_2]` for real poles, `x = h^2 - q >= 0`.
 fn real_poles(h: f64, q: f64, x: f64) -> [f64; 4] {
     let r = libm::sqrt(x);
     let far = h + libm::copysign(r, h);
-    // From the product: the difference of h and r would cancel.
+    // The nearer pole follows from the product, since the difference of h and r would cancel.
     let near = q / far;
     let (near_exp, near_expm1) = exp_and_expm1(near);
     let (far_exp, far_expm1) = exp_and_expm1(far);
@@ -175,7 +174,7 @@ fn real_poles(h: f64, q: f64, x: f64) -> [f64; 4] {
         let phi1 = (far_exp - near_exp) / (far - near);
         (phi1, (mean - phi1) / (2.0 * x))
     };
-    // Poles further apart than this by differences; there q may be zero, else it is above 0.5.
+    // For poles farther apart than this, differences are used, because q may be zero; for closer poles q is above 0.5.
     let phi2 = if r > 0.25 {
         let near_ratio = if near == 0.0 { 1.0 } else { near_expm1 / near };
         (far_expm1 / far - near_ratio) / (far - near)
@@ -185,7 +184,7 @@ fn real_poles(h: f64, q: f64, x: f64) -> [f64; 4] {
     [mean, phi1, phi2_slope, phi2]
 }
 
-/// `E S` and `E G` for `|x| < 1`, by `S = sum x^k/(2k+1)!`, `G = sum (k+1) x^k/(2k+3)!`.
+/// Returns `E S` and `E G` for `|x| < 1`, from `S = sum x^k/(2k+1)!`, `G = sum (k+1) x^k/(2k+3)!`.
 fn near_double(e: f64, x: f64) -> (f64, f64) {
     let (mut s, mut g) = (0.0, 0.0);
     for k in (0..10).rev() {
@@ -195,7 +194,7 @@ fn near_double(e: f64, x: f64) -> (f64, f64) {
     (e * s, e * g)
 }
 
-/// `e^z` and `e^z - 1`, both to full relative precision.
+/// Returns `e^z` and `e^z - 1`, both with full relative precision.
 fn exp_and_expm1(z: f64) -> (f64, f64) {
     if z.abs() < 0.5 {
         let m = libm::expm1(z);

@@ -1,35 +1,35 @@
-//! The covariance of a recursive estimate, for any gain.
+//! Covariance of a recursive estimate, for any gain.
 //!
-//! Let `theta~ = theta - theta^` be the error of the estimate of a constant theta. To first order
-//! the a-priori innovation is `eps^ = eps + h' X`, where X holds theta~ and the errors that past
-//! estimates have left in the filters of the predictor,
+//! Let `theta~ = theta - theta^` be the error of the estimate of a constant theta. To first order the a-priori
+//! innovation is `eps^ = eps + h' X`, where X contains theta~ and the errors that past estimates have left in the
+//! filters of the predictor,
 //!
 //! - `dw = w - w^ = b~' x - f~' w^ - (F^ - 1) dw`,
 //! - `dv = v^ - v = dw - a~' u`,
 //! - `de = eps^ - eps = D^ dv - d~' v^ + c~' eps^ - (C^ - 1) de`,
 //!
-//! (signals with a `~` are past ones, x includes the present one; all follow from eq.
-//! 5.4 by subtraction). So `h` is the pseudo-linear regressor for theta~, `D^ - F^` for the past
-//! dw, `-(C^ - 1)` for the past de; and with the step `theta^ <- theta^ + g eps^`
+//! (signals with a `~` are past signals, x includes the present sample; all three equations follow from eq. 5.4 by
+//! subtraction). The vector `h` therefore contains the pseudo-linear regressor for theta~, `D^ - F^` for the past dw,
+//! and `-(C^ - 1)` for the past de. With the step `theta^ <- theta^ + g eps^`
 //!
 //! `theta~ <- theta~ - g (eps + h' X)`,  `Sigma <- (I - g h') Sigma (I - g h')' + g g'`
 //!
 //! (the Joseph form, in units of sigma^2), after which the new dw, dv and de are stored in X. With `z = Sigma h` and
-//! `k = z - (1 + h' z)/2 g` the update is `Sigma - g k' - k g'`, and for the row a of a new error, which differs from h
-//! in few elements, `Sigma a = z - Sigma (h - a)`: two thirds of the products are shared. No assumption is made about
-//! g: the error bars are valid for a scalar factor, where they tend to `P/(1 + lambda)` for ARX (L. Ljung and T.
-//! Söderström, *Theory and Practice of Recursive Identification*, 1983, eq. 4.136), for a forgetting matrix, a
-//! shortened step, or a gradient. Without forgetting `Sigma` becomes P. The default `h = psi` gives the same result if
-//! the estimate hardly changes within the memory of the filters. If the memory of the estimate is not much longer than
-//! that of 1/F, the variances of this default are up to a third too small, but a step costs half as much. It is
-//! selected by K = 0 (no errors of filters).
+//! `k = z - (1 + h' z)/2 g` the update is `Sigma - g k' - k g'`. The row a of a new error differs from h in few
+//! elements, so `Sigma a = z - Sigma (h - a)`, which shares two thirds of the products. No assumption is made about g.
+//! The error bars are valid for a scalar forgetting factor, for which they tend to `P/(1 + lambda)` in the ARX case (L.
+//! Ljung and T. Söderström, *Theory and Practice of Recursive Identification*, 1983, eq. 4.136), for a forgetting
+//! matrix, a shortened step, or a gradient step. Without forgetting, `Sigma` becomes P. The default `h = psi` gives the
+//! same result if the estimate hardly changes within the memory of the filters. If the memory of the estimate is not
+//! much longer than that of 1/F, the variances of this default are up to a third too small, but a step costs half as
+//! much. The default corresponds to K = 0, where no filter errors are stored.
 //!
-//! **Outliers.** An innovation beyond a few sigma moves the estimate as if it were at that limit (P. J. Huber, *Robust
-//! Statistics*, 1981, section 7.3; the gain in the equations above is then the smaller one that was used). The
-//! innovation variance uses the unclipped innovation, so that a lasting change of the noise is followed.
+//! **Outliers.** An innovation larger than a few sigma changes the estimate as if it were at that limit (P. J. Huber,
+//! *Robust Statistics*, 1981, section 7.3); the gain in the equations above is then the reduced gain that was applied.
+//! The innovation variance uses the unclipped innovation, so that it follows a lasting change of the noise.
 //!
-//! The innovation variance sigma^2 is the mean of `eps^2/(1 + h' Sigma h)`, each term of which has
-//! the expectation sigma^2.
+//! The innovation variance sigma^2 is the mean of `eps^2/(1 + h' Sigma h)`, whose terms each have the expected value
+//! sigma^2.
 
 use crate::{
     innovation_variance::InnovationVariance,
@@ -37,22 +37,22 @@ use crate::{
     state::State,
 };
 
-/// Largest variance of a parameter relative to that at the start; a parameter with this variance is unknown.
+/// Largest variance of a parameter, relative to its initial variance; a parameter with this variance counts as unknown.
 pub const LARGEST_GROWTH: f64 = 1e6;
 /// Number of samples between two checks of the variances.
 const CHECK_PERIOD: u32 = 64;
 
-/// Sigma over sigma^2, and sigma^2. N is the capacity for parameters, K that for the errors of the
-/// filters ([`ErrorLayout::filter_errors`]).
+/// Covariance Sigma divided by sigma^2, and sigma^2 itself. N is the capacity for parameters, K the capacity for the
+/// errors of the filters ([`ErrorLayout::filter_errors`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorBars<const N: usize, const K: usize> {
     /// Covariance of theta.
     theta: [[f64; N]; N],
-    /// Covariance of each error of a filter with theta.
+    /// Covariance of each filter error with theta.
     cross: [[f64; N]; K],
-    /// Covariance of the errors of the filters.
+    /// Covariance of the filter errors.
     filters: [[f64; K]; K],
-    /// Variances of theta at the start.
+    /// Initial variances of theta.
     initial_variances: [f64; N],
     innovation_variance: InnovationVariance,
     /// Multiple of sigma at which innovations are clipped.
@@ -65,23 +65,23 @@ crate::state!([const N: usize, const K: usize] ErrorBars<N, K> {
     theta, cross, filters, initial_variances, innovation_variance, limit, until_check,
 }, bounded);
 
-/// Propagates the error of an estimate through its recursion: [`ErrorBars`], or [`NoErrorBars`] if error bars are not
-/// needed.
+/// Propagation of the error of an estimate through its recursion: [`ErrorBars`], or [`NoErrorBars`] if error bars are
+/// not needed.
 pub trait ErrorPropagation<const N: usize, const K: usize>: State {
     /// Returns the innovation, clipped at the limit for outliers.
     fn clip(&self, eps: f64) -> f64;
-    /// Updates the covariance by a step of the estimate: its gain, its innovation, and the errors that it leaves in
-    /// the filters.
+    /// Updates the covariance for a step of the estimate, given its gain and innovation, and adds the errors that the
+    /// step leaves in the filters.
     fn update(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>, gain: &[f64; N], eps: f64);
     /// Adds the errors that a sample leaves in the filters if the estimate stays constant.
     fn propagate(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>);
-    /// Adds the variance by which parameter i drifts in a sample, up to `bound`.
+    /// Adds the variance by which parameter i drifts per sample, unless its variance has reached `bound`.
     fn add_drift(&mut self, i: usize, variance: f64, bound: f64);
-    /// Returns the innovation variance sigma^2; `None` if it is not estimated.
+    /// Returns the innovation variance sigma^2, or `None` if it is not estimated.
     fn variance(&self) -> Option<f64>;
 }
 
-/// No error bars, no innovation variance and no limit on outliers: only the estimate is computed, without further
+/// No error bars, no innovation variance and no limit on outliers: only the estimate is computed, at no additional
 /// cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct NoErrorBars;
@@ -116,8 +116,9 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         self.until_check = self.until_check.clamp(1, CHECK_PERIOD);
     }
 
-    /// Starts from the covariance of theta over the innovation variance, with correct past signals in the filters.
-    /// Innovations move the estimate as if they were no larger than `limit` times sigma; infinite for no limit.
+    /// Builds the error bars from the covariance of theta divided by the innovation variance; the filters are assumed
+    /// to contain correct past signals. Innovations larger than `limit` times sigma change the estimate as if they were
+    /// at this limit; infinity means no limit.
     pub fn new(start: &[[f64; N]; N], innovation_variance: InnovationVariance, limit: f64) -> Self {
         Self {
             theta: *start,
@@ -130,7 +131,7 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         }
     }
 
-    /// `Sigma a`.
+    /// Returns `Sigma a`.
     #[inline(always)]
     fn times(&self, count: usize, a: &LinearForm<N, K>) -> ([f64; N], [f64; K]) {
         let (mut theta, mut filters) = ([0.0; N], [0.0; K]);
@@ -155,7 +156,7 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         (theta, filters)
     }
 
-    /// Inserts the new dw, dv and de before those of their kind, from `Sigma h`.
+    /// Inserts the new dw, dv and de in front of the past errors of the same kind, given `Sigma h`.
     #[inline(always)]
     fn insert(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>, z: [f64; N], z_filters: [f64; K]) {
         let (with_theta, with_filters) = self.covariances_of_new(layout, rows, z, z_filters);
@@ -184,8 +185,8 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         }
     }
 
-    /// `Sigma a` for the rows a of the new dw, dv and de, from `Sigma h`: with theta, and with the past errors of the
-    /// filters.
+    /// Returns `Sigma a` for the rows a of the new dw, dv and de, computed from `Sigma h`: their covariances with theta
+    /// and with the past filter errors.
     #[inline(always)]
     fn covariances_of_new(
         &self,
@@ -203,7 +204,7 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
             if kinds[kind].1 == 0 {
                 continue;
             }
-            // h and the row differ in A (for dw), in C and D, and in the filters.
+            // h and the row differ in the elements of A (for dw), of C and D, and of the filter errors.
             let of_a = if kind == 0 { layout.na } else { 0 };
             let (first, noise) = layout.noise;
             for j in (0..of_a).chain(first..first + noise) {
@@ -257,7 +258,7 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         among
     }
 
-    /// Shifts the past errors by one sample; the oldest of each kind is dropped.
+    /// Shifts the past errors by one sample and drops the oldest error of each kind.
     #[inline(always)]
     fn shift(&mut self, layout: &ErrorLayout) {
         let kinds = [layout.w, layout.v, layout.e];
@@ -276,8 +277,9 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         }
     }
 
-    /// Limits the variances to [`LARGEST_GROWTH`] times those at the start. The first-order equations can be unstable
-    /// for large gains where the recursion is stable. After an overflow all variances restart from there.
+    /// Limits the variances to [`LARGEST_GROWTH`] times their initial values, since the first-order equations can be
+    /// unstable for large gains for which the recursion itself is stable. After an overflow all variances are set to
+    /// this limit.
     #[cold]
     fn bound_variances(&mut self) {
         if !self.is_valid() {
@@ -303,7 +305,7 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         }
     }
 
-    /// Returns the covariance of theta over sigma^2.
+    /// Returns the covariance of theta divided by sigma^2.
     pub fn normalised_covariance(&self) -> [[f64; N]; N] {
         self.theta
     }
@@ -349,7 +351,7 @@ impl<const N: usize, const K: usize> ErrorPropagation<N, K> for ErrorBars<N, K> 
         for i in 0..N {
             k[i] -= half * gain[i];
         }
-        // Exactly symmetric: the two products are exchanged with i and j.
+        // The result is exactly symmetric: exchanging i and j exchanges the two products.
         for i in 0..N {
             for j in 0..N {
                 self.theta[i][j] -= gain[i] * k[j] + k[i] * gain[j];
@@ -361,7 +363,7 @@ impl<const N: usize, const K: usize> ErrorPropagation<N, K> for ErrorBars<N, K> 
             }
         }
         if count > 0 {
-            // Sigma h after the update: z - g (k' h) - k (g' h).
+            // Sigma h after the update is z - g (k' h) - k (g' h).
             let (mut k_h, mut g_h) = (0.0, 0.0);
             for i in 0..N {
                 k_h += k[i] * rows.e.theta[i];

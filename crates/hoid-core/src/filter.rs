@@ -1,13 +1,12 @@
 //! Rational filters over slices.
 //!
-//! A monic polynomial `D(q^-1) = 1 + d_1 q^-1 + ... + d_n q^-n` is given by its coefficients
-//! `[d_1, ..., d_n]`; the leading one is never stored. All filters start at rest (zeros before the
-//! first sample).
+//! A monic polynomial `D(q^-1) = 1 + d_1 q^-1 + ... + d_n q^-n` is given by its coefficients `[d_1, ..., d_n]`; the
+//! leading 1 is never stored. All filters start at rest (zeros before the first sample).
 
 /// Applies an all-pole filter: `y = x / D(q^-1)`.
 ///
 /// # Panics
-/// If `x` and `y` differ in length.
+/// If `x` and `y` have different lengths.
 pub fn divide(d: &[f64], x: &[f64], y: &mut [f64]) {
     assert_eq!(x.len(), y.len(), "input and output of a filter have the same length");
     if let [d1, d2] = *d {
@@ -23,8 +22,8 @@ pub fn divide_in_place(d: &[f64], x: &mut [f64]) {
     divide_from(d, x, 0);
 }
 
-/// As [`divide_in_place`], from index `from` on; the values before that index are the past output of the filter,
-/// preceded by zeros.
+/// As [`divide_in_place`], starting at index `from`. The values before that index are past outputs of the filter;
+/// outputs before the slice are zero.
 pub fn divide_from(d: &[f64], x: &mut [f64], from: usize) {
     let before = |lag: usize, x: &[f64]| from.checked_sub(lag).map_or(0.0, |t| x[t]);
     match *d {
@@ -53,7 +52,7 @@ pub fn divide_from(d: &[f64], x: &mut [f64], from: usize) {
     }
 }
 
-/// The same for a short D, with the past output in registers.
+/// As [`divide_from`] for a low order, with the past output in registers.
 fn divide_in_registers<const N: usize>(d: [f64; N], x: &mut [f64], from: usize) {
     let mut past: [f64; N] = core::array::from_fn(|i| from.checked_sub(i + 1).map_or(0.0, |t| x[t]));
     for value in &mut x[from..] {
@@ -69,16 +68,16 @@ fn divide_in_registers<const N: usize>(d: [f64; N], x: &mut [f64], from: usize) 
     }
 }
 
-/// `y = x / (1 + d_1 q^-1 + d_2 q^-2)` from rest, four samples at a time.
+/// Second-order all-pole filter `y = x / (1 + d_1 q^-1 + d_2 q^-2)` from rest, four samples at a time.
 ///
-/// If the filter is computed sample by sample, each value waits for the one before it. Written out for four samples
-/// with the impulse response h, `y(t+k) = sum_{i<=k} h_i x(t+k-i) + h_{k+1} y(t-1) - d_2 h_k y(t-2)`, all four wait
-/// only for y(t-1) and y(t-2), and only for a product and two sums.
+/// Computed sample by sample, each output would wait for the previous output. With the impulse response h, four outputs
+/// can be written as `y(t+k) = sum_{i<=k} h_i x(t+k-i) + h_{k+1} y(t-1) - d_2 h_k y(t-2)`, k = 0 to 3. All four then
+/// wait only for y(t-1) and y(t-2), and only for one product and two sums.
 #[derive(Debug, Clone, Copy)]
 pub struct SecondOrder {
-    /// h_1 to h_4; h_0 is one.
+    /// Impulse response h_1 to h_4; h_0 is one.
     h: [f64; 4],
-    /// -d_2 h_0 to -d_2 h_3.
+    /// Products -d_2 h_0 to -d_2 h_3.
     g: [f64; 4],
     y1: f64,
     y2: f64,
@@ -103,7 +102,7 @@ impl SecondOrder {
     #[inline(always)]
     pub fn four(&mut self, [x0, x1, x2, x3]: [f64; 4]) -> [f64; 4] {
         let Self { h, g, y1, y2 } = *self;
-        // The terms of the inputs first: only the last two sums wait for the block before.
+        // The input terms come first, so that only the last two sums wait for the previous block.
         let y = [
             (x0 + g[0] * y2) + h[0] * y1,
             ((x1 + h[0] * x0) + g[1] * y2) + h[1] * y1,
@@ -148,7 +147,7 @@ fn divide_by_second_order_in_place(mut filter: SecondOrder, x: &mut [f64]) {
 /// Applies a monic FIR filter: `y = D(q^-1) x`, that is `y(t) = x(t) + d_1 x(t-1) + ... + d_n x(t-n)`.
 ///
 /// # Panics
-/// If `x` and `y` differ in length.
+/// If `x` and `y` have different lengths.
 pub fn multiply(d: &[f64], x: &[f64], y: &mut [f64]) {
     assert_eq!(x.len(), y.len(), "input and output of a filter have the same length");
     y.copy_from_slice(x);
@@ -163,10 +162,10 @@ pub fn multiply(d: &[f64], x: &[f64], y: &mut [f64]) {
     }
 }
 
-/// Applies an FIR filter with all its coefficients: `y = B(q^-1) q^-nk x`, `b = [b_0, ..., b_{nb-1}]`.
+/// Applies a general FIR filter: `y = B(q^-1) q^-nk x`, `b = [b_0, ..., b_{nb-1}]`.
 ///
 /// # Panics
-/// If `x` and `y` differ in length.
+/// If `x` and `y` have different lengths.
 pub fn fir(b: &[f64], nk: usize, x: &[f64], y: &mut [f64]) {
     assert_eq!(x.len(), y.len(), "input and output of a filter have the same length");
     y.fill(0.0);

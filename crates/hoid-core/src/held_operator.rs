@@ -1,43 +1,40 @@
-//! Exact zero-order hold of the human operator with any delay, and its Jacobian.
+//! Exact zero-order hold of the human operator with an arbitrary delay, and its Jacobian.
 //!
-//! `H(s) = (K_e + K_e_dot s) omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}` with
-//! `tau = l Ts + delta`, `0 <= delta <= Ts`. An error that is held over each sample reaches the
-//! states in two parts,
+//! The operator is `H(s) = (K_e + K_e_dot s) omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}` with
+//! `tau = l Ts + delta`, `0 <= delta <= Ts`. An error that is held over each sample reaches the states in two parts,
 //!
 //! `x_{k+1} = Phi(Ts) x_k + Phi(Ts - delta) Gamma(delta) e_{k-l-1} + Gamma(Ts - delta) e_{k-l}`,
 //!
-//! so that the discrete model is `q^-nk (b0 + b1 q^-1 + b2 q^-2)/(1 + f1 q^-1 + f2 q^-2)` with
-//! `nk = l + 1` (K. J. Åström and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 2.3;
-//! E. I. Jury, *Theory and Application of the z-Transform Method*, 1964: the modified z-transform).
-//! With the step response `K_e A(t) + K_e_dot R(t)` of the operator without its delay, continued
-//! analytically to negative t, where it obeys the same difference equation,
+//! so that the discrete model is `q^-nk (b0 + b1 q^-1 + b2 q^-2)/(1 + f1 q^-1 + f2 q^-2)` with `nk = l + 1` (K. J.
+//! Åström and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 2.3; E. I. Jury, *Theory and Application of
+//! the z-Transform Method*, 1964: the modified z-transform). Let `K_e A(t) + K_e_dot R(t)` be the step response of the
+//! operator without its delay, continued analytically to negative t, where it obeys the same difference equation. Then
 //!
 //! - `b0 = K_e A(Ts - delta) + K_e_dot R(Ts - delta)`,
 //!   `b2 = f2 (K_e A(-delta) + K_e_dot R(-delta))`;
 //! - `b0 + b1 + b2 = K_e (1 + f1 + f2)`, the gain at zero frequency.
 //!
-//! In the [`DividedDifferences`] at the poles times t, `s = -2 zeta omega t` and `q = omega^2 t^2`:
+//! In terms of the [`DividedDifferences`] at the poles times t, with `s = -2 zeta omega t` and `q = omega^2 t^2`:
 //!
 //! - `A = q Phi_2`, `R = omega^2 t Phi_1`; at Ts, `f1 = -2 E C`, `f2 = e^s`, `1 + f1 + f2 = q chi`;
-//! - A and `R/omega` are functions of (omega t, zeta), so that `dA/dt = R` and
-//!   `dR/dt = omega^2 Phi_0` give the derivatives with respect to omega: `omega t^2 Phi_1` and
-//!   `omega t (Phi_0 + Phi_1)`; those with respect to zeta follow by the chain rule through s: `dA/ds = q D_2`,
-//!   `dR/ds = omega^2 t D_1`;
-//! - `df1/domega = 2 Ts (omega Ts Phi_1 + zeta Phi_0)`, `df1/dzeta = 2 omega Ts Phi_0`, and for the
-//!   sum `Phi_0 - f2 = -q dchi/ds`.
+//! - A and `R/omega` are functions of (omega t, zeta), so `dA/dt = R` and `dR/dt = omega^2 Phi_0` give their
+//!   derivatives with respect to omega: `omega t^2 Phi_1` for A and `omega t (Phi_0 + Phi_1)` for R. The derivatives
+//!   with respect to zeta follow by the chain rule through s: `dA/ds = q D_2`, `dR/ds = omega^2 t D_1`;
+//! - `df1/domega = 2 Ts (omega Ts Phi_1 + zeta Phi_0)`, `df1/dzeta = 2 omega Ts Phi_0`. The derivatives of `1 + f1 +
+//!   f2` have `Phi_0 - f2 = -q dchi/ds` in place of `Phi_0`.
 //!
-//! Nothing cancels if omega Ts is small. delta = 0 gives b2 = 0 and the hold of eq. 11. The response is continuous in
+//! No terms cancel if omega Ts is small. delta = 0 gives b2 = 0 and the hold of eq. 11. The response is continuous in
 //! tau and has a kink where tau is a whole number of samples, because the step response starts with the slope
-//! `omega^2 K_e_dot`: derivatives with respect to tau at delta = 0 and delta = Ts are one-sided, from inside the
-//! sample.
+//! `omega^2 K_e_dot`. At delta = 0 and delta = Ts the derivatives with respect to tau are therefore one-sided, from
+//! within the sample.
 //!
-//! Nothing is checked here: parameters that are not finite, or poles so fast that an exponential overflows, give
-//! coefficients that are not finite.
+//! The parameters are not checked here. If a parameter is not finite, or if the poles are so fast that an exponential
+//! overflows, the coefficients are not finite.
 
 use crate::divided_differences::DividedDifferences;
 
-/// Returns `[b0, b1, f1, f2]` of `[K_e, K_e_dot, omega_nm, zeta_nm]` (deg/deg, s, rad/s, 1) for a delay of whole
-/// samples, and their Jacobian (rows: coefficients, columns: parameters). Ts in s.
+/// Returns `[b0, b1, f1, f2]` for the parameters `[K_e, K_e_dot, omega_nm, zeta_nm]` (deg/deg, s, rad/s, 1) and a delay
+/// of whole samples, with the Jacobian (rows: coefficients, columns: parameters). Ts is in s.
 pub fn held_operator(parameters: [f64; 4], ts: f64) -> ([f64; 4], [[f64; 4]; 4]) {
     let [k_e, k_e_dot, omega, zeta] = parameters;
     let at_ts = DividedDifferences::at(-2.0 * zeta * omega * ts, omega * omega * ts * ts);
@@ -61,8 +58,8 @@ pub fn held_operator(parameters: [f64; 4], ts: f64) -> ([f64; 4], [[f64; 4]; 4])
     )
 }
 
-/// Returns `[b0, b1, b2, f1, f2]` for a delay of whole samples and delta, `0 <= delta <= Ts`, and their Jacobian with
-/// respect to `[K_e, K_e_dot, omega_nm, zeta_nm, tau]`, for constant whole samples. delta and Ts in s.
+/// Returns `[b0, b1, b2, f1, f2]` for a delay of whole samples plus delta, `0 <= delta <= Ts`, with the Jacobian with
+/// respect to `[K_e, K_e_dot, omega_nm, zeta_nm, tau]` for a fixed number of whole samples. delta and Ts are in s.
 pub fn held_operator_delayed(parameters: [f64; 4], delta: f64, ts: f64) -> ([f64; 5], [[f64; 5]; 5]) {
     let [k_e, k_e_dot, omega, zeta] = parameters;
     let at = |t: f64| DividedDifferences::at(-2.0 * zeta * omega * t, omega * omega * t * t);
@@ -90,7 +87,7 @@ pub fn held_operator_delayed(parameters: [f64; 4], delta: f64, ts: f64) -> ([f64
     )
 }
 
-/// f1, f2 and `1 + f1 + f2` with their derivatives.
+/// Coefficients f1 and f2 and the sum `1 + f1 + f2`, with their derivatives.
 #[derive(Debug, Clone, Copy)]
 struct Poles {
     f1: f64,
@@ -124,7 +121,7 @@ impl Poles {
     }
 }
 
-/// Contributions of K_e and K_e_dot to the step response at one time, with derivatives; `dA/dt` is
+/// Contributions of K_e and K_e_dot, A and R, to the step response at one time, with their derivatives; `dA/dt` equals
 /// R.
 #[derive(Debug, Clone, Copy)]
 struct Gains {
@@ -158,8 +155,8 @@ impl Gains {
         k_e * self.step + k_e_dot * self.rate
     }
 
-    /// Derivatives of the step response with respect to K_e, K_e_dot, omega, zeta and tau; t decreases as tau
-    /// increases.
+    /// Derivatives of the step response with respect to K_e, K_e_dot, omega, zeta and tau. The derivative with respect
+    /// to tau has the opposite sign of that with respect to t.
     fn row(&self, k_e: f64, k_e_dot: f64) -> [f64; 5] {
         [
             self.step,

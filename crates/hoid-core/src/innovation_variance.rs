@@ -1,9 +1,9 @@
-//! The variance of the innovations, with an exponential memory.
+//! Variance of the innovations, estimated with an exponential memory.
 //!
-//! `sigma^2 = sum_k lambda^{t-k} s_k/sum_k lambda^{t-k}`. Here s_k is the square of an innovation
-//! over its variance in units of sigma^2, so that the expectation of each s_k is sigma^2.
+//! `sigma^2 = sum_k lambda^{t-k} s_k/sum_k lambda^{t-k}`. Here s_k is the square of an innovation divided by its
+//! variance in units of sigma^2, so that each s_k has the expected value sigma^2.
 
-/// The weighted mean of the s_k; the sum of the weights is the number of residuals from which it is estimated.
+/// Weighted mean of the s_k. The sum of the weights is the number of residuals from which the variance is estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InnovationVariance {
     sum: f64,
@@ -14,8 +14,8 @@ pub struct InnovationVariance {
 crate::state!([] InnovationVariance { sum, residuals, lambda });
 
 impl InnovationVariance {
-    /// Starts from a variance that was estimated from this number of residuals; 0 starts without prior knowledge.
-    /// `lambda` is the factor of forgetting.
+    /// Starts from a variance that was estimated from the given number of residuals; zero residuals mean no prior
+    /// knowledge. `lambda` is the forgetting factor.
     pub fn new(variance: f64, residuals: f64, lambda: f64) -> Self {
         Self {
             sum: variance * residuals,
@@ -24,7 +24,7 @@ impl InnovationVariance {
         }
     }
 
-    /// Updates the variance by s_k, the square of an innovation over its variance in units of sigma^2.
+    /// Updates the variance with s_k, the square of an innovation divided by its variance in units of sigma^2.
     #[inline(always)]
     pub fn update(&mut self, squared: f64) {
         self.sum = self.lambda * self.sum + squared;
@@ -47,14 +47,15 @@ impl InnovationVariance {
         self.residuals
     }
 
-    /// True if an innovation is beyond `limit` standard deviations. While sigma is unknown there is no limit.
+    /// True if an innovation exceeds `limit` standard deviations; false as long as sigma is unknown.
     #[inline(always)]
     pub(crate) fn is_beyond(&self, eps: f64, limit: f64) -> bool {
-        // Without a square root, which few innovations need.
+        // Comparing squares avoids a square root, which is needed for few innovations only.
         self.sum > 0.0 && eps * eps * self.residuals > limit * limit * self.sum
     }
 
-    /// Keeps the variance, but limits the number of residuals: the next ones have more weight.
+    /// Limits the number of residuals that the variance counts as, without changing the variance: the next residuals
+    /// then have more weight.
     pub fn limit_residuals(&mut self, residuals: f64) {
         if self.residuals > residuals && residuals > 0.0 {
             self.sum *= residuals / self.residuals;

@@ -1,28 +1,27 @@
-//! Recursive identification of a human operator in real time: the part that runs once per sample, inside a control loop
-//! or in parallel with it.
+//! Recursive identification of a human operator in real time: the part that runs once per sample, either inside a
+//! control loop or in parallel with it.
 //!
-//! A person controls a machine, with the tracking error e and the control output u. Their dynamics change as they
-//! learn, tire or adapt to the machine. The recursions of this crate estimate a model of them from each new sample,
-//! with the uncertainty of the estimate.
+//! A person controls a machine, with the tracking error e and the control output u. The dynamics of a person change as
+//! the person learns, tires or adapts to the machine. The recursions of this crate update a model of these dynamics,
+//! and its uncertainty, with each new sample.
 //!
-//! **Mathematics.** For the model `A u = (B/F) q^-nk e + (C/D) eps` with the coefficients theta of
-//! its polynomials, the one-step prediction error and its negative gradient are `eps(t)` and
-//! `psi(t) = -d eps/d theta`. Each sample moves the estimate by the recursive prediction-error
-//! method (L. Ljung and T. Söderström, *Theory and Practice of Recursive Identification*, 1983):
+//! **Mathematics.** For the model `A u = (B/F) q^-nk e + (C/D) eps`, with the coefficients of its polynomials in theta,
+//! the one-step prediction error and its negative gradient are `eps(t)` and `psi(t) = -d eps/d theta`. Each sample
+//! updates the estimate by the recursive prediction-error method (L. Ljung and T. Söderström, *Theory and Practice of
+//! Recursive Identification*, 1983):
 //!
-//! - forget: `P <- Lambda P Lambda` with a factor for each parameter, or another rule of
-//!   [`adaptation`];
+//! - forgetting: `P <- Lambda P Lambda` with a factor for each parameter, or another rule of [`adaptation`];
 //! - gain: `g = P psi/(1 + psi' P psi)`;
 //! - update: `theta <- theta + g eps`, `P <- P - g psi' P`.
 //!
-//! P is kept in factors `U D U'`, which rounding cannot make indefinite. A step that would make the predictor unstable
-//! is halved until the predictor stays stable. The error bars follow the error of the estimate through the recursion,
-//! for any gain, in units of the innovation variance sigma^2.
+//! P is stored in factored form, `U D U'`, which rounding cannot make indefinite. A step that would make the predictor
+//! unstable is halved until the predictor stays stable. The error bars propagate the error of the estimate through the
+//! recursion, for any gain, in units of the innovation variance sigma^2.
 //!
-//! **Real time.** `no_std`, no allocation, no dependencies except small systems of equations (`hoid-numerics`) and
-//! elementary functions (`libm`). Every routine works in memory that the caller owns and has a bounded number of
-//! operations. The numbers of a recursion can be saved and restored ([`mod@state`]). The batch estimators and the
-//! simulator of hoid use the same filters, so that a recursion and its batch counterpart cannot differ in them.
+//! **Real time.** The crate is `no_std`, allocates no memory, and depends only on `hoid-numerics` (small systems of
+//! equations) and `libm` (elementary functions). Every routine works in memory that the caller owns and has a bounded
+//! number of operations. The state of a recursion can be saved and restored ([`mod@state`]). The batch estimators and
+//! the simulator of hoid use the same filters, so a recursion and its batch counterpart cannot differ in their filters.
 //!
 //! ```
 //! use hoid_core::{
@@ -66,18 +65,18 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`rls`], [`rpem`] | the recursions: least squares, prediction-error method |
-//! | [`adaptive`] | gains in a basis that people share, a noise model and a level of its own, a test for changes |
-//! | [`bounds`] | a number within its bounds |
+//! | [`rls`], [`rpem`] | recursive least squares and the recursive prediction-error method |
+//! | [`adaptive`] | gains in a basis of physical dynamics, with its own noise model, a level of u, and a test for changes |
+//! | [`bounds`] | limits of a number |
 //! | [`predictor`], [`shape`] | one-step predictor of the general model with its gradient; orders of the model |
-//! | [`adaptation`], [`covariance`], [`window`] | from gradient to step: rules of forgetting; P with a guard against windup; a rectangular window |
-//! | [`ud_covariance`] | the covariance `U D U'` |
-//! | [`error_bars`], [`sensitivities`], [`innovation_variance`] | covariance of the estimate for any gain, errors in the filters, sigma^2 |
-//! | [`recursion`] | outcome of a step, polynomials that are kept stable |
+//! | [`adaptation`], [`covariance`], [`window`] | from gradient to step: rules of forgetting; P with protection against windup; a rectangular window |
+//! | [`ud_covariance`] | covariance matrix in the factored form `U D U'` |
+//! | [`error_bars`], [`sensitivities`], [`innovation_variance`] | covariance of the estimate for any gain; errors in the filters; sigma^2 |
+//! | [`recursion`] | result of a step; polynomials that are kept stable |
 //! | [`guard`] | detection of samples and spans that cannot come from tracking, before they reach a recursion |
-//! | [`held_operator`], [`divided_differences`] | exact zero-order hold of the operator with any delay, and its Jacobian; the functions of which it is composed |
+//! | [`held_operator`], [`divided_differences`] | exact zero-order hold of the operator with an arbitrary delay, and its Jacobian; the functions used for both |
 //! | [`filter`], [`delay`], [`stability`] | rational filters over slices, a delay line, the Schur-Cohn test |
-//! | [`mod@state`] | the numbers that change, to save a recursion and continue elsewhere |
+//! | [`mod@state`] | saving a recursion, to continue it elsewhere |
 #![no_std]
 
 #[cfg(test)]

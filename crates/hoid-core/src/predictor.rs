@@ -1,4 +1,4 @@
-//! The one-step predictor of the general model, sample by sample, and its gradient.
+//! One-step predictor of the general model, sample by sample, and its gradient.
 //!
 //! For `A u = (B/F) q^-nk e + (C/D) eps` (eq. 5.1) with the input `x(t) = e(t - nk)`,
 //!
@@ -14,19 +14,19 @@
 //! | `d_j` | `-(1/C) v(t-j)` |
 //! | `f_j` | `-(D/(C F)) w(t-j)` |
 //!
-//! Each filter uses the coefficients of its time; for a constant theta, eps and psi are those of the batch criterion
-//! started at rest. `D/(C F)` is **one filter in direct form**, `y(t) = x(t) + sum d_j x(t-j) - sum g_j y(t-j)` with
-//! `G = C F`. A cascade, first `1/F` and then `D/C`, is the same filter only for a constant theta: time-varying
-//! filters do not commute. Its inner signal `x/F` depends on the F of earlier estimates until its poles have forgotten
-//! them, and the current D no longer cancels it; near the unit circle psi is then wrong for as long as theta moves
-//! ([`Regressor::Cascade`], for comparison).
+//! Each filter uses the coefficients of the current estimate; for a constant theta, eps and psi are those of the batch
+//! criterion started at rest. `D/(C F)` is **one filter in direct form**,
+//! `y(t) = x(t) + sum d_j x(t-j) - sum g_j y(t-j)` with `G = C F`. A cascade of `1/F` followed by `D/C` is the same
+//! filter only for a constant theta, since time-varying filters do not commute. Its inner signal `x/F` depends on the F
+//! of earlier estimates until the poles of F have forgotten them, and the current D no longer cancels these poles. Near
+//! the unit circle psi is then wrong for as long as theta changes ([`Regressor::Cascade`], for comparison).
 //!
-//! After the estimate has moved, w, v and eps of the sample are computed again with it ([`Predictor::correct`]): the
-//! a-posteriori residuals, with which the recursion converges faster (L. Ljung and T. Söderström, *Theory and Practice
-//! of Recursive Identification*, 1983, section 3.7.3 and eq. 3.151).
+//! After the estimate has been updated, w, v and eps of the sample are computed again with the new estimate
+//! ([`Predictor::correct`]). With these a-posteriori residuals the recursion converges faster (L. Ljung and T.
+//! Söderström, *Theory and Practice of Recursive Identification*, 1983, section 3.7.3 and eq. 3.151).
 //!
-//! The input is kept over L samples, so that B may start at any `offset` within them: a delay can be changed without a
-//! transient. N is the capacity for parameters.
+//! The last L samples of the input are stored, so that B can start at any `offset` within them: a delay can be changed
+//! without a transient. N is the capacity for parameters.
 
 use core::hint::black_box;
 
@@ -37,22 +37,22 @@ use crate::{
     shape::Shape,
 };
 
-/// The signals from which psi is computed.
+/// Signals from which psi is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Regressor {
-    /// The gradient: prediction-error method.
+    /// Gradient of the prediction error, for the prediction-error method.
     #[default]
     Gradient,
-    /// The gradient with `D/(C F)` as a cascade, `1/F` before `D/C`: the same for a constant theta, and slower to
-    /// converge while it moves. For comparison.
+    /// Gradient with `D/(C F)` as a cascade, `1/F` followed by `D/C`, for comparison. It is the same for a constant
+    /// theta, and converges more slowly while theta changes.
     Cascade,
-    /// The signals without their filters: pseudo-linear regression, also called extended least
-    /// squares (Ljung and Söderström, section 3.7.4). Fewer operations; it converges where 1/C (1/F
-    /// ...) is positive real.
+    /// Unfiltered signals: pseudo-linear regression, also called extended least squares (Ljung and Söderström, section
+    /// 3.7.4). It needs fewer operations. Convergence is guaranteed only if `1/C - 1/2` (`1/F - 1/2` for an
+    /// output-error model) is positive real.
     PseudoLinear,
 }
 
-/// State of the filters. Histories hold the newest value first.
+/// State of the filters. The histories contain the newest value first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Predictor<S, const N: usize, const L: usize> {
     shape: S,
@@ -73,7 +73,7 @@ pub struct Predictor<S, const N: usize, const L: usize> {
     filtered_v: [f64; N],
     w_over_f: [f64; N],
     filtered_w: [f64; N],
-    /// The output and `x/F` of the sample that was predicted and not yet corrected.
+    /// Output and `x/F` of the sample that has been predicted but not yet corrected.
     pending: [f64; 2],
 }
 
@@ -82,7 +82,7 @@ crate::state!([S, const N: usize, const L: usize] Predictor<S, N, L> {
 });
 
 impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
-    /// Builds all filters at rest. `None` if the shape exceeds N or L, or has no parameter.
+    /// Builds the predictor with all filters at rest. Returns `None` if the shape exceeds N or L, or has no parameter.
     pub fn new(shape: S, regressor: Regressor) -> Option<Self> {
         let inputs = shape.nb().max(shape.nd() + 1).max(shape.nc() + shape.nf());
         let fits = (1..=N).contains(&shape.parameters()) && (shape.nb() == 0 || inputs <= L);
@@ -106,18 +106,18 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         })
     }
 
-    /// Returns the orders.
+    /// Returns the orders of the model.
     pub fn shape(&self) -> S {
         self.shape
     }
 
-    /// Lets B start `offset` samples before the newest input, within the kept input; B can shift if L is larger than
-    /// N.
+    /// Makes B start `offset` samples before the newest input, limited to the stored inputs. The offset has an effect
+    /// only if L is larger than N.
     pub fn set_offset(&mut self, offset: usize) {
         self.offset = offset.min(L - self.shape.nb().min(L));
     }
 
-    /// Resets all filters; the offset of B is unchanged.
+    /// Resets all filters to rest; the offset of B does not change.
     #[cold]
     #[inline(never)]
     pub fn reset(&mut self) {
@@ -128,19 +128,19 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         }
     }
 
-    /// The start of B. If it cannot shift, this is a constant at compile time.
+    /// Offset of B. If B cannot shift, this is a constant at compile time.
     #[inline(always)]
     fn offset(&self) -> usize {
         if L > N { self.offset } else { 0 }
     }
 
-    /// Returns psi, and the a-priori innovation of the sample `x(t) = e(t - nk)`, `u(t)`.
+    /// Predicts the sample `x(t) = e(t - nk)`, `u(t)`; returns psi and the a-priori innovation.
     #[inline(always)]
     pub fn predict(&mut self, theta: &[f64; N], x: f64, u: f64) -> ([f64; N], f64) {
         let shape = self.shape;
         let [_, _, c, d, f] = shape.split(theta);
         let offset = self.offset();
-        // If B cannot shift, only the inputs of the coefficients of B and D are kept.
+        // If B cannot shift, only the inputs that the coefficients of B and D multiply are stored.
         let (input, output) = if L > N {
             (L, L)
         } else {
@@ -175,7 +175,7 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         (psi, self.residual(theta)[2])
     }
 
-    /// `[w, v, eps]` of the pending sample at theta.
+    /// Returns `[w, v, eps]` of the pending sample at theta.
     #[inline(always)]
     fn residual(&self, theta: &[f64; N]) -> [f64; 3] {
         let [a, b, c, d, f] = self.shape.split(theta);
@@ -184,7 +184,7 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         [w, v, v + dot(d, &self.v) - dot(c, &self.eps)]
     }
 
-    /// Advances the filters by the predicted sample, with the updated estimate. Returns the a-posteriori residual.
+    /// Advances the filters by the predicted sample, with the updated estimate, and returns the a-posteriori residual.
     #[inline(always)]
     pub fn correct(&mut self, theta: &[f64; N]) -> f64 {
         let shape = self.shape;
@@ -236,10 +236,10 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         eps
     }
 
-    /// Replaces the missing output of the pending sample by the one-step prediction.
+    /// Replaces the missing output of the pending sample by its one-step prediction.
     pub fn bridge(&mut self, theta: &[f64; N]) {
         self.pending[0] = 0.0;
-        // eps is the output minus its prediction.
+        // eps is the output minus its prediction, so an output of zero gives minus the prediction.
         self.pending[0] = -self.residual(theta)[2];
     }
 
@@ -279,10 +279,10 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
     }
 }
 
-/// Product of coefficients and a history whose numbers were stored one by one just before.
+/// Product of coefficients and a history whose numbers were stored individually just before.
 ///
-/// Each number is read separately: a wide load of narrow stores from just before would wait until all of them have
-/// reached the memory, so that no two samples could overlap. The compiler tends to generate such loads.
+/// Each number is read separately. A wide load right after several narrow stores would wait until all of them have
+/// reached the memory, so that successive samples could not overlap. The compiler tends to generate such loads.
 #[inline(always)]
 fn dot_of_fresh(coefficients: &[f64], history: &[f64]) -> f64 {
     let mut pairs = coefficients.iter().zip(history);
@@ -296,7 +296,7 @@ fn dot_of_fresh(coefficients: &[f64], history: &[f64]) -> f64 {
     sum
 }
 
-/// The coefficients `g_1 ... g_(nc+nf)` of `G = C F`, C and F with a leading 1.
+/// Returns the coefficients `g_1 ... g_(nc+nf)` of `G = C F`, where C and F have a leading 1.
 #[inline(always)]
 fn product<const N: usize>(c: &[f64], f: &[f64]) -> [f64; N] {
     let mut g = [0.0; N];
@@ -310,7 +310,7 @@ fn product<const N: usize>(c: &[f64], f: &[f64]) -> [f64; N] {
     g
 }
 
-/// Inserts a value before the n newest ones.
+/// Inserts the newest value into a history of n values and drops the oldest value.
 #[inline(always)]
 fn push(history: &mut [f64], n: usize, value: f64) {
     if n > 0 {
@@ -319,8 +319,8 @@ fn push(history: &mut [f64], n: usize, value: f64) {
     }
 }
 
-/// psi, from the histories of x and of u, eps, v and w.
-// One move for each number: a wide copy of what was just pushed would wait as in [`dot_of_fresh`].
+/// Returns psi, assembled from the histories of x, u, eps, v and w.
+// Each number is moved separately, since a wide copy of numbers just stored would wait as in [`dot_of_fresh`].
 #[allow(clippy::manual_memcpy)]
 #[inline(always)]
 fn gather<S: Shape, const N: usize>(shape: &S, x: &[f64], [u, eps, v, w]: [&[f64; N]; 4]) -> [f64; N] {

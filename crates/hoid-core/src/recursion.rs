@@ -1,32 +1,32 @@
-//! Outcome of a step, and steps that are shortened until the predictor is stable.
+//! Result of a step of a recursion, and steps that are shortened until the predictor is stable.
 
 use crate::{shape::Shape, stability::roots_inside};
 
-/// Outcome of a step.
+/// Result of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// A-priori innovation eps.
     pub innovation: f64,
-    /// True if stability or a bound shortened the step of the estimate.
+    /// True if the step of the estimate was shortened by a stability condition or a bound.
     pub shortened: bool,
 }
 
-/// Polynomials whose roots a recursion keeps inside the unit circle. With unstable C and F the predictor and its
+/// Polynomials whose roots a recursion keeps inside the unit circle. If C or F is unstable, the predictor and its
 /// gradient diverge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Stable {
     /// C and F.
     #[default]
     Predictor,
-    /// C, D and F: with a stationary noise model, as in the thesis.
+    /// C, D and F, so that the noise model is stationary, as in the thesis.
     PredictorAndNoise,
 }
 
-/// Largest number of halvings of a step; after them the estimate stays constant.
+/// Maximum number of halvings of a step. If it is reached, the estimate stays constant.
 const HALVINGS: u32 = 12;
 
 impl Stable {
-    /// True if theta is stable.
+    /// True if theta has all roots of these polynomials inside the unit circle.
     #[inline]
     pub fn holds<S: Shape>(self, shape: &S, theta: &[f64]) -> bool {
         let [_, _, c, d, f] = shape.split(theta);
@@ -34,21 +34,21 @@ impl Stable {
     }
 }
 
-/// Returns `part/whole`; 1 if the two are equal, also if both are zero.
+/// Returns `part/whole`, or 1 if both are equal, including two zeros.
 #[inline(always)]
 pub fn ratio(part: f64, whole: f64) -> f64 {
     if part == whole { 1.0 } else { part / whole }
 }
 
-/// True if every number is finite; computed in floating-point registers and without a branch for each number.
+/// True if every number is finite. The test uses floating-point registers and no branch for each number.
 #[inline(always)]
 pub(crate) fn all_finite<const N: usize>(values: &[f64; N]) -> bool {
     // Zero times infinity or NaN is NaN.
     values.iter().fold(0.0, |sum, v| sum + 0.0 * v) == 0.0
 }
 
-/// Returns the largest of the fractions 1, 1/2, 1/4 ... of a step that is allowed, and theta after it; 0 and theta if
-/// none is.
+/// Returns the largest of the fractions 1, 1/2, 1/4 ... of a step that is allowed, and theta after the reduced step.
+/// Returns 0 and the old theta if no fraction is allowed.
 #[inline]
 pub fn backtrack<const N: usize>(
     theta: &[f64; N],
@@ -63,7 +63,7 @@ pub fn backtrack<const N: usize>(
     halved(&theta, &step, allowed)
 }
 
-/// The same for a whole step that is not allowed.
+/// As [`backtrack`], if the full step is not allowed.
 #[cold]
 #[inline(never)]
 fn halved<const N: usize>(theta: &[f64; N], step: &[f64; N], allowed: impl Fn(&[f64; N]) -> bool) -> (f64, [f64; N]) {

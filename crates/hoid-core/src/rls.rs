@@ -1,4 +1,4 @@
-//! Recursive least squares for ARX and FIR.
+//! Recursive least squares for ARX and FIR models.
 //!
 //! `eps = u - psi' theta`, `psi = [-u(t-1) .. -u(t-na), x(t) .. x(t-nb+1)]` with
 //! `x(t) = e(t - nk)`, and the step of an [`Adaptation`] (eq. 5.21, 5.25, 5.26; L. Ljung and T.
@@ -14,7 +14,7 @@ use crate::{
     shape::Shape,
 };
 
-/// The recursion. N is the capacity for parameters, B the error bars or
+/// Recursive least squares. N is the capacity for parameters, A the adaptation, and B the error bars or
 /// [`NoErrorBars`](crate::error_bars::NoErrorBars).
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
@@ -30,9 +30,9 @@ pub struct Rls<S, const N: usize, A, B = ErrorBars<N, 0>> {
 crate::state!([S, const N: usize, A: crate::state::State, B: crate::state::State] Rls<S, N, A, B> { theta, psi, adaptation, bars, restarts });
 
 impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<S, N, A, B> {
-    /// Starts from theta `[a.., b..]` with zeros before the first sample. `None` if there is no parameter, more than N
-    /// parameters, or a parameter of C, D or F; or if the rule of forgetting needs the innovation variance and `bars`
-    /// do not estimate it.
+    /// Starts from theta `[a.., b..]` with zeros before the first sample. Returns `None` if there is no parameter, if
+    /// there are more than N parameters or parameters of C, D or F, or if the rule of forgetting needs the innovation
+    /// variance but `bars` do not estimate it.
     pub fn new(shape: S, theta: [f64; N], adaptation: A, bars: B) -> Option<Self> {
         let linear = (shape.nc(), shape.nd(), shape.nf()) == (0, 0, 0);
         let known = bars.variance().is_some() || !adaptation.needs_innovation_variance();
@@ -46,13 +46,13 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         })
     }
 
-    /// Takes a sample `x(t) = e(t - nk)`, `u(t)`. Both must be finite.
+    /// Takes a sample `x(t) = e(t - nk)`, `u(t)`. x and u must be finite.
     #[inline]
     pub fn step(&mut self, x: f64, u: f64) -> Step {
         // The state is read once, processed in local variables and written once.
         let theta = self.theta;
         let (psi, innovation) = self.innovation(&theta, x, u);
-        // The clipped innovation bounds the step of an outlier.
+        // The clipped innovation limits the step that an outlier causes.
         let limited = self.bars.clip(innovation);
         let moved = self
             .adaptation
@@ -61,7 +61,8 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         let sound = all_finite(&theta);
         if sound {
             self.theta = theta;
-            // theta moved by g eps_limited = (eps_limited/eps) g eps: the error bars follow the gain that was applied.
+            // theta changed by g eps_limited = (eps_limited/eps) g eps, so the error bars use the gain that was
+            // actually applied.
             let used = ratio(limited, innovation);
             let gain = moved.gain.map(|g| used * g);
             self.bars.update(
@@ -83,7 +84,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         }
     }
 
-    /// As [`Rls::step`], but the estimate stays constant: only the regressor is advanced.
+    /// As [`Rls::step`], but the estimate stays constant and only the regressor is advanced.
     pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         let (psi, innovation) = self.innovation(&self.theta, x, u);
         self.shift(psi, u);
@@ -93,19 +94,19 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         }
     }
 
-    /// As [`Rls::step_without_update`] for a missing output, which the one-step prediction replaces.
+    /// As [`Rls::step_without_update`], for a sample without u; the one-step prediction replaces the missing output.
     pub fn bridge(&mut self, x: f64) {
         let (psi, innovation) = self.innovation(&self.theta, x, 0.0);
         // With u = 0 the innovation is minus the one-step prediction, which replaces the missing output.
         self.shift(psi, -innovation);
     }
 
-    /// psi with x, and the innovation.
+    /// Returns psi, including the new input x, and the innovation.
     #[inline(always)]
     fn innovation(&self, theta: &[f64; N], x: f64, u: f64) -> ([f64; N], f64) {
         let (na, nb) = (self.shape.na(), self.shape.nb());
-        // Each number is read separately: a wide load right after the narrow stores of the sample before would wait
-        // for the memory.
+        // Each number is read separately, since a wide load right after the narrow stores of the previous sample would
+        // have to wait for the memory.
         let mut psi = self.psi.map(core::hint::black_box);
         for j in (1..nb).rev() {
             psi[na + j] = psi[na + j - 1];
@@ -114,7 +115,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
             psi[na] = x;
         }
         let w = dot(&theta[na..na + nb], &psi[na..]);
-        // The same bits as the predictor of the general model, which keeps u itself.
+        // The result is bit-identical to that of the predictor of the general model, which stores u itself.
         (psi, u - dot(&theta[..na], &psi) - w)
     }
 
@@ -135,7 +136,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         &self.theta
     }
 
-    /// Returns the adaptation with its covariance.
+    /// Returns the adaptation, which contains the covariance.
     pub fn adaptation(&self) -> &A {
         &self.adaptation
     }
@@ -152,7 +153,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
 }
 
 impl<S: Shape, const N: usize, A: Adaptation<N>> Rls<S, N, A> {
-    /// Returns the covariance of theta over sigma^2.
+    /// Returns the covariance of theta divided by sigma^2.
     pub fn normalised_covariance(&self) -> [[f64; N]; N] {
         self.adaptation.normalised_covariance(&self.bars)
     }

@@ -1,11 +1,10 @@
-//! The recursive prediction-error method for `A u = (B/F) q^-nk e + (C/D) eps`: ARX, ARMAX, OE,
-//! ARARX, Box-Jenkins and the general form.
+//! Recursive prediction-error method for `A u = (B/F) q^-nk e + (C/D) eps`: ARX, ARMAX, OE, ARARX, Box-Jenkins and
+//! general models.
 //!
-//! `theta <- theta + g eps` with psi and eps of [`crate::predictor`] and the gain of an
-//! [`Adaptation`] (eq. 31, 5.54; L. Ljung and T. Söderström, *Theory and Practice of Recursive
-//! Identification*, 1983, section 3.7). A step that would take C or F out of the stable region is
-//! halved until it does not. Without C, D and F this is recursive least squares, [`crate::rls`], to
-//! the last bit.
+//! The estimate is updated by `theta <- theta + g eps`, with psi and eps from [`crate::predictor`] and the gain of an
+//! [`Adaptation`] (eq. 31, 5.54; L. Ljung and T. Söderström, *Theory and Practice of Recursive Identification*, 1983,
+//! section 3.7). A step that would make C or F unstable is halved until both are stable. Without C, D and F the results
+//! are bit-identical to those of recursive least squares, [`crate::rls`].
 
 use crate::{
     adaptation::Adaptation,
@@ -16,8 +15,8 @@ use crate::{
     shape::Shape,
 };
 
-/// The recursion. N is the capacity for parameters, K that for the errors of its filters
-/// ([`ErrorLayout::filter_errors`]): 0 for the default error bars and for none, B =
+/// Recursive prediction-error method. N is the capacity for parameters and K the capacity for filter errors
+/// ([`ErrorLayout::filter_errors`]). K is 0 for the default error bars and for B =
 /// [`NoErrorBars`](crate::error_bars::NoErrorBars).
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
@@ -36,8 +35,8 @@ crate::state!([S, const N: usize, const K: usize, A: crate::state::State, B: cra
 });
 
 impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropagation<N, K>> Rpem<S, N, K, A, B> {
-    /// Starts from `theta = [a.. b.. c.. d.. f..]` with filters at rest. `None` if the shape exceeds N or K, theta is
-    /// not stable, or the rule of forgetting needs the innovation variance and `bars` do not estimate it.
+    /// Starts from `theta = [a.. b.. c.. d.. f..]` with filters at rest. Returns `None` if the shape exceeds N or K, if
+    /// theta is not stable, or if the rule of forgetting needs the innovation variance but `bars` do not estimate it.
     pub fn new(
         shape: S,
         regressor: Regressor,
@@ -61,7 +60,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         })
     }
 
-    /// Takes a sample `x(t) = e(t - nk)`, `u(t)`. Both must be finite.
+    /// Takes a sample `x(t) = e(t - nk)`, `u(t)`. x and u must be finite.
     #[inline]
     pub fn step(&mut self, x: f64, u: f64) -> Step {
         let shape = self.predictor.shape();
@@ -75,13 +74,13 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
             .adaptation
             .update(&psi, limited, &theta, self.bars.variance().unwrap_or(0.0));
         let stable = self.stable;
-        // eps and psi are outputs of filters with the poles of C and F: outside the stable region they diverge, and
-        // with them the estimate (Ljung and Söderström 1983, section 3.7.3).
+        // eps and psi are outputs of filters with the poles of C and F. If these poles are unstable, eps and psi
+        // diverge, and with them the estimate (Ljung and Söderström 1983, section 3.7.3).
         let (allowed, theta) = backtrack(&theta, &moved.step, |theta| stable.holds(&shape, theta));
         // The filters continue with the a-posteriori residuals of the new theta (Ljung and Söderström 1983, eq. 3.151).
         self.correct(&theta);
         (self.theta, self.psi) = (theta, psi);
-        // The error bars follow the actual step: shortened by `allowed`, limited by `used`.
+        // The error bars use the step that was applied: shortened by `allowed` and limited by `used`.
         let gain = moved.gain.map(|g| allowed * used * g);
         self.bars.update(&layout, &rows, &gain, innovation);
         self.adaptation.add_drift_to(&mut self.bars);
@@ -91,7 +90,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         }
     }
 
-    /// As [`Rpem::step`], but the estimate stays constant: only the filters are advanced.
+    /// As [`Rpem::step`], but the estimate stays constant and only the filters are advanced.
     pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         let theta = self.theta;
         let (psi, innovation) = self.predictor.predict(&theta, x, u);
@@ -104,7 +103,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         }
     }
 
-    /// As [`Rpem::step_without_update`] for a missing output, which the one-step prediction replaces.
+    /// As [`Rpem::step_without_update`], for a sample without u; the one-step prediction replaces the missing output.
     pub fn bridge(&mut self, x: f64) {
         let theta = self.theta;
         (self.psi, _) = self.predictor.predict(&theta, x, 0.0);
@@ -147,7 +146,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         &self.psi
     }
 
-    /// Returns the adaptation with its covariance.
+    /// Returns the adaptation, which contains the covariance.
     pub fn adaptation(&self) -> &A {
         &self.adaptation
     }
@@ -164,7 +163,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
 }
 
 impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>> Rpem<S, N, K, A> {
-    /// Returns the covariance of theta over sigma^2.
+    /// Returns the covariance of theta divided by sigma^2.
     pub fn normalised_covariance(&self) -> [[f64; N]; N] {
         self.adaptation.normalised_covariance(&self.bars)
     }

@@ -1,23 +1,23 @@
-//! Dependence of the errors in the filters of the predictor on those of the parameters.
+//! Dependence of the errors in the filters of the predictor on the errors of the parameters.
 //!
-//! A wrong estimate leaves errors in the memory of the filters of the [`crate::predictor`]. With theta~ and the past
-//! errors in a vector X, the new ones are linear functions of X;
-//! [`crate::error_bars`] has the equations.
+//! A wrong estimate leaves errors in the memory of the filters of the [`crate::predictor`]. If a vector X contains
+//! theta~ and the past filter errors, the new errors are linear functions of X. The equations are in
+//! [`crate::error_bars`].
 
 use crate::shape::Shape;
 
-/// The layout of X: the parameters that belong to A, and to C and D, and the number of past errors of the filters.
+/// Layout of X: the positions of the parameters of A, of C and D, and of the past filter errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ErrorLayout {
-    /// Number of coefficients of A, which come first.
+    /// Number of coefficients of A, which come first in theta.
     pub na: usize,
-    /// Index of the first coefficient of C and D, and their number.
+    /// Index of the first coefficient of C and D, and number of coefficients of C and D.
     pub noise: (usize, usize),
-    /// Index of the first dw among the errors of the filters, and their number.
+    /// Index of the first dw among the filter errors, and number of dw.
     pub w: (usize, usize),
-    /// Index of the first dv, and their number; none without A, for which dv is dw.
+    /// Index of the first dv, and number of dv; there are none without A, since dv then equals dw.
     pub v: (usize, usize),
-    /// Index of the first de, and their number.
+    /// Index of the first de, and number of de.
     pub e: (usize, usize),
 }
 
@@ -40,7 +40,7 @@ impl ErrorLayout {
         }
     }
 
-    /// No errors of filters: the default error bars, with `h = psi`.
+    /// Layout without filter errors, for the default error bars with `h = psi`.
     pub const NONE: Self = Self {
         na: 0,
         noise: (0, 0),
@@ -55,36 +55,36 @@ impl ErrorLayout {
         if K == 0 { Self::NONE } else { Self::of(shape) }
     }
 
-    /// Returns the number of past errors of the filters.
+    /// Returns the number of past filter errors.
     #[inline(always)]
     pub fn filter_errors(&self) -> usize {
         self.e.0 + self.e.1
     }
 }
 
-/// A linear function of X: its coefficients for the parameters and for the errors of the filters.
+/// Linear function of X: its coefficients for the parameters and for the filter errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinearForm<const N: usize, const K: usize> {
-    /// For theta~.
+    /// Coefficients for theta~.
     pub theta: [f64; N],
-    /// For the past dw, dv and de.
+    /// Coefficients for the past dw, dv and de.
     pub filters: [f64; K],
 }
 
-/// Dependence of the new dw, dv and de on X; the last is also the sensitivity h of the innovation.
+/// Dependence of the new dw, dv and de on X. That of de is also the sensitivity h of the innovation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensitivities<const N: usize, const K: usize> {
-    /// Of dw.
+    /// Dependence of dw on X.
     pub w: LinearForm<N, K>,
-    /// Of dv.
+    /// Dependence of dv on X.
     pub v: LinearForm<N, K>,
-    /// Of de.
+    /// Dependence of de on X.
     pub e: LinearForm<N, K>,
 }
 
 impl<const N: usize, const K: usize> Sensitivities<N, K> {
-    /// Returns the sensitivities of an estimate that does not change within the memory of its filters: `h = psi`, and
-    /// no errors in the filters.
+    /// Returns the sensitivities for an estimate that does not change within the memory of its filters: `h = psi`,
+    /// without filter errors.
     #[inline(always)]
     pub fn from_gradient(psi: &[f64; N]) -> Self {
         let form = LinearForm {

@@ -1,13 +1,12 @@
-//! Orders of the general model, as numbers or in the type.
+//! Orders of the general model, stored as numbers or in the type.
 //!
-//! The parameters of `A u = (B/F) q^-nk e + (C/D) eps` are in one vector,
-//! `theta = [a.. b.. c.. d.. f..]`. A [`Shape`] has the number of each kind, and therefore the position of each
-//! polynomial.
+//! The parameters of `A u = (B/F) q^-nk e + (C/D) eps` form one vector, `theta = [a.. b.. c.. d.. f..]`. A [`Shape`]
+//! contains the number of coefficients of each polynomial, and therefore the position of each polynomial in theta.
 
 /// Numbers of coefficients of A, B, C, D and F.
 ///
-/// [`AnyShape`] stores them as numbers. [`FixedShape`] has them in its type, so that the compiler unrolls every loop
-/// over coefficients: the same operations in the same order, in half the time.
+/// [`AnyShape`] stores these numbers as values. [`FixedShape`] has them in its type, so that the compiler unrolls every
+/// loop over coefficients: the operations and their order are the same, but take half the time.
 pub trait Shape: Copy {
     /// Number of coefficients `a_1 ...`.
     fn na(&self) -> usize;
@@ -37,7 +36,7 @@ pub trait Shape: Copy {
     }
 }
 
-/// Orders as numbers.
+/// Orders stored as values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct AnyShape {
     /// Number of coefficients `a_1 ...`.
@@ -79,7 +78,7 @@ impl Shape for AnyShape {
     }
 }
 
-/// Orders in the type.
+/// Orders given as parameters of the type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FixedShape<const NA: usize, const NB: usize, const NC: usize, const ND: usize, const NF: usize>;
 

@@ -1,18 +1,18 @@
 //! Test whether all roots of a monic polynomial lie inside a circle.
 //!
-//! Schur-Cohn test by the step-down (Levinson) recursion: with `k = d_n`, the polynomial of degree
-//! n has its roots inside the unit circle if and only if `|k| < 1` and the polynomial of degree n - 1 with coefficients
-//! `(d_i - k d_{n-i}) / (1 - k^2)` has its roots there. A circle of radius r is tested on `d_i / r^i`. Source: E. I.
-//! Jury, *Theory and Application of the z-Transform Method*, 1964; S. Kay, *Modern Spectral Estimation*, 1988, eq.
-//! 6.51.
+//! The Schur-Cohn test uses the step-down (Levinson) recursion: with `k = d_n`, the polynomial of degree n has its
+//! roots inside the unit circle if and only if `|k| < 1` and the polynomial of degree n - 1 with coefficients
+//! `(d_i - k d_{n-i}) / (1 - k^2)` has its roots there. For a circle of radius r the test is applied to `d_i / r^i`.
+//! Sources: E. I. Jury, *Theory and Application of the z-Transform Method*, 1964; S. Kay, *Modern Spectral Estimation*,
+//! 1988, eq. 6.51.
 
 /// Highest order that [`roots_inside`] tests; its work space is on the stack.
 pub const MAX_ORDER: usize = 64;
 
 /// True if all roots of `z^n + d_1 z^{n-1} + ... + d_n` lie strictly inside the circle of the given radius.
 ///
-/// Coefficients that are not finite give `false`, and so does an order above [`MAX_ORDER`]: stability is never
-/// reported without proof.
+/// Returns `false` for coefficients that are not finite and for an order above [`MAX_ORDER`], so that stability is
+/// never reported without proof.
 #[inline]
 pub fn roots_inside(d: &[f64], radius: f64) -> bool {
     // Most polynomials of an operator are short, and a recursion tests them at every sample.
@@ -24,7 +24,7 @@ pub fn roots_inside(d: &[f64], radius: f64) -> bool {
     }
 }
 
-/// The test for any order.
+/// Step-down test for any order.
 #[inline(never)]
 fn step_down(d: &[f64], radius: f64) -> bool {
     let order = d.len();
@@ -39,7 +39,7 @@ fn step_down(d: &[f64], radius: f64) -> bool {
     }
     for n in (1..=order).rev() {
         let k = work[n - 1];
-        // Written so that NaN counts as unstable.
+        // The condition is written so that NaN counts as unstable.
         if !(k > -1.0 && k < 1.0) {
             return false;
         }

@@ -1,17 +1,17 @@
-//! The numbers that change while a recursion runs, so that it can be saved and continued elsewhere.
+//! Saving and restoring the numbers that change while a recursion runs, so that it can be continued elsewhere.
 //!
-//! One function visits them in both directions: reading them saves the recursion, writing them restores it, and the
-//! two cannot differ in order. A restored recursion continues with the same digits. Counters are numbers as well;
-//! those of a recursion stay below `2^53`, up to which f64 represents them exactly. Shape and options are not part of
-//! the state: restore it into a recursion that was built with the same shape and options.
+//! One function visits these numbers for both purposes: reading them saves the recursion, writing them restores it, and
+//! the order cannot differ. A restored recursion continues with bit-identical results. Counters are visited as numbers
+//! as well; they stay below `2^53`, up to which f64 represents integers exactly. Shape and options are not part of the
+//! state: restore it into a recursion that was built with the same shape and options.
 
-/// A part of a recursion with numbers to be saved.
+/// Part of a recursion with numbers that can be saved.
 pub trait State {
     /// Passes every number to `each`, which may change it.
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64));
 }
 
-/// Visits the parts in their order.
+/// Visits several parts in the given order.
 pub fn visit_all(parts: &mut [&mut dyn State], each: &mut dyn FnMut(&mut f64)) {
     for part in parts {
         part.visit(each);
@@ -32,8 +32,8 @@ impl State for bool {
     }
 }
 
-/// Limit of restored counters of 64 and 32 bits, which no run reaches: counting further never overflows, whatever was
-/// restored.
+/// Upper limits of restored counters with 64 and 32 bits. No run reaches them, so counting never overflows even after
+/// invalid numbers were restored.
 const MOST: f64 = 9_007_199_254_740_992.0;
 const MOST_OF_32: f64 = 2_147_483_648.0;
 const MOST_OF_USIZE: f64 = if usize::BITS > 32 { MOST } else { MOST_OF_32 };
@@ -69,9 +69,9 @@ impl<T: State + ?Sized> State for &mut T {
     }
 }
 
-/// Implements [`State`] for a type by the named fields: `state!([const N: usize] Type<N> { field, field })`. With
-/// `, bounded` after them the type has a method of that name, which limits indices, lengths and counts to their valid
-/// ranges: the numbers may come from any source.
+/// Implements [`State`] for a type by the named fields: `state!([const N: usize] Type<N> { field, field })`. If
+/// `, bounded` follows the fields, the type must have a method of that name that limits indices, lengths and counts to
+/// their valid ranges, since the restored numbers may come from any source.
 #[macro_export]
 macro_rules! state {
     ([$($generics:tt)*] $type:ty { $($field:ident),+ $(,)? }) => {

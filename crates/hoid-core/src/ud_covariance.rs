@@ -1,6 +1,7 @@
-//! A covariance matrix in factors: `P = U D U'`, U unit upper triangular, D diagonal.
+//! Covariance matrix in factored form: `P = U D U'`, U unit upper triangular, D diagonal.
 //!
-//! P stays symmetric and positive despite rounding, as long as D does. The rules of forgetting need three operations:
+//! P stays symmetric and positive semidefinite despite rounding as long as D stays nonnegative. The rules of forgetting
+//! need three operations:
 //!
 //! - **measurement** with the regressor psi and the variance R: `g = P psi/(R + psi' P psi)`,
 //!   `P <- P - g psi' P`. With `f = U' psi`, `v = D f` and the partial sums
@@ -8,26 +9,26 @@
 //!   follow (G. J. Bierman, *Factorization Methods for Discrete Sequential Estimation*, 1977,
 //!   section V.3). A negative R, with all alpha negative, undoes a measurement by the same
 //!   equations.
-//! - **scaling** `P <- S P S` with a diagonal S: `U_ij <- U_ij s_i/s_j`, `d_j <- d_j s_j^2`. Exact;
-//!   this is the forgetting matrix.
-//! - **rank one** `P <- P + c a a'` with `c >= 0` (W. S. Agee and R. H. Turner, 1972; Bierman,
-//!   section III.4).
+//! - **scaling** `P <- S P S` with a diagonal S: `U_ij <- U_ij s_i/s_j`, `d_j <- d_j s_j^2`. It is exact and implements
+//!   the forgetting matrix.
+//! - **rank-one update** `P <- P + c a a'` with `c >= 0` (W. S. Agee and R. H. Turner, 1972; Bierman, section III.4).
 //!
-//! N is the capacity for parameters. If there are fewer, the d of the others are zero and stay zero.
+//! N is the capacity for parameters. If there are fewer parameters, the d of the unused parameters are zero and stay
+//! zero.
 
-/// `U D U'` of an N x N matrix.
+/// Factors `U D U'` of an N x N matrix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
 pub struct UdCovariance<const N: usize> {
-    /// Column j holds `U_ij`, i < j, and `d_j` in place of the 1; the rest is not used. The entries d are not
-    /// contiguous, so that no compiler loads them as a vector, whose first element would wait for the last.
+    /// Column j holds `U_ij`, i < j, and `d_j` in place of the 1; the other elements are not used. The d_j are not
+    /// contiguous, so that no compiler loads them as a vector, in which the first element would wait for the last.
     u: [[f64; N]; N],
 }
 
 crate::state!([const N: usize] UdCovariance<N> { u });
 
 impl<const N: usize> UdCovariance<N> {
-    /// Returns a diagonal matrix.
+    /// Returns the factors of a diagonal matrix.
     pub fn diagonal(d: [f64; N]) -> Self {
         let mut u = [[0.0; N]; N];
         for j in 0..N {
@@ -36,8 +37,8 @@ impl<const N: usize> UdCovariance<N> {
         Self { u }
     }
 
-    /// Returns the factors of a symmetric matrix; `None` unless it is positive semidefinite up to rounding. Rows and
-    /// columns of zeros are parameters that do not move.
+    /// Returns the factors of a symmetric matrix, or `None` unless it is positive semidefinite up to rounding. Rows and
+    /// columns of zeros belong to parameters that stay constant.
     pub fn from_matrix(p: &[[f64; N]; N]) -> Option<Self> {
         let mut rest = *p;
         let mut factored = Self::diagonal([0.0; N]);
@@ -48,7 +49,7 @@ impl<const N: usize> UdCovariance<N> {
             }
             factored.u[j][j] = d;
             if d == 0.0 {
-                // A constant parameter cannot be correlated with others.
+                // A constant parameter cannot be correlated with other parameters.
                 if (0..j).any(|i| rest[i][j] != 0.0) {
                     return None;
                 }
@@ -67,13 +68,13 @@ impl<const N: usize> UdCovariance<N> {
         Some(factored)
     }
 
-    /// Performs the measurement of the module docs: returns the gain g, and updates P.
+    /// Performs the measurement described in the module documentation: updates P and returns the gain g.
     #[inline]
     pub fn measurement_update(&mut self, psi: &[f64; N], variance: f64) -> [f64; N] {
         self.inflate_and_update(1.0, psi, variance)
     }
 
-    /// Performs `P <- growth P`, then the measurement, in one pass.
+    /// Performs `P <- growth P` and then the measurement, in one pass.
     #[inline(always)]
     pub fn inflate_and_update(&mut self, growth: f64, psi: &[f64; N], variance: f64) -> [f64; N] {
         let (mut f, mut v, mut grown) = ([0.0; N], [0.0; N], [0.0; N]);
@@ -89,11 +90,11 @@ impl<const N: usize> UdCovariance<N> {
         self.update_projected_by(grown, f, v, variance)
     }
 
-    /// Performs the measurement, given the projections.
+    /// Performs the measurement with given projections.
     #[inline(always)]
     fn update_projected_by(&mut self, grown: [f64; N], f: [f64; N], v: [f64; N], variance: f64) -> [f64; N] {
         // Bierman's recursion: alpha_j = R + sum_{i<=j} f_i v_i. All d_j are multiplied by positive ratios, so that P
-        // stays positive whatever the rounding. `gain` accumulates P psi.
+        // stays positive regardless of rounding. `gain` accumulates P psi.
         let mut gain = [0.0; N];
         let (mut before, mut inverse_before) = (variance, 1.0 / variance);
         for j in 0..N {
@@ -122,14 +123,14 @@ impl<const N: usize> UdCovariance<N> {
         f.iter().zip(&v).map(|(f, v)| f * v).sum()
     }
 
-    /// Performs [`UdCovariance::measurement_update`] with the result of [`UdCovariance::projections`] for psi.
+    /// As [`UdCovariance::measurement_update`], with the result of [`UdCovariance::projections`] for psi.
     #[inline(always)]
     pub fn update_projected(&mut self, (f, v): ([f64; N], [f64; N]), variance: f64) -> [f64; N] {
         let grown = core::array::from_fn(|j| self.u[j][j]);
         self.update_projected_by(grown, f, v, variance)
     }
 
-    /// Returns `f = U' psi` and `v = D f`: `psi' P psi = f' v`.
+    /// Returns `f = U' psi` and `v = D f`, for which `psi' P psi = f' v`.
     #[inline(always)]
     pub fn projections(&self, psi: &[f64; N]) -> ([f64; N], [f64; N]) {
         let (mut f, mut v) = ([0.0; N], [0.0; N]);
@@ -157,7 +158,7 @@ impl<const N: usize> UdCovariance<N> {
         product
     }
 
-    /// Performs `P <- s^2 P`.
+    /// Performs `P <- squared P`.
     #[inline]
     pub fn scale_all(&mut self, squared: f64) {
         for j in 0..N {
@@ -176,13 +177,13 @@ impl<const N: usize> UdCovariance<N> {
         }
     }
 
-    /// Performs `P <- P + c a a'`, c not negative.
+    /// Performs `P <- P + c a a'` for nonnegative c.
     #[inline]
     pub fn rank_one_update(&mut self, mut c: f64, mut a: [f64; N]) {
         for j in (0..N).rev() {
             let s = a[j];
             let d = self.u[j][j] + c * s * s;
-            // Zero only where both terms are: the vector has no component here.
+            // d is zero only if both of its terms are zero; the vector then has no component here.
             if d > 0.0 {
                 let share = c / d;
                 c = share * self.u[j][j];

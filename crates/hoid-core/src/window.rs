@@ -1,31 +1,30 @@
-//! A rectangular window: the last W samples count equally.
+//! Rectangular window: the last W samples count equally.
 //!
-//! Each sample gives a linear equation for theta, `y = psi' theta + eps` with
-//! `y = eps(t) + psi(t)' theta(t-1)`; for ARX and FIR y is the output and psi the regressor,
-//! whatever theta was. The estimate is that of least squares over the window,
-//! `theta = R^{-1} sum psi y`, `R = sum psi psi'`, which is exact for ARX and FIR, and for the other structures is the
-//! recursive prediction-error method with that memory.
+//! Each sample gives a linear equation for theta, `y = psi' theta + eps` with `y = eps(t) + psi(t)' theta(t-1)`. For
+//! ARX and FIR models, y is the output and psi the regressor, regardless of theta. The estimate is the least-squares
+//! estimate over the window, `theta = R^{-1} sum psi y`, `R = sum psi psi'`. It is exact for ARX and FIR models; for
+//! the other structures it is the recursive prediction-error method with this memory.
 //!
-//! If the oldest term were subtracted from the sums at each sample, rounding errors would accumulate without limit.
-//! Here the window is kept as two sums: one grows from a boundary on; the other, a sum that grew until that boundary,
-//! loses its terms. When it has lost all of them the first replaces it. No rounding error lasts longer than two
-//! windows.
+//! If the oldest term were subtracted from a single sum at each sample, rounding errors would accumulate without limit.
+//! The window is therefore kept as two sums. One sum grows from a boundary on; the other sum, which grew until that
+//! boundary, loses its terms one by one. When it has lost all terms, the first sum replaces it. No rounding error
+//! persists for longer than two windows.
 //!
-//! The covariance of theta over sigma^2 is `R^{-1}`. If the window does not determine theta (fewer samples than
-//! parameters, no excitation), theta stays constant and there is no covariance. The caller owns the memory of
+//! The covariance of theta divided by sigma^2 is `R^{-1}`. If the window does not determine theta (fewer samples than
+//! parameters, or no excitation), theta stays constant and there is no covariance. The caller owns the memory of
 //! `W (N + 1)` numbers.
 
 use hoid_numerics::cholesky;
 
 use crate::adaptation::{Adaptation, ParameterStep};
 
-/// Smallest pivot of R, scaled to a unit diagonal, of a window that determines theta: some hundred rounding units.
+/// Smallest pivot of R, scaled to a unit diagonal, with which a window determines theta: several hundred rounding
+/// units.
 const SMALLEST_PIVOT: f64 = 1e-13;
-/// Power of a parameter's gradient, relative to the largest so far, below which it is not excited.
+/// Power of a gradient component, relative to its largest power so far, below which the parameter is not excited.
 const NO_EXCITATION: f64 = 1e-20;
 
-/// The sums of the normal equations over some samples: `sum psi psi'` (lower triangle) and
-/// `sum psi y`.
+/// Sums of the normal equations over a number of samples: `sum psi psi'` (lower triangle) and `sum psi y`.
 #[derive(Debug, Clone, PartialEq)]
 struct NormalEquations<const N: usize> {
     r: [[f64; N]; N],
@@ -34,24 +33,23 @@ struct NormalEquations<const N: usize> {
 
 crate::state!([const N: usize] NormalEquations<N> { r, psi_y });
 
-/// The adaptation by a rectangular window. N is the capacity for parameters, M the memory of the
-/// samples.
+/// Adaptation with a rectangular window. N is the capacity for parameters, M the memory for the samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Window<const N: usize, M> {
     memory: M,
     /// Number of parameters in use, at most N.
     parameters: usize,
-    /// W.
+    /// Length W of the window in samples.
     length: usize,
-    /// Number of samples in the memory, and index of the next.
+    /// Number of samples in the memory, and index at which the next sample is stored.
     filled: usize,
     next: usize,
-    /// Sums since the boundary, and sums before it that are still in the window.
+    /// Sums since the boundary, and sums over the samples before the boundary that are still in the window.
     growing: NormalEquations<N>,
     fading: NormalEquations<N>,
-    /// Largest power of each parameter's gradient over a window so far.
+    /// Largest power, so far, of each gradient component over a window.
     largest: [f64; N],
-    /// Number of samples whose window did not determine theta.
+    /// Number of samples at which the window did not determine theta.
     undetermined: u64,
 }
 
@@ -89,13 +87,13 @@ impl<const N: usize> NormalEquations<N> {
 }
 
 impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Window<N, M> {
-    /// Returns the length of the memory for a window of this many samples.
+    /// Returns the required length of the memory for a window of the given number of samples.
     pub const fn memory_length(samples: usize) -> usize {
         samples * (N + 1)
     }
 
-    /// Builds a window as long as the memory allows, for the first `parameters` of N. `None` if the memory is shorter
-    /// than one sample or there is no parameter.
+    /// Builds a window as long as the memory allows, for `parameters` parameters, at most N. Returns `None` if the
+    /// memory is too short for one sample or the number of parameters is not valid.
     pub fn new(memory: M, parameters: usize) -> Option<Self> {
         let length = memory.as_ref().len() / (N + 1);
         (length > 0 && (1..=N).contains(&parameters)).then_some(Self {
@@ -111,12 +109,12 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Window<N, M> {
         })
     }
 
-    /// Returns the number of samples whose window did not determine theta, so that it stayed constant.
+    /// Returns the number of samples at which the window did not determine theta, so that theta stayed constant.
     pub fn undetermined(&self) -> u64 {
         self.undetermined
     }
 
-    /// R in factors; `None` if it is singular.
+    /// Returns the Cholesky factors of R, or `None` if R is singular.
     fn cholesky(&self) -> Option<Cholesky<N>> {
         let p = self.parameters;
         let (mut l, mut scale) = ([[0.0; N]; N], [0.0; N]);
@@ -138,7 +136,7 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Window<N, M> {
     }
 }
 
-/// `R = S^{-1} L L' S^{-1}` with a diagonal S that scales R to a unit diagonal.
+/// Factors `R = S^{-1} L L' S^{-1}` with a diagonal S that scales R to a unit diagonal.
 struct Cholesky<const N: usize> {
     l: [[f64; N]; N],
     /// Diagonal of S.
@@ -147,7 +145,7 @@ struct Cholesky<const N: usize> {
 }
 
 impl<const N: usize> Cholesky<N> {
-    /// `R^{-1} right`.
+    /// Returns `R^{-1} right`.
     fn solve(&self, right: &[f64; N]) -> [f64; N] {
         let p = self.parameters;
         let mut x = [0.0; N];
@@ -185,7 +183,7 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Adaptation<N> for Window<N,
         for i in 0..p {
             self.largest[i] = self.largest[i].max(self.growing.r[i][i] + self.fading.r[i][i]);
         }
-        // With as many samples as parameters the residuals are zero and carry no information.
+        // With as many samples as parameters, the residuals are zero and carry no information.
         let factor = if self.filled > p { self.cholesky() } else { None };
         let Some(factor) = factor else {
             self.undetermined += 1;

@@ -437,8 +437,8 @@ fn what_makes_no_sense_is_refused() {
     let memory = || vec![0.0; least_memory(TS)];
     assert!(AdaptiveFilter::new(prior(13.5), vec![0.0; 3]).is_none());
     let sound = prior(13.5);
-    let changed = |between: f64, steady: f64| ChangePrior {
-        between,
+    let changed = |mean_interval_s: f64, steady: f64| ChangePrior {
+        mean_interval_s,
         steady,
         ..sound.changes
     };

@@ -1,10 +1,10 @@
-//! Design of experiments before the data, and comparison of conditions and people after them.
+//! Design of experiments before data are collected, and comparison of conditions and people afterwards.
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`compare`] | differences between conditions and between people, from the estimates of each person |
-//! | [`experiment`] | an experiment before it is done: forcing function, standard errors, people for a difference |
-//! | [`pool`](mod@pool) | estimates of each person from all people, and the population as a prior |
+//! | [`compare`] | differences between conditions and between people, from estimates for each person |
+//! | [`experiment`] | design of an experiment: forcing function, expected standard errors, number of people needed to find a difference |
+//! | [`pool`](mod@pool) | estimates for each person, pooled with all people, and the population as a prior |
 
 pub mod compare;
 pub mod experiment;

@@ -1,19 +1,20 @@
-//! Hierarchical estimates: each person estimated from all people, and the population from which they are drawn.
+//! Hierarchical estimates: an estimate for each person, pooled with all people, and the population from which the
+//! people are drawn.
 //!
-//! In a condition, `y_i = ln theta_i` is known about person i with variance `v_i = (s_i/theta_i)^2`, and people are
-//! drawn from a population, `y_i ~ N(mu, tau^2)` plus their error. mu is the mean of [`crate::compare::meta_mean`], and
-//! tau^2 maximises `l + log tau` (Y. Chung, S. Rabe-Hesketh and I.-H. Choi, *Stat. Med.* 32 (2013) 4071-4089), which is
-//! never zero. The estimate of a person from all (B. Efron and C. Morris, *J. Am. Stat. Assoc.* 70 (1975) 311-319) is
+//! In a condition, the data of person i give `y_i = ln theta_i` with the variance `v_i = (s_i/theta_i)^2`. The true
+//! values are drawn from a population `N(mu, tau^2)`. mu is the mean of [`crate::compare::meta_mean`], and tau^2
+//! maximises `l + log tau` (Y. Chung, S. Rabe-Hesketh and I.-H. Choi, *Stat. Med.* 32 (2013) 4071-4089), which is never
+//! zero. The pooled estimate for a person (B. Efron and C. Morris, *J. Am. Stat. Assoc.* 70 (1975) 311-319) is
 //!
 //! `B_i mu + (1 - B_i) y_i`, `B_i = v_i/(v_i + tau^2)`, with the variance `(1 - B_i) v_i + B_i^2 var(mu)`:
 //!
-//! **B is the shrinkage**, 1 for a person without information. The variance ignores that tau^2 is estimated. A future
-//! person has `mu` with the variance `tau^2 + var(mu)`, which is the prior.
+//! **B is the shrinkage**, which is 1 for a person without information. The variance ignores that tau^2 is itself an
+//! estimate. A new person has the mean `mu` and the variance `tau^2 + var(mu)`, which form the prior.
 //!
-//! A prior that is already part of the estimates is removed first, since it would otherwise count once for each person:
-//! with its share w, its centre m and an estimate y, the data show `y - w (m - y)/(1 - w)` with the variance
-//! `v/(1 - w)` ([`OperatorPrior::pull`]). If the share of the prior is above nine tenths, the person is without
-//! information.
+//! A prior that is already part of the estimates is removed first, since it would otherwise be counted once for each
+//! person. With its share w, its centre m and an estimate y, the data alone give `y - w (m - y)/(1 - w)` with the
+//! variance `v/(1 - w)` ([`OperatorPrior::pull`]). If the share of the prior exceeds nine tenths, the person counts as
+//! having no information.
 
 use hoid_ident::family::{OperatorPrior, Parameter};
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
@@ -22,61 +23,61 @@ use hoid_study::group::Person;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::compare::{CompareError, Observation, Weights, meta_mean, variance_between};
+use crate::compare::{CompareError, Observation, Weights, meta_mean, variance_between_people};
 
 /// Parameters with the same meaning in every form.
 const OF_ANY_FORM: [&str; 3] = ["omega_nm", "zeta_nm", "tau_e"];
-/// Least number of people with information.
+/// Smallest number of people with information for which a parameter is pooled.
 const LEAST_PEOPLE: usize = 3;
-/// Share of the prior above which the data carry no information.
-const ALL_PRIOR: f64 = 0.9;
+/// Share of the prior above which the data of a person are regarded as uninformative.
+const UNINFORMATIVE_PRIOR_SHARE: f64 = 0.9;
 
 /// Estimate for one person, pooled with all people.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PooledPerson {
     /// Name of the person.
     pub subject: String,
-    /// Estimate from the person's own data, with its standard error; `None` without information.
+    /// Estimate from the person's own data, with its standard error; `None` if these data carry no information.
     pub own: Option<(f64, f64)>,
-    /// Estimate from all people.
+    /// Estimate pooled with all people.
     pub value: f64,
-    /// Its standard error.
+    /// Standard error of the pooled estimate.
     pub standard_error: f64,
-    /// Shrinkage towards the mean of all people: 0 none, 1 complete.
+    /// Shrinkage towards the mean of all people, from 0 (none) to 1 (complete).
     pub shrinkage: f64,
 }
 
 /// A parameter of the population in a condition.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PooledParameter {
-    /// Its name.
+    /// Name of the parameter.
     pub name: String,
-    /// Its unit.
+    /// Unit of the parameter.
     pub unit: String,
     /// Median over people.
     pub centre: f64,
-    /// Standard deviation of the logarithm between people.
+    /// Standard deviation between people of the logarithm of the parameter.
     pub spread: f64,
-    /// The same for a new person, with the error of the centre included.
+    /// Standard deviation of the logarithm for a new person, which includes the error of the centre.
     pub spread_of_another: f64,
-    /// The people.
+    /// Pooled estimates for the people.
     pub people: Vec<PooledPerson>,
 }
 
 /// The population of a condition.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Population {
-    /// The condition.
+    /// Name of the condition.
     pub condition: String,
-    /// The form of all people; `None` if they differ.
+    /// Form of the operators of all people; `None` if they differ.
     pub form: Option<String>,
-    /// Its parameters.
+    /// Parameters that are pooled.
     pub parameters: Vec<PooledParameter>,
     /// Parameters that are not pooled, with the reason.
     pub left_out: Vec<(String, String)>,
 }
 
-/// Returns the populations of the conditions of a group. `prior` is the prior of the estimates of the people.
+/// Returns the population of each condition of a group. `prior` is the prior with which the people were fitted.
 pub fn pool(people: &[Person], prior: &OperatorPrior) -> Vec<Population> {
     let mut conditions: Vec<&str> = Vec::new();
     for person in people.iter().filter(|p| p.is_of_all_runs() && !p.parameters.is_empty()) {
@@ -108,7 +109,7 @@ fn population(condition: &str, people: &[&Person], prior: &OperatorPrior) -> Pop
             continue;
         }
         if form.is_none() && !OF_ANY_FORM.contains(&name) {
-            let why = "the forms of people differ; name one under [analysis] in group.toml".to_owned();
+            let why = "the forms of people differ; name a form under [analysis] in group.toml".to_owned();
             found.left_out.push((name.to_owned(), why));
             continue;
         }
@@ -129,13 +130,14 @@ fn population(condition: &str, people: &[&Person], prior: &OperatorPrior) -> Pop
     found
 }
 
-/// Logarithm of a parameter as determined by the data of the person alone.
+/// Returns the logarithm of a parameter as determined by the person's own data, without the prior; `None` without
+/// information.
 fn data(parameter: &Parameter, prior: &OperatorPrior) -> Option<Observation> {
     let error = parameter.standard_error_person.or(parameter.standard_error)?;
     let counts = parameter.determined && parameter.value > 0.0 && parameter.value.is_finite() && error > 0.0;
     let has_prior = prior.entries().iter().any(|entry| entry.parameter == parameter.name);
     let share = if has_prior { parameter.prior_share } else { 0.0 };
-    if !counts || share > ALL_PRIOR {
+    if !counts || share > UNINFORMATIVE_PRIOR_SHARE {
         return None;
     }
     let relative = error / parameter.value;
@@ -147,7 +149,7 @@ fn data(parameter: &Parameter, prior: &OperatorPrior) -> Option<Observation> {
 
 fn pooled((name, unit): (&str, &str), own: &[(&str, Option<Observation>)]) -> Result<PooledParameter, CompareError> {
     let known: Vec<Observation> = own.iter().filter_map(|(_, o)| *o).collect();
-    // For two people the variance between them is not known at all.
+    // With only two people, the variance between them is practically unknown.
     if known.len() < LEAST_PEOPLE {
         return Err(CompareError::TooFew {
             found: known.len(),
@@ -156,7 +158,7 @@ fn pooled((name, unit): (&str, &str), own: &[(&str, Option<Observation>)]) -> Re
     }
     let mean = meta_mean(&known, Weights::default())?.coefficients[0];
     let (mu, of_mu) = (mean.value, mean.standard_error.powi(2));
-    let tau = variance_between(&known)?;
+    let tau = variance_between_people(&known)?;
     let person = |(subject, own): &(&str, Option<Observation>)| {
         let (y, v) = own.map_or((mu, f64::INFINITY), |o| (o.value, o.variance));
         let shrinkage = if v.is_finite() { v / (v + tau) } else { 1.0 };
@@ -185,7 +187,7 @@ fn pooled((name, unit): (&str, &str), own: &[(&str, Option<Observation>)]) -> Re
 }
 
 impl Population {
-    /// Returns the object that `--prior` reads: each parameter with the standard error for a new person.
+    /// Returns the JSON object that `--prior` reads; each parameter has the standard error for a new person.
     pub fn json(&self) -> Value {
         let parameter = |p: &PooledParameter| {
             json!({
@@ -209,7 +211,7 @@ impl Population {
     }
 }
 
-/// Returns the people of all populations, one row for each parameter.
+/// Returns a table of the people of all populations, with one row for each person and parameter.
 pub fn table(populations: &[Population]) -> OutputTable {
     let all = || {
         let of = |p: &'_ Population| {

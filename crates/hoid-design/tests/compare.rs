@@ -74,7 +74,7 @@ fn conditions_within_people() {
     let adjusted = found.differences.iter().map(|d| d.p_adjusted).fold(1.0, f64::min);
     assert!((adjusted - 3.0 * least).abs() < 1e-12);
     let unadjusted = Comparing {
-        of: crossover(),
+        quantities: crossover(),
         ..Comparing::default()
     };
     let found = unadjusted.run(&group(&THREE)).unwrap();
@@ -90,7 +90,7 @@ fn what_is_missing_is_named() {
     rows.push(("P11", "fo", 2.5, 0.1, 0.2, "lead"));
     rows[1].2 = f64::NAN; // null in JSON
     let found = Comparing {
-        of: crossover(),
+        quantities: crossover(),
         ..Comparing::default()
     }
     .run(&group(&rows))
@@ -115,7 +115,7 @@ fn what_is_missing_is_named() {
     );
     // No one is left.
     let found = Comparing {
-        of: crossover(),
+        quantities: crossover(),
         ..Comparing::default()
     }
     .run(&group(&rows[..4]))
@@ -130,7 +130,7 @@ fn what_is_missing_is_named() {
 fn parameters_are_those_of_one_form() {
     let of = vec!["K".parse().unwrap(), "tau_e".parse().unwrap()];
     let comparing = Comparing {
-        of,
+        quantities: of,
         ..Comparing::default()
     };
     assert_eq!(comparing.run(&group(&THREE)).unwrap().differences.len(), 2);
@@ -164,7 +164,7 @@ fn groups_of_people_and_interactions() {
     ];
     let comparing = Comparing {
         factors,
-        of: crossover(),
+        quantities: crossover(),
         adjustment: Adjustment::None,
         ..Comparing::default()
     };
@@ -223,7 +223,7 @@ fn errors_say_what_to_do() {
     let of = |names: &[&str]| names.iter().map(|n| n.parse().unwrap()).collect::<Vec<Quantity>>();
     let run = |comparing: Comparing| comparing.run(&all).unwrap_err().to_string();
     let from_runs = run(Comparing {
-        of: of(&["gain_db@2"]),
+        quantities: of(&["gain_db@2"]),
         ..Comparing::default()
     });
     assert!(

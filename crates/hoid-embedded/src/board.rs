@@ -1,4 +1,4 @@
-//! A processor without an operating system: entry, file and output by semihosting, and the stack usage.
+//! Processor without an operating system: entry point, file access and output by semihosting, and stack usage.
 #![allow(unsafe_code)]
 
 use cortex_m_rt::entry;
@@ -7,7 +7,7 @@ use semihosting::{fs::File, io::Read, println, process};
 use crate::run;
 
 unsafe extern "C" {
-    /// Ends of the stack, from the linker.
+    /// Ends of the stack, defined by the linker.
     static _stack_start: u32;
     static _stack_end: u32;
 }
@@ -41,12 +41,13 @@ fn work() -> Result<(), &'static str> {
     )
 }
 
-/// Number of bytes of the stack that were ever written.
+/// Returns the number of bytes of the stack that have been written.
 fn used() -> usize {
     let (top, bottom) = (&raw const _stack_start, &raw const _stack_end);
     let words = (top as usize - bottom as usize) / size_of::<u32>();
-    // SAFETY: both are ends of one region of the board's memory, which contains `words` aligned words. The reads are
-    // volatile, since the stack above is in use; the part in use is not read, as the first used word ends the loop.
+    // SAFETY: both pointers are ends of one region of the board's memory, which contains `words` aligned words. The
+    // reads are volatile, since the upper part of the stack is in use; this part is not read, because the loop ends at
+    // the first word that was used.
     let painted = (0..words)
         .take_while(|i| unsafe { bottom.add(*i).read_volatile() } == PAINT)
         .count();

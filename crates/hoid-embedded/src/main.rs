@@ -1,13 +1,13 @@
-//! The tracker on a bare processor: reads samples of e and u from the file `run.csv`, and writes the estimate of each
-//! second to standard output.
+//! Tracker on a processor without an operating system: reads samples of e and u from the file `run.csv` and writes one
+//! estimate per second to standard output.
 //!
-//! | file | holds |
+//! | file | contents |
 //! |---|---|
-//! | `run.rs` | code common to all targets: lines, filter, estimates |
-//! | `board.rs` | entry, files and output of a processor without an operating system, by semihosting |
+//! | `run.rs` | code common to all targets: input lines, filter, estimates |
+//! | `board.rs` | entry point, file access and output on a processor without an operating system, by semihosting |
 //!
-//! On the host it is an ordinary program, so that the digits of both can be compared (`cargo xtask embedded`). No
-//! memory is allocated; the filter is on the stack.
+//! On the host it is an ordinary program, so that the results on both targets can be compared digit by digit
+//! (`cargo xtask embedded`). No memory is allocated; the filter is on the stack.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]

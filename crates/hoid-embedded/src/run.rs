@@ -1,7 +1,8 @@
-//! Samples in, estimates out.
+//! Reads samples and writes estimates.
 //!
-//! A line of input is `e,u`, at [`SAMPLE_TIME_S`]. A line of output is one of the trace of `hoid track`, with
-//! the columns [`HEADER`]: t, then K_e, K_e_dot, omega_nm, zeta_nm and tau_e, each with its standard error.
+//! An input line is `e,u`, sampled at intervals of [`SAMPLE_TIME_S`]. An output line is a row of the trace of
+//! `hoid track` with the columns [`HEADER`]: t, then K_e, K_e_dot, omega_nm, zeta_nm and tau_e, each with its standard
+//! error.
 
 use core::{ffi::CStr, fmt::Arguments};
 
@@ -10,24 +11,24 @@ use hoid_core::adaptive::{
     defaults::{DefaultOperator, GIVEN_DELAY_S, SPREAD},
 };
 
-/// The file of the samples.
+/// Name of the file with the samples.
 pub const FILE: &CStr = c"run.csv";
-/// Message if it cannot be read.
+/// Message if the file cannot be read.
 pub const UNREADABLE: &str = "run.csv cannot be read";
 /// Columns of the output.
 const HEADER: &str = "t,K_e,K_e_se,K_e_dot,K_e_dot_se,omega_nm,omega_nm_se,zeta_nm,zeta_nm_se,tau_e,tau_e_se";
-/// Sample time, s.
+/// Sample time in s.
 const SAMPLE_TIME_S: f64 = 0.01;
-/// nk of the textbook's operator, the initial delay of the filter.
+/// nk of the textbook operator, from which the initial delay of the filter follows.
 const NK: f64 = 29.0;
-/// Number of samples per line of output.
+/// Number of samples per output line.
 const EVERY: u32 = 100;
-/// Number of memory entries: more than `least_memory(SAMPLE_TIME_S)`, and too few for replays.
+/// Length of the memory: more than `least_memory(SAMPLE_TIME_S)`, but too short for replays.
 const MEMORY: usize = 3 * 128;
-/// Longest line of input, in bytes.
+/// Longest input line in bytes.
 const LONGEST: usize = 80;
 
-/// The recursion, with its own memory.
+/// Recursion with its own memory.
 type Filter = AdaptiveFilter<[f64; MEMORY]>;
 
 /// Size of the recursion in bytes.
@@ -36,7 +37,7 @@ pub const STATE_BYTES: usize = size_of::<Filter>();
 /// Reads all samples and writes the estimates.
 ///
 /// # Errors
-/// A sentence about a failure of input or output.
+/// A message that describes the failure of input or output.
 pub fn run(
     read: impl FnMut(&mut [u8]) -> Result<usize, &'static str>,
     mut write: impl FnMut(Arguments<'_>) -> Result<(), &'static str>,
@@ -68,7 +69,7 @@ pub fn run(
     Ok(())
 }
 
-/// Reader of lines of two numbers.
+/// Reader of lines with two numbers each.
 struct Lines<R> {
     read: R,
     chunk: [u8; 256],
@@ -86,7 +87,7 @@ impl<R: FnMut(&mut [u8]) -> Result<usize, &'static str>> Lines<R> {
         }
     }
 
-    /// Returns e and u of the next line; `None` at the end.
+    /// Returns e and u of the next line; `None` at the end of the file.
     fn next(&mut self) -> Result<Option<(f64, f64)>, &'static str> {
         let (mut line, mut length) = ([0_u8; LONGEST], 0);
         loop {

@@ -1,8 +1,8 @@
-//! Pointers from the caller: all assumptions of this crate about them.
+//! Pointers from the caller, and all assumptions of this crate about them.
 //!
-//! A pointer that is null or not aligned is refused. Two conditions cannot be checked and are the
-//! contract of every function here: the pointer refers to an object as the header describes it, and
-//! no other thread uses it at the same time.
+//! A pointer that is null or not aligned is rejected. Two conditions cannot be checked and must be guaranteed by the
+//! caller of every function: the pointer refers to an object as described in the header, and no other thread uses the
+//! object at the same time.
 
 use std::{
     ffi::{CStr, c_char},
@@ -17,8 +17,8 @@ use crate::{
     },
 };
 
-/// A tracker. Make it with hoid_tracker_new, hoid_tracker_from_fit or hoid_tracker_restore, free it with
-/// hoid_tracker_free. One thread at a time may use it.
+/// Handle of a tracker. Create it with hoid_tracker_new, hoid_tracker_from_fit or hoid_tracker_restore, and free it
+/// with hoid_tracker_free. Only one thread at a time may use a tracker.
 pub struct HoidTracker {
     session: Session,
     is_broken: bool,
@@ -37,24 +37,24 @@ fn check<T>(pointer: *const T, what: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A text from the caller; `None` for a null pointer.
+/// Returns a string passed by the caller; `None` for a null pointer.
 ///
 /// # Safety
-/// `pointer` is null or points to a text that ends with a zero and stays as it is during the call.
+/// `pointer` is null or points to a null-terminated string that does not change during the call.
 pub(crate) unsafe fn text<'a>(pointer: *const c_char, what: &str) -> Result<Option<&'a str>, Failure> {
     if pointer.is_null() {
         return Ok(None);
     }
-    // SAFETY: not null; that it ends with a zero and stays is the contract.
+    // SAFETY: the pointer is not null; the caller guarantees a null-terminated string that does not change.
     let text = unsafe { CStr::from_ptr(pointer) };
-    let wrong = |_| Failure::new(HOID_BAD_TEXT, format!("{what} is not in UTF-8"));
+    let wrong = |_| Failure::new(HOID_BAD_TEXT, format!("{what} is not valid UTF-8"));
     text.to_str().map(Some).map_err(wrong)
 }
 
-/// Bytes from the caller.
+/// Returns bytes passed by the caller.
 ///
 /// # Safety
-/// `pointer` is null or points to `length` bytes that stay as they are during the call.
+/// `pointer` is null or points to `length` bytes that do not change during the call.
 pub(crate) unsafe fn bytes<'a>(pointer: *const u8, length: usize, what: &str) -> Result<&'a [u8], Failure> {
     check(pointer, what)?;
     if length > isize::MAX as usize {
@@ -68,30 +68,31 @@ pub(crate) unsafe fn bytes<'a>(pointer: *const u8, length: usize, what: &str) ->
     Ok(unsafe { slice::from_raw_parts(pointer, length) })
 }
 
-/// Writes a value where the caller wants it.
+/// Writes a value to the memory that the caller provides.
 ///
 /// # Safety
-/// `pointer` is null or points to room for one value.
+/// `pointer` is null or points to memory for one value.
 pub(crate) unsafe fn put<T>(pointer: *mut T, value: T, what: &str) -> Result<(), Failure> {
     check(pointer, what)?;
-    // SAFETY: not null, aligned; that there is room is the contract. The previous content needs no drop.
+    // SAFETY: the pointer is not null and is aligned; the caller guarantees memory for the value. The previous content
+    // needs no drop.
     unsafe { pointer.write(value) };
     Ok(())
 }
 
-/// Writes a list where the caller wants it, and its length. Without room (`list` null and `room`
-/// zero) only the length is reported.
+/// Writes an array of values and their number to the memory that the caller provides. If `list` is null and `room` is
+/// zero, only the number is written.
 ///
 /// # Safety
-/// `list` is null or points to room for `room` values, `count` is null or to room for a number.
-pub(crate) unsafe fn put_all<T: Copy>(
+/// `list` is null or points to memory for `room` values, and `count` is null or points to memory for a number.
+pub(crate) unsafe fn write_array<T: Copy>(
     values: &[T],
     list: *mut T,
     room: usize,
     count: *mut usize,
     what: &str,
 ) -> Result<(), Failure> {
-    // SAFETY: by the contract of this function.
+    // SAFETY: guaranteed by the caller of this function.
     unsafe { put(count, values.len(), "the pointer for the count") }?;
     if list.is_null() && room == 0 {
         return Ok(());
@@ -103,8 +104,8 @@ pub(crate) unsafe fn put_all<T: Copy>(
             format!("{what} has room for {room} values, but there are {}", values.len()),
         ));
     }
-    // SAFETY: not null, aligned, and by the contract with room for `room` values, which is enough;
-    // memory of the caller does not overlap with ours.
+    // SAFETY: the pointer is not null and is aligned, and the caller guarantees memory for `room` values, which is
+    // enough. The memory of the caller does not overlap with `values`.
     unsafe { list.copy_from_nonoverlapping(values.as_ptr(), values.len()) };
     Ok(())
 }
@@ -112,57 +113,57 @@ pub(crate) unsafe fn put_all<T: Copy>(
 /// Passes a tracker to the caller.
 ///
 /// # Safety
-/// `place` is null or points to room for a pointer.
-pub(crate) unsafe fn hand_over(session: Session, place: *mut *mut HoidTracker) -> Result<(), Failure> {
+/// `place` is null or points to memory for a pointer.
+pub(crate) unsafe fn into_handle(session: Session, place: *mut *mut HoidTracker) -> Result<(), Failure> {
     check(place, "the pointer for the tracker")?;
     let tracker = Box::into_raw(Box::new(HoidTracker {
         session,
         is_broken: false,
     }));
-    // SAFETY: by the contract of this function.
+    // SAFETY: guaranteed by the caller of this function.
     unsafe { put(place, tracker, "the pointer for the tracker") }
 }
 
-/// Takes a tracker back and lets it go.
+/// Takes a tracker back from the caller and frees it.
 ///
 /// # Safety
-/// `tracker` is null or one that was handed over and not taken back.
-pub(crate) unsafe fn take_back(tracker: *mut HoidTracker) {
+/// `tracker` is null, or came from [`into_handle`] and has not been taken back.
+pub(crate) unsafe fn free_handle(tracker: *mut HoidTracker) {
     if tracker.is_null() {
         return;
     }
-    // SAFETY: it came from `hand_over`, by the contract for the only time.
+    // SAFETY: the pointer came from `into_handle`; the caller guarantees that it is taken back only once.
     drop(unsafe { Box::from_raw(tracker) });
 }
 
-/// Looks at a tracker.
+/// Calls a function with shared access to a tracker.
 ///
 /// # Safety
-/// `tracker` is null or one that was handed over, and no other thread uses it.
+/// `tracker` is null or came from [`into_handle`], and no other thread uses it.
 pub(crate) unsafe fn with_tracker(
     tracker: *const HoidTracker,
     call: impl FnOnce(&Session) -> Result<(), Failure>,
 ) -> HoidStatus {
     guarded(|| {
         check(tracker, "the tracker")?;
-        // SAFETY: not null, aligned; by the contract it is ours and no one changes it.
+        // SAFETY: the pointer is not null and is aligned; the caller guarantees a tracker that no other code changes.
         let tracker = unsafe { &*tracker };
         tracker.check()?;
         call(&tracker.session)
     })
 }
 
-/// Moves a tracker. After a panic in it, it is broken.
+/// Calls a function that may change a tracker. If the function panics, the tracker cannot be used any more.
 ///
 /// # Safety
 /// As [`with_tracker`].
-pub(crate) unsafe fn move_tracker(
+pub(crate) unsafe fn with_tracker_mut(
     tracker: *mut HoidTracker,
     call: impl FnOnce(&mut Session) -> Result<(), Failure>,
 ) -> HoidStatus {
     guarded(|| {
         check(tracker, "the tracker")?;
-        // SAFETY: not null, aligned; by the contract it is ours and no other code uses it.
+        // SAFETY: the pointer is not null and is aligned; the caller guarantees a tracker that no other code uses.
         let tracker = unsafe { &mut *tracker };
         tracker.check()?;
         let session = &mut tracker.session;
@@ -208,14 +209,14 @@ mod tests {
         for place in &mut trackers {
             let session = Session::new(Some("rpem"), 0.01, Some("{\"nk\": 9}"), None).unwrap();
             // SAFETY: a place on the stack.
-            unsafe { hand_over(session, place) }.unwrap();
+            unsafe { into_handle(session, place) }.unwrap();
         }
         // SAFETY: made above.
-        let status = unsafe { move_tracker(trackers[0], |_| panic!("as planned")) };
+        let status = unsafe { with_tracker_mut(trackers[0], |_| panic!("as planned")) };
         assert_eq!(status, HOID_PANIC);
         assert!(last().contains("as planned"), "{}", last());
         // SAFETY: made above.
-        let status = unsafe { move_tracker(trackers[0], |_| Ok(())) };
+        let status = unsafe { with_tracker_mut(trackers[0], |_| Ok(())) };
         assert_eq!(status, HOID_BROKEN);
         // SAFETY: made above.
         let status = unsafe { with_tracker(trackers[1], |_| Ok(())) };
@@ -224,7 +225,7 @@ mod tests {
         assert!(last().ends_with('7'));
         for tracker in trackers {
             // SAFETY: made above, taken back once.
-            unsafe { take_back(tracker) };
+            unsafe { free_handle(tracker) };
         }
         std::panic::set_hook(hook);
     }
@@ -242,13 +243,13 @@ mod tests {
         assert!(refused.text.contains("aligned"));
         let mut count = 0;
         // SAFETY: room for two.
-        let refused = unsafe { put_all(&[1.0, 2.0, 3.0], room.as_mut_ptr(), 2, &mut count, "the list") };
+        let refused = unsafe { write_array(&[1.0, 2.0, 3.0], room.as_mut_ptr(), 2, &mut count, "the list") };
         assert_eq!(
             (refused.unwrap_err().status, count, room),
             (HOID_TOO_SMALL, 3, [0.0; 2])
         );
         // SAFETY: nothing to be written to.
-        let told = unsafe { put_all(&[1.0], ptr::null_mut(), 0, &mut count, "the list") };
+        let told = unsafe { write_array(&[1.0], ptr::null_mut(), 0, &mut count, "the list") };
         assert_eq!((told, count), (Ok(()), 1));
         // SAFETY: ends with a zero.
         let refused = unsafe { text(c"\xff".as_ptr(), "a") }.unwrap_err();

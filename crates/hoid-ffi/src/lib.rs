@@ -1,45 +1,45 @@
-//! The tracker of `hoid track` and `hoid stream` behind a C ABI.
+//! C interface of the tracker of `hoid track` and `hoid stream`.
 //!
-//! The one crate of the workspace with unsafe code. What is unsafe about a C boundary is that pointers are trusted, so
-//! that is all the unsafe code does: `boundary` reads texts and writes results through pointers of the caller, and
-//! nothing else dereferences one. Behind it is the safe `session`, which does not depend on C.
+//! This is the only crate of the workspace with unsafe code. A C interface is unsafe because it must trust pointers,
+//! and the unsafe code does nothing else: `boundary` reads strings and writes results through pointers from the caller,
+//! and no other code dereferences such a pointer. The module `session` behind it is safe and independent of C.
 //!
-//! Three rules hold for every function:
+//! Every function follows three rules:
 //!
-//! - **It returns a status**, zero for done, positive if there is no value now, negative for an error. The reason is in
-//!   [`hoid_last_error`] of the calling thread.
-//! - **No panic crosses.** A panic is caught, becomes [`HOID_PANIC`], and the tracker that was at work
-//!   answers [`HOID_BROKEN`] from then on: its state may be half updated.
-//! - **A null pointer is an error**, not a crash, and a list that is too short is not written.
+//! - **It returns a status**: zero for success, positive if there is currently no value, negative for an error.
+//!   [`hoid_last_error`], called in the same thread, returns the reason.
+//! - **No panic crosses the interface.** A panic is caught and becomes [`HOID_PANIC`]. From then on, every call with
+//!   the affected tracker returns [`HOID_BROKEN`], since the state of the tracker may be inconsistent.
+//! - **A null pointer is an error**, not a crash, and nothing is written to an array that is too short.
 //!
-//! Names, order and units are those of Rust and Python.
+//! Names, order and units are the same as in Rust and Python.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `session` | a tracker as its options ask for it, and the prior knowledge of it |
-//! | `options` | options in JSON, by the keywords of Python |
-//! | `saved`, `packed` | a tracker as bytes |
-//! | `status`, `boundary` | statuses and their texts; pointers |
-//! | `types` | types that cross the interface |
-//! | `making`, `stepping`, `reading` | the functions |
-//! | [`fmi`] | the functions of the Functional Mock-up Interface |
+//! | `session` | tracker built from its options, with its prior knowledge |
+//! | `options` | options in JSON, with the keywords of Python |
+//! | `saved`, `packed` | serialisation of a tracker as bytes |
+//! | `status`, `boundary` | status codes and error messages; pointers |
+//! | `types` | types of the interface |
+//! | `create`, `update`, `results` | functions of the interface |
+//! | [`fmi`] | functions of the Functional Mock-up Interface |
 
 mod boundary;
+mod create;
 /// cbindgen:ignore
 pub mod fmi;
-mod making;
 mod options;
 mod packed;
-mod reading;
+mod results;
 mod saved;
 mod session;
 mod status;
-mod stepping;
 mod types;
+mod update;
 
 pub use boundary::HoidTracker;
-pub use making::*;
-pub use reading::*;
+pub use create::*;
+pub use results::*;
 pub use status::*;
-pub use stepping::*;
 pub use types::*;
+pub use update::*;

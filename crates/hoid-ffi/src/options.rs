@@ -1,12 +1,11 @@
-//! Signals to be tracked: method, sample time, options in JSON, a fit.
+//! Request for a tracker: method, sample time, options in JSON, and a fit.
 //!
-//! The options are one object with the keywords of `pyhoid.Tracker`: `structure`, `na` to `nk` (a
-//! number, or a pair that is searched on the warm-up), `criterion`, `start` (coefficients by name, or
-//! "nothing"), `largest`, `at`, `controlled_element` ("90/(s(s+6))", or a pair of coefficients),
-//! `decimate` ("auto", "off" or a factor: rates above 200 Hz are decimated to about 100 Hz by default), `warm_up` in s,
-//! and the options of the method, whose values are those of the command line: a
-//! number, a text, true, a pair, values by name. `prior` may be a fit itself, as `hoid identify
-//! --json` prints it, or the name of its file.
+//! The options are one object with the keywords of `pyhoid.Tracker`: `structure`; `na` to `nk` (a number, or a pair of
+//! limits between which the order is searched during the warm-up); `criterion`; `start` (coefficients by name, or
+//! "nothing"); `largest`; `at`; `controlled_element` ("90/(s(s+6))", or a pair of coefficient lists); `decimate`
+//! ("auto", "off" or a factor; by default, rates above 200 Hz are decimated to about 100 Hz); `warm_up` in s; and the
+//! options of the method. The values of these options are those of the command line: a number, a string, true, a pair,
+//! or values by name. `prior` may be a fit itself, as printed by `hoid identify --json`, or the name of its file.
 
 use std::{ops::RangeInclusive, path::Path};
 
@@ -21,10 +20,10 @@ use serde_json::{Map, Value};
 
 use crate::status::Failure;
 
-/// The request, as it is saved.
+/// Request for a tracker, in the form in which it is saved.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TrackerRequest {
-    /// Name of the method; `None` for the default one.
+    /// Name of the method; `None` for the default method.
     pub method: Option<String>,
     pub sample_time_s: f64,
     /// Options in JSON.
@@ -34,7 +33,7 @@ pub(crate) struct TrackerRequest {
 }
 
 impl TrackerRequest {
-    /// The recursion at its start.
+    /// Builds the requested recursion at its start.
     pub fn live(&self) -> Result<Live, Failure> {
         let sample_time = SampleTime::new(self.sample_time_s)?;
         let mut options = object(self.options.as_deref().unwrap_or("{}"))?;
@@ -71,7 +70,7 @@ impl TrackerRequest {
     }
 }
 
-/// Options of the method, those first that others belong to, and the fit.
+/// Sets the options of the method, those first on which other options depend, and then the fit.
 fn set(method: &mut Method, mut options: Map<String, Value>, fit: Option<&str>) -> Result<(), Failure> {
     let mut fitted = fit.map(|text| operator(text, "the fit")).transpose()?;
     if let Some(prior) = options.get("prior") {
@@ -101,7 +100,7 @@ fn set(method: &mut Method, mut options: Map<String, Value>, fit: Option<&str>) 
     if let Some((unknown, _)) = options.into_iter().next() {
         let own: Vec<&str> = method.settings().list().iter().map(|own| own.name).collect();
         return Err(Failure::option(format!(
-            "there is no option {unknown}; there is structure, na to nk, criterion, start, largest, at, \
+            "there is no option {unknown}; the options are structure, na to nk, criterion, start, largest, at, \
              controlled_element, decimate, warm_up, and for {method} {}",
             own.join(", ")
         )));
@@ -120,12 +119,12 @@ fn object(text: &str) -> Result<Map<String, Value>, Failure> {
     let text = if text.trim().is_empty() { "{}" } else { text };
     serde_json::from_str(text).map_err(|error| {
         Failure::option(format!(
-            "the options are not an object in JSON ({error}); write them as {{\"nk\": 29, \"memory\": \"4s\"}}"
+            "the options are not a JSON object ({error}); write them as {{\"nk\": 29, \"memory\": \"4s\"}}"
         ))
     })
 }
 
-/// Takes an option out; `None` if it is missing or null.
+/// Removes an option from the object and returns it; `None` if it is missing or null.
 fn taken<T>(
     options: &mut Map<String, Value>,
     name: &str,
@@ -160,7 +159,7 @@ fn numbers(value: &Value) -> Result<Vec<f64>, String> {
 }
 
 fn element(value: &Value) -> Result<ContinuousTransferFunction, String> {
-    let expected = "a text such as \"90/(s(s+6))\", or a pair of coefficients by descending powers of s";
+    let expected = "a text such as \"90/(s(s+6))\", or a pair of coefficients in descending powers of s";
     match value {
         Value::String(text) => text.parse().map_err(|error| format!("{expected} ({error})")),
         Value::Array(pair) if pair.len() == 2 => {
@@ -200,7 +199,7 @@ fn range(value: &Value, name: &str) -> Result<RangeInclusive<usize>, String> {
     }
 }
 
-/// A value as the command line writes it; `None` if it carries no information.
+/// Returns a value in the notation of the command line; `None` for a value that sets nothing.
 fn text(value: &Value) -> Option<String> {
     Some(match value {
         Value::Null | Value::Bool(false) => return None,
@@ -266,7 +265,7 @@ mod tests {
     fn what_cannot_be_says_why() {
         for (method, options, reason) in [
             ("kalman", "{}", "adaptive"),
-            ("rpem", "[1]", "not an object in JSON"),
+            ("rpem", "[1]", "not a JSON object"),
             ("rpem", "{\"nk\": -1}", "whole number"),
             ("rpem", "{\"nk\": [30, 20]}", "smaller first"),
             ("rpem", "{\"nd\": 65}", "64"),

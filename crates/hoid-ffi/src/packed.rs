@@ -1,26 +1,26 @@
-//! A description in JSON followed by bytes, in which damage is detected.
+//! Binary format: a description in JSON followed by data, with a checksum.
 //!
-//! | bytes | |
+//! | bytes | contents |
 //! |---|---|
-//! | 8 | type of the object, and the version of its layout |
+//! | 8 | type of the object and version of its layout |
 //! | 8 | length L of the description |
-//! | L | the description |
-//! | | the bytes |
-//! | 8 | FNV-1a over all before (G. Fowler, L. C. Noll, K.-P. Vo, 1991; 64 bits) |
+//! | L | description |
+//! | any number | data |
+//! | 8 | FNV-1a checksum of all preceding bytes (G. Fowler, L. C. Noll, K.-P. Vo, 1991; 64 bits) |
 //!
-//! Little-endian. The sum guards against damage, not against an adversary.
+//! All numbers are little-endian. The checksum detects damage, but does not protect against an adversary.
 
 use serde_json::Value;
 
 const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
 const PRIME: u64 = 0x0000_0100_0000_01b3;
 
-/// Reason why bytes cannot be read.
+/// Reason why packed bytes cannot be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Closed {
-    /// They are something else, or of another version.
+    /// The bytes are of another type or version.
     Other,
-    /// They were changed or cut.
+    /// The bytes were changed or truncated.
     Damaged,
 }
 
@@ -40,7 +40,7 @@ pub(crate) fn packed(magic: [u8; 8], description: &Value, bytes: &[u8]) -> Vec<u
     all
 }
 
-/// Description and bytes.
+/// Returns the description and the data of packed bytes.
 pub(crate) fn opened(magic: [u8; 8], all: &[u8]) -> Result<(Value, &[u8]), Closed> {
     let rest = all.strip_prefix(&magic).ok_or(Closed::Other)?;
     let of = || {
@@ -57,12 +57,12 @@ pub(crate) fn opened(magic: [u8; 8], all: &[u8]) -> Result<(Value, &[u8]), Close
     of().ok_or(Closed::Damaged)
 }
 
-/// Numbers as bytes.
+/// Converts numbers to bytes.
 pub(crate) fn as_bytes(numbers: &[f64]) -> Vec<u8> {
     numbers.iter().flat_map(|number| number.to_le_bytes()).collect()
 }
 
-/// The numbers of bytes; `None` if there are some left.
+/// Converts bytes to numbers; `None` if their count is not a multiple of eight.
 pub(crate) fn as_numbers(bytes: &[u8]) -> Option<Vec<f64>> {
     let (numbers, []) = bytes.as_chunks::<8>() else {
         return None;

@@ -1,7 +1,7 @@
-//! A tracker as bytes, to continue elsewhere with the same digits.
+//! Serialisation of a tracker, so that it can be continued elsewhere with bit-identical results.
 //!
-//! The description is the request and the orders, the bytes are the numbers of
-//! [`hoid_track::Live::saved`] (`packed`).
+//! In the packed format (`packed`), the description contains the request and the orders, and the data are the numbers
+//! of [`hoid_track::Live::saved`].
 
 use hoid_model::Orders;
 use serde_json::{Value, json};
@@ -15,7 +15,7 @@ use crate::{
 
 const MAGIC: [u8; 8] = *b"hoid\x01\0\0\0";
 impl Session {
-    /// The tracker as bytes. It does not change.
+    /// Returns the tracker as bytes, without changing it.
     pub fn saved(&mut self) -> Vec<u8> {
         let (asked, live) = self.parts();
         let (orders, numbers) = live.saved();
@@ -31,7 +31,7 @@ impl Session {
         packed(MAGIC, &description, &as_bytes(&numbers))
     }
 
-    /// The tracker that [`Session::saved`] was asked of.
+    /// Restores a tracker from the bytes of [`Session::saved`].
     pub fn restored(bytes: &[u8]) -> Result<Self, Failure> {
         let wrong = |text: &str| Failure::new(HOID_BAD_STATE, format!("{text}; save the tracker again"));
         let damaged = || wrong("the bytes were changed or truncated since they were saved");

@@ -1,5 +1,5 @@
-//! A tracker as it was requested, from its warm-up on. Nothing here knows of C, except for the
-//! names, which C wants to keep.
+//! Tracker built from a request, including its warm-up. The module is independent of C except for the names, which must
+//! remain valid for the caller in C.
 
 use std::ffi::{CStr, CString};
 
@@ -12,7 +12,7 @@ use crate::{
     types::{HOID_SHIFTS, HoidChange, HoidCounts, HoidEstimate, HoidOutcome, HoidShift},
 };
 
-/// Names of the operator's parameters with their units, in the order of the tables.
+/// Names and units of the parameters of the operator, in the order of the tables.
 const OPERATOR: [(&CStr, &CStr); 6] = [
     (c"K_e", c""),
     (c"T_L", c"s"),
@@ -21,19 +21,19 @@ const OPERATOR: [(&CStr, &CStr); 6] = [
     (c"zeta_nm", c""),
     (c"tau_e", c"s"),
 ];
-/// Quantities that a change refers to.
+/// Quantities for which a change is reported.
 const SHIFTED: [&CStr; HOID_SHIFTS] = [c"K_e", c"K_e_dot", c"omega_nm", c"zeta_nm", c"remnant", c"tau_e"];
 
-/// A tracker and the prior knowledge of it.
+/// Tracker with the request from which it was built.
 pub(crate) struct Session {
     asked: TrackerRequest,
     live: Live,
-    /// Names of the coefficients, once there are some.
+    /// Names of the coefficients; empty until the structure is known.
     names: Vec<CString>,
 }
 
 impl Session {
-    /// As asked for: by name of the method and sample time in s, with options and a fit in JSON.
+    /// Builds a tracker from the name of the method, the sample time in s, options in JSON, and a fit in JSON.
     pub fn new(
         method: Option<&str>,
         sample_time_s: f64,
@@ -49,7 +49,7 @@ impl Session {
         Self::of(asked)
     }
 
-    /// As requested, at its start.
+    /// Builds the requested tracker at its start.
     pub fn of(asked: TrackerRequest) -> Result<Self, Failure> {
         let mut session = Self {
             live: asked.live()?,
@@ -67,7 +67,7 @@ impl Session {
         Ok(())
     }
 
-    /// Components of it, and its recursion to be saved.
+    /// Returns the request and the recursion, for saving.
     pub fn parts(&mut self) -> (&TrackerRequest, &mut Live) {
         (&self.asked, &mut self.live)
     }
@@ -79,7 +79,7 @@ impl Session {
         }
     }
 
-    /// The tracker; while there is none, how far the warm-up is.
+    /// Returns the tracker, or an error with the progress of the warm-up if there is no tracker yet.
     pub fn tracker(&self) -> Result<&Tracker, Failure> {
         match self.live.stage() {
             Stage::Tracking(tracker) => Ok(tracker),
@@ -93,7 +93,7 @@ impl Session {
         }
     }
 
-    /// Takes a sample. With `moves` false the filters follow and the estimate stays.
+    /// Takes a sample. If `moves` is false, the filters are updated but the estimate stays constant.
     pub fn take(&mut self, sample: Sample, moves: bool) -> HoidOutcome {
         let taken = (self.live).update(sample, moves, &|plan, record| plan.choose(record, &|| {}));
         if taken.started.is_some() {
@@ -112,14 +112,14 @@ impl Session {
         }
     }
 
-    /// The coefficients, in the order of theta.
+    /// Returns the coefficients in the order of theta.
     pub fn parameters(&self) -> Result<Vec<HoidEstimate>, Failure> {
         let estimates = self.tracker()?.parameters();
         let of = |(name, estimate): (&CString, Estimate)| HoidEstimate::new(name.as_ptr(), c"".as_ptr(), estimate);
         Ok(self.names.iter().zip(estimates).map(of).collect())
     }
 
-    /// The operator.
+    /// Returns the parameters of the operator.
     pub fn operator(&self) -> Result<Vec<HoidEstimate>, Failure> {
         let tracker = self.tracker()?;
         let operator = tracker
@@ -138,7 +138,7 @@ impl Session {
             .collect())
     }
 
-    /// Crossover and phase margin.
+    /// Returns the crossover frequency and the phase margin.
     pub fn open_loop(&self) -> Result<Vec<HoidEstimate>, Failure> {
         let found = self.tracker()?.open_loop().ok_or_else(|| {
             Failure::nothing("there is no controlled element; give it in the options as \"controlled_element\"")
@@ -150,11 +150,11 @@ impl Session {
         ])
     }
 
-    /// Gain and phase at a frequency in rad/s.
+    /// Returns gain and phase at a frequency in rad/s.
     pub fn response(&self, omega_rad_s: f64) -> Result<Vec<HoidEstimate>, Failure> {
         if !(omega_rad_s > 0.0 && omega_rad_s.is_finite()) {
             return Err(Failure::option(format!(
-                "the frequency is {omega_rad_s} rad/s, expected a positive one"
+                "the frequency is {omega_rad_s} rad/s, expected a positive frequency"
             )));
         }
         let found = self.tracker()?.response(omega_rad_s);
@@ -165,33 +165,33 @@ impl Session {
         ])
     }
 
-    /// Covariance of the coefficients by rows.
+    /// Returns the covariance of the coefficients, row by row.
     pub fn covariance(&self) -> Result<Vec<f64>, Failure> {
         let covariance = self.tracker()?.covariance();
         covariance.ok_or_else(|| Failure::nothing("the estimate has no covariance yet"))
     }
 
-    /// The change that was declared at the last sample.
+    /// Returns the change that was declared at the last sample.
     pub fn change(&self) -> Result<HoidChange, Failure> {
         let change = self.tracker()?.change();
         let change = change.ok_or_else(|| Failure::nothing("no change was declared at the last sample"))?;
         Ok(shown(&change))
     }
 
-    /// Logarithm of the odds of a change within the last few seconds.
+    /// Returns the current evidence of a change (`log_odds` of [`HoidChange`]).
     pub fn change_log_odds(&self) -> Result<f64, Failure> {
         let odds = self.tracker()?.change_odds();
         odds.ok_or_else(|| Failure::nothing("the method does not report changes; adaptive and multiple-model do"))
     }
 
-    /// Verdict on the estimate now.
+    /// Returns the verdict on the current estimate.
     pub fn level(&self) -> VerdictLevel {
         self.tracker().map_or(VerdictLevel::NotDetermined, |tracker| {
             tracker.level(&tracker.operator())
         })
     }
 
-    /// Samples so far.
+    /// Returns the counts since the start.
     pub fn counts(&self) -> HoidCounts {
         let counts = self.live.counts();
         HoidCounts {
@@ -203,7 +203,7 @@ impl Session {
         }
     }
 
-    /// Sample time, s.
+    /// Returns the sample time in s.
     pub fn sample_time_s(&self) -> f64 {
         self.live.sample_time().s()
     }

@@ -1,6 +1,6 @@
-//! Statuses, and the text of the last one.
+//! Status codes, and the message of the last error.
 //!
-//! The text belongs to the thread: two threads with a tracker each do not mix theirs up.
+//! Each thread has its own message, so two threads with separate trackers do not affect each other.
 
 use std::{
     any::Any,
@@ -13,29 +13,29 @@ use hoid_ident::IdentError;
 use hoid_io::IoError;
 use hoid_model::ModelError;
 
-/// Return code of a function: zero for done, positive if there is no value, negative for an error.
+/// Return code of a function: zero for success, positive if there is no value, negative for an error.
 pub type HoidStatus = i32;
 
-/// Done.
+/// Success.
 pub const HOID_OK: HoidStatus = 0;
-/// There is no such value now; hoid_last_error gives the reason.
+/// The requested value is currently not available; hoid_last_error returns the reason.
 pub const HOID_NOTHING: HoidStatus = 1;
 /// A pointer is null or not aligned.
 pub const HOID_BAD_POINTER: HoidStatus = -1;
-/// A text is not in UTF-8.
+/// A string is not valid UTF-8.
 pub const HOID_BAD_TEXT: HoidStatus = -2;
-/// A method, an option, a sample time or a fit that cannot be used.
+/// The method, an option, the sample time or the fit cannot be used.
 pub const HOID_BAD_OPTION: HoidStatus = -3;
-/// A list or buffer is too short.
+/// An array or buffer is too small.
 pub const HOID_TOO_SMALL: HoidStatus = -4;
-/// Bytes that are not a saved tracker of this version, or were changed.
+/// The bytes are not a tracker saved by this version, or were changed.
 pub const HOID_BAD_STATE: HoidStatus = -5;
 /// An internal error of hoid was caught.
 pub const HOID_PANIC: HoidStatus = -6;
-/// An internal error was caught in this tracker before: free it.
+/// An earlier call with this tracker failed with an internal error; free the tracker.
 pub const HOID_BROKEN: HoidStatus = -7;
 
-/// A status that is not [`HOID_OK`], with its text.
+/// Status other than [`HOID_OK`], with its message.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Failure {
     pub status: HoidStatus,
@@ -81,7 +81,8 @@ thread_local! {
     static LAST: RefCell<CString> = RefCell::new(CString::default());
 }
 
-/// Runs a function of the boundary: its status, its text for [`hoid_last_error`], no panic.
+/// Runs a function of the interface and returns its status. Panics are caught, and the message of a failure is stored
+/// for [`hoid_last_error`].
 pub(crate) fn guarded(call: impl FnOnce() -> Result<(), Failure>) -> HoidStatus {
     let failure = match catch_unwind(AssertUnwindSafe(call)) {
         Ok(Ok(())) => return HOID_OK,
@@ -92,7 +93,7 @@ pub(crate) fn guarded(call: impl FnOnce() -> Result<(), Failure>) -> HoidStatus 
     failure.status
 }
 
-/// Report of a panic.
+/// Returns the error message for a panic.
 pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> String {
     let words = (panic.downcast_ref::<&str>().copied())
         .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
@@ -102,12 +103,12 @@ pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> String {
 
 fn remember(text: &str) {
     let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
-    // When a thread ends, its storage may no longer exist.
+    // While a thread ends, its thread-local storage may no longer exist.
     let _ = LAST.try_with(|last| *last.borrow_mut() = text);
 }
 
-/// The text of the last status of this thread that was not HOID_OK, empty before the first. The
-/// pointer stays valid until the next status of this thread that is not HOID_OK.
+/// Returns the message of the last status in this thread that was not HOID_OK, or an empty string if there was none.
+/// The pointer stays valid until a function called in this thread again returns a status other than HOID_OK.
 #[unsafe(no_mangle)]
 pub extern "C" fn hoid_last_error() -> *const c_char {
     const EMPTY: &CStr = c"";

@@ -1,40 +1,40 @@
-//! The data passed on. Numbers that are not known are NaN.
+//! Data types of the interface. Numbers that are not known are NaN.
 
 use std::{ffi::c_char, ptr};
 
 use hoid_model::uncertainty::Estimate;
 
-/// Result of a sample.
+/// Outcome of an update with one sample.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HoidOutcome {
-    /// A-priori innovation; NaN at a sample that was skipped or held back, and during a warm-up.
+    /// A-priori innovation; NaN if the sample was skipped or held back, and during the warm-up.
     pub innovation: f64,
-    /// 1 after the warm-up; always 1 for a method without one.
+    /// 1 after the warm-up, and always for a method without a warm-up; otherwise 0.
     pub ready: i32,
-    /// 1 if e or u was faulty: not a finite number, or beyond `largest`.
+    /// 1 if e or u was faulty: not finite, or larger in magnitude than `largest`.
     pub skipped: i32,
     /// 1 if the guard held back the sample.
     pub held: i32,
-    /// 1 if the step was shortened to keep stability or a bound.
+    /// 1 if the step of the estimate was shortened to ensure stability or to respect a bound.
     pub shortened: i32,
     /// 1 if a change of the person was declared at this sample.
     pub changed: i32,
 }
 
-/// A number with its standard error.
+/// Estimate with its standard error.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HoidEstimate {
-    /// Its name; valid as long as the tracker.
+    /// Name of the quantity; the pointer is valid as long as the tracker.
     pub name: *const c_char,
-    /// Its unit, empty if there is none; always valid.
+    /// Unit of the quantity, empty if there is none; the pointer is always valid.
     pub unit: *const c_char,
-    /// The value.
+    /// Estimated value.
     pub value: f64,
-    /// Its standard error; NaN if there is none.
+    /// Standard error of the value; NaN if there is none.
     pub standard_error: f64,
-    /// 1 if the data determine it, 0 if they do not, -1 if that is not judged.
+    /// 1 if the data determine the quantity, 0 if they do not, -1 if this is not assessed.
     pub determined: i32,
 }
 
@@ -50,39 +50,40 @@ impl HoidEstimate {
     }
 }
 
-/// A quantity before and after a change.
+/// Quantity before and after a change.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HoidShift {
-    /// Its name; always valid.
+    /// Name of the quantity; the pointer is always valid.
     pub name: *const c_char,
     /// Value before the change.
     pub before: f64,
-    /// Its standard error; NaN if there is none.
+    /// Standard error of the value before the change; NaN if there is none.
     pub before_standard_error: f64,
     /// Value after the change.
     pub after: f64,
-    /// Its standard error; NaN if there is none.
+    /// Standard error of the value after the change; NaN if there is none.
     pub after_standard_error: f64,
-    /// The change divided by its standard error; for the remnant, the change of the logarithm.
+    /// Change divided by its standard error; for the remnant, the change of the logarithm divided by its standard
+    /// error.
     pub z: f64,
 }
 
-/// Number of quantities of a change.
+/// Number of quantities in a change.
 pub const HOID_SHIFTS: usize = 6;
 
-/// A declared change of the person.
+/// Declared change of the person.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HoidChange {
-    /// Time from the change to its declaration, s.
+    /// Time in s from the change to its declaration.
     pub seconds_ago: f64,
-    /// `adaptive`: -ln of the p-value of the change test; `multiple-model`: logarithm of the odds of
-    /// a change within the last four seconds.
+    /// With the method `adaptive`, -ln of the p-value of the change test; with `multiple-model`, log odds of a change
+    /// within the last four seconds.
     pub log_odds: f64,
-    /// 1/(1 + exp(-log_odds)); with `multiple-model` the probability of the change.
+    /// 1/(1 + exp(-log_odds)); with `multiple-model`, the probability of the change.
     pub probability: f64,
-    /// K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm, remnant (innovation variance), tau_e (s).
+    /// K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm, remnant (innovation variance) and tau_e (s), in this order.
     pub shifts: [HoidShift; HOID_SHIFTS],
 }
 
@@ -103,14 +104,14 @@ impl Default for HoidShift {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HoidCounts {
-    /// Samples.
+    /// Number of samples.
     pub samples: u64,
-    /// Samples with a fault in e or u.
+    /// Number of samples with a fault in e or u.
     pub skipped: u64,
-    /// Samples that the guard held back.
+    /// Number of samples that the guard held back.
     pub held: u64,
-    /// Restarts of the estimate by the guard.
+    /// Number of restarts of the estimate by the guard.
     pub restarts: u64,
-    /// Steps shortened to keep stability or a bound.
+    /// Number of steps that were shortened to ensure stability or to respect a bound.
     pub steps_shortened: u64,
 }

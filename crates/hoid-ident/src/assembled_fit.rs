@@ -1,4 +1,4 @@
-//! The fit at a minimum: loss, innovation variance and the other results of the sum of squares.
+//! Assembly of a fit at a minimum: loss, innovation variance and covariance from the sum of squares.
 //!
 //! With n residuals, p free parameters and s initial states, `V = sum eps^2 / n` and
 //! `sigma^2 = sum eps^2 / (n - p - s)`. The covariance of theta is `sigma^2 (psi' psi)^-1` over the
@@ -11,14 +11,14 @@ use crate::{
     criterion::{Criterion, output_variance},
 };
 
-/// The minimum at which a fit was found.
+/// The minimum found by a search.
 pub(crate) struct Solution {
     pub theta: Vec<f64>,
     pub sum_of_squares: f64,
     pub termination: Termination,
-    /// True for parameters that are not free.
-    pub held: Vec<bool>,
-    /// Name of the start.
+    /// True for each parameter that is fixed or at a bound.
+    pub is_fixed_or_bounded: Vec<bool>,
+    /// Name of the start that led to the minimum.
     pub start: String,
 }
 
@@ -36,14 +36,14 @@ pub(crate) fn assembled_fit(
         theta,
         sum_of_squares,
         termination,
-        held,
+        is_fixed_or_bounded,
         start,
     } = solution;
     let n = criterion.residuals();
-    let free = held.iter().filter(|held| !**held).count();
+    let free = is_fixed_or_bounded.iter().filter(|held| !**held).count();
     let freedom = n - free - criterion.states();
     Ok(Fit {
-        held,
+        is_fixed_or_bounded,
         model: PolynomialModel::new(structure, criterion.orders, sample_time, theta)?,
         covariance: None,
         loss: sum_of_squares / n as f64,
@@ -71,7 +71,7 @@ impl Fit {
     }
 }
 
-/// Returns for each of p parameters whether it is not free.
-pub(crate) fn held(free: &[usize], p: usize) -> Vec<bool> {
+/// Returns for each of the p parameters whether it is missing from `free`: fixed or at a bound.
+pub(crate) fn is_fixed_or_bounded(free: &[usize], p: usize) -> Vec<bool> {
     (0..p).map(|i| !free.contains(&i)).collect()
 }

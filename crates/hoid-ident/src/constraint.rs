@@ -1,6 +1,6 @@
-//! Prior knowledge of a parameter: a value, a range, or a guess with a weight.
+//! Prior knowledge of a parameter: a fixed value, bounds, or a weighted guess.
 
-/// A parameter that is not free.
+/// Constraint on a parameter: a fixed value or bounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Constraint {
     /// Held at this value.
@@ -10,7 +10,7 @@ pub enum Constraint {
 }
 
 impl Constraint {
-    /// Returns the lower and upper bound; equal for a fixed parameter.
+    /// Returns the lower and the upper bound, which are equal for a fixed parameter.
     pub fn limits(self) -> (f64, f64) {
         match self {
             Self::Fixed(value) => (value, value),
@@ -29,12 +29,12 @@ impl Constraint {
 
 /// A guess theta* of one parameter: the loss grows by `weight (theta - theta*)^2`.
 ///
-/// A weight of `sigma^2 / (N s^2)` represents knowledge of theta* with the standard deviation s
-/// (innovation variance sigma^2, N residuals).
+/// A weight of `sigma^2 / (N s^2)` corresponds to a prior standard deviation s, where sigma^2 is the innovation
+/// variance and N the number of residuals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
     /// The guess theta*.
     pub value: f64,
-    /// Its weight in the loss, in units of the loss divided by the squared unit of the parameter.
+    /// Weight of the guess, in units of the loss divided by the squared unit of the parameter.
     pub weight: f64,
 }

@@ -1,18 +1,18 @@
 //! Poles, zeros, crossover and margins of a fit, with standard errors by the delta method.
 //!
-//! A simple root z of `p(z) = z^n + p_1 z^{n-1} + ... + p_n` moves with the coefficients as
-//! `dz/dp_j = -z^{n-j} / p'(z)`; the same holds for B with its leading coefficient b_0. At a
-//! multiple root the derivative does not exist, and near one it carries little information: the
-//! standard error grows without bound there, as the root itself is ill determined.
+//! A simple root z of `p(z) = z^n + p_1 z^{n-1} + ... + p_n` depends on the coefficients with the derivative
+//! `dz/dp_j = -z^{n-j} / p'(z)`; the same formula holds for B with its leading coefficient b_0. At a multiple root the
+//! derivative does not exist. Near a multiple root the standard error grows without bound, because the root itself is
+//! ill determined.
 //!
-//! The open loop is `L(omega, theta) = H(omega, theta) Y_c(omega)` with a given controlled element Y_c. Where theta
-//! changes and `|L| = 1` still holds,
+//! The open loop is `L(omega, theta) = H(omega, theta) Y_c(omega)` with a given controlled element Y_c. If theta
+//! changes, omega_c and phi_m follow from the condition `|L| = 1`:
 //!
 //! `d omega_c = -(d ln|L|/d theta) / (d ln|L|/d omega)`,
 //! `d phi_m = d arg L/d theta + (d arg L/d omega) d omega_c`,
 //!
-//! and for the gain margin, where `arg L = -180 deg` still holds, with phase and gain exchanged. A searched delay also
-//! changes the phase by `-omega d tau` (`searched_delay.rs`).
+//! The gain margin follows in the same way from the condition `arg L = -180 deg`, with phase and gain exchanged. A
+//! searched delay also changes the phase by `-omega d tau` (`searched_delay.rs`).
 
 use hoid_model::{
     Complex64, margins::Margins, margins::margins, polynomial, polynomial_model::monic, uncertainty::Estimate,
@@ -24,17 +24,17 @@ use crate::Fit;
 /// A pole or a zero in the z plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Root {
-    /// The polynomial of the root: `'a'`, `'b'`, `'c'`, `'d'` or `'f'`.
+    /// The polynomial to which the root belongs: `'a'`, `'b'`, `'c'`, `'d'` or `'f'`.
     pub polynomial: char,
-    /// Its value.
+    /// Value of the root.
     pub value: Complex64,
     /// Standard errors of the real and the imaginary part; `None` without a covariance or at a multiple root.
     pub standard_error: Option<(f64, f64)>,
 }
 
 impl Root {
-    /// Natural frequency in rad/s and damping ratio of the continuous pole `ln(z)/Ts`; `None` on the closed negative
-    /// real axis of z, where this does not exist.
+    /// Returns natural frequency in rad/s and damping ratio of the continuous-time pole `ln(z)/Ts`; `None` if z is one,
+    /// zero or a negative real number.
     pub fn frequency_and_damping(&self, sample_time_s: f64) -> Option<(f64, f64)> {
         if self.value.im == 0.0 && self.value.re <= 0.0 {
             return None;
@@ -45,7 +45,7 @@ impl Root {
     }
 }
 
-/// Crossover and margins of an open loop with their standard errors; `None` if there is no crossover.
+/// Crossover and margins of an open loop with their standard errors; each is `None` if there is no such crossing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MarginEstimates {
     /// Gain crossover frequency omega_c in rad/s.
@@ -59,7 +59,7 @@ pub struct MarginEstimates {
 }
 
 impl From<Margins> for MarginEstimates {
-    /// Converts computed margins, which have no standard errors.
+    /// Converts computed margins, without standard errors.
     fn from(m: Margins) -> Self {
         Self {
             crossover_rad_s: m.crossover_rad_s.map(Estimate::fixed),
@@ -71,9 +71,9 @@ impl From<Margins> for MarginEstimates {
 }
 
 impl Fit {
-    /// Returns the roots of A, B, C, D and F with their standard errors, in this order: the poles of the system are the
-    /// roots of A and F, its zeros those of B (without the zeros of the delay); the poles of the noise filter are the
-    /// roots of A and D, its zeros those of C.
+    /// Returns the roots of A, B, C, D and F, in this order, with their standard errors. The poles of the system are
+    /// the roots of A and F, and its zeros are the roots of B (without the zeros of the delay). The poles of the noise
+    /// filter are the roots of A and D, and its zeros are the roots of C.
     pub fn roots(&self) -> Vec<Root> {
         let m = self.model();
         let o = self.orders();
@@ -94,8 +94,8 @@ impl Fit {
         all
     }
 
-    /// Standard errors of a root of `p`, whose coefficients are in theta from `at` on (all of them, or all except the
-    /// leading one).
+    /// Returns the standard errors of the root `z` of `p`. The coefficients of `p` are in theta from index `at`, with
+    /// the leading coefficient if `leading` is true.
     fn root_error(&self, p: &[f64], z: Complex64, at: usize, leading: bool) -> Option<(f64, f64)> {
         let covariance = self.covariance()?;
         let n = p.len() - 1;
@@ -112,12 +112,12 @@ impl Fit {
         let error =
             |gradient: &[f64]| Estimate::with_variance(0.0, variance_along(gradient, covariance)).standard_error;
         let (re, im) = (error(&by_re)?, if z.im == 0.0 { 0.0 } else { error(&by_im)? });
-        // Coefficients without a variance: fixed ones.
+        // Fixed coefficients have no variance.
         (re > 0.0 || im > 0.0).then_some((re, im))
     }
 
-    /// Returns crossover frequency and margins of the open loop with a controlled element of the given frequency
-    /// response.
+    /// Returns crossover frequencies and margins, with standard errors, of the open loop with a controlled element of
+    /// this frequency response.
     pub fn margins(&self, controlled_element: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> MarginEstimates {
         let open_loop = |omega: f64| self.model().response(omega) * controlled_element(omega);
         let found = margins(open_loop, range_rad_s);
@@ -125,7 +125,7 @@ impl Fit {
         if self.covariance().is_none() {
             return estimates;
         }
-        // d ln L / d omega by a central difference: L is smooth, so that the relative error is about 1e-10.
+        // d ln L / d omega by a central difference: L is smooth, and the relative error is about 1e-10.
         let slope = |omega: f64| {
             let h = 1e-5 * omega;
             let ratio = open_loop(omega + h) / open_loop(omega - h);
@@ -184,7 +184,7 @@ mod tests {
             ..Orders::default()
         };
         Fit {
-            held: vec![false; theta.len()],
+            is_fixed_or_bounded: vec![false; theta.len()],
             model: PolynomialModel::new(Structure::BoxJenkins, orders, SampleTime::HUNDREDTH, theta).unwrap(),
             covariance: Some(covariance),
             loss: 1.0,

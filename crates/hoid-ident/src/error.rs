@@ -3,200 +3,202 @@
 use hoid_model::ModelError;
 use thiserror::Error;
 
-/// Errors that stop a fit. How a search *ended* is data in the fit ([`crate::Termination`]), not an error.
+/// Errors that stop a fit. The termination of a search is not an error but part of the fit ([`crate::Termination`]).
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum IdentError {
-    /// The model or a record is invalid by itself.
+    /// The model or a record is invalid in itself.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// No record at all.
-    #[error("no record was given; a fit needs at least one")]
+    /// No record was given.
+    #[error("no record was given; a fit needs at least one record")]
     NoRecords,
-    /// A structure with an input, and a record without one.
+    /// The structure has an input, but a record has none.
     #[error(
-        "{structure} describes how an output follows an input, but record {label} has no input; give one, or use ar, ma or arma"
+        "{structure} describes how an output follows an input, but record {label} has no input; give an input, or use \
+         ar, ma or arma"
     )]
     NoInput {
-        /// The structure.
+        /// Name of the structure.
         structure: String,
-        /// The record.
+        /// Label of the record.
         label: String,
     },
-    /// Records that were sampled differently cannot share a discrete model.
+    /// The records have different sample times and therefore cannot share a discrete-time model.
     #[error(
         "record {label} has the sample time {found} s, the first record {expected} s; resample them to one rate, for example with --new-fs {rate}, or fit them separately",
         rate = lower_rate(*found, *expected)
     )]
     MixedSampling {
-        /// The record that differs.
+        /// Label of the record that differs from the first.
         label: String,
-        /// Its sample time, s.
+        /// Sample time of this record, s.
         found: f64,
-        /// The sample time of the first record, s.
+        /// Sample time of the first record, s.
         expected: f64,
     },
-    /// Fewer residuals than unknowns.
+    /// There are no more residuals than unknowns.
     #[error(
         "record {label} has {samples} samples; {orders} with its delay and initial states needs more than {needed}; use a longer record or lower orders"
     )]
     TooFewSamples {
-        /// The record.
+        /// Label of the record.
         label: String,
-        /// Number of its samples.
+        /// Number of samples of the record.
         samples: usize,
-        /// The orders.
+        /// Orders of the model.
         orders: String,
-        /// Number of samples that are used up before the first degree of freedom is left.
+        /// Number of samples that the record must exceed.
         needed: usize,
     },
-    /// A delay for which nothing of the record is left.
+    /// The delay is at least as long as the record.
     #[error("the delay nk = {nk} is not shorter than record {label} with {samples} samples; check nk and the sampling")]
     DelayTooLong {
-        /// The delay in samples.
+        /// Delay in samples.
         nk: usize,
-        /// The record.
+        /// Label of the record.
         label: String,
-        /// Number of its samples.
+        /// Number of samples of the record.
         samples: usize,
     },
-    /// A constant signal.
+    /// A signal is constant.
     #[error(
         "{channel} of record {label} is {value} in every sample: there is nothing to identify; check the column and the span"
     )]
     NoExcitation {
         /// Name of the channel.
         channel: String,
-        /// The record.
+        /// Label of the record.
         label: String,
-        /// Its constant value.
+        /// Constant value of the channel.
         value: f64,
     },
-    /// Linearly dependent regressors.
+    /// The regressors are linearly dependent.
     #[error(
         "the regressors are singular: {columns}; the record does not excite so many parameters: lower the orders or use a record with more frequencies"
     )]
     SingularRegressors {
-        /// The dependent columns by name.
+        /// Names of the dependent columns.
         columns: String,
     },
-    /// Linearly dependent instruments, or instruments that do not follow the regressors.
+    /// The instruments are linearly dependent or uncorrelated with the regressors.
     #[error(
-        "the instruments are singular: {dependence}; the signal that they are made from does not excite so many \
-         parameters: lower the orders or use one with more frequencies"
+        "the instruments are singular: {dependence}; the signal from which they are made does not excite so many \
+         parameters: lower the orders or use a signal with more frequencies"
     )]
     SingularInstruments {
         /// The dependence between instruments.
         dependence: String,
     },
-    /// A channel that a record does not have.
+    /// A record lacks a requested channel.
     #[error("record {label} has no channel {channel} to make instruments from; it has {available}")]
     NoChannel {
-        /// The channel that was requested.
+        /// Name of the requested channel.
         channel: String,
-        /// The record.
+        /// Label of the record.
         label: String,
-        /// The available channels.
+        /// Names of the available channels.
         available: String,
     },
-    /// A singular information matrix.
+    /// The information matrix is singular.
     #[error(
         "the data do not determine {parameters}: the information matrix is singular (a pole and a zero that cancel, or too little excitation); lower the orders"
     )]
     SingularInformation {
-        /// The parameters of the undetermined combination.
+        /// Names of the parameters in the undetermined combination.
         parameters: String,
     },
-    /// An unusable start of the search.
+    /// The start of the search cannot be used.
     #[error("the start cannot be used: {reason}")]
     BadStart {
-        /// The reason, and the remedy.
+        /// Reason and remedy.
         reason: String,
     },
-    /// A name that is not a parameter of the model.
+    /// The model has no parameter with this name.
     #[error("the model has no parameter {name}; it has {available}")]
     UnknownParameter {
-        /// The name.
+        /// The unknown name.
         name: String,
-        /// The available parameters.
+        /// Names of the available parameters.
         available: String,
     },
-    /// An option that is not valid, alone or with the others.
+    /// An option is invalid, by itself or in combination with others.
     #[error("{option}: found {found}; expected {expected}")]
     BadOption {
-        /// The option.
+        /// Description of the option.
         option: String,
-        /// The value given.
+        /// The invalid value.
         found: String,
         /// The expected value.
         expected: String,
     },
-    /// An option that contradicts another, or does not fit the estimator.
+    /// An option contradicts another one or does not apply to the estimator.
     #[error("{name}: {reason}")]
     Option {
-        /// Its name.
+        /// Name of the option.
         name: &'static str,
-        /// The reason: the value found, the expected value, the remedy.
+        /// Reason: value found, expected value, remedy.
         reason: String,
     },
     /// No start led to a finite loss.
     #[error("no start of the search gave a finite loss; check the scale of the data and the orders")]
     NoFiniteLoss,
-    /// A search that found no minimum where a minimum is necessary.
+    /// The search did not converge, but the result requires a minimum.
     #[error("the search did not converge ({reason}); lower the orders, or use a longer window")]
     NotSettled {
-        /// How it ended.
+        /// Reason why the search stopped.
         reason: String,
     },
-    /// An empty range of orders.
+    /// A range of orders is empty.
     #[error("the range {range} is empty; write LO..HI with LO <= HI")]
     EmptyRange {
         /// The range as given.
         range: String,
     },
-    /// A span that holds no whole number of periods.
+    /// A span does not contain a whole number of periods.
     #[error(
         "record {label} has {samples} samples ({span_s} s), which is not a whole number of periods of {period_s} s; {remedy}"
     )]
     NotWholePeriods {
-        /// The record.
+        /// Label of the record.
         label: String,
-        /// Samples of the span.
+        /// Number of samples in the span.
         samples: usize,
-        /// Its duration, s.
+        /// Duration of the span, s.
         span_s: f64,
-        /// The period of the excitation, s.
+        /// Period of the excitation, s.
         period_s: f64,
-        /// The nearest suitable span.
+        /// Remedy: the nearest suitable span.
         remedy: String,
     },
-    /// A line of the excitation at which a channel has no power.
+    /// A channel has no power at a line of the excitation.
     #[error(
         "{channel} of record {label} has no power at the line {omega_rad_s} rad/s; leave this line out, or check the period and the span"
     )]
     NoLinePower {
         /// Name of the channel.
         channel: String,
-        /// The record.
+        /// Label of the record.
         label: String,
-        /// The line, rad/s.
+        /// Frequency of the line, rad/s.
         omega_rad_s: f64,
     },
-    /// A line above the Nyquist frequency.
+    /// A line is at or above the Nyquist frequency.
     #[error(
-        "the line {omega_rad_s} rad/s is not below half the sampling frequency of record {label}, {nyquist_rad_s} rad/s; leave it out"
+        "the line {omega_rad_s} rad/s is not below half the sampling frequency of record {label}, {nyquist_rad_s} \
+         rad/s; leave this line out"
     )]
     LineBeyondNyquist {
-        /// The line, rad/s.
+        /// Frequency of the line, rad/s.
         omega_rad_s: f64,
-        /// The record.
+        /// Label of the record.
         label: String,
-        /// Half its sampling frequency, rad/s.
+        /// Nyquist frequency of the record, rad/s.
         nyquist_rad_s: f64,
     },
 }
 
-/// Lower of the rates of two sample times, in Hz, to which both can be converted.
+/// Returns the lower of the two sampling frequencies, in Hz: records with either sample time can be resampled to it.
 fn lower_rate(a_s: f64, b_s: f64) -> String {
     let hz = 1.0 / a_s.max(b_s);
     let digits = format!("{hz:.6}");

@@ -1,4 +1,4 @@
-//! The estimator by the prediction error method and its options.
+//! Estimator based on the prediction error method, with its options.
 //!
 //! Options, their validation, and the functions that fit. The method itself is in [`crate::pem`].
 
@@ -16,7 +16,7 @@ use crate::{
 /// Purpose of the fitted model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Focus {
-    /// One-step-ahead prediction: the prediction error method, efficient if the structure is right.
+    /// One-step-ahead prediction by the prediction error method, which is efficient if the structure is right.
     #[default]
     Prediction,
     /// Simulation from the input only: the system from e to u minimises the simulation error, and the noise model is
@@ -33,34 +33,35 @@ pub struct Estimator {
     pub structure: Structure,
     /// The orders.
     pub orders: Orders,
-    /// Initial states of each record. Default (`None`): automatic, which is `Estimate` with an input and `Backcast` for
-    /// an output alone, whose past is as stationary as its present.
+    /// Initial states of each record. Default (`None`): automatic, which means `Estimate` for a structure with an input
+    /// and `Backcast` for a structure without one, whose output is assumed to be stationary before the record as well.
     pub initial_state: Option<InitialState>,
-    /// Method and limits of the search.
+    /// Search method and limits of the search.
     pub search: SearchOptions,
-    /// Number of own starts from which the search runs to completion; the best minimum is used. Default 2.
+    /// Number of automatic starts from which the search runs to completion; the lowest minimum is used. Default 2.
     pub starts: usize,
-    /// Start of the search instead of the estimator's own; theta in the order of
+    /// User-defined start of the search, which replaces the automatic starts: theta in the order of
     /// [`Orders::parameter_names`].
     pub start: Option<Vec<f64>>,
     /// Fixed and bounded coefficients, by name.
     pub constraints: BTreeMap<String, Constraint>,
-    /// Prior guesses of coefficients, by name.
+    /// Weighted prior guesses of coefficients, by name.
     pub priors: BTreeMap<String, Prior>,
-    /// Weight of a residual. Default: its square. With a robust loss each sample of e and u is limited by its
-    /// neighbours beforehand ([`crate::faults::resistant`]).
+    /// Loss function of the residuals. Default: quadratic. With a robust loss, e and u are first limited to four
+    /// standard deviations from the prediction of each sample by its neighbours ([`crate::faults::resistant`]).
     pub loss: Loss,
     /// Purpose of the model. Default: prediction.
     pub focus: Focus,
-    /// True if u of each record has a constant that is not a response to e; it is an unknown like its initial states
-    /// ([`crate::level`]); not with initial states of zero. Default false.
+    /// True if u of each record contains a constant that is not a response to e; the constant is estimated like the
+    /// initial states ([`crate::level`]). Ignored with initial states of zero. Default false.
     pub level: bool,
-    /// True if A must be stable too, so that the model from e to u is stable. C and F always are. Default false.
+    /// True if A must also be stable, so that the model from e to u is stable. C and F are always stable. Default
+    /// false.
     pub stable: bool,
 }
 
 impl Estimator {
-    /// An estimator with the default options.
+    /// Creates an estimator with the default options.
     pub fn new(structure: Structure, orders: Orders) -> Self {
         Self {
             structure,
@@ -78,7 +79,8 @@ impl Estimator {
         }
     }
 
-    /// Returns the same estimator with other orders, and without a start (which would not fit them).
+    /// Returns a copy of the estimator with other orders and without the user-defined start, which would not fit these
+    /// orders.
     pub fn with_orders(&self, orders: Orders) -> Self {
         Self {
             orders,
@@ -87,14 +89,14 @@ impl Estimator {
         }
     }
 
-    /// Checks structure, orders and options against each other.
+    /// Validates structure, orders and options, also in combination.
     ///
     /// # Errors
-    /// [`IdentError`] with the problem.
+    /// [`IdentError`] describes the problem.
     pub fn check(&self) -> Result<(), IdentError> {
         self.orders.check(self.structure)?;
         let mut named = self.constraints.keys().chain(self.priors.keys()).peekable();
-        // Most fits have no names, and the list of names is not made for them.
+        // Most fits have no named coefficients; the list of names is then not built.
         let names = named.peek().map_or_else(Vec::new, |_| self.orders.parameter_names());
         for name in named {
             if !names.contains(name) {
@@ -116,7 +118,7 @@ impl Estimator {
             return Err(IdentError::BadOption {
                 option: format!("the prior of {name}"),
                 found: format!("value {}, weight {}", prior.value, prior.weight),
-                expected: "a finite value and a weight that is not negative".to_owned(),
+                expected: "a finite value and a nonnegative weight".to_owned(),
             });
         }
         if let Loss::Huber { threshold } = self.loss
@@ -133,7 +135,7 @@ impl Estimator {
                 return Err(IdentError::BadOption {
                     option: "the focus".to_owned(),
                     found: format!("simulation with {}", self.structure),
-                    expected: "a structure with an input; without one there is nothing to simulate".to_owned(),
+                    expected: "a structure with an input; without an input there is nothing to simulate".to_owned(),
                 });
             }
             if self.orders.na > 0 && self.orders.nf > 0 {
@@ -147,7 +149,7 @@ impl Estimator {
         Ok(())
     }
 
-    /// Returns the rule for initial states in use, with the automatic choice resolved.
+    /// Returns the rule for initial states that is used: the given rule, or the result of the automatic choice.
     pub fn initial_state_in_use(&self) -> InitialState {
         self.initial_state.unwrap_or(if self.structure.has_input() {
             InitialState::Estimate
@@ -156,22 +158,23 @@ impl Estimator {
         })
     }
 
-    /// Fits one model to all records: a common theta, and initial states of each record.
+    /// Fits one model to all records, with a common theta and separate initial states for each record.
     ///
     /// # Errors
-    /// [`IdentError`]; how a search ended is part of the fit.
+    /// [`IdentError`]. A search that does not converge is not an error: its termination is part of the fit.
     pub fn fit(&self, records: &[Record]) -> Result<Fit, IdentError> {
         self.fit_from(records, 0)
     }
 
-    /// As [`Estimator::fit`], with residuals that count from sample `first` of each record at the earliest, so that
-    /// models of different orders are compared on the same samples.
+    /// As [`Estimator::fit`], but residuals count only from sample `first` of each record, or later if the orders
+    /// require it, so that models of different orders can be compared on the same samples.
     ///
     /// # Errors
     /// As [`Estimator::fit`].
     pub fn fit_from(&self, records: &[Record], first: usize) -> Result<Fit, IdentError> {
         self.check()?;
-        // The contribution of a sample to the filters is bounded first: the loss bounds only residuals.
+        // The samples are limited first, since the robust loss bounds the effect of residuals but not of faulty samples
+        // in the regressors.
         let held = match self.loss {
             Loss::Huber { .. } => held(records),
             Loss::Quadratic => None,
@@ -186,9 +189,9 @@ impl Estimator {
 
     /// Fits a model to each record separately.
     ///
-    /// Box-Jenkins models of records of one length are searched in parallel lanes, in about half the time that they
-    /// would take one after the other. The result of a fit does not depend on the records that it is searched with; it
-    /// differs from that of [`Estimator::fit`] by rounding, less than 1e-7 of a standard error.
+    /// Box-Jenkins models of records of equal length are searched in parallel lanes, in about half the time of separate
+    /// searches. The result of a fit does not depend on the records that share the lanes; it differs from the result of
+    /// [`Estimator::fit`] only by rounding, less than 1e-7 of a standard error.
     ///
     /// # Errors
     /// The errors of [`Estimator::fit`], for each record separately.
@@ -205,12 +208,13 @@ impl Estimator {
         })
     }
 
-    /// True if the system from e to u minimises an error other than that of the prediction.
+    /// True if the system from e to u minimises the simulation error and this differs from the prediction error (every
+    /// structure except output error).
     fn simulates(&self) -> bool {
         self.focus == Focus::Simulation && self.structure != Structure::OutputError
     }
 
-    /// Returns the options that the method needs.
+    /// Returns the options in the form required by [`crate::pem`].
     pub(crate) fn settings(&self) -> FitSettings {
         FitSettings {
             structure: self.structure,

@@ -1,4 +1,4 @@
-//! The result of an estimation: the model, its uncertainty, and the data of the search.
+//! Result of an estimation: the model, its uncertainty, and the termination of the search.
 
 use hoid_model::{
     NotConvertible, Orders, PolynomialModel, Record,
@@ -27,24 +27,24 @@ pub struct Fit {
     pub(crate) initial_state: InitialState,
     pub(crate) termination: Termination,
     pub(crate) start: String,
-    /// Parameters that were fixed, or are at a bound.
-    pub(crate) held: Vec<bool>,
-    /// Variance of the output over the residuals that count.
+    /// True for each parameter that is fixed or at a bound.
+    pub(crate) is_fixed_or_bounded: Vec<bool>,
+    /// Variance of the output over the samples whose residuals count.
     pub(crate) output_variance: f64,
     /// True if the innovation variance is the square of a robust scale.
     pub(crate) robust: bool,
-    /// True if instruments replaced the regressors.
+    /// True for an estimate by instrumental variables.
     pub(crate) instrumented: bool,
-    /// The physical parameters from which theta was computed, for a grey box.
+    /// For a grey box, the physical parameters from which theta was computed.
     pub(crate) physical: Option<Box<Physical>>,
-    /// The error of nk, if it was searched.
+    /// Variance of the delay and its effect on theta, if nk was searched.
     pub(crate) searched_delay: Option<SearchedDelay>,
 }
 
-/// Physical parameters of a grey-box fit, of which theta is a function.
+/// Physical parameters of a grey-box fit; theta is a function of them.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Physical {
-    /// Title of the fitted model in one line.
+    /// Title of the fitted model, one line of text.
     pub title: String,
     /// Name and estimate of each parameter.
     pub parameters: Vec<(String, Estimate)>,
@@ -54,32 +54,32 @@ pub(crate) struct Physical {
     pub remnant: Option<RemnantEstimate>,
 }
 
-/// Variance of a searched delay, and the dependence of theta on it.
+/// Variance of a searched delay, and derivative of theta with respect to the delay.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct SearchedDelay {
-    /// Variance of the delay, s^2.
+    /// Variance of the delay tau, s^2.
     pub variance_s2: f64,
-    /// `d theta/d tau`, 1/s.
+    /// Derivative `d theta/d tau`, 1/s.
     pub slope: Vec<f64>,
 }
 
-/// Values on the time axis of a record, from sample `first` on.
+/// Signal on the time axis of a record, from sample `first` on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     /// Index of the first sample that has a value.
     pub first: usize,
-    /// One value per sample from there to the end of the record.
+    /// One value per sample from `first` to the end of the record.
     pub values: Vec<f64>,
 }
 
-/// Frequency response from e to u with its standard errors.
+/// Frequency response from e to u at one frequency, with standard errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResponsePoint {
     /// Frequency, rad/s.
     pub omega_rad_s: f64,
     /// Magnitude in dB.
     pub magnitude_db: Estimate,
-    /// Phase in deg, principal value in (-180, 180]; the caller unwraps it along frequency.
+    /// Phase in deg, principal value in (-180, 180]; the caller may unwrap it along the frequency axis.
     pub phase_deg: Estimate,
 }
 
@@ -89,14 +89,14 @@ impl Fit {
         &self.model
     }
 
-    /// The orders.
+    /// Returns the orders of the model.
     pub fn orders(&self) -> Orders {
         self.model.orders()
     }
 
-    /// Returns the covariance of theta by rows, `sigma^2 (psi' psi)^-1` with the initial states eliminated, plus the
-    /// contribution of a searched delay for an operator (`searched_delay.rs`); `None` for an exact fit, whose residuals
-    /// carry no information about the noise.
+    /// Returns the covariance of theta by rows: `sigma^2 (psi' psi)^-1` with the initial states eliminated, plus the
+    /// contribution of a searched delay if the model represents an operator (`searched_delay.rs`). `None` for an exact
+    /// fit, whose residuals carry no information about the noise.
     pub fn covariance(&self) -> Option<&[f64]> {
         self.covariance.as_deref()
     }
@@ -115,7 +115,7 @@ impl Fit {
             .enumerate()
             .map(|(i, name)| {
                 let estimate = match &self.covariance {
-                    Some(c) if !self.held[i] => Estimate::with_variance(theta[i], c[i * p + i]),
+                    Some(c) if !self.is_fixed_or_bounded[i] => Estimate::with_variance(theta[i], c[i * p + i]),
                     _ => Estimate::fixed(theta[i]),
                 };
                 (name, estimate)
@@ -129,7 +129,7 @@ impl Fit {
     }
 
     /// Returns the unbiased innovation variance `sum eps^2 / (n - p - s)` with p parameters and s estimated initial
-    /// states; with a robust loss the square of the robust scale ([`Fit::is_robust`]).
+    /// states. With a robust loss it is the square of the robust scale ([`Fit::is_robust`]).
     pub fn innovation_variance(&self) -> f64 {
         self.innovation_variance
     }
@@ -144,22 +144,22 @@ impl Fit {
         self.states
     }
 
-    /// Returns the assumption about the time before the records.
+    /// Returns the assumption about the signals before the start of each record.
     pub fn initial_state(&self) -> InitialState {
         self.initial_state
     }
 
-    /// Returns for each coefficient whether it was fixed or is at a bound; it then has no standard error.
+    /// Returns for each coefficient whether it is fixed or at a bound; such coefficients have no standard error.
     pub fn held(&self) -> &[bool] {
-        &self.held
+        &self.is_fixed_or_bounded
     }
 
-    /// How the search ended.
+    /// Returns the termination of the search.
     pub fn termination(&self) -> Termination {
         self.termination
     }
 
-    /// Returns the name of the best start.
+    /// Returns the name of the start that led to the lowest minimum.
     pub fn start(&self) -> &str {
         &self.start
     }
@@ -199,13 +199,14 @@ impl Fit {
     }
 
     /// Young's criterion `ln(V / var u) + ln( (1/p) sum_i var theta_i / theta_i^2 )` over the free coefficients of A, B
-    /// and F (P. C. Young, *Recursive Estimation and Time-Series Analysis*, 2011, section 6.7): the more negative, the
-    /// better the fit for well determined coefficients. `None` without standard errors or if a coefficient is zero.
+    /// and F (P. C. Young, *Recursive Estimation and Time-Series Analysis*, 2011, section 6.7). A more negative value
+    /// means a closer fit with better determined coefficients. `None` without standard errors or if a coefficient is
+    /// zero.
     pub fn yic(&self) -> Option<f64> {
         let relative: Option<Vec<f64>> = self
             .parameters()
             .iter()
-            .zip(&self.held)
+            .zip(&self.is_fixed_or_bounded)
             .filter(|((name, _), held)| !**held && name.starts_with(['a', 'b', 'f']))
             .map(|((_, e), _)| Some((e.standard_error? / e.value).powi(2)))
             .collect();
@@ -219,17 +220,17 @@ impl Fit {
         if let Some(physical) = &self.physical {
             return physical.free;
         }
-        self.held.iter().filter(|held| !**held).count()
+        self.is_fixed_or_bounded.iter().filter(|held| !**held).count()
     }
 
     fn parameter_count(&self) -> f64 {
         self.free_count() as f64
     }
 
-    /// Returns the operator's parameters with standard errors.
+    /// Returns the parameters of the operator with standard errors.
     ///
     /// # Errors
-    /// [`NotConvertible`] with the reason.
+    /// [`NotConvertible`] if the model represents no operator, with the reason.
     pub fn operator(&self) -> Result<OperatorEstimate, NotConvertible> {
         if let Some(physical) = &self.physical {
             return physical.operator.clone();
@@ -245,7 +246,7 @@ impl Fit {
         Ok(found)
     }
 
-    /// True for a fit by a robust loss.
+    /// True if a robust loss was used.
     pub fn is_robust(&self) -> bool {
         self.robust
     }
@@ -255,7 +256,8 @@ impl Fit {
         self.physical.is_some()
     }
 
-    /// Returns structure and orders as in print; for a grey box or an operator of the family, its parameters.
+    /// Returns the title for printed output: structure and orders, or the title of a grey box or an operator of the
+    /// family.
     pub fn title(&self) -> String {
         match &self.physical {
             Some(physical) => physical.title.clone(),
@@ -263,11 +265,11 @@ impl Fit {
         }
     }
 
-    /// Returns T_n and K_n of the remnant filter that the noise model represents. A grey box has fitted them for a hold
-    /// over each sample, regardless of `how`.
+    /// Returns T_n and K_n of the remnant filter that the noise model represents. For a grey box both were fitted with
+    /// a remnant held over each sample, regardless of `how`.
     ///
     /// # Errors
-    /// [`NotConvertible`] with the reason.
+    /// [`NotConvertible`] if the noise model represents no remnant filter, with the reason.
     pub fn remnant(&self, how: RemnantDiscretisation) -> Result<RemnantEstimate, NotConvertible> {
         if let Some(physical) = &self.physical {
             return physical.remnant.ok_or_else(|| NotConvertible::NotARemnantFilter {
@@ -285,7 +287,7 @@ impl Fit {
         )
     }
 
-    /// Returns the one-step-ahead residuals on a record, with initial states treated as in the fit.
+    /// Returns the one-step-ahead residuals for a record, with initial states treated as in the fit.
     ///
     /// # Errors
     /// [`IdentError::MixedSampling`], [`IdentError::TooFewSamples`].
@@ -301,9 +303,9 @@ impl Fit {
         Ok(output_less(record, self.residuals(record)?))
     }
 
-    /// Returns the simulated output: the response of `B/(A F)` to the input alone, without noise model. If the fit
-    /// estimated initial states, those of the simulation are estimated too (least squares of the simulation error). A
-    /// model without an input gives zero.
+    /// Returns the simulated output: the response of `B/(A F)` to the input alone, without the noise model. If the fit
+    /// estimated initial states, those of the simulation are also estimated, by least squares of the simulation error.
+    /// For a model without an input the simulated output is zero.
     ///
     /// # Errors
     /// As [`Fit::residuals`].
@@ -318,11 +320,11 @@ impl Fit {
         Ok(output_less(record, self.errors_of(orders, &theta, record)?))
     }
 
-    /// Variance of a quantity with the gradient `by_theta` and the derivative `by_delay` (1/s) with respect to the
-    /// delay; `None` without a covariance.
+    /// Returns the variance of a quantity with the gradient `by_theta` with respect to theta and the derivative
+    /// `by_delay` (1/s) with respect to the delay; `None` without a covariance.
     pub(crate) fn variance_of(&self, by_theta: &[f64], by_delay: f64) -> Option<f64> {
         let covariance = self.covariance.as_ref()?;
-        // The covariance contains (g's)^2 var tau already.
+        // The covariance already contains (g's)^2 var tau.
         let with_delay = self.searched_delay.as_ref().map_or(0.0, |delay| {
             let moved = dot(by_theta, &delay.slope);
             delay.variance_s2 * by_delay * (2.0 * moved + by_delay)
@@ -357,8 +359,8 @@ impl Fit {
         })
     }
 
-    /// Returns the frequency response with standard errors by the delta method: with `dH` the gradient,
-    /// `d ln|H| = Re(dH/H)` and `d arg H = Im(dH/H) - omega d tau`.
+    /// Returns the frequency response with standard errors by the delta method: `d ln|H| = Re(dH/H)` and
+    /// `d arg H = Im(dH/H) - omega d tau`, where dH is the gradient with respect to theta.
     pub fn frequency_response(&self, omega_rad_s: &[f64]) -> Vec<ResponsePoint> {
         let to_db = 20.0 / std::f64::consts::LN_10;
         omega_rad_s
@@ -394,8 +396,8 @@ fn output_less(record: &Record, mut errors: Series) -> Series {
     errors
 }
 
-/// Returns orders and theta of the output-error model `u = B/(A F) q^-nk e + eps` with the same system: its residual is
-/// the simulation error of the model.
+/// Returns orders and theta of the output-error model `u = B/(A F) q^-nk e + eps` with the same system. The residual of
+/// this model is the simulation error.
 fn output_error_form(model: &PolynomialModel) -> (Orders, Vec<f64>) {
     let orders = model.orders();
     let den = product(&monic(model.a()), &monic(model.f()));

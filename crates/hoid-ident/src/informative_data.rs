@@ -1,7 +1,7 @@
-//! Test of whether records are informative enough for a model: one sample time, an input that is not constant, more
-//! residuals than unknowns.
+//! Checks whether records are informative enough for a model: equal sample times, no constant signals, more residuals
+//! than unknowns.
 //!
-//! These are the conditions that can be checked before the fit; dependent regressors are found by the fit itself.
+//! These conditions can be checked before the fit; linearly dependent regressors are detected by the fit itself.
 //! Source: L. Ljung, *System Identification*, 1999, section 8.2 (informative data).
 
 use hoid_model::{Orders, Record, SampleTime, Structure};
@@ -24,7 +24,7 @@ pub(crate) fn common_sample_time(records: &[Record]) -> Result<SampleTime, Ident
     }
 }
 
-/// Refuses a record that cannot determine a model whose residuals start at sample `first`.
+/// Returns an error if a record cannot determine a model whose residuals start at sample `first`.
 ///
 /// # Errors
 /// [`IdentError::NoInput`], [`IdentError::NoExcitation`], [`IdentError::DelayTooLong`],
@@ -72,8 +72,7 @@ pub(crate) fn check_record(
     Ok(())
 }
 
-/// Refuses records with fewer residuals than unknowns: `N > p + s` with p parameters and s initial
-/// states.
+/// Returns an error unless there are more residuals than unknowns: `N > p + s` with p parameters and s initial states.
 ///
 /// # Errors
 /// [`IdentError::TooFewSamples`].

@@ -1,19 +1,20 @@
-//! The level of a record: the constant of u that is not a response to e.
+//! The level of a record: the constant part of u that is not a response to e.
 //!
-//! `u(t) = c + G e(t) + v(t)`: caused by a stick whose rest is not zero, an amplifier with an offset, or an e with an
-//! offset. For given dynamics c is linear, and for long records its least squares estimate is that from the means,
+//! `u(t) = c + G e(t) + v(t)`: the level c results from a nonzero rest position of the stick, or from an offset of an
+//! amplifier or of e. For given dynamics u is linear in c. For long records the least squares estimate of c follows
+//! from the means,
 //!
 //! `c = mean(u) - G(1) mean(e)`,
 //!
-//! so that a fit to e and u without their means ([`hoid_model::Detrend::Mean`]) is the fit with c for each record (L.
-//! Ljung, *System Identification*, 1999, section 14.1), except for effects of the ends of the record: for a step the
-//! mean of u is not a level. In this case c is an unknown of the fit, like the initial states
-//! ([`crate::Estimator::level`]), and its remainder in a record is
+//! so that a fit to e and u without their means ([`hoid_model::Detrend::Mean`]) is equivalent to a fit that also
+//! estimates c for each record (L. Ljung, *System Identification*, 1999, section 14.1), except for end effects: the
+//! mean of u in a step response, for example, is not the level. In this case c is an unknown of the fit, like the
+//! initial states ([`crate::Estimator::level`]), and the constant that remains in a record is
 //!
-//! `c = eps'z / z'z`, z the residuals of u = 1 at e = 0.
+//! `c = eps'z / z'z`, where z denotes the residuals for u = 1 and e = 0.
 //!
-//! Its variance is `sigma^2 |H(1)|^2/n`, H = C/(A D) the noise model, and the uncertainty of G(1),
-//! `mean(e)^2 var G(1)`.
+//! The variance of c is `sigma^2 |H(1)|^2/n`, with the noise model H = C/(A D), plus the contribution
+//! `mean(e)^2 var G(1)` of the uncertain static gain.
 
 use hoid_model::{
     Channel, Detrend, Record,
@@ -24,13 +25,13 @@ use hoid_numerics::statistics::mean;
 
 use crate::{Fit, IdentError, linalg::least_squares::dot};
 
-/// Mean square of the residuals of u = 1 below which a constant has no effect on the model.
-const LEAST: f64 = 1e-16;
-/// The channel of true gains in simulated runs, which have no level.
+/// Mean square of the residuals for u = 1 below which a constant in u has no effect on the residuals.
+const MIN_MEAN_SQUARE: f64 = 1e-16;
+/// Channel that contains the true gain in simulated runs, which have no level.
 const TRUTH: &str = "K_e";
 
-/// True for records with a possible level: not for simulated runs, which contain their true gains, and not if e or u is
-/// constant, which the fit refuses with its original value.
+/// True if the records may have a level. False for simulated runs, which contain their true gain, and if e or u is
+/// constant: the fit rejects such a record and reports the original value.
 pub fn may_have_level(records: &[Record]) -> bool {
     let simulated = records.iter().any(|record| record.channel(TRUTH).is_some());
     let moves = |x: &[f64]| x.iter().any(|v| *v != x[0]);
@@ -38,28 +39,29 @@ pub fn may_have_level(records: &[Record]) -> bool {
     !simulated && records.iter().all(alive)
 }
 
-/// Returns the records without the means of e and u, which removes the level for a constant model.
+/// Returns the records with the means of e and u removed, which removes the level for a time-invariant model.
 pub fn without_level(records: &[Record]) -> Vec<Record> {
     records.iter().map(|r| r.clone().detrended(Detrend::Mean)).collect()
 }
 
 impl Fit {
-    /// Returns the constant of u that is not a response to e, by least squares over the residuals; `None` if a constant
-    /// has no effect in the model, as with an integration.
+    /// Returns the constant part of u that is not a response to e, by least squares over the residuals; `None` if a
+    /// constant in u has no effect on the residuals, as with a root of A or D at one.
     ///
     /// # Errors
-    /// The errors of residuals.
+    /// The errors of [`Fit::residuals`].
     pub fn constant_of(&self, record: &Record) -> Result<Option<f64>, IdentError> {
         let ones = |name: &str, one: f64| Channel::new(name, "", vec![one; record.len()]);
         let unit = Record::new(record.sample_time(), ones("e", 0.0), ones("u", 1.0))?;
         let (of_record, of_unit) = (self.residuals(record)?.values, self.residuals(&unit)?.values);
         let (products, squares) = (dot(&of_record, &of_unit), dot(&of_unit, &of_unit));
         let found = products / squares;
-        Ok((squares > LEAST * of_unit.len() as f64 && found.is_finite()).then_some(found))
+        Ok((squares > MIN_MEAN_SQUARE * of_unit.len() as f64 && found.is_finite()).then_some(found))
     }
 
-    /// Returns the level c of u in a record, in the unit of u, with its standard error, for a fit to the record without
-    /// its means. `None` if the model has no static gain (an integration), no input or no noise.
+    /// Returns the level c of u in a record, in the unit of u, with its standard error. The model must have been fitted
+    /// to the record without its means. `None` if the model has no static gain (an integrator) or no input, or if the
+    /// fit is exact.
     pub fn level(&self, record: &Record) -> Option<Estimate> {
         let model = self.model();
         let covariance = self.covariance()?;

@@ -1,28 +1,27 @@
 //! Identification of the human operator from records: batch estimators.
 //!
-//! **The problem.** A person tracks a target: they see the error e and move the control, u. Both are sampled with the
-//! period Ts. The dynamics from e to u, their uncertainty, and the part of u that they leave unexplained, the remnant,
-//! must be estimated.
+//! **The problem.** A person tracks a target: they see the error e and move the control u. Both signals are sampled
+//! with the period Ts. The quantities to estimate are the dynamics from e to u, their uncertainty, and the remnant: the
+//! part of u that these dynamics do not explain.
 //!
-//! **The model.** Everything here is a case of
+//! **The model.** All models of this crate are special cases of
 //!
 //! `A(q) u(t) = (B(q)/F(q)) q^-nk e(t) + (C(q)/D(q)) eps(t)`
 //!
-//! with polynomials in the backward shift `q^-1`, `A = 1 + a1 q^-1 + ..`, `B = b0 + b1 q^-1 + ..`,
-//! and white innovations eps with the variance sigma^2. B/F with nk is the operator with the delay,
-//! C/D shapes the remnant; structures set some of the polynomials to one (ARX: A and B;
-//! Box-Jenkins: B, C, D and F).
+//! with polynomials in the backward shift `q^-1`, `A = 1 + a1 q^-1 + ..`, `B = b0 + b1 q^-1 + ..`, and white
+//! innovations eps with the variance sigma^2. B/F with nk is the operator with its delay, and C/D shapes the remnant.
+//! In each structure the other polynomials are one (ARX has A and B; Box-Jenkins has B, C, D and F).
 //!
-//! **The method.** For given coefficients theta the best prediction of u(t) from all earlier data leaves
+//! **The method.** For given coefficients theta the error of the best prediction of u(t) from all earlier data is
 //!
 //! `eps(t, theta) = (D/C) (A u(t) - (B/F) q^-nk e(t))`
 //!
 //! and theta minimises `V = (1/N) sum eps(t, theta)^2`: the prediction error method (L. Ljung, *System Identification*,
-//! 1999, ch. 7). It is consistent if the structure contains the true dynamics, in a closed loop too if there is a delay
-//! in the loop, and it attains the Cramér-Rao bound for normal innovations. Its covariance is `sigma^2 (psi' psi)^-1`
-//! with `psi = -d eps/d theta`. The unknown initial states of a record enter eps linearly and are eliminated exactly
-//! for each theta. ARX is linear in theta and solved in one step; the others by damped Gauss-Newton from several
-//! starts.
+//! 1999, ch. 7). The estimate is consistent if the structure contains the true dynamics, also in a closed loop with a
+//! delay, and attains the Cramér-Rao bound for normally distributed innovations. Its covariance is
+//! `sigma^2 (psi' psi)^-1` with `psi = -d eps/d theta`. The unknown initial states of a record enter eps linearly and
+//! are eliminated exactly for each theta. ARX models are linear in theta and solved in one step; all other structures
+//! are fitted by damped Gauss-Newton steps from several starts.
 //!
 //! ```
 //! use hoid_ident::Estimator;
@@ -52,31 +51,31 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`Estimator`] | the prediction error method: structure, orders, options; `fit`, `fit_each` |
+//! | [`Estimator`] | the prediction error method: structure, orders, options; the fits `fit` and `fit_each` |
 //! | [`Fit`] | the model, its covariance and criteria; prediction, simulation, frequency response, poles and margins |
 //! | [`validation`] | VAF, NRMSE, residual tests |
-//! | [`order_selection`] | ranges of orders and delay, criteria, the chosen model |
+//! | [`order_selection`] | selection of orders and delay from ranges, by a criterion |
 //! | [`several_inputs`] | polynomial models with several inputs |
 //! | [`iv`] | instrumental variables, in open and closed loop |
-//! | [`family`] | operators of recorded people: form, parameters, reliable errors, a verdict |
-//! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
-//! | [`SigmoidChange`] | gains that follow a sigmoid, with the time and the rate of the change |
-//! | [`faults`] | faults of recorded data, found and repaired before a fit |
-//! | [`frequency`] | describing function, coherence, remnant spectrum and margins by Fourier coefficients |
+//! | [`family`] | operators of recorded people: form, parameters, robust errors, a verdict |
+//! | [`grey_box`] | fits in physical parameters: an operator with a real-valued delay, a remnant filter |
+//! | [`SigmoidChange`] | gains that change once along a sigmoid, with the time and the rate of the change |
+//! | [`faults`] | faults of recorded data, detected and repaired before a fit |
+//! | [`frequency`] | describing function, coherence, remnant spectrum and margins from Fourier coefficients |
 //! | [`diagnostics`] | evidence for and against a fit: [`Fit::verdict`] |
-//! | [`progress`] | progress of a fit, for the caller that waits |
+//! | [`progress`] | progress of a fit, reported to the caller |
 //! | [`linalg`] | sums of products, least squares by QR, the inverse of an information matrix |
 //!
-//! and internally, each using those before it:
+//! Internal modules, each of which uses the modules above it:
 //!
 //! | module | contents |
 //! |---|---|
-//! | `optimize` | minimisation of a sum of squares, also along the border of stability |
-//! | `criterion` | the prediction-error criterion of the general model and its gradients; initial states |
+//! | `optimize` | minimisation of a sum of squares, also along the boundary of the stability region |
+//! | `criterion` | prediction-error criterion of the general model, its gradients, and initial states |
 //! | `multistart` | searches from several starts |
-//! | `initial_guess` | starts of a search |
-//! | `pem` | bounds, priors, robust loss, focus; fits of one record or of many in parallel lanes |
-//! | `searched_delay` | contribution of the search of nk to the error bars |
+//! | `initial_guess` | starting values of a search |
+//! | `pem` | bounds, priors, robust loss, focus; fits of one record, or of many records in parallel lanes |
+//! | `searched_delay` | contribution of a searched nk to the error bars |
 
 mod assembled_fit;
 mod constraint;

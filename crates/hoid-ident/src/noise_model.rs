@@ -4,9 +4,9 @@ use hoid_model::polynomial::reflected_inside;
 
 use crate::linalg::least_squares::{dot, solve_symmetric};
 
-/// Returns C and D of `v = (C/D) eps` by Hannan and Rissanen (*Biometrika* 69 (1982) 81-94): with nc = 0 one
-/// autoregression, otherwise a long autoregression for eps and then a regression on past v and past eps. Zeros if that
-/// is singular.
+/// Returns C and D of `v = (C/D) eps` by the method of Hannan and Rissanen (*Biometrika* 69 (1982) 81-94). For nc = 0
+/// this is one autoregression; otherwise a long autoregression estimates eps, and v is then regressed on past v and
+/// past eps. All coefficients are zero if a regression is singular.
 pub(crate) fn noise_model(v: &[Vec<f64>], nc: usize, nd: usize) -> (Vec<f64>, Vec<f64>) {
     let nothing = (vec![0.0; nc], vec![0.0; nd]);
     if nc == 0 {
@@ -38,7 +38,8 @@ pub(crate) fn noise_model(v: &[Vec<f64>], nc: usize, nd: usize) -> (Vec<f64>, Ve
     }
 }
 
-/// Coefficients of the regression of the first signal on lagged signals (index of signal, lag), rows from `first` on.
+/// Returns the coefficients of the regression of the first signal on lagged signals, given as (index of the signal,
+/// lag), over the rows from `first` on.
 fn lagged_regression<const K: usize>(
     records: &[[&[f64]; K]],
     lags: &[(usize, usize)],

@@ -1,9 +1,10 @@
-//! Choice of orders and delay.
+//! Selection of orders and delay.
 //!
-//! Every combination of the given ranges is fitted on the same samples (the residuals of all candidates start where the
-//! most demanding one can), and the criterion decides: the loss if only the delay differs, BIC if the number of
-//! parameters differs. The chosen model is then fitted once more on all samples available for its own orders, and its
-//! error bars include the search of the delay (`searched_delay.rs`).
+//! Every combination of the given ranges is fitted on the same samples: the residuals of all candidates start at the
+//! first sample that is possible for every candidate. A criterion selects the best candidate. The loss is a valid
+//! criterion only if the candidates differ only in the delay; BIC also compares different numbers of parameters. The
+//! selected model is fitted again on all samples available for its own orders, and its error bars include the
+//! uncertainty of a searched delay (`searched_delay.rs`).
 
 use std::{collections::BTreeMap, fmt, ops::RangeInclusive};
 
@@ -12,30 +13,30 @@ use rayon::prelude::*;
 
 use crate::{Estimator, Fit, IdentError, SearchOptions, criterion::first_residual};
 
-/// Largest number of candidates of a search: each is a fit of some milliseconds.
+/// Maximum number of candidates in a search; the fit of each candidate takes some milliseconds.
 pub const MOST_CANDIDATES: usize = 100_000;
 
-/// A range for each order and for the delay.
+/// Ranges of the orders and of the delay.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OrderRanges {
-    /// Coefficients of A.
+    /// Number of coefficients of A.
     pub na: RangeInclusive<usize>,
-    /// Coefficients of B.
+    /// Number of coefficients of B.
     pub nb: RangeInclusive<usize>,
-    /// Coefficients of C.
+    /// Number of coefficients of C.
     pub nc: RangeInclusive<usize>,
-    /// Coefficients of D.
+    /// Number of coefficients of D.
     pub nd: RangeInclusive<usize>,
-    /// Coefficients of F.
+    /// Number of coefficients of F.
     pub nf: RangeInclusive<usize>,
     /// Delay of b0 in samples.
     pub nk: RangeInclusive<usize>,
 }
 
-/// Orders by their names (na, nb, nc, nd, nf, nk), each with its range.
+/// Range of each order by its name: na, nb, nc, nd, nf or nk.
 pub type NamedOrders = BTreeMap<String, RangeInclusive<usize>>;
 
-/// Refuses values that are not orders, and orders that no model has.
+/// Returns an error if the name is not that of an order, or if the range exceeds the largest possible order or delay.
 ///
 /// # Errors
 /// [`IdentError::BadOption`].
@@ -59,8 +60,8 @@ pub fn check_order(name: &str, range: &RangeInclusive<usize>) -> Result<(), Iden
     }
 }
 
-/// Formats a range as typed by users.
-pub(crate) fn written(range: &RangeInclusive<usize>) -> String {
+/// Formats a range as on the command line: `2` or `1..4`.
+pub(crate) fn range_text(range: &RangeInclusive<usize>) -> String {
     match (*range.start(), *range.end()) {
         (low, high) if low == high => low.to_string(),
         (low, high) => format!("{low}..{high}"),
@@ -87,7 +88,7 @@ impl fmt::Display for OrderRanges {
         for (name, range) in self.named() {
             match (*range.start(), *range.end()) {
                 (0, 0) if name != "nk" || *self.nb.end() == 0 => continue,
-                _ => write!(f, "{separator}{name}={}", written(range))?,
+                _ => write!(f, "{separator}{name}={}", range_text(range))?,
             }
             separator = ", ";
         }
@@ -133,10 +134,10 @@ impl OrderRanges {
         Ok(self)
     }
 
-    /// Returns the number of all combinations.
+    /// Returns the number of combinations.
     ///
     /// # Errors
-    /// [`IdentError::EmptyRange`]; [`IdentError::BadOption`] for more than [`MOST_CANDIDATES`].
+    /// [`IdentError::EmptyRange`] if a range is empty, [`IdentError::BadOption`] for more than [`MOST_CANDIDATES`].
     pub fn candidates(&self) -> Result<usize, IdentError> {
         if let Some((name, range)) = self.named().into_iter().find(|(_, r)| r.is_empty()) {
             return Err(IdentError::EmptyRange {
@@ -151,7 +152,7 @@ impl OrderRanges {
             return Err(IdentError::BadOption {
                 option: "the search of orders and delay".to_owned(),
                 found: format!("{all} candidates ({self})"),
-                expected: format!("at most {MOST_CANDIDATES}: narrow --nk and --orders"),
+                expected: format!("at most {MOST_CANDIDATES} candidates: narrow --nk and --orders"),
             });
         }
         Ok(all as usize)
@@ -186,23 +187,23 @@ impl OrderRanges {
     }
 }
 
-/// Criterion for the choice between candidates; the smallest value is best.
+/// Criterion that selects among candidates; the smallest value is best.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Criterion {
-    /// The loss itself: valid only for candidates with the same number of parameters.
+    /// The loss, valid only for candidates with the same number of parameters.
     Loss,
-    /// Akaike.
+    /// Akaike's criterion.
     Aic,
-    /// Akaike with the correction for short records.
+    /// Akaike's criterion with the correction for short records.
     Aicc,
-    /// Schwarz.
+    /// Schwarz's (Bayesian) criterion.
     #[default]
     Bic,
     /// Akaike's final prediction error.
     Fpe,
     /// Rissanen's minimum description length.
     Mdl,
-    /// Young's criterion: the fit against the relative errors of the coefficients.
+    /// Young's criterion, which weighs the fit against the relative errors of the coefficients.
     Yic,
 }
 
@@ -211,7 +212,7 @@ hoid_model::named_choice!(Criterion, "criterion", 7, {
 });
 
 impl Criterion {
-    /// Returns the name as in print.
+    /// Returns the name of the criterion for printed output.
     pub fn label(self) -> &'static str {
         match self {
             Self::Loss => "loss",
@@ -228,26 +229,26 @@ impl Criterion {
 /// One candidate of a search.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Candidate {
-    /// Its orders.
+    /// Orders of the candidate.
     pub orders: Orders,
-    /// Its criteria, or the reason why it could not be fitted.
+    /// Criteria of the candidate, or the reason why it could not be fitted.
     pub outcome: Result<CandidateFigures, String>,
 }
 
-/// Criteria of a candidate, all on the same samples.
+/// Criteria of a candidate, computed on the samples common to all candidates.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CandidateFigures {
     /// Loss V.
     pub loss: f64,
     /// Akaike's criterion.
     pub aic: f64,
-    /// Akaike's criterion corrected.
+    /// Akaike's criterion with the correction for short records.
     pub aicc: f64,
-    /// Schwarz's criterion.
+    /// Schwarz's (Bayesian) criterion.
     pub bic: f64,
-    /// Final prediction error.
+    /// Akaike's final prediction error.
     pub fpe: f64,
-    /// Minimum description length.
+    /// Rissanen's minimum description length.
     pub mdl: f64,
     /// Young's criterion; `None` without standard errors.
     pub yic: Option<f64>,
@@ -272,7 +273,7 @@ impl CandidateFigures {
         }
     }
 
-    /// Returns the value of a criterion.
+    /// Returns the value of a criterion for the candidate.
     pub fn value(&self, criterion: Criterion) -> f64 {
         match criterion {
             Criterion::Loss => self.loss,
@@ -286,19 +287,19 @@ impl CandidateFigures {
     }
 }
 
-/// The chosen fit with the table of candidates.
+/// The fit of the selected model, with a table of all candidates.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Choice {
-    /// The chosen model, fitted on all its samples.
+    /// The selected model, fitted on all samples available for its orders.
     pub fit: Fit,
     /// All candidates in the order of [`OrderRanges::combinations`].
     pub candidates: Vec<Candidate>,
-    /// The criterion of the choice.
+    /// Criterion that selected the model.
     pub criterion: Criterion,
 }
 
-/// Identifies a person by a Box-Jenkins model, as does `hoid identify --structure bj`: the delay is searched over 0.05
-/// to 0.6 s and the order of the noise model over 1 to 4, chosen by BIC.
+/// Identifies a person with a Box-Jenkins model, like `hoid identify --structure bj`: the delay is searched over 0.05
+/// to 0.6 s and nd over 1 to 4, and BIC selects among the candidates.
 ///
 /// # Errors
 /// As [`choose_orders`]; [`IdentError::NoRecords`] without a record.
@@ -310,8 +311,8 @@ pub fn identify_box_jenkins(records: &[Record]) -> Result<Choice, IdentError> {
     choose_orders(&template, &ranges, Criterion::Bic, records)
 }
 
-/// Fits every combination of orders and returns the best. `template` contains the options; its orders and start are not
-/// used.
+/// Fits every combination of orders and returns the best fit. `template` contains the options; its orders and its start
+/// are not used.
 ///
 /// # Errors
 /// [`IdentError::EmptyRange`]; the error of the first candidate if none could be fitted.
@@ -324,8 +325,8 @@ pub fn choose_orders(
     choose_orders_with(template, ranges, criterion, records, &|| {})
 }
 
-/// As [`choose_orders`], calling `each` after every candidate, from any thread, to report the progress of a long
-/// search.
+/// As [`choose_orders`], and calls `each` after every candidate, possibly from other threads, to report the progress of
+/// a long search.
 ///
 /// # Errors
 /// As [`choose_orders`].
@@ -345,7 +346,7 @@ pub fn choose_orders_with(
         .map(|o| first_residual(o, template.initial_state_in_use()))
         .max()
         .unwrap_or(0);
-    // To rank candidates the loss need not be known to the last digit; the chosen one is fitted again with full
+    // A ranking of candidates does not need the full accuracy of the loss; the selected model is fitted again with full
     // accuracy.
     let quick = Estimator {
         search: SearchOptions {
@@ -356,13 +357,13 @@ pub fn choose_orders_with(
         starts: 1,
         ..template.clone()
     };
-    // Delays in blocks: within one, each delay starts from its neighbour. The blocks are the same
-    // for any number of threads, and the results are collected by index, so that the table does not
-    // depend on them.
+    // Delays are fitted in blocks: within a block, each delay starts from the result of the previous delay. The blocks
+    // do not depend on the number of threads and the results are collected by index, so that the table does not depend
+    // on the number of threads either.
     let delays = ranges.nk.clone().count();
     let blocks: Vec<&[Orders]> = combinations
         .chunks(delays)
-        .flat_map(|row| row.chunks(NEIGHBOURS))
+        .flat_map(|row| row.chunks(BLOCK_SIZE))
         .collect();
     let (candidates, errors): (Vec<Candidate>, Vec<Option<IdentError>>) = blocks
         .into_par_iter()
@@ -389,10 +390,10 @@ pub fn choose_orders_with(
     })
 }
 
-/// Number of delays that are fitted one from the other.
-const NEIGHBOURS: usize = 12;
+/// Number of delays in a block, each fitted from the result of the previous one.
+const BLOCK_SIZE: usize = 12;
 
-/// Fits orders that differ only by their delay, each from the coefficients of the previous one.
+/// Fits orders that differ only in the delay, each starting from the coefficients of the previous fit.
 fn fit_neighbours(
     quick: &Estimator,
     block: &[Orders],
@@ -422,12 +423,12 @@ fn fit_neighbours(
         .collect()
 }
 
-/// Returns the fit of one model if the ranges contain only one, otherwise the best of them with the table of
-/// candidates. `template` contains the options; its start is used only for a single model.
+/// Returns the fit if the ranges contain only one model; otherwise the best fit with the table of candidates.
+/// `template` contains the options; its start is used only for a single model.
 ///
 /// # Errors
-/// The errors of [`Estimator::fit`] and [`choose_orders`]; [`IdentError::BadStart`] for a start if several models are
-/// tried.
+/// The errors of [`Estimator::fit`] and [`choose_orders`]; [`IdentError::BadStart`] if `template` has a start but
+/// several models are compared.
 pub fn fit_or_choose(
     template: &Estimator,
     ranges: &OrderRanges,
@@ -445,7 +446,8 @@ pub fn fit_or_choose(
     }
     if template.start.is_some() {
         return Err(IdentError::BadStart {
-            reason: "it applies to a single model, but a range of orders or delays is searched; give nk and the orders as single numbers"
+            reason: "a start applies to a single model, but a range of orders or delays is searched; give nk and the \
+                     orders as single numbers"
                 .to_owned(),
         });
     }
@@ -454,10 +456,10 @@ pub fn fit_or_choose(
 }
 
 impl Choice {
-    /// Returns the interval of delays nk that the data do not distinguish from the best one, with the other orders of
-    /// the chosen model: the smallest and the largest with `n ln(V/V_min) <= 3.84`, the 95 % point of chi-square with
-    /// one degree of freedom (a profile likelihood interval; nk is an integer, so that it is coarse if one sample
-    /// changes the loss much). `None` if fewer than two delays were fitted.
+    /// Returns the smallest and the largest delay nk that the data do not distinguish from the best delay at the
+    /// selected orders: `n ln(V/V_min) <= 3.84`, the 95 % point of chi-square with one degree of freedom. This profile
+    /// likelihood interval is coarse if one sample of delay changes the loss much, since nk is an integer. `None` if
+    /// fewer than two delays were fitted.
     pub fn delay_interval(&self) -> Option<(usize, usize)> {
         let chosen = self.fit.orders();
         let profile: Vec<(usize, f64, usize)> = self
@@ -485,14 +487,14 @@ impl Choice {
 /// 95 % point of chi-square with one degree of freedom.
 const CHI_SQUARE_95: f64 = 3.841_458_820_694_124;
 
-/// Delays of human operators, 0.05 to 0.6 s, in samples: the default range of nk.
+/// Returns the default range of nk in samples, which covers the delays of human operators, 0.05 to 0.6 s.
 pub fn default_delay_range(sample_time: hoid_model::SampleTime) -> RangeInclusive<usize> {
     // tau_e = (nk - 1) Ts.
     sample_time.nk(0.05)..=sample_time.nk(0.6)
 }
 
-/// Returns the operator's orders with the defaults of the command line: nk searched, and nd over 1 to 4 for
-/// Box-Jenkins.
+/// Returns the orders that represent an operator, with the default ranges of the command line: nk is searched, and for
+/// Box-Jenkins also nd from 1 to 4.
 pub fn default_operator_ranges(structure: Structure, sample_time: hoid_model::SampleTime) -> OrderRanges {
     let mut ranges = OrderRanges::from(structure.operator_orders(1));
     if structure.has_input() {

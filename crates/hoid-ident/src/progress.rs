@@ -1,7 +1,7 @@
-//! Progress of a fit, reported to the caller that waits on the thread of the fit.
+//! Progress of a fit, reported to a caller that waits for the fit.
 //!
-//! A fit of forms or orders, one after the other, takes seconds for many or long records. It reports its progress
-//! before each of them; without a watcher this costs nothing.
+//! A fit of several forms or orders takes seconds if the records are long or numerous. The fit reports the number of
+//! finished items; without a watcher this costs nothing.
 
 use std::{
     cell::RefCell,
@@ -11,14 +11,14 @@ use std::{
     },
 };
 
-/// One step of the progress.
+/// One progress report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Step {
     /// Name of the counted items, in the plural.
     pub what: &'static str,
     /// Number of finished items.
     pub done: usize,
-    /// Total number.
+    /// Total number of items.
     pub total: usize,
 }
 
@@ -28,9 +28,9 @@ thread_local! {
     static WATCHER: RefCell<Option<Watcher>> = const { RefCell::new(None) };
 }
 
-/// Does the work and reports each of its steps on this thread to the watcher.
+/// Runs `work` and passes every progress report of this thread to the watcher.
 pub fn watched<T>(watcher: impl Fn(Step) + Send + Sync + 'static, work: impl FnOnce() -> T) -> T {
-    /// Restores the previous watcher in any case.
+    /// Restores the previous watcher when dropped, also after a panic.
     struct Before(Option<Watcher>);
     impl Drop for Before {
         fn drop(&mut self) {
@@ -41,17 +41,17 @@ pub fn watched<T>(watcher: impl Fn(Step) + Send + Sync + 'static, work: impl FnO
     work()
 }
 
-/// Reports the number of finished items.
+/// Reports the number of finished items to the watcher of this thread.
 pub(crate) fn step(what: &'static str, done: usize, total: usize) {
-    // Taken out of the cell first: the watcher may itself run a fit.
+    // Cloned out of the cell first, because the watcher may itself run a fit.
     let watcher = WATCHER.with_borrow(Clone::clone);
     if let Some(watcher) = watcher {
         watcher(Step { what, done, total });
     }
 }
 
-/// Counts items that are finished on many threads, for a caller that watches this one: each call reports one more of
-/// `total`.
+/// Returns a function that reports one more of `total` finished items at each call, from any thread, to the watcher of
+/// the thread that called `counter`.
 pub fn counter(what: &'static str, total: usize) -> impl Fn() + Send + Sync {
     let watcher = WATCHER.with_borrow(Clone::clone);
     let done = AtomicUsize::new(0);

@@ -1,22 +1,23 @@
 //! Contribution of a searched delay to the error bars of a fit.
 //!
 //! A searched nk is estimated from the data like theta, and theta depends on it. The residual also has a derivative
-//! with respect to the delay: with `x = (D/C) w = sum_j b_j psi_bj` the response of the model,
-//! `d(t) = -d eps/d tau = (x(t-1) - x(t+1))/(2 Ts)`, the central difference of a signal that is known one sample ahead.
-//! With `G = psi' psi` the estimate of theta for another delay changes along
+//! with respect to the delay. With the response of the model `x = (D/C) w = sum_j b_j psi_bj`, this is
+//! `d(t) = -d eps/d tau = (x(t-1) - x(t+1))/(2 Ts)`, a central difference, for which x(t+1) is known one sample ahead.
+//! With `G = psi' psi` the estimate of theta depends on the delay with the slope
 //!
 //! `s = d theta/d tau = -G^-1 psi' d`
 //!
 //! and the component of `d` orthogonal to psi determines the delay:
-//! `var tau = sigma^2/(d'd - d' psi G^-1 psi' d) + Ts^2/12` (the corner of the inverse of the information of theta and
-//! tau together: L. Ljung, *System Identification*, 1999, section 9.4; the second term because nk is an integer: W. F.
-//! Sheppard, *Proc. London Math. Soc.* 29 (1898) 353-380). It is at most the variance for equally likely delays over
-//! the searched range. The covariance of theta becomes `P + s s' var tau`, and a quantity with the gradient g with
-//! respect to theta and h with respect to the delay has the variance
+//! `var tau = sigma^2/(d'd - d' psi G^-1 psi' d) + Ts^2/12`. The first term is the corner element of the inverse
+//! information of theta and tau together (L. Ljung, *System Identification*, 1999, section 9.4). The second term is due
+//! to the integer nk (W. F. Sheppard, *Proc. London Math. Soc.* 29 (1898) 353-380). The variance is limited to that of
+//! a uniform distribution over the searched range. The covariance of theta becomes `P + s s' var tau`, and a quantity
+//! with the gradient g with respect to theta and the derivative h with respect to the delay has the variance
 //!
 //! `g' P g + (g' s + h)^2 var tau`.
 //!
-//! The two terms of `g' s + h` partly cancel in the frequency response: a longer delay is combined with faster muscles.
+//! The two terms of `g' s + h` partly cancel in the frequency response: a longer delay is compensated by a faster
+//! neuromuscular system.
 
 use hoid_model::Record;
 use nalgebra::{DMatrix, DVector};
@@ -29,9 +30,9 @@ use crate::{
 };
 
 impl Fit {
-    /// Returns the same fit with the delay treated as estimated over a range of `delays` values of nk. Models that do
-    /// not correspond to any operator are unchanged: with many coefficients of B a shift of one sample only renames
-    /// them.
+    /// Returns the fit with the delay treated as an estimate from a search over `delays` values of nk. Models that do
+    /// not represent an operator are returned unchanged: with many coefficients of B, a shift by one sample only
+    /// renumbers them.
     pub(crate) fn with_searched_delay(self, records: &[Record], delays: usize) -> Self {
         match self.delay_from(records, delays) {
             None => self,
@@ -55,7 +56,7 @@ impl Fit {
             return None;
         }
         let (orders, theta, ts) = (self.orders(), self.model.theta(), self.model.sample_time().s());
-        let free: Vec<usize> = (0..theta.len()).filter(|i| !self.held[*i]).collect();
+        let free: Vec<usize> = (0..theta.len()).filter(|i| !self.is_fixed_or_bounded[*i]).collect();
         let n = free.len();
         let mut gram = DMatrix::<f64>::zeros(n, n);
         let mut along = DVector::<f64>::zeros(n);
@@ -75,7 +76,7 @@ impl Fit {
             }
         }
         let a = gram.cholesky()?.solve(&along);
-        // The variance over the range of delays without data.
+        // Variance of a uniform distribution over the searched range: the uncertainty without data.
         let most = (delays as f64 * ts).powi(2) / 12.0;
         let known = own - along.dot(&a);
         let from_data = if known > 0.0 {
@@ -92,8 +93,8 @@ impl Fit {
         finite.then_some(SearchedDelay { variance_s2, slope })
     }
 
-    /// Returns the columns of psi in the record of a criterion, followed by d: the derivative of the residual with
-    /// respect to the delay, as if that were the last element of theta.
+    /// Returns the columns of psi for the record of a criterion, followed by the column d: the negative derivative of
+    /// the residual with respect to the delay, as if the delay were the last element of theta.
     pub(crate) fn jacobian_with_delay(&self, criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Vec<f64>> {
         let mut psi = criterion.jacobian(self.model.theta(), 0, workspace);
         let of_b = &psi[criterion.orders.na..];
@@ -108,8 +109,8 @@ fn along_the_delay(b: &[f64], of_b: &[Vec<f64>], sample_time_s: f64) -> Vec<f64>
     let x = |t: usize| -> f64 { b.iter().zip(of_b).map(|(b, column)| b * column[t]).sum() };
     (0..n)
         .map(|t| {
-            let (before, behind) = (t.saturating_sub(1), (t + 1).min(n - 1));
-            (x(before) - x(behind)) / ((behind - before).max(1) as f64 * sample_time_s)
+            let (before, next) = (t.saturating_sub(1), (t + 1).min(n - 1));
+            (x(before) - x(next)) / ((next - before).max(1) as f64 * sample_time_s)
         })
         .collect()
 }
@@ -163,10 +164,10 @@ mod tests {
                 .theta()
                 .to_vec()
         };
-        let (before, behind) = (at(nk - 1), at(nk + 1));
+        let (before, next) = (at(nk - 1), at(nk + 1));
         let b = fit.model().b()[0];
         for (i, slope) in slope.iter().enumerate() {
-            let chord = (behind[i] - before[i]) / (2.0 * record.sample_time().s());
+            let chord = (next[i] - before[i]) / (2.0 * record.sample_time().s());
             // Within a fifth of the largest.
             assert!(
                 (slope - chord).abs() < 0.2 * chord.abs().max(0.2 * b / 0.01),

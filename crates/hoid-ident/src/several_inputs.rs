@@ -2,10 +2,11 @@
 //!
 //! `A(q) u(t) = sum_i (B_i(q)/F_i(q)) q^-nk_i x_i(t) + (C(q)/D(q)) eps(t)`
 //!
-//! by the prediction error method (L. Ljung, *System Identification*, 1999, section 4.2, eq. 4.35): ARX, FIR, ARMAX, ARARX,
-//! ARARMAX, output error, Box-Jenkins and the general structure, with nb, nf and nk for each input. FIR and ARX are linear in theta and
-//! solved in one step. The others start from an ARX model of high order: the response of each input by itself has hardly any noise,
-//! and its own B and F follow from it as from a record with one input.
+//! by the prediction error method (L. Ljung, *System Identification*, 1999, section 4.2, eq. 4.35): ARX, FIR, ARMAX,
+//! ARARX, ARARMAX, output error, Box-Jenkins and the general structure, with nb, nf and nk for each input. FIR and ARX
+//! are linear in theta and solved in one step. The other structures start from a high-order ARX model: its response to
+//! each input alone is nearly free of noise, and B and F of that input are fitted to this response as to a record with
+//! one input.
 //!
 //! ```
 //! use hoid_ident::several_inputs::{InputOrders, SeveralInputs};
@@ -51,23 +52,24 @@ use crate::{
     optimize::{Linearisation, Minimum, Objective, minimise},
 };
 
-/// Number of coefficients of A and of each B in the model of high order.
+/// Maximum number of coefficients that A and each B of the high-order model have in addition to the orders of the
+/// fitted model.
 const HIGH_ORDER: usize = 12;
-/// Relative part of its diagonal that is added to the normal matrix of the model of high order.
+/// Relative increase of the normal matrix diagonal in the high-order model.
 const RIDGE: f64 = 1e-8;
-/// Order of the autoregression that gives the innovations for the start of C.
+/// Order of the autoregression that estimates the innovations for the start of C.
 const LONG: usize = 24;
 
-/// How a linear regression ends.
+/// Termination of a linear regression.
 const DIRECT: Termination = Termination {
     reason: Reason::Direct,
     iterations: 0,
 };
 
-/// A model with several inputs, with the options of its estimation.
+/// Structure and orders of a model with several inputs, and options of its estimation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeveralInputs {
-    /// The structure, which must have an input.
+    /// Structure of the model, which must have an input.
     pub structure: Structure,
     /// Number of coefficients of A.
     pub na: usize,
@@ -75,20 +77,21 @@ pub struct SeveralInputs {
     pub nc: usize,
     /// Number of coefficients of D.
     pub nd: usize,
-    /// Name and orders of each input. The first is the input of the records, the others are channels.
+    /// Name and orders of each input. The first input is e of the records; the others are channels of the records.
     pub inputs: Vec<(String, InputOrders)>,
     /// Initial states: estimated (the default) or zero.
     pub initial_state: InitialState,
-    /// True if each record has a constant of u, estimated like its initial states. Default true.
+    /// True if a constant of u is estimated for each record, like its initial states; ignored with initial states of
+    /// zero. Default true.
     pub level: bool,
     /// Limits of the search.
     pub search: SearchOptions,
 }
 
-/// The result of [`SeveralInputs::fit`].
+/// Result of [`SeveralInputs::fit`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeveralInputsFit {
-    /// The fitted model.
+    /// Structure, orders and options of the fitted model.
     pub model: SeveralInputs,
     theta: Vec<f64>,
     covariance: Option<Vec<f64>>,
@@ -98,16 +101,16 @@ pub struct SeveralInputsFit {
     pub innovation_variance: f64,
     /// Number n of residuals.
     pub residuals: usize,
-    /// How the search ended.
+    /// Termination of the search.
     pub termination: Termination,
     /// VAF of the one-step-ahead prediction, %.
     pub vaf_prediction: f64,
-    /// Time between two samples.
+    /// Sample time of the records.
     pub sample_time: SampleTime,
 }
 
 impl SeveralInputs {
-    /// Creates a structure without orders and inputs.
+    /// Creates a model of this structure without inputs and with orders of zero.
     pub fn new(structure: Structure) -> Self {
         Self {
             structure,
@@ -129,7 +132,7 @@ impl SeveralInputs {
         })
     }
 
-    /// Returns the orders of A, C, D, and of the first input.
+    /// Returns the orders of A, C and D and those of the first input.
     fn orders(&self) -> Orders {
         let first = self
             .inputs
@@ -145,16 +148,16 @@ impl SeveralInputs {
         }
     }
 
-    /// Checks structure, orders and inputs against each other.
+    /// Validates structure, orders and inputs, also in combination.
     ///
     /// # Errors
-    /// [`IdentError`] with the problem.
+    /// [`IdentError`] describes the problem.
     pub fn check(&self) -> Result<(), IdentError> {
         if !self.structure.has_input() {
-            return Self::refuse("the structure", self.structure, "one with inputs");
+            return Self::refuse("the structure", self.structure, "a structure with inputs");
         }
         if self.inputs.is_empty() {
-            return Self::refuse("the inputs", "none", "at least one, with its orders");
+            return Self::refuse("the inputs", "none", "at least one input, with its orders");
         }
         if self.initial_state == InitialState::Backcast {
             return Self::refuse("the initial states", "backcast", "estimate or zero for several inputs");
@@ -177,7 +180,7 @@ impl SeveralInputs {
     /// Fits one model to all records.
     ///
     /// # Errors
-    /// [`IdentError`] for invalid orders, inputs or records, and if there is no minimum.
+    /// [`IdentError`] for invalid orders, inputs or records, and if no search reaches a finite loss.
     pub fn fit(&self, records: &[Record]) -> Result<SeveralInputsFit, IdentError> {
         self.check()?;
         let sample_time = common_sample_time(records)?;
@@ -205,8 +208,8 @@ impl SeveralInputs {
         Ok(self.assembled(&criterion, sample_time, (theta, termination), &at))
     }
 
-    /// Fits an ARX model by ridge regression to a criterion of its orders: its response where the records determine
-    /// few combinations of the coefficients. `None` if the normal equations are singular.
+    /// Fits an ARX model of the orders of `criterion` by ridge regression. This gives a frequency response even if the
+    /// records determine only few combinations of the coefficients. `None` if the normal equations are singular.
     pub(crate) fn ridge(
         &self,
         criterion: &Criterion<'_>,
@@ -215,13 +218,13 @@ impl SeveralInputs {
     ) -> Option<SeveralInputsFit> {
         let mut at = criterion.linearise(&vec![0.0; criterion.parameters()], &mut Workspace::of_thread());
         let theta = at.solution(ridge)?;
-        // At least the rounding error of such a regression.
+        // Not below the rounding error of such a regression.
         let squares = (at.sum_of_squares - dot(&theta, &at.descent)).max(1e-12 * at.sum_of_squares);
         at.sum_of_squares = squares;
         Some(self.assembled(criterion, sample_time, (theta, DIRECT), &at))
     }
 
-    /// Returns the result for this theta, with the sum of squares and `psi' psi` there.
+    /// Returns the result for theta; `at` contains the sum of squares and `psi' psi` at theta.
     fn assembled(
         &self,
         criterion: &Criterion<'_>,
@@ -249,7 +252,7 @@ impl SeveralInputs {
         }
     }
 
-    /// Returns the normal equations with one step of refinement from the residuals themselves.
+    /// Solves the normal equations, with two refinement steps that recompute the residuals.
     fn refined(
         &self,
         criterion: &Criterion<'_>,
@@ -274,8 +277,8 @@ impl SeveralInputs {
         self.na + self.nc + self.nd + of_inputs
     }
 
-    /// Returns the names of the coefficients in the order of theta: those of A, B, C, D, F with the first input, then B
-    /// and F of each further one.
+    /// Returns the names of the coefficients in the order of theta: A, B, C, D and F with B and F of the first input,
+    /// then B and F of each further input.
     fn names(&self) -> Vec<String> {
         let own = self.orders().parameter_names();
         let first = self.inputs.first().map_or("", |(name, _)| name.as_str());
@@ -292,7 +295,7 @@ impl SeveralInputs {
         all
     }
 
-    /// Returns the criterion of these orders, with those of each input by `of`.
+    /// Returns the criterion with these orders; `of` returns the orders of each further input.
     fn criterion<'a>(
         &self,
         records: &'a [Record],
@@ -339,9 +342,10 @@ impl SeveralInputs {
         }
     }
 
-    /// Returns starting values of theta: B and F of each input from its response in an ARX model of high order, which
-    /// is nearly without noise, and from the part of u that the responses to the other inputs do not explain; then the
-    /// noise.
+    /// Returns starting values of theta. In the first start, B and F of each input are fitted to the response to this
+    /// input in a high-order ARX model, which is nearly free of noise. In the second start, they are fitted to the part
+    /// of u that the responses to the other inputs do not explain. C and D are then fitted to the remainder of u. A
+    /// structure with A and no F has the single start of `start_with_a`.
     fn starts(&self, records: &[Record], workspace: &mut Workspace) -> Result<Vec<Vec<f64>>, IdentError> {
         if self.na > 0 && self.inputs.iter().all(|(_, o)| o.nf == 0) {
             return Ok(vec![self.start_with_a(records, workspace)?]);
@@ -404,7 +408,7 @@ impl SeveralInputs {
         Ok(starts)
     }
 
-    /// Returns the response to each input in each record, from an ARX model of high order.
+    /// Returns the response to each input in each record, computed with a high-order ARX model.
     fn responses(&self, records: &[Record], workspace: &mut Workspace) -> Result<Vec<Vec<Vec<f64>>>, IdentError> {
         let shortest = records.iter().map(Record::len).min().unwrap_or(0);
         let high = HIGH_ORDER.min(shortest / (4 * (self.inputs.len() + 1))).max(2);
@@ -444,7 +448,7 @@ impl SeveralInputs {
         Ok(all)
     }
 
-    /// The same if A takes the place of the F: an ARX model, without a noise model yet.
+    /// Returns the start of a structure with A and no F: an ARX model, with the coefficients of C and D zero.
     fn start_with_a(&self, records: &[Record], workspace: &mut Workspace) -> Result<Vec<f64>, IdentError> {
         let arx = Orders {
             nc: 0,
@@ -504,7 +508,7 @@ fn channel<'r>(record: &'r Record, name: &str) -> Result<&'r [f64], IdentError> 
     })
 }
 
-/// Returns the input of the record for the first name, otherwise the channel.
+/// Returns the input of the record if `name` is the name of the first input, otherwise the channel with this name.
 fn channel_or_input<'r>(record: &'r Record, name: &str, first: &str) -> Result<&'r [f64], IdentError> {
     if name == first {
         Ok(record.input())
@@ -514,7 +518,7 @@ fn channel_or_input<'r>(record: &'r Record, name: &str, first: &str) -> Result<&
 }
 
 impl SeveralInputsFit {
-    /// Returns names and estimates of all coefficients: `a1`, `b0[e]`, `f1[r]`, `c1`, `d1`.
+    /// Returns names and estimates of all coefficients, for example `a1`, `b0[e]`, `f1[r]`, `c1`, `d1`.
     pub fn parameters(&self) -> Vec<(String, Estimate)> {
         let p = self.theta.len();
         let estimate = |i: usize| match &self.covariance {
@@ -525,7 +529,7 @@ impl SeveralInputsFit {
         names.map(|(i, name)| (name, estimate(i))).collect()
     }
 
-    /// Covariance of the coefficients by rows.
+    /// Returns the covariance of the coefficients by rows.
     pub fn covariance(&self) -> Option<&[f64]> {
         self.covariance.as_deref()
     }
@@ -535,7 +539,7 @@ impl SeveralInputsFit {
         self.residuals as f64 * self.loss.ln() + 2.0 * self.theta.len() as f64
     }
 
-    /// Returns the indices in theta of A, and of B and F of an input.
+    /// Returns the indices in theta of the coefficients of A, and of B and F of an input.
     fn places(&self, input: usize) -> [std::ops::Range<usize>; 3] {
         let o = self.model.orders();
         let a = 0..o.na;
@@ -551,7 +555,8 @@ impl SeveralInputsFit {
         [a, from..from + own.nb, from + own.nb..from + own.nb + own.nf]
     }
 
-    /// Returns gain and phase from an input, given by its number, to u at frequencies in rad/s: `B_i/(A F_i) q^-nk_i`.
+    /// Returns gain and phase of `B_i/(A F_i) q^-nk_i`, the response of u to the input with this index, at frequencies
+    /// in rad/s.
     pub fn frequency_response(&self, input: usize, omega_rad_s: &[f64]) -> Vec<ResponsePoint> {
         let [a, b, f] = self.places(input);
         let nk = self.model.inputs[input].1.nk;
@@ -565,7 +570,7 @@ impl SeveralInputsFit {
             let (of_a, of_f) = (one + sum(&a), one + sum(&f));
             let of_b: Complex64 = b.clone().map(|i| self.theta[i] * back(nk + i - b.start)).sum();
             let response = of_b / (of_a * of_f);
-            // Derivatives of ln H.
+            // Derivatives of ln H with respect to theta.
             let mut slopes = vec![Complex64::new(0.0, 0.0); p];
             a.clone().for_each(|i| slopes[i] = -back(i - a.start + 1) / of_a);
             f.clone().for_each(|i| slopes[i] = -back(i - f.start + 1) / of_f);

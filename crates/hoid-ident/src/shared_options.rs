@@ -1,4 +1,4 @@
-//! Options that several batch estimators share: each is declared here once, over the field of the estimator.
+//! Options shared by several batch estimators. Each option is defined once, for a given field of the estimator.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
@@ -12,9 +12,9 @@ use crate::{
     settings::{BatchOption, Bounds, Kind, OneOrSpan, Setting, Value},
 };
 
-/// Words for a form.
+/// Accepted values of the option `form`.
 static FORMS: [&str; Form::NAMES.len() + 1] = or_auto(Form::NAMES);
-/// Words for a rule for initial states.
+/// Accepted values of the option `initial_state`.
 static INITIAL_STATES: [&str; InitialState::NAMES.len() + 1] = or_auto(InitialState::NAMES);
 
 /// Returns `auto` followed by these names.
@@ -27,19 +27,21 @@ const fn or_auto<const N: usize, const M: usize>(names: [&'static str; N]) -> [&
     all
 }
 
-/// A field of an estimator.
+/// Mutable access to a field of an estimator.
 pub type Field<E, T> = fn(&mut E) -> &mut T;
 
-/// Returns the option for the noise model of an operator, which determines the estimator.
+/// Returns the option for the type of noise model of an operator; this option also determines which estimator is used.
 pub fn noise<E: 'static>(set: impl Fn(&mut E, &Setting, &str) -> Result<(), IdentError> + 'static) -> BatchOption<E> {
-    let help = "Noise model: autoregression (ar), with moving average nc (arma), or remnant of order m (remnant)";
+    let help = "Noise model: autoregression (ar), autoregression and moving average of order nc (arma), or remnant of \
+                order m (remnant)";
     let setting = Setting::new("noise", Kind::Choice(&["ar", "arma", "remnant"]), help).default("ar");
     BatchOption::new(setting, set)
 }
 
-/// Returns the option for a change of the operator, which determines the estimator.
+/// Returns the option for a change of the operator; this option also determines which estimator is used.
 pub fn change<E: 'static>() -> BatchOption<E> {
-    let help = "Change of the operator: none, or of its gains once, as a sigmoid";
+    let help = "Change of the operator: none, or one change of its gains along a sigmoid, for which hoid identify \
+                refuses --figure, --validate, --horizon and --report";
     let setting = Setting::new("change", Kind::Choice(&["none", "sigmoid"]), help).default("none");
     BatchOption::new(setting, |_, _, _| Ok(()))
 }
@@ -60,7 +62,7 @@ pub fn form<E: 'static>(set: fn(&mut E, Option<Form>)) -> BatchOption<E> {
 
 /// Returns the option for the neuromuscular part of an operator.
 pub fn neuromuscular<E: 'static>(field: Field<E, bool>) -> BatchOption<E> {
-    let help = "Include neuromuscular dynamics omega_nm, zeta_nm";
+    let help = "Include neuromuscular dynamics (omega_nm, zeta_nm)";
     let setting = Setting::new("neuromuscular", Kind::Choice(&["yes", "no"]), help).default("yes");
     BatchOption::new(setting, move |how, option, text| {
         *field(how) = match text {
@@ -72,7 +74,7 @@ pub fn neuromuscular<E: 'static>(field: Field<E, bool>) -> BatchOption<E> {
     })
 }
 
-/// Yes or no.
+/// Returns `yes` or `no`.
 pub fn yes_words(yes: bool) -> String {
     if yes { "yes" } else { "no" }.to_owned()
 }
@@ -88,22 +90,23 @@ pub fn prior<E: 'static>(default: &str, field: Field<E, OperatorPrior>) -> Batch
     })
 }
 
-/// Returns the setting for an order, given or searched.
+/// Returns the setting for orders, given as numbers or as ranges to search.
 pub fn orders(default: &str) -> Setting {
-    let help = "Orders, or ranges to search, as nb=2,nc=0,nd=1..4,nf=2; nb counts b0, b1, ...";
+    let help = "Orders, or ranges to search, such as nb=2,nc=0,nd=1..4,nf=2; nb counts b0, b1, ...";
     Setting::new("orders", Kind::Named(&Kind::Counts), help).default(default)
 }
 
 /// Returns the setting for the delay in s.
 pub fn delay(default: &str) -> Setting {
-    let help = "Delay tau_e, or its range; for polynomials, replaces nk = tau_e/Ts + 1";
+    let help = "Delay tau_e, or a range to search; for polynomials it replaces nk = tau_e/Ts + 1";
     Setting::new("delay", Kind::NumberOrSpan, help)
         .default(default)
         .unit("s")
         .bounds(Bounds::NonNegative)
 }
 
-/// Returns the option for the shortest and the longest delay of an operator, with its printed form.
+/// Returns the option for the shortest and the longest delay of an operator; `of` returns the delays for printed
+/// output.
 pub fn delay_range<E: 'static>(
     default: (f64, f64),
     field: Field<E, (f64, f64)>,
@@ -118,16 +121,16 @@ pub fn delay_range<E: 'static>(
     .printed("delay in s", move |how, _| of(how).text())
 }
 
-/// A range of orders as text.
+/// Formats a range of orders.
 pub fn range_words(range: &RangeInclusive<usize>) -> String {
     range.text().unwrap_or_default()
 }
 
-/// Returns the option for parameters that are individual to each record.
+/// Returns the option for parameters that differ between records.
 pub fn individual<E: 'static>(
     set: impl Fn(&mut E, &Setting, Vec<String>) -> Result<(), IdentError> + 'static,
 ) -> BatchOption<E> {
-    let help = "Parameters that differ between records, as K,T_L";
+    let help = "Parameters that differ between records, such as K,T_L";
     let setting = Setting::new("individual", Kind::Names, help);
     BatchOption::new(setting, move |how, option, text| set(how, option, option.read(text)?))
 }
@@ -136,7 +139,8 @@ pub fn individual<E: 'static>(
 pub fn initial_state<E: 'static>(
     set: impl Fn(&mut E, &Setting, Option<InitialState>) -> Result<(), IdentError> + 'static,
 ) -> BatchOption<E> {
-    let help = "Initial states of each record; auto: estimate, or backcast without an input (ar, ma, arma)";
+    let help = "Initial states of each record; auto: estimate, but backcast for structures without an input (ar, ma, \
+                arma)";
     let setting = Setting::new("initial_state", Kind::Choice(&INITIAL_STATES), help).default("auto");
     BatchOption::new(setting, move |how, option, text| {
         let rule = match text {
@@ -147,14 +151,15 @@ pub fn initial_state<E: 'static>(
     })
 }
 
-/// Returns the options for parameters fixed at a value or constrained to bounds; each parameter once.
+/// Returns the options for parameters that are fixed at a value or constrained to bounds; a parameter must not have
+/// both.
 pub fn constraints<E: 'static>(
     field: Field<E, BTreeMap<String, Constraint>>,
     of: Constraints<E>,
 ) -> [BatchOption<E>; 2] {
-    let fix = "Parameters fixed at a value, as d1=-0.85,f1=-1.9";
+    let fix = "Parameters fixed at a value, such as d1=-0.85,f1=-1.9";
     let fix = Setting::new("fix", Kind::Named(&Kind::Number), fix).bounds(Bounds::Finite);
-    let bound = "Bounds of parameters, as b0=0..0.2,f2=..0.99; either end may be omitted";
+    let bound = "Bounds of parameters, such as b0=0..0.2,f2=..0.99; either end may be omitted";
     let bound = Setting::new("bound", Kind::Named(&Kind::OpenSpan), bound);
     let fixed = move |how: &mut E, option: &Setting, text: &str| {
         let all: BTreeMap<String, f64> = option.read(text)?;
@@ -174,7 +179,7 @@ pub fn constraints<E: 'static>(
     ]
 }
 
-/// Access to the constraints of an estimator.
+/// Read access to the constraints of an estimator.
 pub type Constraints<E> = fn(&E) -> &BTreeMap<String, Constraint>;
 
 fn constrain(
@@ -184,7 +189,7 @@ fn constrain(
 ) -> Result<(), IdentError> {
     for (name, constraint) in given {
         if all.contains_key(&name) {
-            return Err(option.error(format!("{name} is both fixed and bounded; drop one")));
+            return Err(option.error(format!("{name} is both fixed and bounded; drop one of the two")));
         }
         all.insert(name, constraint);
     }
@@ -207,7 +212,7 @@ fn bound_words(all: &BTreeMap<String, Constraint>) -> Option<String> {
     (!words.is_empty()).then(|| words.join(", "))
 }
 
-/// Returns `name=value, name=value`; `None` if there are none.
+/// Formats values as `name=value, name=value`; `None` if there are no values.
 pub fn named_words<'a>(values: impl IntoIterator<Item = (&'a String, f64)>) -> Option<String> {
     let all: Vec<String> = values
         .into_iter()

@@ -6,12 +6,12 @@ use hoid_model::{estimate_table::write_rows, numbers::significant};
 
 use crate::{Fit, Reason};
 
-/// Significant digits of loss and criteria.
+/// Number of significant digits of loss and criteria.
 const DIGITS: i32 = 5;
 
 impl fmt::Display for Fit {
-    /// Formats structure and orders, a row for each parameter with its standard error, loss and criteria, and the
-    /// termination of the search.
+    /// Formats title, parameters with standard errors (one row each), loss, criteria, and the termination of the
+    /// search.
     ///
     /// ```
     /// # use hoid_ident::Estimator;

@@ -1,28 +1,27 @@
-//! All errors of files, in terms of the user, who has to correct the file.
+//! All errors of files, described in the terms of the user who has to correct the file.
 
 use hoid_model::ModelError;
 use thiserror::Error;
 
 use crate::wording::{list, sparse_option};
 
-/// Reason why a file could not be read or written. Each message names the file, the place in it,
-/// the content found, the expected content and the remedy. A `place` is "line 12" if the format has
-/// lines, otherwise "row 12".
+/// Reason why a file could not be read or written. Each message gives the file, the place in it, the contents found,
+/// the expected contents and the remedy. A `place` is "line 12" if the format has lines, otherwise "row 12".
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum IoError {
-    /// A file that the system cannot read.
+    /// A file that cannot be read from the file system.
     #[error("{file} cannot be read: {source}; check the name and the permissions")]
     Unreadable {
-        /// The file.
+        /// Name of the file.
         file: String,
         /// Error reported by the operating system.
         source: std::io::Error,
     },
-    /// A file that the system cannot write.
+    /// A file that cannot be written to the file system.
     #[error("{file} cannot be written: {source}; {}", remedy_of_writing(source))]
     Unwritable {
-        /// The file.
+        /// Name of the file.
         file: String,
         /// Error reported by the operating system.
         source: std::io::Error,
@@ -32,116 +31,117 @@ pub enum IoError {
         "{file} is {input}, which is read by the same command and would be lost; choose another file for the result"
     )]
     OutputIsInput {
-        /// The path of the result.
+        /// Path of the result.
         file: String,
-        /// The data read.
+        /// Path of the input.
         input: String,
     },
-    /// Results must not overwrite their inputs.
+    /// A directory of results that contains an input, which might be overwritten.
     #[error(
         "{directory} holds {input}, which is read by the same command and may be lost; choose another directory for \
          the results"
     )]
     OutputAmongInputs {
-        /// The directory of the results.
+        /// Path of the directory of results.
         directory: String,
-        /// The data read.
+        /// Path of the input.
         input: String,
     },
-    /// A file that holds no fit.
+    /// A file that does not contain a fit.
     #[error("{file}: {reason}; give the output of `hoid identify --json`")]
     NoFit {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// Reason.
+        /// Reason for the error.
         reason: String,
     },
-    /// A file that is not a shared library of a platform that units are made for.
+    /// A file that is not a shared library for a platform supported by FMUs.
     #[error(
-        "{file} is not a 64-bit shared library for Linux, Windows or macOS; give the one that `cargo xtask ffi` built"
-    )]
-    NoLibrary {
-        /// The file.
-        file: String,
-    },
-    /// A shared library without the functions of a unit.
-    #[error(
-        "{file} is a shared library, but not that of hoid: it has no {missing}; give the one that `cargo xtask ffi` \
+        "{file} is not a 64-bit shared library for Linux, Windows or macOS; give the library that `cargo xtask ffi` \
          built"
     )]
-    OtherLibrary {
-        /// The file.
+    NoLibrary {
+        /// Name of the file.
         file: String,
-        /// The function that it lacks.
+    },
+    /// A shared library without the functions required by an FMU.
+    #[error(
+        "{file} is a shared library, but not that of hoid: it has no {missing}; give the library that `cargo xtask \
+         ffi` built"
+    )]
+    OtherLibrary {
+        /// Name of the file.
+        file: String,
+        /// Name of the missing function.
         missing: &'static str,
     },
     /// A directory in use by another process.
     #[error("another process is working on {directory}: wait until it ends, or choose another directory")]
     InUse {
-        /// The directory.
+        /// Name of the directory.
         directory: String,
     },
     /// A directory where a file is expected.
     #[error("{file} is a directory, expected a file; name the file in it")]
     Directory {
-        /// The directory.
+        /// Name of the directory.
         file: String,
     },
-    /// An extension that does not correspond to any format.
+    /// An extension that belongs to no known format.
     #[error("{file}: {found}; expected {expected}{remedy}")]
     UnknownFormat {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The extension, or that there is none.
+        /// The extension, or a statement that there is none.
         found: String,
-        /// The extensions that are known.
+        /// The known extensions.
         expected: String,
-        /// "; unpack it", empty if the format is unknown.
+        /// Remedy such as "; unpack it first"; empty if none is known.
         remedy: String,
     },
-    /// Content that is not text.
+    /// Contents that are not text.
     #[error("{file}, {place}: {found}, expected text in UTF-8; save the table as CSV in UTF-8")]
     NotText {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// Place.
+        /// Place in the file.
         place: String,
-        /// The first bad byte.
+        /// The first invalid byte.
         found: String,
     },
     /// A file with only blank lines and comments.
     #[error("{file} is empty, expected a header with the names of the columns and one line per sample")]
     Empty {
-        /// The file.
+        /// Name of the file.
         file: String,
     },
     /// A header without rows.
     #[error("{file} has a header but no samples; check that the recording was saved completely")]
     NoRows {
-        /// The file.
+        /// Name of the file.
         file: String,
     },
-    /// Numbers where the column names should be.
+    /// Numbers in the line where the column names are expected.
     #[error(
         "{file}, {place}: the first line holds numbers ({found}), expected the names of the columns; put a header such as t,e,u above it, without # in front"
     )]
     NoHeader {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// Place.
+        /// Place in the file.
         place: String,
-        /// The first cells.
+        /// The first cells of the line.
         found: String,
     },
-    /// Cells separated by blanks.
+    /// Cells that are separated by blanks.
     #[error(
         "{file}: a line has {found} numbers separated by blanks, expected commas, semicolons or tabs; save the table \
-         with these, and with a header such as t,e,u"
+         with one of these separators, and with a header such as t,e,u"
     )]
     Blanks {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// Number of numbers in the first line.
+        /// Count of the numbers in the first line.
         found: usize,
     },
     /// A table with too many columns.
@@ -150,23 +150,23 @@ pub enum IoError {
          missing line ends"
     )]
     TooManyColumns {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// Columns of the file.
+        /// Number of columns in the file.
         found: usize,
-        /// The limit.
+        /// Maximum number of columns.
         most: usize,
     },
     /// Two columns with the same name.
     #[error("{file}: columns {first} and {second} are both named \"{name}\"; give each column its own name")]
     DuplicateColumn {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The name.
+        /// The duplicated name.
         name: String,
-        /// Number of the first column, from 1.
+        /// Number of the first column, counted from 1.
         first: usize,
-        /// Number of the second column, from 1.
+        /// Number of the second column, counted from 1.
         second: usize,
     },
     /// A row that is shorter or longer than the header.
@@ -175,13 +175,13 @@ pub enum IoError {
          separator or an open quotation mark"
     )]
     RowLength {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// Place.
+        /// Place in the file.
         place: String,
-        /// Values in the row.
+        /// Number of values in the row.
         found: usize,
-        /// Names in the header.
+        /// Number of names in the header.
         expected: usize,
     },
     /// A truncated last line.
@@ -190,60 +190,60 @@ pub enum IoError {
          that line and use the lines above it"
     )]
     CutRow {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// Place.
+        /// Place in the file.
         place: String,
-        /// Values in the row.
+        /// Number of values in the row.
         found: usize,
-        /// Names in the header.
+        /// Number of names in the header.
         expected: usize,
     },
-    /// A column that the file does not have.
+    /// A column that does not exist in the file.
     #[error(
         "{file} has no column {missing} (asked for: {asked}{meant}); it has {available}; choose with --input and \
          --output by NAME, -NAME or NAME-NAME"
     )]
     NoSuchColumn {
-        /// The file.
+        /// Name of the file.
         file: String,
         /// The names that were not found.
         missing: String,
-        /// The whole expression.
+        /// The complete requested expression.
         asked: String,
-        /// "; did you mean "u"?", empty if no name is near.
+        /// Suggestion such as "; did you mean "u"?"; empty if no name is similar.
         meant: String,
-        /// The names that exist.
+        /// Names that exist in the file.
         available: String,
     },
     /// Text that does not select a column.
     #[error("the column \"{found}\": {expected}")]
     Expression {
-        /// The text as given.
+        /// Text given by the user.
         found: String,
-        /// The problem and the remedy.
+        /// Description of the problem and the remedy.
         expected: String,
     },
-    /// The same column as input and output.
+    /// The same column requested as input and output.
     #[error("{file}: input and output are both {asked}; choose two columns with --input and --output")]
     SameColumn {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The expression.
+        /// The requested expression.
         asked: String,
     },
     /// Text where a number is expected.
     #[error("{file}, {place}, column {column}: found \"{found}\", expected a number; {remedy}")]
     NotANumber {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// Place.
+        /// Place in the file.
         place: String,
-        /// The column.
+        /// Name of the column.
         column: String,
         /// The text found, shortened to a readable length.
         found: String,
-        /// Remedy.
+        /// Remedy for the error.
         remedy: &'static str,
     },
     /// An infinite value.
@@ -251,66 +251,66 @@ pub enum IoError {
         "{file}, {place}, column {column}: found {found}, expected a finite number; correct the value, or empty the cell and bridge it with --fill"
     )]
     Infinite {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// Place.
+        /// Place in the file.
         place: String,
-        /// The column.
+        /// Name of the column.
         column: String,
-        /// The cell.
+        /// Text of the cell.
         found: String,
     },
-    /// Missing values.
+    /// Missing values in a column.
     #[error(
         "{file}, {place}, column {column}: the value is missing ({found}), as are {count} of {rows} in this column; bridge them linearly with --fill, or leave them out with --from and --to"
     )]
     Missing {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The first.
+        /// Place of the first missing value.
         place: String,
-        /// The column.
+        /// Name of the column.
         column: String,
-        /// The cell.
+        /// Text of the cell.
         found: String,
         /// Number of missing values.
         count: usize,
         /// Number of rows examined.
         rows: usize,
     },
-    /// Values missing in many places, as for a topic with another rate.
+    /// Values missing in many places, as in a topic with another rate.
     #[error(
         "{file}, {place}, column {column}: the value is missing ({found}), as are {count} of {rows} in this column; if \
-         it was logged at its own instants, read it with {} (or linear, drop); otherwise bridge them linearly with \
-         --fill, or leave them out with --from and --to",
+         the column was logged at its own instants, read it with {} (or linear, drop); otherwise bridge the missing \
+         values linearly with --fill, or leave them out with --from and --to",
         sparse_option(column)
     )]
     Sparse {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The first.
+        /// Place of the first missing value.
         place: String,
-        /// The column.
+        /// Name of the column.
         column: String,
-        /// The cell.
+        /// Text of the cell.
         found: String,
         /// Number of missing values.
         count: usize,
         /// Number of rows examined.
         rows: usize,
     },
-    /// Missing values at the start or end.
+    /// Missing values at the start or the end of the record.
     #[error(
         "{file}, {place}, column {column}: the values are missing up to the {end} of the record, so that --fill has nothing to bridge to; leave them out with --from and --to"
     )]
     NothingToBridgeTo {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The first or last of them.
+        /// Place of the first or the last missing value.
         place: String,
-        /// The column.
+        /// Name of the column.
         column: String,
-        /// "start" or "end".
+        /// End of the record: "start" or "end".
         end: &'static str,
     },
     /// Neither a time column nor a given sampling frequency.
@@ -319,15 +319,15 @@ pub enum IoError {
          --time COLUMN, or give --fs HZ; it has {available}"
     )]
     NoSampling {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The names that exist.
+        /// Names that exist in the file.
         available: String,
     },
     /// An invalid sampling frequency.
     #[error("the sampling frequency is {found} Hz, expected a positive finite number of samples per second")]
     SamplingFrequency {
-        /// The value given.
+        /// The given value.
         found: f64,
     },
     /// Too few samples to determine the sampling.
@@ -336,17 +336,17 @@ pub enum IoError {
          give --fs HZ"
     )]
     TooFewSamples {
-        /// The file.
+        /// Name of the file.
         file: String,
         /// Number of samples.
         found: usize,
     },
-    /// Several trials where one is expected.
+    /// Several trials where a single trial is expected.
     #[error("{file} holds {} trials by {by}: {}; read one of them with --trial {by}={}", .trials.len(), listed(.trials), .trials.first().map_or("", |name| name.as_str()))]
     SeveralTrials {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The column that counts them, or t.
+        /// Column that numbers the trials, or t.
         by: String,
         /// Names of the trials, at least two.
         trials: Vec<String>,
@@ -354,73 +354,75 @@ pub enum IoError {
     /// A trial that does not exist.
     #[error("{file}: there is no trial {asked}; it has {available}")]
     NoSuchTrial {
-        /// The file.
+        /// Name of the file.
         file: String,
         /// The requested trial.
         asked: String,
-        /// The names that exist.
+        /// Names that exist in the file.
         available: String,
     },
-    /// Time that is constant or runs backwards.
+    /// A time that is constant or runs backwards.
     #[error(
         "{file}, {place}: t = {found} s after {previous} s, expected increasing time; drop rows that were written \
          twice with --drop-repeated, use --trial t if the time restarts with each trial, write t with more decimals, \
          or give --fs HZ in place of t"
     )]
     NotIncreasing {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The later row.
+        /// Place of the later row.
         place: String,
-        /// Its time, s.
+        /// Time in the later row, s.
         found: f64,
-        /// Previous time, s.
+        /// Time in the row before, s.
         previous: f64,
     },
     /// Missing samples.
     #[error(
-        "{file}: samples missing after {place}, t = {after_s} s: {missing} (the next is at {next_s} s, the sample time is {sample_time_s:.6} s; gaps in all: {gaps}); interpolate over them with --resample, or use the part before or after with --from and --to"
+        "{file}: samples missing after {place}, t = {after_s} s: {missing} (the next is at {next_s} s, the sample time \
+         is {sample_time_s:.6} s; number of gaps: {gaps}); interpolate over them with --resample, or use the part \
+         before or after with --from and --to"
     )]
     Gap {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The row before the first gap.
+        /// Place of the row before the first gap.
         place: String,
-        /// Its time, s.
+        /// Time in this row, s.
         after_s: f64,
-        /// The time of the row after the gap, s.
+        /// Time in the row after the gap, s.
         next_s: f64,
-        /// Samples missing in the first gap.
+        /// Number of samples missing in the first gap.
         missing: u64,
         /// Number of gaps.
         gaps: usize,
         /// Sample time, s.
         sample_time_s: f64,
     },
-    /// Samples that deviate from the even grid.
+    /// Samples that deviate from the evenly spaced grid.
     #[error(
         "{file}: t is uneven: at {place}, t = {found} s, it is {deviation_s:.3e} s off the even grid with sample time {sample_time_s:.6} s, more than the allowed {tolerance_s:.3e} s; interpolate onto the grid with --resample, or give --fs HZ if the samples were taken evenly and only t is wrong"
     )]
     Jitter {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The row with the largest deviation.
+        /// Place of the row with the largest deviation.
         place: String,
-        /// Its time, s.
+        /// Time in this row, s.
         found: f64,
-        /// Deviation, s.
+        /// Deviation from the grid, s.
         deviation_s: f64,
-        /// Tolerance, s.
+        /// Largest permitted deviation, s.
         tolerance_s: f64,
         /// Sample time, s.
         sample_time_s: f64,
     },
-    /// A resampled record that would consist mostly of interpolated samples.
+    /// A resampled record that would consist almost entirely of interpolated samples.
     #[error(
         "{file}: resampling from t = {start_s} s to {end_s} s would make {samples:.0} samples out of {rows}, expected at most {factor} times as many; look for a wrong time in t, or use a part with --from and --to"
     )]
     ResampledTooLong {
-        /// The file.
+        /// Name of the file.
         file: String,
         /// First time, s.
         start_s: f64,
@@ -430,13 +432,13 @@ pub enum IoError {
         samples: f64,
         /// Number of recorded samples.
         rows: usize,
-        /// The largest ratio allowed.
+        /// Largest permitted ratio of resampled to recorded samples.
         factor: usize,
     },
     /// A time span without samples.
     #[error("{file}: the span {span} holds no samples; the record covers {start_s} to {end_s} s")]
     EmptySpan {
-        /// The file.
+        /// Name of the file.
         file: String,
         /// The span as requested.
         span: String,
@@ -450,9 +452,9 @@ pub enum IoError {
     Preparation {
         /// Label of the record.
         record: String,
-        /// The step, named as its option.
+        /// Name of the step, as in its command-line option.
         step: &'static str,
-        /// The problem.
+        /// Description of the problem.
         found: String,
         /// The expected value, or the remedy.
         expected: String,
@@ -460,7 +462,7 @@ pub enum IoError {
     /// Text that is not a valid scale.
     #[error("the scale \"{found}\": expected {expected}")]
     Scaling {
-        /// The text, or the factor.
+        /// The given text or factor.
         found: String,
         /// Admissible values of a scale.
         expected: String,
@@ -468,27 +470,27 @@ pub enum IoError {
     /// Text that is not a valid offset.
     #[error("the offset \"{found}\": expected a number of samples (1, -0.5) or of seconds (0.0167s)")]
     Offset {
-        /// The text.
+        /// The given text.
         found: String,
     },
-    /// A channel name that cannot be a column of a file.
+    /// A channel name that cannot serve as a column name in a file.
     #[error("{file}: the column \"{name}\" cannot be written: {reason}; rename it")]
     ChannelName {
-        /// The file.
+        /// Name of the file.
         file: String,
         /// Name of the channel.
         name: String,
-        /// Reason.
+        /// Reason for the error.
         reason: &'static str,
     },
     /// Columns of different lengths.
     #[error("{file}: the column \"{column}\" holds {found} values, expected {expected} as in the first column")]
     ColumnLength {
-        /// The file.
+        /// Name of the file.
         file: String,
         /// Name of the column.
         column: String,
-        /// Number of its values.
+        /// Number of values of this column.
         found: usize,
         /// Number of values of the first column.
         expected: usize,
@@ -498,31 +500,31 @@ pub enum IoError {
         "{file}: {column} holds {found} values, expected {expected} as in {other}; choose arrays of one recording with --input and --output"
     )]
     UnequalColumns {
-        /// The file.
+        /// Name of the file.
         file: String,
         /// Path of the first array.
         column: String,
-        /// Number of its values.
+        /// Number of values of the first array.
         found: usize,
         /// Path of the second array.
         other: String,
-        /// Number of its values.
+        /// Number of values of the second array.
         expected: usize,
     },
-    /// Streams without a common time.
+    /// Streams that do not overlap in time.
     #[error(
         "{file}: input and output were recorded one after the other, expected a time in which both have samples; choose other streams with --input and --output"
     )]
     NoOverlap {
-        /// The file.
+        /// Name of the file.
         file: String,
     },
     /// A name that matches several arrays.
-    #[error("{file}: \"{asked}\" may be any of {found}; give the whole path with --input and --output")]
+    #[error("{file}: \"{asked}\" may be any of {found}; give the full path with --input and --output")]
     AmbiguousColumn {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The name.
+        /// The ambiguous name.
         asked: String,
         /// The paths that end in the name.
         found: String,
@@ -530,76 +532,76 @@ pub enum IoError {
     /// A table without columns.
     #[error("{file}: the table has no columns, expected at least one")]
     NoColumns {
-        /// The file.
+        /// Name of the file.
         file: String,
     },
     /// Rows that do not match the columns of the file.
     #[error("{file}: rows of {found} cannot follow {expected}; append tables of the same columns in the same order")]
     ColumnsDiffer {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// Columns of the rows.
+        /// Columns of the appended rows.
         found: String,
         /// Columns of the file.
         expected: String,
     },
-    /// Content that is not Parquet.
+    /// Contents that are not Parquet.
     #[error(
         "{file} is not a Parquet file: {found}, expected PAR1 at both ends; copy or write it again if it was cut short, or name it .csv if it is text"
     )]
     NotParquet {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The content found.
+        /// Description of the contents found.
         found: String,
     },
-    /// Content in a format other than that of the extension.
+    /// Contents whose format differs from the extension.
     #[error(
         "{file} is not in the format {format}: {found}, expected {expected}; copy or write it again if it was cut \
          short, or give it the extension of its format"
     )]
     WrongFormat {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The format of the extension.
+        /// Format that corresponds to the extension.
         format: &'static str,
-        /// The content found.
+        /// Description of the contents found.
         found: String,
-        /// First bytes of such a file.
+        /// First bytes of a file in that format.
         expected: &'static str,
     },
-    /// Content that violates the file format.
+    /// Contents that violate the file format.
     #[error("{file} is damaged: {found}; copy or write it again")]
     Damaged {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The violation and its place.
+        /// Description of the violation and its place.
         found: String,
     },
-    /// Valid content that hoid does not support.
+    /// Valid contents that hoid does not support.
     #[error("{file}: {found}, which hoid does not read; {remedy}")]
     Unsupported {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The content found and its place.
+        /// Description of the contents and their place.
         found: String,
-        /// Remedy.
+        /// Remedy for the error.
         remedy: &'static str,
     },
     /// Data that do not form a record.
     #[error("{file}: {source}")]
     Model {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// Reason.
+        /// Reason for the error.
         source: ModelError,
     },
 }
 
-/// Remedy for a file that cannot be written.
+/// Returns the remedy for a file that cannot be written.
 fn remedy_of_writing(source: &std::io::Error) -> &'static str {
     use std::io::ErrorKind;
-    // An I/O error wrapped by the CSV writer.
+    // The CSV writer wraps the I/O error.
     let wrapped = source.get_ref().and_then(|inner| inner.downcast_ref::<csv::Error>());
     let kind = match wrapped.map(csv::Error::kind) {
         Some(csv::ErrorKind::Io(inner)) => inner.kind(),
@@ -613,7 +615,7 @@ fn remedy_of_writing(source: &std::io::Error) -> &'static str {
     }
 }
 
-/// Names as text.
+/// Lists names as text.
 fn listed(names: &[String]) -> String {
     list(&names.iter().map(String::as_str).collect::<Vec<_>>())
 }

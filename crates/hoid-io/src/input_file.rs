@@ -1,4 +1,4 @@
-//! Files other than recordings, read completely: texts, settings of limited length, bytes; and the file names in a
+//! Reading of whole files other than recordings (text, settings of limited length, bytes), and the file names in a
 //! directory.
 
 use std::fs;
@@ -8,10 +8,10 @@ use std::path::Path;
 use crate::IoError;
 use crate::formats::Settings;
 
-/// Reads the text of a file.
+/// Reads a text file.
 ///
 /// # Errors
-/// [`IoError::Unreadable`] for errors that the operating system reports.
+/// [`IoError::Unreadable`] for errors reported by the operating system.
 pub fn read_text(path: &Path) -> Result<String, IoError> {
     fs::read_to_string(path).map_err(|source| IoError::Unreadable {
         file: path.display().to_string(),
@@ -19,11 +19,10 @@ pub fn read_text(path: &Path) -> Result<String, IoError> {
     })
 }
 
-/// Reads the text of a file of settings, whose length is limited so that memory is bounded.
+/// Reads the text of a settings file, whose length is limited to bound the memory.
 ///
 /// # Errors
-/// [`IoError::Unreadable`] for errors that the operating system reports, and for a file that is too
-/// long.
+/// [`IoError::Unreadable`] for errors reported by the operating system, and for a file that is too long.
 pub fn read_settings(path: &Path) -> Result<String, IoError> {
     settings_text(path).map_err(|source| IoError::Unreadable {
         file: path.display().to_string(),
@@ -31,7 +30,7 @@ pub fn read_settings(path: &Path) -> Result<String, IoError> {
     })
 }
 
-/// As [`read_settings`], with the error of the operating system.
+/// Reads like [`read_settings`], but returns the error of the operating system.
 pub(crate) fn settings_text(path: &Path) -> io::Result<String> {
     let is_json = path
         .extension()
@@ -44,8 +43,8 @@ pub(crate) fn settings_text(path: &Path) -> io::Result<String> {
         return Ok(text);
     }
     Err(io::Error::other(format!(
-        "more than {} MB of settings; if it is meant to be so long, set HOID_MAX_UNPACKED_MB in the environment to {} \
-         times its MB",
+        "more than {} MB of settings; if this length is intended, set HOID_MAX_UNPACKED_MB in the environment to {} \
+         times its size in MB",
         longest >> 20,
         kind.share()
     )))
@@ -54,7 +53,7 @@ pub(crate) fn settings_text(path: &Path) -> io::Result<String> {
 /// Reads the bytes of a file.
 ///
 /// # Errors
-/// [`IoError::Unreadable`] for errors that the operating system reports.
+/// [`IoError::Unreadable`] for errors reported by the operating system.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>, IoError> {
     fs::read(path).map_err(|source| IoError::Unreadable {
         file: path.display().to_string(),
@@ -62,10 +61,10 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>, IoError> {
     })
 }
 
-/// Names of the files in a directory, in arbitrary order.
+/// Returns the names of the files in a directory, in arbitrary order.
 ///
 /// # Errors
-/// [`IoError::Unreadable`] for errors that the operating system reports.
+/// [`IoError::Unreadable`] for errors reported by the operating system.
 pub fn file_names(directory: &Path) -> Result<Vec<String>, IoError> {
     let unreadable = |source| IoError::Unreadable {
         file: directory.display().to_string(),

@@ -1,8 +1,8 @@
-//! The file formats of hoid; no other crate handles them.
+//! Reading and writing of all file formats of hoid.
 //!
-//! Recordings are in CSV, Parquet, NPZ, MATLAB or XDF, with columns of any name, clocks that jitter and missing rows.
-//! Reading selects the requested columns, determines the sampling, checks every value in use, and returns an evenly
-//! sampled [`Record`](hoid_model::Record) or an error that names the position in the file. Data are repaired only on
+//! Recordings are in CSV, Parquet, NPZ, MATLAB or XDF format, with columns of any name, clocks with jitter, and missing
+//! rows. Reading selects the requested columns, determines the sampling, checks every value in use, and returns an
+//! evenly sampled [`Record`](hoid_model::Record), or an error with its position in the file. Data are repaired only on
 //! request; problems of the data are reported with the record.
 //!
 //! ```
@@ -24,19 +24,19 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | `formats` | the formats, a module each, and what they share; [`readable_endings`] |
-//! | `table` | the columns of any format; [`ColumnExpression`], [`error_among`]: selection of columns |
+//! | `formats` | the file formats, one module per format, and their common parts; [`readable_endings`] |
+//! | `table` | the columns of a file of any format; [`ColumnExpression`], [`error_among`]: selection of columns |
 //! | `time` | [`TimeChoice`]: choice of the time column; [`even_times`]: check that the times are evenly spaced |
-//! | `record` | [`read_record`], [`read_aligned`], [`read_segments`] by [`ReadOptions`]; [`write_record`] |
-//! | `preparation` | [`Preparation`]: scale, offset, rate, run-in and trend of channels, and the account of it |
-//! | `data_quality` | [`QualityIssue`]: the problems of the sampling and the values, where and how much |
+//! | `record` | [`read_record`], [`read_aligned`], [`read_segments`] with [`ReadOptions`]; [`write_record`] |
+//! | `preparation` | [`Preparation`]: scale, offset, rate, run-in and trend of channels, and the list of applied steps |
+//! | `data_quality` | [`QualityIssue`]: problems of the sampling and the values, with their location and size |
 //! | `survey` | [`survey()`]: overview of the contents of a file |
 //! | `scenario` | [`read_scenario`]: scenarios in TOML |
 //! | [`fmu`] | functional mock-up units |
-//! | `results` | [`OutputTable`], [`write_table`], [`TableWriter`]: tables of results; [`read_fit`]: a fit that was printed |
-//! | `output` | [`write_atomically`], [`check_output`], [`DirectoryLock`]: rules for all output |
-//! | `input_file` | [`read_text`], [`read_settings`]: files that are not recordings |
-//! | `wording` | numbers and names in messages |
+//! | `results` | [`OutputTable`], [`write_table`], [`TableWriter`]: tables of results; [`read_fit`]: a fit printed by hoid |
+//! | `output` | [`write_atomically`], [`check_output`], [`DirectoryLock`]: writing without loss of data |
+//! | `input_file` | [`read_text`], [`read_settings`]: files other than recordings |
+//! | `wording` | formatting of numbers and names in messages |
 //! | `error` | [`IoError`] |
 
 mod data_quality;

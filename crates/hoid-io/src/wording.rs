@@ -1,13 +1,13 @@
-//! Numbers, names and cells as text in messages.
+//! Formatting of numbers, names and cells in messages.
 
 use std::borrow::Cow;
 
 use crate::table::{control_among, error_among};
 
-/// Maximum length of a cell in a message, characters.
+/// Maximum length in characters of a cell in a message.
 const SHOWN: usize = 40;
 
-/// A cell or a name for a message: short, and without terminal control characters.
+/// Formats a cell or a name for a message: shortened, and without terminal control characters.
 pub(crate) fn shown(text: &str) -> String {
     let text = text.trim();
     let cut = match text.char_indices().nth(SHOWN) {
@@ -17,19 +17,19 @@ pub(crate) fn shown(text: &str) -> String {
     cut.escape_debug().to_string()
 }
 
-/// Number of first bytes of a file in a message.
+/// Number of bytes at the start of a file that a message quotes.
 const FIRST_BYTES: usize = 12;
 
-/// The start of a file for a message about its format: `it starts with "..."`.
+/// Quotes the start of a file for a message about its format: `it starts with "..."`.
 pub(crate) fn start_of(bytes: &[u8]) -> String {
     let start = bytes.get(..FIRST_BYTES).unwrap_or(bytes);
     format!("it starts with \"{}\"", String::from_utf8_lossy(start).escape_debug())
 }
 
-/// Maximum length of a column name in a message, characters.
+/// Maximum length in characters of a column name in a message.
 const NAMED: usize = 80;
 
-/// A column name for a message: unchanged, except for its length and terminal control characters.
+/// Formats a column name for a message: only its length and terminal control characters are changed.
 pub(crate) fn named(name: &str) -> String {
     let mut text = String::with_capacity(name.len().min(4 * NAMED));
     for (at, character) in name.chars().enumerate() {
@@ -46,7 +46,7 @@ pub(crate) fn named(name: &str) -> String {
     text
 }
 
-/// The option that reads a sparse column.
+/// Returns the command-line option for reading a sparse column.
 pub(crate) fn sparse_option(name: &str) -> String {
     let name = named(name);
     if name.contains(char::is_whitespace) {
@@ -56,8 +56,8 @@ pub(crate) fn sparse_option(name: &str) -> String {
     }
 }
 
-/// A message that may repeat parts of a file, without terminal control characters: those other than
-/// line ends are written as `\u{1b}`.
+/// Escapes the terminal control characters, except line ends, of a message that may quote parts of a file; for example,
+/// escape is written as `\u{1b}`.
 #[must_use]
 pub fn printable(message: &str) -> String {
     let mut text = String::with_capacity(message.len());
@@ -71,23 +71,24 @@ pub fn printable(message: &str) -> String {
     text
 }
 
-/// Error message of a crate, short, and without terminal control characters.
-pub(crate) fn told(what: &str) -> String {
+/// Formats the error message of a third-party crate: shortened, and without terminal control characters.
+pub(crate) fn short_error(what: &str) -> String {
     let line = what.lines().next().unwrap_or_default();
     line.chars().take(200).collect::<String>().escape_debug().to_string()
 }
 
-/// Smallest similarity of a suggested name: the same as for flags of the command line.
+/// Minimum similarity of a suggested name; flags of the command line have the same limit.
 const NEAR: f64 = 0.7;
 
-/// "; did you mean "u"?" for names that do not exist: for each the one that differs only in case, otherwise the nearest
-/// by Jaro's measure (M. A. Jaro, J. Am. Stat. Assoc. 84 (1989) 414-420). For e and u it may be the column with the
-/// common name of the signal. Empty if none is near.
+/// Returns suggestions such as "; did you mean "u"?" for names that do not exist: for each of them the name that
+/// differs only in case, or else the most similar name in Jaro's measure (M. A. Jaro, J. Am. Stat. Assoc. 84 (1989)
+/// 414-420). For e and u the column with a common name of the signal may be suggested. The result is empty if no name
+/// is similar.
 pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
     let of = |asked: &&str| {
         let asked = asked.trim().to_lowercase();
         let score = |name: &str| (strsim::jaro(&asked, &name.trim().to_lowercase()), name.to_owned());
-        // One or two letters occur in every longer name: a name that starts with them is meant.
+        // One or two letters occur in many longer names: only a name that starts with them is suggested.
         let is_near = |name: &&&str| asked.chars().count() > 2 || name.trim().to_lowercase().starts_with(&asked);
         let known = names
             .iter()
@@ -95,7 +96,7 @@ pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
             .filter(is_near)
             .map(|name| score(name));
         let best = known.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|best| best.0 > NEAR);
-        let meant = best.map(|best| best.1).or_else(|| by_what_it_is(&asked, names))?;
+        let meant = best.map(|best| best.1).or_else(|| by_role(&asked, names))?;
         Some(format!("\"{}\"", named(&meant)))
     };
     let near: Vec<String> = unknown.iter().filter_map(of).collect();
@@ -106,9 +107,9 @@ pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
     }
 }
 
-/// The requested column under another name: the error for `e` or `error`, the control for `u` or
-/// `stick`.
-fn by_what_it_is(asked: &str, names: &[&str]) -> Option<String> {
+/// Returns the column that holds the requested signal under another name: the error for `e` or `error`, the control for
+/// `u` or `stick`.
+fn by_role(asked: &str, names: &[&str]) -> Option<String> {
     let default = match (error_among(&[asked]), control_among(&[asked])) {
         (Some(_), _) => error_among(names),
         (_, Some(_)) => control_among(names),
@@ -117,7 +118,7 @@ fn by_what_it_is(asked: &str, names: &[&str]) -> Option<String> {
     default.map(str::to_owned)
 }
 
-/// Names for a message: all of them, unless there are too many.
+/// Lists names for a message; a long list is shortened.
 pub(crate) fn list(names: &[&str]) -> String {
     const SHOWN: usize = 40;
     let known: Vec<&str> = names.iter().copied().filter(|name| !name.is_empty()).collect();
@@ -131,13 +132,13 @@ pub(crate) fn list(names: &[&str]) -> String {
     text
 }
 
-/// A number for a message: up to nine significant digits, without trailing zeros.
+/// Formats a number for a message with up to nine significant digits, without trailing zeros.
 pub(crate) fn decimal(value: f64) -> String {
     let rounded = format!("{value:.8e}").parse::<f64>().unwrap_or(value);
     format!("{rounded}")
 }
 
-/// A number with four significant digits.
+/// Formats a number with up to four significant digits.
 pub(crate) fn short(value: f64) -> String {
     let rounded = format!("{value:.3e}").parse::<f64>().unwrap_or(value);
     if rounded != 0.0 && !(1e-3..1e7).contains(&rounded.abs()) {
@@ -147,7 +148,7 @@ pub(crate) fn short(value: f64) -> String {
     }
 }
 
-/// "1 row", "7 rows".
+/// Formats a count and its noun, such as "1 row" or "7 rows".
 pub(crate) fn counted(n: usize, what: &str) -> String {
     if n == 1 {
         format!("1 {what}")

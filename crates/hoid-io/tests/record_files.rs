@@ -226,7 +226,7 @@ fn errors_name_line_column_and_remedy() {
     );
     says(
         "t,e,u\n2024-03-01 10:00:00.00,1,2\n0.02,1,2\n",
-        &["line 2, column t", "a date or time of a clock among numbers", "--fs HZ"],
+        &["line 2, column t", "a date or clock time among numbers", "--fs HZ"],
     );
     says(
         "t e\n0.00 1.5 2\n0.01 1.6 2\n",
@@ -256,7 +256,7 @@ fn errors_name_line_column_and_remedy() {
         "t,e,u\n0.0,1,2\n0.1,1,2\n0.2,1,2\n0.6,1,2\n0.7,1,2\n0.8,1,2\n0.9,1,2\n",
         &[
             "samples missing after line 4, t = 0.2 s: 3 (the next is at 0.6 s",
-            "gaps in all: 1",
+            "number of gaps: 1",
             "--resample",
         ],
     );

@@ -71,7 +71,7 @@ fn values_are_held_between_their_own() {
     );
     let text = read.steps[0].to_string();
     assert!(
-        text.starts_with("column e: 10 values of its own, 18 rows between them hold the last one"),
+        text.starts_with("column e: 10 values of its own, 18 rows between them hold the last value"),
         "{text}"
     );
 }

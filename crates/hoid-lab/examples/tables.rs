@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (k, planned) in plan(&config, 0).iter().enumerate() {
         let condition = &config.condition[planned.condition];
         let task = Task::new(condition, planned.condition as u64, k as u64 + 1)?;
-        let element = condition.course()?.lasting_element()?;
+        let element = condition.course()?.constant_element()?;
         runs.push(json!({
             "condition": condition,
             "element": element.map(|element| element.to_string()),

@@ -1,10 +1,10 @@
-//! Contribution of page and events to an identified delay.
+//! Calibration of the latency that page and events add to an identified delay.
 //!
-//! A simulated operator replaces the person: in the page, in real time, with the displayed error as input and pointer
-//! events as output. Its gain, neuromuscular system and delay tau are known; the excess of the delay identified by
-//! `hoid identify` over tau is the latency of page, frames and events, as in every delay that is identified on this
-//! machine. It includes neither the screen (from the buffer to the light) nor the device (from the hand to the event):
-//! these need a sensor.
+//! A simulated operator replaces the person: it runs in the page in real time, with the displayed error as input and
+//! pointer events as output. Its gain, neuromuscular system and delay tau are known. The delay identified by
+//! `hoid identify` minus tau is the latency of page, frames and events, which is part of every delay identified on this
+//! computer. The latency does not include the screen (from the frame buffer to the light) or the device (from the hand
+//! to the event): these can be measured only with a sensor.
 
 use std::path::Path;
 
@@ -24,21 +24,21 @@ use crate::{
     wire::SimulatedOperator,
 };
 
-/// The simulated operator: gain, natural frequency in rad/s, damping, delay in ticks.
+/// Parameters of the simulated operator: gain, natural frequency in rad/s, damping, delay in ticks.
 const GAIN: f64 = 0.75;
 const OMEGA_RAD_S: f64 = 14.0;
 const ZETA: f64 = 0.5;
 const DELAY: usize = 150;
-/// Standard deviation of the remnant, and the time constant of its filter, s.
+/// Standard deviation of the remnant, and time constant of its filter in s.
 const REMNANT: f64 = 0.05;
 const REMNANT_S: f64 = 0.1;
-/// Tolerance of the neuromuscular system: rounding of its hold.
+/// Prior spread of the neuromuscular parameters, which are known up to the effect of the hold.
 const KNOWN: f64 = 0.01;
 
-/// Result of a calibration; kept in `calibration.toml` of the experiment.
+/// Result of a calibration, stored in `calibration.toml` of the experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
-    /// Time in UTC.
+    /// Time of the calibration in UTC.
     pub utc: String,
     /// Latency of page, frames and events, s.
     pub latency_s: f64,
@@ -77,7 +77,7 @@ struct Kept {
     calibration: Vec<Calibration>,
 }
 
-/// Returns the experiment of a calibration: one run of 40 s.
+/// Returns the configuration of a calibration: one run of 40 s.
 pub fn config() -> Config {
     Config {
         name: "Calibration".to_owned(),
@@ -96,7 +96,7 @@ mouse alone."
     }
 }
 
-/// Returns the operator, and the remnant of a run at each tick.
+/// Returns the simulated operator, and its remnant at each tick of a run.
 ///
 /// # Errors
 /// [`LabError::Model`].
@@ -116,7 +116,7 @@ pub fn operator(task: &Task, seed: u64) -> Result<(SimulatedOperator, Vec<f64>),
         replication: 1,
     }
     .white_noise(task.ticks);
-    // First order, of that variance: n <- a n + sqrt(1 - a^2) sigma w.
+    // First-order remnant with standard deviation sigma: n <- a n + sqrt(1 - a^2) sigma w.
     let a = (-TICK_S / REMNANT_S).exp();
     let (drive, mut n) = (REMNANT * (1.0 - a * a).sqrt(), 0.0);
     let noise = white.iter().map(|w| {
@@ -126,10 +126,10 @@ pub fn operator(task: &Task, seed: u64) -> Result<(SimulatedOperator, Vec<f64>),
     Ok((SimulatedOperator { plant, delay: DELAY }, noise.collect()))
 }
 
-/// Evaluates the run of a calibration and stores the result in the experiment.
+/// Evaluates the run of a calibration and stores the result in the folder of the experiment.
 ///
 /// # Errors
-/// [`LabError::Ident`] for a run that cannot be identified; errors of files.
+/// [`LabError::Ident`] if the run cannot be identified; errors of reading or writing files.
 pub fn judge(out: &Path, record: &Record, logged: &Logged) -> Result<Calibration, LabError> {
     let measured = record.span(0.0, record.time_s(record.len()))?;
     let estimator = FamilyEstimator {

@@ -1,4 +1,4 @@
-//! Definition of an experiment: `lab.toml`.
+//! Definition of an experiment in `lab.toml`.
 //!
 //! ```toml
 //! name = "First try"
@@ -26,13 +26,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::{LabError, plant::MOST_STATES};
 
-/// An experiment.
+/// Configuration of an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
-    /// Its name.
+    /// Name of the experiment.
     pub name: String,
-    /// Consent text, to be confirmed before any measurement.
+    /// Consent text, which the person confirms before any measurement.
     pub consent: String,
     /// The order of the conditions.
     pub order: Order,
@@ -46,14 +46,14 @@ pub struct Config {
     pub condition: Vec<Condition>,
 }
 
-/// Order of the conditions of a session.
+/// Order of the conditions in a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Order {
-    /// Row of a balanced Latin square for each person.
+    /// Each person has a row of a balanced Latin square.
     #[default]
     Latin,
-    /// Order in the file.
+    /// The order in the file is used.
     Given,
 }
 
@@ -74,14 +74,14 @@ pub enum LiveFor {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Limits {
-    /// Longest time between two frames, ms.
+    /// Longest permitted time between two frames, ms.
     pub frame_ms: f64,
-    /// Longest time from an input event to the tick at which it takes effect, ms.
+    /// Longest permitted time from an input event to the tick at which it takes effect, ms.
     pub input_ms: f64,
 }
 
 impl Default for Limits {
-    /// 100 ms: six frames at 60 Hz, half of the delay of a typical operator.
+    /// Both limits are 100 ms, which is six frames at 60 Hz, or half of the delay of a typical operator.
     fn default() -> Self {
         Self {
             frame_ms: 100.0,
@@ -90,22 +90,21 @@ impl Default for Limits {
     }
 }
 
-/// A condition.
+/// Condition of an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Condition {
-    /// Letters and digits, since it is part of file names.
+    /// Name of the condition: letters and digits, since it is part of file names.
     pub name: String,
     /// Instructions shown to the person before a run.
     pub text: String,
-    /// A condition C1 to C6, or a scenario file; it replaces the keys from `controlled_element` to
-    /// `disturbance`.
+    /// A condition from C1 to C6, or a scenario file; it replaces the keys from `controlled_element` to `disturbance`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scenario: Option<String>,
-    /// The text of that file, stored with the session.
+    /// Text of the scenario file, stored with the session.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scenario_text: Option<String>,
-    /// The controlled element, in s.
+    /// Controlled element, as a transfer function in s.
     pub controlled_element: String,
     /// The controlled element after the change.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -118,48 +117,48 @@ pub struct Condition {
     /// Interval between changes back and forth, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interval_s: Option<f64>,
-    /// Measurement, s.
+    /// Length of the measurement, s.
     pub measurement_s: f64,
-    /// Run-in before it, s.
+    /// Length of the run-in before the measurement, s.
     pub run_in_s: f64,
-    /// The signal that the person tracks.
+    /// Target that the person tracks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<Signal>,
     /// Disturbance at the input of the controlled element.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub disturbance: Option<Signal>,
-    /// Seed of the phases; each run draws its own phases.
+    /// Seed of the phases; different phases are drawn for each run.
     pub seed: u64,
     /// Half width of the display, in the unit of e.
     pub half_width: f64,
     /// Display of the task.
     pub display: Display,
-    /// Preview time of the target, s.
+    /// Time for which the future target is displayed ahead, s.
     pub preview_s: f64,
     /// u at full deflection of the device.
     pub full_deflection: f64,
-    /// Number of training runs before the runs that count.
+    /// Number of training runs before the measured runs.
     pub training: usize,
-    /// Number of runs that count.
+    /// Number of measured runs.
     pub runs: usize,
     /// Rest after each run, s.
     pub break_s: f64,
 }
 
-/// A sum of sines at prime multiples of one frequency, with phases drawn from the seed.
+/// A sum of sines at prime multiples of a base frequency, with phases drawn from the seed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Signal {
-    /// Period, s: all sines are harmonics of it.
+    /// Period in s, of which all sines are harmonics.
     pub period_s: f64,
-    /// The largest harmonic.
+    /// Largest multiple of the base frequency.
     pub largest: u32,
-    /// Root mean square.
+    /// Root mean square of the signal.
     pub rms: f64,
 }
 
 impl Default for Signal {
-    /// 20 s, up to the 31st multiple, 1.5.
+    /// Period of 20 s, multiples up to 31, root mean square 1.5.
     fn default() -> Self {
         let default = MultiSine::default();
         Self {
@@ -171,7 +170,7 @@ impl Default for Signal {
 }
 
 impl Default for Condition {
-    /// A rate control of 4/s, compensatory, 80 s after a run-in of 10 s.
+    /// Compensatory tracking with rate control (4/s), 80 s long after a run-in of 10 s.
     fn default() -> Self {
         Self {
             name: "rate".to_owned(),
@@ -200,8 +199,8 @@ impl Default for Condition {
     }
 }
 
-/// Recursive method of the live estimate: it needs no start fit, so that estimates are available
-/// from the first seconds.
+/// Default recursive method of the live estimate; since it needs no start fit, estimates are available after the first
+/// few seconds.
 const DEFAULT_METHOD: &str = "adaptive";
 
 /// Default consent text.
@@ -211,7 +210,7 @@ and no sound. You may stop at any time with the Escape key or by closing the win
 with its folder. Do not take part if moving patterns make you unwell.";
 
 impl Default for Config {
-    /// A trial of two minutes: one run.
+    /// A single run of about two minutes for trying out the lab.
     fn default() -> Self {
         Self {
             name: "First try".to_owned(),
@@ -229,7 +228,7 @@ impl Default for Config {
 }
 
 impl Config {
-    /// Reads and checks a configuration; scenario files are relative to its directory.
+    /// Reads and checks a configuration; the paths of scenario files are relative to its directory.
     ///
     /// # Errors
     /// [`LabError::Config`] with the place, the value found and the expected value.
@@ -254,7 +253,7 @@ impl Config {
         Ok(config)
     }
 
-    /// Checks everything that is known before an experiment.
+    /// Checks everything that can be checked before an experiment.
     ///
     /// # Errors
     /// [`LabError::Config`].
@@ -297,7 +296,7 @@ impl Config {
         Ok(())
     }
 
-    /// As TOML.
+    /// Returns the configuration as TOML.
     ///
     /// # Errors
     /// [`LabError::Config`], which cannot occur for a configuration that was read.
@@ -309,11 +308,11 @@ impl Config {
     }
 }
 
-/// Longest run, s.
+/// Maximum length of a run, s.
 const LONGEST_S: f64 = 1800.0;
 
 impl Condition {
-    /// Loads the text of its scenario file.
+    /// Loads the text of the scenario file.
     fn load(&mut self, directory: &Path) -> Result<(), LabError> {
         let Some(name) = &self.scenario else { return Ok(()) };
         if self.scenario_text.is_some() {
@@ -326,7 +325,7 @@ impl Condition {
         Ok(())
     }
 
-    /// Checks that the condition can be run, and that its numbers are valid.
+    /// Checks that the numbers of the condition are valid and that it can be run.
     pub(crate) fn check(&self) -> Result<(), LabError> {
         let wrong = |reason: String| Err(LabError::Message(reason));
         let name = &self.name;
@@ -377,7 +376,8 @@ impl Condition {
         }
         if course.excitations().iter().all(|e| e.function.sinusoids().is_empty()) {
             return wrong(
-                "neither a target nor a disturbance: the person would have nothing to do; give one".to_owned(),
+                "without target and disturbance the person would have nothing to do; give a target or a disturbance"
+                    .to_owned(),
             );
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! The task of a condition: the controlled element at each time, and the excitation of the loop.
+//! The task of a condition: the controlled element as a function of time, and the excitation of the loop.
 
 use hoid_model::{
     ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, ModelError, SampleTime,
@@ -14,8 +14,8 @@ use crate::{
 
 /// The task of a condition: a scenario without its operator.
 #[derive(Debug, Clone)]
-pub enum Course {
-    /// One of the conditions C1 to C6, or a similar one.
+pub enum TaskDefinition {
+    /// One of the conditions C1 to C6, or a similar condition.
     Reference(Box<hoid_model::scenario::ResolvedScenario>),
     /// A task with any controlled element.
     Family(Box<hoid_model::family_scenario::ResolvedFamilyScenario>),
@@ -34,22 +34,22 @@ impl Signal {
 }
 
 impl Condition {
-    /// Returns its task.
+    /// Returns the task of the condition.
     ///
     /// # Errors
     /// [`LabError::Scenario`], [`LabError::Model`].
-    pub fn course(&self) -> Result<Course, LabError> {
+    pub fn course(&self) -> Result<TaskDefinition, LabError> {
         if let Some(text) = &self.scenario_text {
             let name = self.scenario.as_deref().unwrap_or(&self.name);
             return Ok(match hoid_io::parse_any_scenario(text, name, &self.name)? {
-                hoid_io::AnyScenario::Reference(scenario) => Course::Reference(Box::new(scenario.resolve()?)),
-                hoid_io::AnyScenario::Family(scenario) => Course::Family(Box::new(scenario.resolve()?)),
+                hoid_io::AnyScenario::Reference(scenario) => TaskDefinition::Reference(Box::new(scenario.resolve()?)),
+                hoid_io::AnyScenario::Family(scenario) => TaskDefinition::Family(Box::new(scenario.resolve()?)),
             });
         }
         let element: ContinuousTransferFunction = self.controlled_element.parse()?;
         let state = |controlled_element| -> Result<FamilyState, ModelError> {
             Ok(FamilyState {
-                // The person is at the screen; the scenario requires an operator.
+                // The scenario requires an operator, which is not used: the person is at the screen.
                 operator: FamilyOperator::new(Form::Gain, false, &[1.0, 0.2])?,
                 controlled_element,
             })
@@ -73,12 +73,12 @@ impl Condition {
             |signal: &Option<Signal>| signal.as_ref().map_or(Ok(Excitation::default()), Signal::excitation);
         scenario.target = excitation(&self.target)?;
         scenario.disturbance = excitation(&self.disturbance)?;
-        Ok(Course::Family(Box::new(scenario.resolve()?)))
+        Ok(TaskDefinition::Family(Box::new(scenario.resolve()?)))
     }
 }
 
-impl Course {
-    /// Run-in and measurement, s.
+impl TaskDefinition {
+    /// Returns the lengths of run-in and measurement, s.
     pub fn times_s(&self) -> (f64, f64) {
         match self {
             Self::Reference(course) => (course.scenario().run_in_s, course.scenario().measurement_s),
@@ -86,7 +86,7 @@ impl Course {
         }
     }
 
-    /// The controlled element at a time from the start of the measurement.
+    /// Returns the controlled element at a time from the start of the measurement.
     pub fn element_at(&self, t_s: f64) -> Result<ContinuousTransferFunction, ModelError> {
         match self {
             Self::Reference(course) => course.parameters_at(t_s).controlled_element.transfer_function(),
@@ -94,18 +94,18 @@ impl Course {
         }
     }
 
-    /// The controlled element, if it is constant.
+    /// Returns the controlled element if it is constant.
     ///
     /// # Errors
-    /// As [`Course::element_at`].
-    pub fn lasting_element(&self) -> Result<Option<ContinuousTransferFunction>, ModelError> {
+    /// As [`TaskDefinition::element_at`].
+    pub fn constant_element(&self) -> Result<Option<ContinuousTransferFunction>, ModelError> {
         match self.change_s() {
             None => self.element_at(0.0).map(Some),
             Some(_) => Ok(None),
         }
     }
 
-    /// Target and disturbance.
+    /// Returns the target and the disturbance.
     pub fn excitations(&self) -> [Excitation; 2] {
         let fixed = |function: &ForcingFunction| Excitation {
             function: function.clone(),
@@ -117,7 +117,7 @@ impl Course {
         }
     }
 
-    /// Position of the leading gain.
+    /// Returns the position of the leading gain.
     pub fn realisation(&self) -> hoid_model::scenario::Realisation {
         match self {
             Self::Reference(course) => course.scenario().realisation,
@@ -125,7 +125,7 @@ impl Course {
         }
     }
 
-    /// The time of the change, s, where there is one.
+    /// Returns the time of the change, s; `None` if the element does not change.
     pub fn change_s(&self) -> Option<f64> {
         match self {
             Self::Reference(course) => course.scenario().schedule.change_s(),

@@ -8,28 +8,28 @@ use hoid_model::ModelError;
 use hoid_study::StudyError;
 use thiserror::Error;
 
-/// Reason why an experiment cannot be set up, run, checked or shown.
+/// Reason why an experiment cannot be set up, run, verified or displayed.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LabError {
     /// A configuration that contradicts itself or cannot be read.
     #[error("{place}: {reason}")]
     Config {
-        /// The file and the place in it.
+        /// Name of the file and the place in it.
         place: String,
-        /// The problem, the expected value and the remedy.
+        /// Description of the problem, the expected value and the remedy.
         reason: String,
     },
-    /// An invalid message of a page.
-    #[error("a message of the page was refused: {0}")]
+    /// An invalid message from a page.
+    #[error("a message from the page was refused: {0}")]
     Message(String),
-    /// A step at the wrong time.
+    /// A request at the wrong time.
     #[error("{0}")]
     Order(String),
-    /// A file of a session that the system cannot read or write.
+    /// A file of a session that cannot be read or written.
     #[error("{file}: {source}; check the location and the permissions")]
     File {
-        /// The file.
+        /// Path of the file.
         file: String,
         /// Error reported by the operating system.
         source: std::io::Error,
@@ -37,21 +37,21 @@ pub enum LabError {
     /// A damaged file of a session.
     #[error("{file}: {reason}")]
     Damaged {
-        /// The file.
+        /// Path of the file.
         file: String,
-        /// The value found and the value expected.
+        /// The value found and the expected value.
         reason: String,
     },
-    /// No port, or no random numbers.
+    /// No available port, or no random numbers.
     #[error("the server cannot start: {0}")]
     Server(String),
-    /// A page of results that could not be made.
+    /// A page of results that could not be created.
     #[error("{0}")]
     Report(String),
-    /// A file of a recording or a table.
+    /// An error of a recording or a table.
     #[error(transparent)]
     Io(#[from] IoError),
-    /// A scenario file.
+    /// An error in a scenario file.
     #[error(transparent)]
     Scenario(Box<ScenarioFileError>),
     /// An invalid number.
@@ -60,13 +60,13 @@ pub enum LabError {
     /// An estimate that cannot be computed.
     #[error(transparent)]
     Ident(Box<IdentError>),
-    /// A manifest of a group.
+    /// An error of the manifest of a group.
     #[error(transparent)]
     Study(Box<StudyError>),
 }
 
 impl LabError {
-    /// Error reported by the operating system of a file.
+    /// Creates the error for a file that the operating system cannot read or write.
     pub(crate) fn file(path: &Path, source: std::io::Error) -> Self {
         Self::File {
             file: path.display().to_string(),
@@ -92,5 +92,5 @@ macro_rules! boxed {
     };
 }
 
-// Large ones are boxed, so that a result without an error stays small.
+// Large errors are boxed, so that a `Result` stays small.
 boxed! { ScenarioFileError => Scenario, IdentError => Ident, StudyError => Study }

@@ -1,5 +1,5 @@
-//! Files of an experiment besides its sessions: its description, the participants, and the manifest
-//! of `hoid group`.
+//! Files of an experiment outside its sessions: its description, the list of participants, and the manifest for
+//! `hoid group`.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -9,37 +9,52 @@ use serde_json::json;
 use crate::{
     LabError,
     config::{Condition, Config},
-    session::{How, Session},
+    session::{RunEnd, Session},
 };
 
-const README: &str = "\
-A tracking experiment by `hoid lab`.
+const README: &str = " A tracking experiment by `hoid lab`.
 
-sub-P01/ses-01/             one session of one person, who has a made-up name
-  lab.toml                  the experiment, its order, browser and screen
+sub-P01/ses-01/             one session of one person, \
+                      who has a made-up name
+  lab.toml                  the experiment, its order, browser and \
+                      screen
   lab.copy.toml             the same, for when lab.toml is damaged
-  runs.csv                  each run that ended: verified, or unverified and why
-  ..._run.json              the task of a run and its settings, written before it started
-  ..._forcing.parquet       target and disturbance at each tick of 1 ms
-  ..._ticks.csv             u (hand) and e (error) at each tick
-  ..._events.csv            input events: the tick that took them, their own time stamp, when the page
-                            had them (ms from tick 0), what the device reported
-  ..._frames.csv            frames: their time, when they were drawn (ms from tick 0), the tick and the
+  runs.csv             \
+                      each run that ended: verified, or unverified and why
+  ..._run.json              the task of a \
+                      run and its settings, written before it started
+  ..._forcing.parquet       target and \
+                      disturbance at each tick of 1 ms
+  ..._ticks.csv             u (hand) and e (error) at each \
+                      tick
+  ..._events.csv            input events: the tick that took them, their own time stamp, \
+                      when the page
+                            received them (ms from tick 0), what the device \
+                      reported
+  ..._frames.csv            frames: their time, when they were drawn (ms from tick 0), \
+                      the tick and the
                             error that they show
-  ..._live.csv              the estimate while the run continued
-  ..._end.json              how the run ended, SHA-256 of ticks, events and frames
-  ..._beh.parquet           the run at 100 Hz: t, e, u, f_t (target), d (disturbance), y (output),
+  ..._live.csv              \
+                      the estimate while the run continued
+  ..._end.json              how the run ended, SHA-256 of \
+                      ticks, events and frames
+  ..._beh.parquet           the run at 100 Hz: t, e, u, f_t (target), d \
+                      (disturbance), y (output),
                             e_shown (error on the screen)
 
-Check and see a session again:  hoid lab --replay sub-P01/ses-01
-One run:                        hoid identify sub-P01/ses-01/..._beh.parquet --from 0
-All people:                     hoid group group.toml --out results
+Verify and \
+                      replay a session:    hoid lab --replay sub-P01/ses-01
+One run:                        hoid \
+                      identify sub-P01/ses-01/..._beh.parquet --from 0
+All people:                     hoid group \
+                      group.toml --out results
 
-Names follow BIDS where it has names; it has none for tracking experiments, so that a validator of
-BIDS need not accept the folder.
+Names follow BIDS where BIDS defines names; it defines none for \
+                      tracking experiments, so a BIDS
+validator may reject the folder.
 ";
 
-/// Writes the texts that do not exist yet.
+/// Writes the descriptive files that do not exist yet.
 ///
 /// # Errors
 /// [`LabError::Io`].
@@ -67,7 +82,7 @@ fn write(path: &Path, text: &str) -> Result<(), LabError> {
 /// Writes the list of participants.
 ///
 /// # Errors
-/// The errors of files.
+/// Errors of reading or writing files.
 pub fn list(out: &Path) -> Result<(), LabError> {
     let mut people: BTreeMap<String, (usize, String)> = BTreeMap::new();
     for folder in Session::folders(out)? {
@@ -84,18 +99,17 @@ pub fn list(out: &Path) -> Result<(), LabError> {
     write(&out.join("participants.tsv"), &text)
 }
 
-/// Writes the manifest of all finished runs; unverified and training runs do not count. Writes
-/// nothing if no run counts.
+/// Writes the manifest of all finished runs except unverified runs and training runs. Writes nothing if no run remains.
 ///
 /// # Errors
-/// The errors of files.
+/// Errors of reading or writing files.
 pub fn manifest(out: &Path) -> Result<(), LabError> {
     let mut runs = Vec::new();
     let mut conditions: BTreeMap<String, Condition> = BTreeMap::new();
     for folder in Session::folders(out)? {
         let session = Session::read(&folder)?;
         let facts = &session.facts;
-        for done in session.done.iter().filter(|done| done.how == How::Finished) {
+        for done in session.done.iter().filter(|done| done.how == RunEnd::Finished) {
             let path = session.stem(&done.condition, done.number).file("beh.parquet");
             if !path.exists() {
                 continue;
@@ -140,14 +154,14 @@ pub fn manifest(out: &Path) -> Result<(), LabError> {
     write(&out.join(MANIFEST), &manifest.text())
 }
 
-/// Known properties of a condition.
+/// Returns the known properties of a condition for the manifest.
 fn known(condition: &Condition) -> Result<ConditionSettings, LabError> {
     let course = condition.course()?;
     let lines = course
         .excitations()
         .map(|excitation| !excitation.function.sinusoids().is_empty());
     Ok(ConditionSettings {
-        controlled_element: course.lasting_element()?.map(|element| element.to_string()),
+        controlled_element: course.constant_element()?.map(|element| element.to_string()),
         excitation: match lines {
             [true, _] => Some("f_t".to_owned()),
             [false, true] => Some("d".to_owned()),

@@ -1,4 +1,4 @@
-//! A session as one archive, with the common files of its experiment.
+//! Export of a session as one archive, with the common files of its experiment.
 
 use std::{
     io::{Cursor, Write as _},
@@ -9,15 +9,15 @@ use zip::{CompressionMethod, DateTime, ZipWriter, write::SimpleFileOptions};
 
 use crate::LabError;
 
-/// The files of the experiment that are included.
-const BESIDE: [&str; 3] = ["README", "dataset_description.json", "participants.tsv"];
+/// Files of the experiment that are included in the archive.
+const ARCHIVED_FILES: [&str; 3] = ["README", "dataset_description.json", "participants.tsv"];
 
-/// The archive of a session, its paths as in the experiment. The same files give the same bytes.
+/// Returns the archive of a session, with the same paths as in the experiment. The same files give the same bytes.
 ///
 /// # Errors
-/// The errors of files.
+/// Errors of reading files.
 pub fn archive(out: &Path, folder: &Path) -> Result<Vec<u8>, LabError> {
-    let mut files: Vec<PathBuf> = BESIDE
+    let mut files: Vec<PathBuf> = ARCHIVED_FILES
         .iter()
         .map(|name| out.join(name))
         .filter(|path| path.exists())
@@ -28,7 +28,7 @@ pub fn archive(out: &Path, folder: &Path) -> Result<Vec<u8>, LabError> {
         .compression_method(CompressionMethod::Deflated)
         .last_modified_time(DateTime::default());
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
-    let unwritable = |error: String| LabError::damaged(folder, format!("it cannot be packed: {error}"));
+    let unwritable = |error: String| LabError::damaged(folder, format!("the archive cannot be written: {error}"));
     for path in &files {
         let name = path
             .strip_prefix(out)

@@ -1,13 +1,14 @@
-//! The experiment as seen by its pages: one session at a time, one page that tracks, any number of
-//! observers.
+//! The experiment as its pages interact with it: one session at a time, one page for tracking, and any number of pages
+//! for observers.
 //!
-//! Messages from pages arrive on the threads of their sockets and are processed one at a time under one lock; messages
-//! to pages are queued for each. The estimate has its own thread, and so do the pages of results.
+//! Messages from pages arrive on the threads of their sockets and are processed one at a time under a common lock;
+//! messages to a page are queued for that page. The live estimate and the creation of result pages have separate
+//! threads.
 //!
 //! | file | contents |
 //! |---|---|
-//! | `runs` | a run: sent, started, taken batch by batch, ended |
-//! | `told` | reports to the pages |
+//! | `runs` | the stages of a run: sent, started, received in batches, ended |
+//! | `told` | messages to the pages |
 
 mod runs;
 mod told;
@@ -32,32 +33,32 @@ use crate::{
     live::Samples,
     replay,
     reports::{self, Pages},
-    session::{How, RunLog, RunStart, Session, Stem},
+    session::{RunEnd, RunLog, RunStart, Session, Stem},
     task::Task,
     wire::{FromPage, Role, ToPage},
 };
 
-/// Messages to a page.
+/// A message to a page.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outgoing {
-    /// A message.
+    /// A text message.
     Text(String),
     /// The tables of a run.
     Binary(Vec<u8>),
 }
 
-/// Mode of the lab.
+/// Mode of operation of the lab.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Mode {
-    /// Sessions of people.
+    /// Sessions with people.
     Sessions,
-    /// A session is replayed.
+    /// Replay of the session in this folder.
     Replay(PathBuf),
-    /// A simulated operator replaces the person.
+    /// Calibration, in which a simulated operator replaces the person.
     Calibrate,
 }
 
-/// The experiment.
+/// A running experiment.
 pub struct Lab {
     shared: Arc<Shared>,
     next_page: AtomicU64,
@@ -67,11 +68,11 @@ struct Shared {
     out: PathBuf,
     config: Config,
     mode: Mode,
-    /// The program `hoid`, which makes the pages of results.
+    /// Path of the program `hoid`, which creates the pages of results.
     program: Option<PathBuf>,
     state: Mutex<Current>,
     pages: Mutex<BTreeMap<u64, Page>>,
-    /// Prevents a second server on the same experiment.
+    /// Prevents a second server for the same experiment.
     _lock: Option<DirectoryLock>,
 }
 
@@ -84,13 +85,13 @@ struct Page {
 #[derive(Default)]
 struct Current {
     session: Option<Session>,
-    /// The page that tracks.
+    /// Number of the page used for tracking.
     person: Option<u64>,
-    /// A run that was sent and has not been started.
+    /// A run that was sent to the page but not started.
     ready: Option<Ready>,
     run: Option<Running>,
-    /// The last run that ended: its page may not know yet, and send for a moment.
-    over: Option<usize>,
+    /// Number of the last run that ended; its page may not know this yet and still send batches.
+    last_ended_run: Option<usize>,
     reporting: bool,
     pages: Pages,
     calibration: Option<Calibration>,
@@ -111,13 +112,13 @@ struct Running {
 }
 
 impl Current {
-    /// The current run, by its number.
+    /// Returns the current run if it has this number.
     fn running(&self, number: usize) -> Result<&Running, LabError> {
         let run = self.run.as_ref().filter(|run| run.begun.number == number);
         run.ok_or_else(|| LabError::Order(format!("run {number} is not in progress")))
     }
 
-    /// Continues with a session; a run that was sent for another one cannot be started in it.
+    /// Makes a session the current one; a run that was sent for another session cannot be started in it.
     fn enter(&mut self, session: Session) {
         self.session = Some(session);
         self.ready = None;
@@ -129,7 +130,7 @@ impl Lab {
     /// Opens an experiment for sessions, a replay or a calibration.
     ///
     /// # Errors
-    /// [`LabError`] for a folder that cannot be used, or contains no session to replay.
+    /// [`LabError`] for a folder that cannot be used, or that contains no session to replay.
     pub fn open(out: &Path, config: Config, mode: Mode, program: Option<PathBuf>) -> Result<Self, LabError> {
         let mut current = Current::default();
         let config = match &mode {
@@ -143,7 +144,7 @@ impl Lab {
             Mode::Calibrate => calibrate::config(),
             Mode::Sessions => config,
         };
-        // Runs without a person are separate.
+        // Runs without a person are stored in a separate folder.
         let out = if mode == Mode::Calibrate {
             out.join("calibration")
         } else {
@@ -185,19 +186,19 @@ impl Lab {
         id
     }
 
-    /// Removes a page; its current run is aborted, and the session continues in the newest remaining window: a reloaded
-    /// page may arrive before the old one is known to be closed.
+    /// Removes a page. If it was the tracking page, its current run is aborted, and the session continues in the newest
+    /// remaining window of the person: a reloaded page may connect before the old connection is known to be closed.
     pub fn leave(&self, id: u64) {
         self.shared.pages().remove(&id);
         let mut state = self.shared.state();
         if state.person == Some(id) {
             state.person = None;
             state.ready = None;
-            // Its files cannot be closed: the session reports this when it is next opened.
-            let _ = self.shared.end_run(&mut state, How::Interrupted, BTreeMap::new());
+            // If the files of the run cannot be completed, the session reports this when it is next opened.
+            let _ = self.shared.end_run(&mut state, RunEnd::Interrupted, BTreeMap::new());
             let left = self.shared.newest_person();
             if let Some(newest) = left {
-                let _ = self.shared.give(&mut state, newest);
+                let _ = self.shared.hand_over(&mut state, newest);
             }
             drop(state);
             if let Some(newest) = left {
@@ -207,29 +208,28 @@ impl Lab {
         }
     }
 
-    /// Processes a message of a page.
+    /// Processes a message from a page.
     ///
     /// # Errors
-    /// [`LabError::Message`] for invalid messages, [`LabError::Order`] for messages at the wrong time; errors of files.
-    pub fn hear(&self, id: u64, message: FromPage) -> Result<(), LabError> {
+    /// [`LabError::Message`] for invalid messages, [`LabError::Order`] for messages at the wrong time; errors of
+    /// reading or writing files.
+    pub fn receive(&self, id: u64, message: FromPage) -> Result<(), LabError> {
         let shared = &self.shared;
         if let FromPage::Hello { role, browser } = message {
             return shared.hello(id, role, browser);
         }
         if matches!(shared.mode, Mode::Replay(_)) {
-            return Err(LabError::Order(
-                "a session is shown again; nothing is measured".to_owned(),
-            ));
+            return Err(LabError::Order("a session is replayed; nothing is measured".to_owned()));
         }
         let mut state = shared.state();
         if state.person != Some(id) {
             return Err(LabError::Order(
-                "This window looks on; the session runs in another one.".to_owned(),
+                "This window only watches; the session runs in another window.".to_owned(),
             ));
         }
-        // Neither changes the state of the session.
+        // Neither of these messages changes the state of the session.
         let quiet = matches!(message, FromPage::Next {} | FromPage::Batch { .. });
-        let obeyed = shared.obey(&mut state, id, message);
+        let obeyed = shared.execute(&mut state, id, message);
         drop(state);
         if !quiet || obeyed.is_err() {
             shared.tell_state();
@@ -237,10 +237,10 @@ impl Lab {
         obeyed
     }
 
-    /// Returns the session as one archive; nothing if there is none.
+    /// Returns the session as an archive; `None` if there is no session.
     ///
     /// # Errors
-    /// The errors of files.
+    /// Errors of reading files.
     pub fn export(&self) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
         let Some(folder) = self.shared.session_folder() else {
             return Ok(None);
@@ -248,10 +248,10 @@ impl Lab {
         Ok(Some((export::archive(&self.shared.out, &folder)?, "application/zip")))
     }
 
-    /// Returns the signals of a run, `3.json`; nothing if there is no such run.
+    /// Returns the signals of a run, requested by a name such as `3.json`; `None` if there is no such run.
     ///
     /// # Errors
-    /// The errors of files.
+    /// Errors of reading files.
     pub fn data(&self, name: &str) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
         let number: Option<usize> = name.strip_suffix(".json").and_then(|number| number.parse().ok());
         let (Some(number), Some(folder)) = (number, self.shared.session_folder()) else {
@@ -262,10 +262,11 @@ impl Lab {
         Ok(Some((replay::data(&stem)?, "application/json")))
     }
 
-    /// Returns a file of the pages of results, by the names in [`State::reports`](crate::wire::State::reports).
+    /// Returns a file of the pages of results, by its path components as in
+    /// [`State::reports`](crate::wire::State::reports).
     ///
     /// # Errors
-    /// The errors of files.
+    /// Errors of reading files.
     pub fn report(&self, names: &[&str]) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
         let Some(folder) = self.shared.session_folder() else {
             return Ok(None);
@@ -279,7 +280,7 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The folder of the current or replayed session.
+    /// Returns the folder of the current or replayed session.
     fn session_folder(&self) -> Option<PathBuf> {
         self.state().session.as_ref().map(|session| session.folder.clone())
     }
@@ -301,15 +302,15 @@ impl Shared {
         }
         let mut state = self.state();
         if role == Role::Person && state.run.is_none() {
-            // The newest window has the session; an older one is notified.
+            // The newest window takes over the session; the previous window is notified.
             let before = state.person.filter(|before| *before != id);
-            self.give(&mut state, id)?;
+            self.hand_over(&mut state, id)?;
             if let Some(before) = before {
-                let words = "The session continues in another window; this one looks on.".to_owned();
+                let words = "The session continues in another window; this window only watches.".to_owned();
                 self.tell(&ToPage::Refused { words, elsewhere: true }, |page, _| page == before);
             }
         } else if role == Role::Person {
-            let words = "A run continues in another window; this one looks on.".to_owned();
+            let words = "A run continues in another window; this window only watches.".to_owned();
             self.tell(&ToPage::Refused { words, elsewhere: true }, |page, _| page == id);
         }
         drop(state);
@@ -317,7 +318,7 @@ impl Shared {
         Ok(())
     }
 
-    /// The newest window of the person.
+    /// Returns the newest window of the person.
     fn newest_person(&self) -> Option<u64> {
         let pages = self.pages();
         pages
@@ -327,8 +328,8 @@ impl Shared {
             .map(|(id, _)| *id)
     }
 
-    /// The session continues in the window `id`.
-    fn give(&self, state: &mut Current, id: u64) -> Result<(), LabError> {
+    /// Continues the session in the window `id`.
+    fn hand_over(&self, state: &mut Current, id: u64) -> Result<(), LabError> {
         state.person = Some(id);
         state.ready = None;
         let browser = self
@@ -345,8 +346,8 @@ impl Shared {
         }
     }
 
-    /// Executes a message from the person's page.
-    fn obey(self: &Arc<Self>, state: &mut Current, id: u64, message: FromPage) -> Result<(), LabError> {
+    /// Executes a message from the tracking page.
+    fn execute(self: &Arc<Self>, state: &mut Current, id: u64, message: FromPage) -> Result<(), LabError> {
         match message {
             FromPage::Hello { .. } => Ok(()),
             FromPage::Consent { subject, agreed, cc0 } => self.consent(state, &subject, agreed, cc0),
@@ -356,7 +357,7 @@ impl Shared {
             FromPage::Batch { number, batch } => self.take(state, number, &batch),
             FromPage::Abort { number } => {
                 state.running(number)?;
-                self.end_run(state, How::Interrupted, BTreeMap::new())
+                self.end_run(state, RunEnd::Interrupted, BTreeMap::new())
             }
             FromPage::Finish { number, counted } => self.finish(state, number, counted),
             FromPage::Reports {} => {

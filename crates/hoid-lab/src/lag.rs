@@ -1,14 +1,15 @@
-//! The lag of the operator during a run.
+//! Estimation of the lag of the operator during a run.
 //!
-//! The basis of the tracker has a fixed lag: it gives no information about T_I. Therefore the samples of the
-//! measurement since the last declared change are fitted as by `hoid identify`, every 10 s, on a separate thread: all
-//! forms of the operator, the one selected by held-out data, and its T_I if the data determine it
-//! ([`hoid_analysis::identify`]). For a form without a lag, or one whose interval includes a pure integration, T_I is
-//! not determined, and no number is reported.
+//! The recursion of the tracker assumes a fixed lag and therefore gives no information about T_I. Every 10 s, on a
+//! separate thread, the samples of the measurement since the last declared change are therefore fitted as in
+//! `hoid identify`: all forms of the operator are fitted, held-out data select the form, and its T_I is used if the
+//! data determine it ([`hoid_analysis::identify`]). If the selected form has no lag, or if the interval of T_I includes
+//! a pure integration, T_I is not determined and no value is reported.
 //!
-//! A form with a lag is sometimes selected for operators without one, a short lag combined with a longer lead: for 13
-//! of 60 runs of C1 and 2 of 20 of C2, 30 and 80 s long, with T_I up to 6.3 standard errors from zero. A true lag of 1
-//! s is at least 25 standard errors from zero. So a lag is reported from ten standard errors on.
+//! For an operator without a lag a form with a lag is sometimes selected, with a short lag combined with a longer lead:
+//! in 13 of 60 runs of C1 and 2 of 20 runs of C2 (30 and 80 s long), with T_I up to 6.3 standard errors from zero. A
+//! true lag of 1 s is at least 25 standard errors from zero. A lag is therefore reported only if it exceeds ten
+//! standard errors.
 
 use std::{
     sync::mpsc::{Receiver, Sender, channel},
@@ -18,21 +19,21 @@ use std::{
 use hoid_model::{Channel, Record, SampleTime, uncertainty::Estimate};
 use hoid_track::Sample;
 
-/// Shortest span of a fit, and the time between fits, s.
+/// Minimum length of the data for a fit, and time between fits, s.
 const SHORTEST_S: f64 = 40.0;
 const EVERY_S: f64 = 10.0;
-/// Smallest reported lag, in standard errors.
-const CLEAR: f64 = 10.0;
+/// Minimum ratio of a reported lag to its standard error.
+const MIN_SIGNIFICANCE: f64 = 10.0;
 
-/// State of the estimate of the lag.
+/// Result of the latest estimation of the lag.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Lag {
     /// No fit has been made yet.
     #[default]
     Waiting,
-    /// The data do not determine it.
+    /// The data do not determine the lag.
     NotDetermined,
-    /// T_I, s.
+    /// Estimate of T_I, s.
     Known(Estimate),
 }
 
@@ -45,7 +46,7 @@ impl Lag {
             all.iter().find(|p| p.name == "T_I" && p.determined).cloned()
         });
         match parameter.map(|p| (p.value, p.standard_error)) {
-            Some((value, Some(error))) if value.is_finite() && value > CLEAR * error => Self::Known(Estimate {
+            Some((value, Some(error))) if value.is_finite() && value > MIN_SIGNIFICANCE * error => Self::Known(Estimate {
                 value,
                 standard_error: Some(error),
             }),
@@ -54,7 +55,7 @@ impl Lag {
     }
 }
 
-/// Samples to be fitted, and the time of the first, s.
+/// Samples to fit, and the time of the first sample, s.
 struct Span {
     from_s: f64,
     record: Record,
@@ -67,17 +68,17 @@ pub struct LagFits {
     e: Vec<f64>,
     u: Vec<f64>,
     ts: SampleTime,
-    /// Time of the first sample, s.
+    /// Time of the first sample in memory, s.
     from_s: f64,
     /// Number of samples at the last fit.
     fitted: usize,
-    /// A fit is in progress.
+    /// True while a fit is in progress.
     busy: bool,
     last: Lag,
 }
 
 impl LagFits {
-    /// Starts the thread, which ends when this is dropped.
+    /// Starts the thread, which ends when this value is dropped.
     pub fn new(ts: SampleTime) -> Self {
         let (spans, waiting) = channel::<Span>();
         let (tell, found) = channel();
@@ -101,13 +102,13 @@ impl LagFits {
         }
     }
 
-    /// Takes a sample of the measurement.
+    /// Adds a sample of the measurement.
     pub fn take(&mut self, sample: Sample) {
         self.e.push(sample.e);
         self.u.push(sample.u);
     }
 
-    /// Discards the data before a change of the operator, s.
+    /// Discards the samples before a change of the operator at the time `at_s`.
     pub fn changed(&mut self, at_s: f64) {
         let past = ((at_s - self.from_s) / self.ts.s())
             .ceil()
@@ -118,11 +119,11 @@ impl LagFits {
         (self.fitted, self.last) = (0, Lag::Waiting);
     }
 
-    /// The lag by the last completed fit; starts the next fit if it is due.
+    /// Returns the lag from the last completed fit, and starts the next fit if it is due.
     pub fn lag(&mut self) -> Lag {
         while let Ok((from_s, lag)) = self.found.try_recv() {
             self.busy = false;
-            // A fit that started before a change is discarded.
+            // The result of a fit to samples before a change is discarded.
             if from_s == self.from_s {
                 self.last = lag;
             }
@@ -210,7 +211,7 @@ mod tests {
 
     #[test]
     fn who_has_no_lag_is_given_none() {
-        // Without the limit of `CLEAR` a lag is reported for the last three.
+        // Without the limit of `MIN_SIGNIFICANCE` a lag is reported for the last three.
         for (seed, n) in [(1, 3000), (21, 3000), (31, 3000), (2, 8000)] {
             assert_eq!(
                 Lag::of(record(&samples_of_c1(seed)[..n])),

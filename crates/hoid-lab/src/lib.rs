@@ -1,27 +1,27 @@
-//! A tracking experiment in the browser, identified online and verified afterwards.
+//! Tracking experiments in the browser, with online identification and subsequent verification.
 //!
-//! The page computes the controlled element at 1 ms from tables that are made here, logs every input event, tick and
-//! frame, and sends them in batches. Here they are appended to the folder of the session, passed to the tracker, and
-//! recomputed to the last bit after the run.
+//! The page simulates the controlled element in steps of 1 ms from tables computed by this crate. It logs every input
+//! event, tick and frame, and sends them in batches. This crate appends the batches to the folder of the session,
+//! passes them to the tracker, and after the run recomputes them to the last bit.
 //!
 //! | module | contents |
 //! |---|---|
 //! | [`config`] | [`Config`]: the experiment, `lab.toml` |
-//! | [`course`] | [`Course`](course::Course): the controlled element at each time |
-//! | [`order`] | the order of the runs, by Latin squares |
-//! | [`task`] | [`Task`](task::Task): a run as tables, and its recomputation |
-//! | [`plant`] | the arithmetic of a tick, twin of the page's |
-//! | [`session`] | the folder: files that are appended to, files written at once, resumption of a session |
-//! | [`verify`] | [`check`](verify::check): verified, or unverified and why |
-//! | [`record`] | a run as a record for all commands of hoid |
-//! | [`live`], [`lag`] | the estimate while the run continues, the lag of the person besides |
+//! | [`course`] | [`TaskDefinition`](course::TaskDefinition): the controlled element as a function of time |
+//! | [`order`] | the order of the runs, from Latin squares |
+//! | [`task`] | [`Task`](task::Task): the tables of a run, and its recomputation |
+//! | [`plant`] | the arithmetic of a tick, identical to that of the page |
+//! | [`session`] | the folder of a session: appended files, files written as a whole, resumption |
+//! | [`verify`] | [`check`](verify::check): verification of a run, with the reasons if it is unverified |
+//! | [`record`] | conversion of a run to a record for all commands of hoid |
+//! | [`live`], [`lag`] | the live estimate during a run; the estimate of the lag of the person |
 //! | [`wire`] | messages between page and server |
-//! | [`lab`] | [`Lab`]: the experiment as its pages see it |
+//! | [`lab`] | [`Lab`]: the experiment as its pages interact with it |
 //! | [`server`] | [`Server`]: HTTP and sockets on 127.0.0.1 |
-//! | `experiment`, `export`, `replay`, `reports` | files next to the sessions; archives; replay of runs; pages |
-//! | [`calibrate`] | the delay added by the loop of page and events |
+//! | `experiment`, `export`, `replay`, `reports` | files outside the sessions; archives; replay of runs; result pages |
+//! | [`calibrate`] | the delay that page, frames and events add to the loop |
 
-// Numbers of a page or a file are never an index, a length or a summand before they are checked.
+// Numbers from a page or a file are checked before they serve as an index, a length or a summand.
 #![cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 
 pub mod calibrate;

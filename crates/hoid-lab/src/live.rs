@@ -1,13 +1,15 @@
-//! The estimate during a run.
+//! Live estimate during a run.
 //!
-//! A recursion of `hoid track` takes e and u of every tenth tick on a separate thread, fed by the batches of the page;
-//! it is not part of the loop. With the controlled element P known, the open loop is `L = Y P`, the crossover frequency
-//! the lowest with `|L| = 1` and the phase margin there `180 deg + arg L`. With `d ln Y = g + j p` of covariance matrix
-//! S, to first order
+//! A recursion of `hoid track` runs on a separate thread and processes e and u of every tenth tick from the batches
+//! sent by the page; it is not part of the control loop. With the known controlled element P the open loop is
+//! `L = Y P`. The crossover frequency omega_c is the lowest frequency at which |L| falls below 1, and the phase margin
+//! is `phi_m = 180 deg + arg L` at this frequency. With `d ln Y = g + j p`, where g and p have the covariance matrix S,
+//! to first order
 //!
 //! `d omega_c = -g / s_g`,  `d phi_m = p - (s_p/s_g) g`,
 //!
-//! `s_g` and `s_p` the slopes of `ln |L|` and `arg L` along omega.
+//! where `s_g` and `s_p` are the slopes of `ln |L|` and `arg L` with respect to omega. The variances of omega_c and
+//! phi_m follow from S.
 
 use std::{
     fs::OpenOptions,
@@ -24,23 +26,23 @@ use serde::Serialize;
 
 use crate::{
     LabError,
-    course::Course,
+    course::TaskDefinition,
     lag::{Lag, LagFits},
     session::Stem,
     task::{TICK_S, TICKS_PER_SAMPLE},
 };
 
-/// Initial delay of a method, samples of 10 ms.
+/// Initial delay of a method, in samples of 10 ms.
 const DEFAULT_NK: usize = 21;
-/// Frequency range of the search for the crossover, rad/s, and its number of geometric steps.
+/// Frequency range in rad/s of the search for the crossover, and the number of its logarithmically spaced steps.
 const CROSSOVERS: (f64, f64, usize) = (0.3, 15.0, 40);
-/// Relative step of the slopes.
+/// Relative frequency step for the slopes.
 const SLOPE: f64 = 1e-3;
 
-/// A number with its standard error; `None` if unknown.
+/// A value and its standard error; each is `None` if unknown.
 type ReportedValue = (Option<f64>, Option<f64>);
 
-/// The estimate at an instant.
+/// Estimates at one time.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct LiveLine {
     /// Time from the start of the measurement, s.
@@ -49,9 +51,9 @@ pub struct LiveLine {
     pub gain: ReportedValue,
     /// Lead T_L, s.
     pub lead_s: ReportedValue,
-    /// Lag T_I, s, if the data determine it.
+    /// Lag T_I, s, if the data determine the lag.
     pub lag_s: ReportedValue,
-    /// Reason why no lag is reported.
+    /// Reason why no lag is reported; `None` if the lag is reported.
     pub lag_waiting: Option<&'static str>,
     /// Natural frequency of the neuromuscular system, rad/s.
     pub omega_nm_rad_s: ReportedValue,
@@ -61,30 +63,30 @@ pub struct LiveLine {
     pub crossover_rad_s: ReportedValue,
     /// Phase margin, deg.
     pub phase_margin_deg: ReportedValue,
-    /// Time of the change, s, if one was declared at this instant.
+    /// Time of a change, s, if one was declared in this update.
     pub changed_s: Option<f64>,
-    /// Reason why there is no estimate yet.
+    /// Reason why there is no estimate yet; `None` if there is an estimate.
     pub waiting: Option<String>,
 }
 
-/// Samples in the queue of the estimate.
+/// Samples queued for the estimate.
 pub type Samples = Vec<Sample>;
 
 /// The recursion of one run.
 pub struct LiveRun {
     live: Live,
     lags: LagFits,
-    course: Course,
+    course: TaskDefinition,
     t_s: f64,
     ts: SampleTime,
 }
 
 impl LiveRun {
-    /// Creates a live estimate with the named method, for a task.
+    /// Creates a live estimate for a task with the named method.
     ///
     /// # Errors
-    /// [`LabError::Ident`] for a method that cannot run live.
-    pub fn new(method: &str, course: Course) -> Result<Self, LabError> {
+    /// [`LabError::Ident`] for a method that does not support live estimation.
+    pub fn new(method: &str, course: TaskDefinition) -> Result<Self, LabError> {
         let ts = SampleTime::new(TICK_S * TICKS_PER_SAMPLE as f64)?;
         let method = hoid_survey::method(method)?;
         let options = TrackOptions::default_for(method, DEFAULT_NK);
@@ -99,7 +101,7 @@ impl LiveRun {
         })
     }
 
-    /// Processes samples, and returns the estimate after the last of them.
+    /// Processes samples and returns the estimates after the last sample.
     pub fn take(&mut self, samples: &[Sample]) -> LiveLine {
         let mut changed_s = None;
         for sample in samples {
@@ -110,7 +112,7 @@ impl LiveRun {
                 changed_s = Some(at_s);
                 self.lags.changed(at_s);
             }
-            // The run-in is excluded: the target is faded in.
+            // The run-in, during which the target is faded in, is excluded.
             if self.t_s > -self.ts.s() / 2.0 {
                 self.lags.take(*sample);
             }
@@ -159,8 +161,8 @@ fn reported(estimate: Estimate) -> ReportedValue {
     (finite(estimate.value), estimate.standard_error.and_then(finite))
 }
 
-/// Crossover frequency in rad/s and phase margin in degrees, to first order; `None` if `|L|` does not
-/// cross one from above.
+/// Returns the crossover frequency in rad/s and the phase margin in degrees, with first-order standard errors; `None`
+/// if `|L|` does not cross one from above.
 fn crossover(
     response: &dyn Fn(f64) -> Option<Response>,
     element: &ContinuousTransferFunction,
@@ -196,7 +198,7 @@ fn crossover(
     let ratio = open(omega * (1.0 + SLOPE))? / open(omega * (1.0 - SLOPE))?;
     let width = 2.0 * SLOPE * omega;
     let (slope_gain, slope_phase) = (ratio.norm().ln() / width, ratio.arg() / width);
-    // d ln Y of d Re, d Im: (dRe + j dIm)/Y.
+    // Derivatives of ln Y with respect to Re Y and Im Y: d ln Y = (dRe + j dIm)/Y.
     let [re, im] = own.value;
     let square = re * re + im * im;
     let (gain, phase) = ([re / square, im / square], [-im / square, re / square]);
@@ -217,7 +219,7 @@ fn crossover(
     ))
 }
 
-/// Starts the thread of a run: it processes samples until its sender is dropped, reports each line
+/// Starts the thread of a run. It processes samples until the returned sender is dropped, passes each line to `tell`
 /// and appends it to `live.csv`.
 pub fn start(mut run: LiveRun, stem: &Stem, tell: impl Fn(&LiveLine) + Send + 'static) -> Sender<Samples> {
     let (sender, receiver): (Sender<Samples>, Receiver<Samples>) = channel();
@@ -225,15 +227,15 @@ pub fn start(mut run: LiveRun, stem: &Stem, tell: impl Fn(&LiveLine) + Send + 's
     thread::spawn(move || {
         let mut file = OpenOptions::new().append(true).create(true).open(&path).ok();
         let mut write = |text: &str| {
-            // The estimate can be recomputed from the record at any time: a full disk is handled by
-            // the log.
+            // Write errors are ignored here: the estimate can be recomputed from the record at any time, and the log
+            // reports a full disk.
             if let Some(file) = &mut file {
                 let _ = file.write_all(text.as_bytes());
             }
         };
         write(HEADER);
         while let Ok(mut samples) = receiver.recv() {
-            // Further waiting samples are processed at once.
+            // Samples that have arrived in the meantime are processed together.
             while let Ok(more) = receiver.try_recv() {
                 samples.extend(more);
             }

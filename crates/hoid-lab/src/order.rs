@@ -1,9 +1,9 @@
 //! The order of the runs of a session.
 //!
-//! Row r of a balanced Latin square of n conditions is, by E. J. Williams (*Australian Journal of
-//! Scientific Research* A 2 (1949) 149-168), `r, r+1, r-1, r+2, r-2, ...` modulo n: each condition
-//! occurs once in each position and follows each other one equally often. For an odd n this
-//! requires a second square, the first in reverse: 2n rows.
+//! In the balanced Latin squares of E. J. Williams (*Australian Journal of Scientific Research* A 2 (1949) 149-168),
+//! row r for n conditions is `r, r+1, r-1, r+2, r-2, ...` modulo n: each condition occurs once in each position and
+//! follows each other condition equally often. For an odd n a second square is required, in which each row of the first
+//! is reversed; there are then 2n rows.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,15 +12,15 @@ use crate::config::{Config, Order};
 /// A planned run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Planned {
-    /// Index of its condition in the configuration.
+    /// Index of the condition in the configuration.
     pub condition: usize,
-    /// True for a training run, which does not count.
+    /// True for a training run, which is excluded from the analysis.
     pub training: bool,
-    /// Number of the run within its condition, from 1.
+    /// Number of the run within its condition, counted from 1.
     pub run: usize,
 }
 
-/// The conditions of row `row` of a balanced square of `n`.
+/// Returns the conditions in row `row` of a balanced square for `n` conditions.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "2 n of a list fits into usize; without conditions there is no place, and no remainder by zero"
@@ -41,7 +41,7 @@ pub fn latin_row(n: usize, row: usize) -> Vec<usize> {
     order
 }
 
-/// All runs of a session: condition by condition, its training runs first.
+/// Returns all runs of a session, one condition after the other, each with its training runs first.
 pub fn plan(config: &Config, row: usize) -> Vec<Planned> {
     let n = config.condition.len();
     let order = match config.order {

@@ -1,26 +1,26 @@
-//! The controlled element over one tick, and the effect of the hand on it. The page has the same
-//! arithmetic (`page/src/plant.ts`), operation by operation, so that both give the same bits.
+//! The controlled element over one tick, and the conversion of device positions to u. The page executes the same
+//! arithmetic operations in the same order (`page/src/plant.ts`), so that both give identical bits.
 //!
-//! At tick k, with the held input u of the hand, disturbance d and target f,
+//! At tick k, with the held input u from the device, disturbance d and target f,
 //!
 //! `v = u + d`, `y = C x + D v`, `e = f - y`, then `x <- A x + B v`.
 //!
-//! Sums run from the first term to the last, each product rounded before it is added: IEEE 754 in
-//! double precision determines the result uniquely, in Rust and in ECMAScript. There is no other
-//! operation and no transcendental function: matrices and signals are tables.
+//! Sums are accumulated from the first term to the last, and each product is rounded before it is added: IEEE 754
+//! double precision then determines the result uniquely, in Rust and in ECMAScript. No other operations and no
+//! transcendental functions occur, since matrices and signals are tables.
 
 use serde::{Deserialize, Serialize};
 
 /// Matrices of a controlled element over one tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plant {
-    /// A by rows.
+    /// Matrix A, row by row.
     pub a: Vec<f64>,
-    /// B.
+    /// Input matrix B.
     pub b: Vec<f64>,
-    /// C.
+    /// Output matrix C.
     pub c: Vec<f64>,
-    /// D.
+    /// Direct feedthrough D.
     pub d: f64,
 }
 
@@ -30,8 +30,8 @@ impl Plant {
         self.b.len()
     }
 
-    /// True if the dimensions of the matrices match and the state is not too large.
-    pub fn is_sound(&self) -> bool {
+    /// True if the dimensions of the matrices are consistent and the number of states is at most [`MOST_STATES`].
+    pub fn is_valid(&self) -> bool {
         let n = self.order();
         n <= MOST_STATES && self.a.len() == n.saturating_mul(n) && self.c.len() == n
     }
@@ -62,29 +62,28 @@ impl Plant {
     }
 }
 
-/// Largest number of states of a controlled element.
+/// Maximum number of states of a controlled element.
 pub const MOST_STATES: usize = 16;
 
-/// Map from the output of a device to u.
+/// Map from the raw value of a device to u.
 ///
-/// `w = (raw - centre)/span`, within -1 to 1; `|w| <= dead` gives 0, larger values are scaled so
-/// that the ends are unchanged; `u = gain w`. The gain includes sensitivity, direction and the full
-/// deflection.
+/// `w = (raw - centre)/span`, limited to -1 to 1; `|w| <= dead` gives 0, and larger values are rescaled so that full
+/// deflection is unchanged; `u = gain w`. The gain includes sensitivity, direction and u at full deflection.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InputMap {
-    /// Value of the device at rest: pixels from the left edge, or 0 of a gamepad.
+    /// Value of the device at rest: pixels from the left edge, or 0 for a gamepad.
     pub centre: f64,
-    /// Distance from there to the full deflection.
+    /// Distance from the rest position to full deflection.
     pub span: f64,
-    /// Dead zone, as a fraction of the span, 0 to below 1.
+    /// Dead zone as a fraction of the span, at least 0 and below 1.
     pub dead: f64,
-    /// u at full deflection; negative for the other direction.
+    /// u at full deflection; a negative value reverses the direction.
     pub gain: f64,
 }
 
 impl InputMap {
-    /// u for a value of the device.
+    /// Returns u for a value of the device.
     pub fn u(&self, raw: f64) -> f64 {
         let w = ((raw - self.centre) / self.span).clamp(-1.0, 1.0);
         let size = if w < 0.0 { -w } else { w };
@@ -99,7 +98,7 @@ impl InputMap {
         }
     }
 
-    /// Returns the problem of the map, if any.
+    /// Returns a description of the problem if the map is invalid.
     pub fn fault(&self) -> Option<String> {
         let finite = [self.centre, self.span, self.dead, self.gain]
             .iter()

@@ -1,5 +1,5 @@
-//! A run as a record that all commands of hoid read: every tenth tick, e and u at that instant, also target,
-//! disturbance and output, and e as displayed. t = 0 is the start of the measurement.
+//! Conversion of a run to a record that all commands of hoid can read. It contains every tenth tick: e and u at that
+//! time, and the target, disturbance, output and displayed e. t = 0 is the start of the measurement.
 
 use hoid_model::{Channel, Record, SampleTime};
 
@@ -9,12 +9,12 @@ use crate::{
     task::{TICK_S, TICKS_PER_SAMPLE, Task},
 };
 
-/// The record of a run, with its run-in.
+/// Returns the record of a run, including the run-in.
 ///
 /// # Errors
-/// [`LabError::Model`] for a run without a sample.
+/// [`LabError::Model`] for a run without samples.
 pub fn record(begun: &RunStart, task: &Task, logged: &Logged) -> Result<Record, LabError> {
-    // A log longer than its run contains invalid ticks.
+    // If a log is longer than its run, the additional ticks are invalid.
     let n = logged.signals.e.len().min(logged.signals.u.len()).min(task.ticks);
     let every = |values: &[f64]| {
         values

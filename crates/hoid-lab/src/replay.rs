@@ -1,4 +1,4 @@
-//! A run for replay in the page: its signals at 100 Hz, its live estimate, and its present verdict.
+//! Data for replaying a run in the page: its signals at 100 Hz, its live estimate, and its current verdict.
 
 use serde_json::{Value, json};
 
@@ -9,10 +9,10 @@ use crate::{
     verify::check,
 };
 
-/// Returns the run as JSON.
+/// Returns the data of the run as JSON.
 ///
 /// # Errors
-/// The errors of files.
+/// Errors of reading files.
 pub fn data(stem: &Stem) -> Result<Vec<u8>, LabError> {
     let begun = RunStart::read(stem)?;
     let task = begun.task(stem)?;
@@ -38,12 +38,12 @@ pub fn data(stem: &Stem) -> Result<Vec<u8>, LabError> {
     serde_json::to_vec(&data).map_err(|error| LabError::damaged(&stem.file("beh.parquet"), error.to_string()))
 }
 
-/// Rounds to six digits, which suffice for a picture.
+/// Rounds to six significant digits, which suffice for display.
 fn rounded(values: &[f64]) -> Vec<f64> {
     values.iter().map(|v| (v * 1e6).round() / 1e6).collect()
 }
 
-/// The rows of the live estimate, numbers or null, without the header; none if there was none.
+/// Returns the rows of the live estimate (numbers or null) without the header; empty if there was no live estimate.
 fn live(stem: &Stem) -> Vec<Vec<Value>> {
     let text = hoid_io::read_text(&stem.file("live.csv")).unwrap_or_default();
     let cell = |cell: &str| cell.parse::<f64>().map_or(Value::Null, Value::from);

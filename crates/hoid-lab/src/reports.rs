@@ -1,6 +1,6 @@
-//! Pages about a session, created by the program `hoid` itself: the results of `identify`, `track`
-//! and `describe` for each run, and those of `group` for all people so far. They run in a separate
-//! process, on one core, so that they cannot abort or delay an experiment.
+//! Pages about a session, created by running the program `hoid`: the results of `identify`, `track` and `describe` for
+//! each run, and the results of `group` for all people so far. The program runs in a separate process on one core, so
+//! that it can neither abort nor delay an experiment.
 
 use std::{
     path::{Path, PathBuf},
@@ -12,28 +12,28 @@ use hoid_study::group::MANIFEST;
 use crate::{
     LabError,
     config::Config,
-    session::{How, Session, Stem},
+    session::{RunEnd, Session, Stem},
 };
 
-/// Folder of the results of `hoid group` in the experiment.
+/// Folder of the results of `hoid group` within the experiment.
 const GROUP: &str = "group";
 
-/// Existing pages.
+/// Titles and paths of the existing pages.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Pages(Vec<(String, String)>);
 
 impl Pages {
-    /// Titles of the pages, and their paths.
+    /// Returns the titles and paths of the pages.
     pub fn links(&self) -> Vec<(String, String)> {
         self.0.clone()
     }
 }
 
-/// The commands of a run, each with the name of its folder.
+/// Commands run for each run; each writes to a folder with its name.
 const COMMANDS: [&str; 3] = ["identify", "track", "describe"];
 
-/// Creates the pages of all finished runs without pages, then those of the group; `each` is called
-/// after every page.
+/// Creates the pages of all finished runs that have none, then the pages of the group; `each` is called after every
+/// page.
 pub fn make(program: &Path, out: &Path, folder: &Path, each: &dyn Fn(&Pages)) -> Pages {
     let Ok(session) = Session::read(folder) else {
         return Pages::default();
@@ -41,7 +41,7 @@ pub fn make(program: &Path, out: &Path, folder: &Path, each: &dyn Fn(&Pages)) ->
     let runs = session
         .done
         .iter()
-        .filter(|done| done.how == How::Finished && !done.training);
+        .filter(|done| done.how == RunEnd::Finished && !done.training);
     for done in runs {
         let stem = session.stem(&done.condition, done.number);
         for name in COMMANDS {
@@ -56,7 +56,7 @@ pub fn make(program: &Path, out: &Path, folder: &Path, each: &dyn Fn(&Pages)) ->
         let place = out.join(GROUP);
         let mut command = hoid(program);
         command.arg("group").arg(out.join(MANIFEST)).arg("--out").arg(&place);
-        said(&mut command, &place, "group");
+        run_command(&mut command, &place, "group");
     }
     found(folder)
 }
@@ -67,14 +67,14 @@ fn hoid(program: &Path) -> Command {
     command
 }
 
-/// Creates one page of a run.
+/// Creates one page for a run.
 fn one(program: &Path, config: &Config, stem: &Stem, name: &str) {
     let place = stem.reports().join(name);
     let mut command = hoid(program);
     command.arg(name).arg(stem.file("beh.parquet")).args(["--from", "0"]);
     let begun = crate::session::RunStart::read(stem).ok();
     let course = begun.as_ref().and_then(|begun| begun.condition.course().ok());
-    // Margins refer to a constant element.
+    // Margins are defined only for a constant controlled element.
     let element = course
         .filter(|course| course.change_s().is_none())
         .and_then(|course| course.element_at(0.0).ok());
@@ -97,11 +97,11 @@ fn one(program: &Path, config: &Config, stem: &Stem, name: &str) {
     if let Some(element) = element.filter(|_| name != "track") {
         command.arg(format!("--controlled-element={element}"));
     }
-    said(&mut command, &place, name);
+    run_command(&mut command, &place, name);
 }
 
-/// Runs a command; if it creates no page, its output becomes one.
-fn said(command: &mut Command, place: &Path, name: &str) {
+/// Runs a command; if it creates no page, a page is created from its output.
+fn run_command(command: &mut Command, place: &Path, name: &str) {
     let made = hoid_io::make_directory(place).map_err(LabError::from).and_then(|()| {
         command
             .output()
@@ -131,7 +131,7 @@ fn said(command: &mut Command, place: &Path, name: &str) {
         escaped(&out),
         escaped(&wrong)
     );
-    // Without the page its link is missing, which shows the failure.
+    // If the page cannot be written, its link is missing, which indicates the failure.
     let _ = hoid_io::write_atomically(&page, |file| file.write_all(html.as_bytes()));
 }
 
@@ -139,7 +139,7 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// The existing pages.
+/// Returns the existing pages.
 pub fn found(folder: &Path) -> Pages {
     let mut pages = Vec::new();
     for (number, stem) in Stem::all(folder).unwrap_or_default() {
@@ -162,11 +162,11 @@ pub fn found(folder: &Path) -> Pages {
     Pages(pages)
 }
 
-/// A file of these pages with its media type; nothing for any other name. Names are letters,
-/// digits, `-`, `_` and dots that do not lead, so that no name leads out of its folder.
+/// Returns a file of these pages with its media type; `None` if the name is not valid. Names may contain letters,
+/// digits, `-`, `_` and dots, but no leading dot, so that no name refers to a file outside its folder.
 ///
 /// # Errors
-/// The errors of files.
+/// Errors of reading the files.
 pub fn file(folder: &Path, out: &Path, names: &[&str]) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
     let sound = |name: &&str| {
         let known = |b: u8| b.is_ascii_alphanumeric() || b"-_.".contains(&b);

@@ -1,19 +1,20 @@
-//! The server of the page: HTTP on 127.0.0.1, and the sockets of its pages.
+//! The server of the page: HTTP on 127.0.0.1, and WebSockets for the pages.
 //!
-//! It serves one page, its data and the pages of results, to authorised clients only: the address contains a random
-//! token, and a request is refused unless its `Host` is the address of the server, its `Origin`, if present, is as
-//! well, and it is a GET of bounded length. A socket must have an origin. No message of a page names a file.
+//! The server provides one page, its data and the pages of results, to authorised clients only. The address contains a
+//! random token. A request is accepted only if its `Host` is the address of the server, if its `Origin`, when present,
+//! is also that address, and if it is a GET request of limited length. A request for a socket must have an origin. No
+//! message from a page contains a file name.
 //!
-//! | refused | status |
+//! | refused request | status |
 //! |---|---|
-//! | another host or origin, no token or another one | 403 |
-//! | a path that is invalid | 404 |
-//! | another method than GET | 405 |
+//! | wrong host or origin, missing or wrong token | 403 |
+//! | an invalid path | 404 |
+//! | a method other than GET | 405 |
 //! | a head of more than 16 KiB | 431 |
-//! | more than 64 connections with the token at once | 503 |
+//! | more than 64 simultaneous connections with the token | 503 |
 //!
-//! **Strangers** are clients that have not presented the token (`reception`): a head must arrive within 5 s, the oldest
-//! of 256 is closed for the next, and none of them has a thread.
+//! **Strangers** are clients that have not presented the token (`reception`): their request head must arrive within 5
+//! s, at most 256 of them are kept (the oldest is closed first), and they have no threads of their own.
 
 mod http;
 mod reception;
@@ -36,13 +37,13 @@ use socket2::SockRef;
 use crate::{LabError, lab::Lab};
 use http::{Reply, Request};
 
-/// Number of connections that the system keeps until they are accepted. With the 128 of the standard library a burst of
-/// strangers fills the queue, and the system leaves the page to ask again after a second.
+/// Number of connections that the operating system queues until they are accepted. With the value of 128 in the
+/// standard library, a burst of strangers fills the queue, and the page must then retry its connection after a second.
 const QUEUE: i32 = 4096;
 /// Maximum number of simultaneous connections with the token.
 const KNOWN: usize = 64;
-/// Timeout of a response to one of them.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// Timeout for reading from and writing to such a connection.
+const IO_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// The page, built from `page/` by `npm run build`.
 const PAGE: &str = include_str!("../page/dist/lab.html");
@@ -52,7 +53,7 @@ pub struct Server {
     listener: TcpListener,
     address: SocketAddr,
     token: String,
-    /// The token of [`Server::address_once`], until it is used.
+    /// Token of [`Server::address_once`] until it is used.
     once: Mutex<Option<String>>,
     policy: String,
     lab: Arc<Lab>,
@@ -63,7 +64,7 @@ pub struct Server {
 struct AuthorisedConnection(Arc<Server>);
 
 impl AuthorisedConnection {
-    /// Admits one more, if the limit allows it.
+    /// Admits another connection if the limit allows it.
     fn enter(server: &Arc<Server>) -> Option<Self> {
         let before = server.known.fetch_add(1, Ordering::Relaxed);
         let known = Self(Arc::clone(server));
@@ -78,7 +79,7 @@ impl Drop for AuthorisedConnection {
 }
 
 impl Server {
-    /// Listens on a port of 127.0.0.1, or on a free one if none is given.
+    /// Listens on the given port of 127.0.0.1, or on a free port if none is given.
     ///
     /// # Errors
     /// [`LabError::Server`].
@@ -87,7 +88,7 @@ impl Server {
             let asked = port.map_or("no port is free".to_owned(), |port| {
                 format!("port {port} is not available")
             });
-            LabError::Server(format!("{asked}: {error}; leave --port out for any free one"))
+            LabError::Server(format!("{asked}: {error}; leave --port out to use any free port"))
         })?;
         let address = SockRef::from(&listener)
             .listen(QUEUE)
@@ -104,16 +105,16 @@ impl Server {
         })
     }
 
-    /// The address to open, including the token.
+    /// Returns the address to open, including the token.
     pub fn address(&self) -> String {
         format!("http://{}/{}/", self.address, self.token)
     }
 
-    /// An address for starting a browser, which other users may read in the list of processes: it
-    /// leads to [`Server::address`] once only.
+    /// Returns an address with which a browser can be started. Other users may read it in the list of processes; it
+    /// therefore redirects to [`Server::address`] only once.
     ///
     /// # Errors
-    /// [`LabError::Server`] if the system provides no random numbers.
+    /// [`LabError::Server`] if the operating system provides no random numbers.
     pub fn address_once(&self) -> Result<String, LabError> {
         let token = random_token()?;
         let address = format!("http://{}/{token}/", self.address);
@@ -121,13 +122,13 @@ impl Server {
         Ok(address)
     }
 
-    /// True for the first use of the token of [`Server::address_once`].
+    /// True for the first use of the token from [`Server::address_once`].
     fn is_once(&self, token: &str) -> bool {
         let mut once = self.once.lock().unwrap_or_else(PoisonError::into_inner);
         once.take_if(|known| same(known, token)).is_some()
     }
 
-    /// Serves while the program runs.
+    /// Serves requests while the program runs.
     pub fn serve(self) {
         let server = Arc::new(self);
         reception::receive(&server.listener, |request, stream| {
@@ -138,11 +139,11 @@ impl Server {
             let Some(known) = AuthorisedConnection::enter(&server) else {
                 return Err((busy("too many connections"), stream));
             };
-            // If a thread cannot be created, its connection is lost: there is none to report it on.
+            // The stream moves into the thread; if the thread cannot be created, the copy is used for the reply.
             let other = stream.try_clone();
             let made = thread::Builder::new().spawn(move || known.0.answer(stream, &request));
             match (made, other) {
-                (Err(_), Ok(stream)) => Err((busy("the system cannot start a thread for it"), stream)),
+                (Err(_), Ok(stream)) => Err((busy("the system cannot start a thread for the connection"), stream)),
                 _ => Ok(()),
             }
         });
@@ -151,8 +152,8 @@ impl Server {
     fn answer(&self, mut stream: TcpStream, request: &Request) {
         let timed = stream
             .set_nonblocking(false)
-            .and(stream.set_read_timeout(Some(PATIENCE)))
-            .and(stream.set_write_timeout(Some(PATIENCE)));
+            .and(stream.set_read_timeout(Some(IO_TIMEOUT)))
+            .and(stream.set_write_timeout(Some(IO_TIMEOUT)));
         if timed.and(stream.set_nodelay(true)).is_err() {
             return;
         }
@@ -160,11 +161,11 @@ impl Server {
             Ok(Route::Socket(key)) => return socket::run(stream, &key, &self.lab),
             Ok(Route::Reply(reply)) | Err(reply) => reply,
         };
-        // A closed page needs no response.
+        // If the page has been closed, the error is ignored.
         let _ = reply.write(&mut stream);
     }
 
-    /// Checks that a request comes from this page.
+    /// Checks that a request comes from the page of this server.
     fn admits(&self, request: &Request) -> Result<(), Reply> {
         let own = |authority: &str| {
             let port = self.address.port();
@@ -190,7 +191,7 @@ impl Server {
         Ok(())
     }
 
-    /// Resource of an admitted request.
+    /// Returns the resource for an admitted request.
     fn routed(&self, request: &Request) -> Result<Route, Reply> {
         let parts: Vec<&str> = request.token().1.split('/').collect();
         let file = |found: Result<Option<(Vec<u8>, &'static str)>, LabError>| match found {
@@ -202,7 +203,7 @@ impl Server {
             [""] | ["experimenter"] => Ok(Route::Reply(Reply::page(PAGE, &self.policy))),
             ["socket"] => match &request.socket_key {
                 Some(key) if request.origin.is_some() => Ok(Route::Socket(key.clone())),
-                _ => Err(Reply::refused(403, "no socket, or none of this page")),
+                _ => Err(Reply::refused(403, "not a WebSocket request from this page")),
             },
             ["export.zip"] => file(self.lab.export()),
             ["data", name] => file(self.lab.data(name)),
@@ -220,17 +221,17 @@ enum Route {
 fn random_token() -> Result<String, LabError> {
     let mut random = [0; 16];
     getrandom::fill(&mut random)
-        .map_err(|error| LabError::Server(format!("the system gives no random numbers for the token: {error}")))?;
+        .map_err(|error| LabError::Server(format!("the system provides no random numbers for the token: {error}")))?;
     Ok(HEXLOWER.encode(&random))
 }
 
-/// Comparison in constant time.
+/// Compares two strings in constant time.
 fn same(a: &str, b: &str) -> bool {
     a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |differ, (a, b)| differ | (a ^ b)) == 0
 }
 
-/// The policy of the page: its own script and style by their hashes, its own socket and data, nothing
-/// else.
+/// Returns the content security policy of the page: only its own script and style, identified by their hashes, and its
+/// own socket and data are permitted.
 fn policy(page: &str) -> String {
     let hash = |tag: &str| {
         let inside = page

@@ -1,10 +1,9 @@
-//! A run as tables, which the page uses and from which Rust recomputes it.
+//! The tables of a run, which the page uses and from which Rust recomputes the run.
 //!
-//! The controlled element is discretised exactly over a tick of 1 ms (zero-order hold,
-//! [`hoid_model::held_system`]). If it changes, its matrices are those of the continuous model at
-//! the middle of each block of ten ticks. Target and disturbance are sampled at every tick; over
-//! the first seconds of the run-in they are faded in linearly, so that a run does not start with a
-//! jump.
+//! The controlled element is discretised exactly over a tick of 1 ms (zero-order hold, [`hoid_model::held_system`]). If
+//! it varies, the matrices of each block of ten ticks are computed from the continuous model at the middle of the
+//! block. Target and disturbance are sampled at every tick; they are faded in linearly over the first seconds of the
+//! run-in, so that a run does not start with a jump.
 
 use std::{collections::BTreeMap, f64::consts::TAU};
 
@@ -20,54 +19,54 @@ use serde::{Deserialize, Serialize};
 
 use crate::{LabError, config::Condition, plant::Plant};
 
-/// Duration of a tick, s.
+/// Length of a tick, s.
 pub const TICK_S: f64 = 1e-3;
-/// Number of ticks per sample of the record.
+/// Number of ticks per sample of a record.
 pub const TICKS_PER_SAMPLE: usize = 10;
-/// Time in which target and disturbance are faded in, s.
+/// Time over which target and disturbance are faded in, s.
 const FADE_S: f64 = 3.0;
 
-/// A controlled element and its first tick.
+/// A controlled element, and the tick from which it applies.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Phase {
-    /// Its first tick.
+    /// First tick at which the element applies.
     pub from: usize,
-    /// Its matrices.
+    /// Matrices of the element.
     #[serde(flatten)]
     pub plant: Plant,
 }
 
-/// A run as tables.
+/// The tables of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Task {
     /// Number of ticks before the measurement.
     pub run_in: usize,
-    /// Number of all ticks, including the run-in.
+    /// Total number of ticks, including the run-in.
     pub ticks: usize,
-    /// The controlled elements, the first from tick 0 on.
+    /// Controlled elements; the first applies from tick 0.
     pub phases: Vec<Phase>,
-    /// The target at each tick, and beyond the end as far as the preview time.
+    /// Target at each tick, continued beyond the end of the run by the preview time.
     pub target: Vec<f64>,
-    /// The disturbance at each tick.
+    /// Disturbance at each tick.
     pub disturbance: Vec<f64>,
 }
 
 /// Signals of the loop.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Signals {
-    /// u of the hand at each tick.
+    /// Input u from the device at each tick.
     pub u: Vec<f64>,
-    /// e at each tick.
+    /// Error e at each tick.
     pub e: Vec<f64>,
 }
 
 impl Task {
-    /// Creates the tables of a run: `cell` is the index of the condition, `replication` the number
-    /// of the run, which determine the phases with the seed of the condition.
+    /// Creates the tables of a run. `cell` is the index of the condition and `replication` the number of the run; with
+    /// the seed of the condition they determine the phases.
     ///
     /// # Errors
-    /// [`LabError::Message`] for an invalid condition, which a file may contain; [`LabError::Model`] for an element
-    /// that cannot be discretised.
+    /// [`LabError::Message`] if the condition, which may come from a file, is invalid; [`LabError::Model`] for an
+    /// element that cannot be discretised.
     pub fn new(condition: &Condition, cell: u64, replication: u64) -> Result<Self, LabError> {
         condition.check()?;
         let course = condition.course()?;
@@ -137,7 +136,7 @@ impl Task {
     }
 }
 
-/// The excitation with its phases, drawn if requested.
+/// Returns the excitation as a function of time, with random phases if requested.
 fn drawn(excitation: &Excitation, turns: &mut impl Iterator<Item = f64>) -> Result<ForcingFunction, LabError> {
     if !excitation.random_phases {
         return Ok(excitation.function.clone());
@@ -150,7 +149,7 @@ fn drawn(excitation: &Excitation, turns: &mut impl Iterator<Item = f64>) -> Resu
     Ok(ForcingFunction::new(drawn.collect())?)
 }
 
-/// Discretises a controlled element over one tick; the position of its leading gain is given by the realisation.
+/// Discretises a controlled element over one tick; `realisation` gives the position of its leading gain.
 fn held(num: &[f64], den: &[f64], realisation: Realisation, tick: SampleTime) -> Result<Plant, LabError> {
     let gain = num.first().copied().unwrap_or(0.0);
     let shape: Vec<f64> = num.iter().map(|c| if gain == 0.0 { *c } else { c / gain }).collect();
@@ -168,7 +167,8 @@ fn held(num: &[f64], den: &[f64], realisation: Realisation, tick: SampleTime) ->
     })
 }
 
-/// u at each tick, from the events `(tick, u)` in their order: the last one that took effect.
+/// Returns u at each tick from the events `(tick, u)` in chronological order: u of the last event that has taken
+/// effect.
 pub fn held_inputs(events: &[(usize, f64)], ticks: usize) -> Vec<f64> {
     let by_tick: BTreeMap<usize, f64> = events.iter().copied().collect();
     let mut u = 0.0;

@@ -1,15 +1,15 @@
-//! Times as ISO 8601 in UTC, without a calendar library.
+//! Formatting of times as ISO 8601 in UTC without a calendar library.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// The current time, to the second.
+/// Returns the current time with a resolution of one second.
 pub fn now() -> String {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     of_seconds(since.as_secs())
 }
 
-/// Seconds since 1970 as `2026-11-23T05:33:00Z`; the civil date by H. Hinnant's algorithm of eras of
-/// 400 years.
+/// Formats seconds since 1970 as text such as `2026-11-23T05:33:00Z`; the date is computed by H. Hinnant's algorithm
+/// with eras of 400 years.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "the first step divides, so that no u64 overflows; what is subtracted is part of what it is subtracted from"

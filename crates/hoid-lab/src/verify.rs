@@ -1,23 +1,23 @@
 //! Verification of a run: every tick is recomputed from the logged inputs.
 //!
-//! A run is *verified* if none of these problems is found, otherwise *unverified* with the reasons:
+//! A run is *verified* if none of these problems is found; otherwise it is *unverified*, and the reasons are given:
 //!
 //! | kind | reason |
 //! |---|---|
-//! | `lab-interrupted` | it did not reach its end |
-//! | `lab-task` | its tables are not those of its condition and seed |
-//! | `lab-ticks` | ticks are missing, twice or out of order |
-//! | `lab-log` | a file of the log is missing, cut or no log; it counts as far as it is whole |
-//! | `lab-input` | u at a tick is not that of the events |
-//! | `lab-tick` | e at a tick is not that of the plant, by a bit |
-//! | `lab-event` | an event was taken before its time stamp, or too late |
-//! | `lab-frame` | a frame was too late, or did not show the tick that it names |
-//! | `lab-changed` | a file was changed after the end |
+//! | `lab-interrupted` | the run did not reach its end |
+//! | `lab-task` | the tables of the run do not match its condition and seed |
+//! | `lab-ticks` | ticks are missing, duplicated or out of order |
+//! | `lab-log` | a file of the log is missing, truncated or invalid; its complete part is still used |
+//! | `lab-input` | u at a tick does not match the input events |
+//! | `lab-tick` | e at a tick differs in at least one bit from the e computed with the controlled element |
+//! | `lab-event` | an event took effect before its time stamp, or too late |
+//! | `lab-frame` | a frame was too late, or did not show the tick logged for it |
+//! | `lab-changed` | a file was changed after the end of the run |
 //!
-//! u and e are compared bit for bit, except for the sign of zero, which text does not preserve. e is recomputed from
-//! the u of the log, so that a wrong event and a wrong tick are distinguished; the tables are those given to the page,
-//! which are compared up to rounding with those recomputed from the seed (sines may differ between computers in the
-//! last bit).
+//! u and e are compared bit by bit, except for the sign of zero, which is not preserved in text. e is recomputed from
+//! the logged u, so that a wrong event can be distinguished from a wrong tick. The tables used are those sent to the
+//! page; they are compared, up to rounding, with tables recomputed from the seed (sines may differ between computers in
+//! the last bit).
 
 use hoid_model::{Finding, Verdict, VerdictLevel};
 use hoid_numerics::statistics::upper_median;
@@ -25,28 +25,28 @@ use serde::Serialize;
 
 use crate::{
     LabError,
-    session::{Ended, How, Logged, RunStart, Stem},
+    session::{Ended, RunEnd, Logged, RunStart, Stem},
     task::{Task, held_inputs},
 };
 
-/// Relative difference in a table due to the sine functions of two computers.
+/// Largest relative difference in a table that may be due to different sine functions.
 const TABLE: f64 = 1e-9;
-/// A frame is missed if the interval exceeds the typical one by this factor.
-const MISSED: f64 = 1.5;
+/// A frame counts as missed if the interval between frames exceeds the typical one by this factor.
+const MISSED_FRAME_RATIO: f64 = 1.5;
 
 /// Result of the verification of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Checked {
-    /// Verdict; trustworthy means verified.
+    /// Verdict on the run; trustworthy means verified.
     pub verdict: Verdict,
     /// Additional measurements.
     pub measures: Measures,
 }
 
-/// Measures of a run.
+/// Measured quantities of a run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Measures {
-    /// Ticks in the log.
+    /// Number of ticks in the log.
     pub ticks: usize,
     /// Frames.
     pub frames: usize,
@@ -56,30 +56,30 @@ pub struct Measures {
     pub longest_frame_ms: f64,
     /// Number of missed frames.
     pub missed_frames: usize,
-    /// Input events per second.
+    /// Number of input events per second.
     pub input_hz: f64,
-    /// Median age of an event when the page received it, ms.
+    /// Median time from an event to its reception by the page, ms.
     pub input_age_ms: f64,
-    /// Root mean square of e in the measurement.
+    /// Root mean square of e during the measurement.
     pub rms_e: f64,
-    /// Root mean square of the target or disturbance.
+    /// Root mean square of the error that would result without control.
     pub rms_forcing: f64,
-    /// 100 for no error, 0 for the error without control.
+    /// Score from 0 to 100: 100 for zero error, 0 for the error without control.
     pub score: f64,
 }
 
 impl Checked {
-    /// True if there is no finding against the run.
+    /// True if the run is verified.
     pub fn is_verified(&self) -> bool {
         self.verdict.level == VerdictLevel::Trustworthy
     }
 
-    /// `verified` or `unverified`.
+    /// Returns `verified` or `unverified`.
     pub fn word(&self) -> &'static str {
         if self.is_verified() { "verified" } else { "unverified" }
     }
 
-    /// The reasons in one line; empty if it is verified.
+    /// Returns the reasons in one line; empty if the run is verified.
     pub fn reasons(&self) -> String {
         self.verdict.reasons().collect::<Vec<_>>().join("; ")
     }
@@ -88,7 +88,8 @@ impl Checked {
 /// Checks a run of a session.
 ///
 /// # Errors
-/// [`LabError`] if `run.json` is missing or the system refuses a file; problems of the other files are findings.
+/// [`LabError`] if `run.json` is missing or the operating system cannot read a file; problems of the other files are
+/// findings.
 pub fn check(stem: &Stem) -> Result<Checked, LabError> {
     let begun = RunStart::read(stem)?;
     let logged = Logged::read(stem)?;
@@ -115,7 +116,7 @@ pub fn check(stem: &Stem) -> Result<Checked, LabError> {
     findings.extend(frames_of(&begun, &logged));
     if let Some(ended) = &ended {
         findings.extend(files_of(stem, ended)?);
-        findings.extend(hands_of(&begun, ended));
+        findings.extend(input_findings(&begun, ended));
     }
     let measures = measures(&begun, &task, &logged);
     if measures.missed_frames > 0 {
@@ -129,7 +130,7 @@ pub fn check(stem: &Stem) -> Result<Checked, LabError> {
 }
 
 fn end_of(begun: &RunStart, ended: Option<&Ended>, logged: &Logged) -> Option<Finding> {
-    let finished = ended.is_some_and(|ended| ended.how == How::Finished);
+    let finished = ended.is_some_and(|ended| ended.how == RunEnd::Finished);
     let ticks = logged.numbers.len();
     (!finished || ticks != begun.ticks).then(|| {
         let words = format!("the run ended after {ticks} of {} ticks", begun.ticks);
@@ -145,7 +146,7 @@ fn task_of(begun: &RunStart, task: &Task) -> Option<Finding> {
         ))
     };
     let Ok(made) = Task::new(&begun.condition, begun.cell, begun.replication) else {
-        return wrong("the condition cannot be rebuilt: it");
+        return wrong("the task cannot be built from its condition: it");
     };
     let near = |a: &[f64], b: &[f64]| {
         let size = b.iter().fold(1e-300, |m: f64, v| m.max(v.abs()));
@@ -213,9 +214,9 @@ fn errors_of(task: &Task, logged: &Logged) -> Option<Finding> {
     })
 }
 
-/// The first index at which two signals differ in a bit, and the number of differences.
+/// Returns the first index at which two signals differ in a bit, and the number of differences.
 fn differing(made: &[f64], logged: &[f64]) -> Option<(usize, usize)> {
-    // Minus zero plus zero is zero.
+    // Adding zero turns minus zero into zero.
     let differ = |(a, b): (&f64, &f64)| (a + 0.0).to_bits() != (b + 0.0).to_bits();
     let places: Vec<usize> = (logged.iter().enumerate())
         .filter(|(k, logged)| made.get(*k).is_none_or(|made| differ((made, logged))))
@@ -246,7 +247,7 @@ fn frames_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
         if !(0.0..=limit).contains(&interval) {
             return wrong(
                 number,
-                format!("came {interval:.1} ms after the last one, expected 0 to {limit} ms"),
+                format!("came {interval:.1} ms after the previous frame, expected 0 to {limit} ms"),
             );
         }
         if !(0.0..=limit).contains(&age.abs()) {
@@ -283,12 +284,13 @@ fn files_of(stem: &Stem, ended: &Ended) -> Result<Option<Finding>, LabError> {
     }))
 }
 
-/// Marks runs not made by hand, which may be as exact as others.
-fn hands_of(begun: &RunStart, ended: &Ended) -> Vec<Finding> {
+/// Adds notes if input events came from a program or the time from another clock; such runs may nevertheless be
+/// verified.
+fn input_findings(begun: &RunStart, ended: &Ended) -> Vec<Finding> {
     let made = ended.counted.get("synthetic_events").copied().unwrap_or(0.0);
     let mut notes = Vec::new();
     if made > 0.0 {
-        let words = format!("{made} input events were made by a program, not by a hand");
+        let words = format!("{made} input events were made by a program, not by hand");
         notes.push(Finding::note("lab-simulated", words));
     }
     if begun.clock != "browser" {
@@ -311,7 +313,7 @@ fn measures(begun: &RunStart, task: &Task, logged: &Logged) -> Measures {
         frame_ms
     };
     let missed = |interval: &f64| {
-        if *interval > MISSED * typical {
+        if *interval > MISSED_FRAME_RATIO * typical {
             ((interval / typical).round() as usize).saturating_sub(1)
         } else {
             0
@@ -323,11 +325,11 @@ fn measures(begun: &RunStart, task: &Task, logged: &Logged) -> Measures {
         .map(|event| event.handled_ms - event.stamp_ms)
         .collect();
     let e = &logged.signals.e;
-    // Ticks beyond the end of the run are invalid.
+    // Ticks after the end of the run are invalid.
     let e = e.get(..task.ticks).unwrap_or(e);
     let measured = |e: &[f64]| rms(e.get(begun.run_in..).unwrap_or_default());
     let rms_e = measured(e);
-    // The error without control.
+    // Simulation without control.
     let rest = task.run(&vec![0.0; e.len()]);
     let rms_forcing = measured(&rest.e);
     Measures {
@@ -353,7 +355,7 @@ fn rms(values: &[f64]) -> f64 {
     (sum / values.len().max(1) as f64).sqrt()
 }
 
-/// The median of the finite values; zero if there are none.
+/// Returns the median of the finite values; zero if there are none.
 fn median(values: &[f64]) -> f64 {
     let mut finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     upper_median(&mut finite).unwrap_or(0.0)

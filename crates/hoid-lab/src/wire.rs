@@ -1,5 +1,5 @@
-//! The messages between the page and the server: JSON in text frames, the `type` first. The tables of
-//! a run follow its message as one binary frame of 64-bit numbers, little end first.
+//! Messages between page and server: JSON in text frames, with `type` as the first key. The tables of a run follow its
+//! message as one binary frame of little-endian 64-bit numbers.
 
 use std::collections::BTreeMap;
 
@@ -14,37 +14,37 @@ use crate::{
     verify::Measures,
 };
 
-/// Largest message of a page, bytes: a second of ticks is a tenth of it.
+/// Maximum size of a message from a page in bytes; one second of ticks takes about a tenth of this.
 pub const LARGEST: usize = 1 << 20;
 
-/// Audience of a page.
+/// Role of the user of a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
     /// The person who tracks.
     Person,
-    /// Observers.
+    /// An observer, such as the experimenter.
     Experimenter,
 }
 
-/// Content of a page. Variants without fields have braces, so that they take no unknown ones.
+/// Message from a page. Variants without fields have braces, so that unknown fields are refused.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 #[allow(missing_docs)]
 pub enum FromPage {
-    /// It is there.
+    /// The page is connected.
     Hello {
         role: Role,
         #[serde(default)]
         browser: BTreeMap<String, String>,
     },
-    /// The person has read the text.
+    /// The person has read the consent text.
     Consent { subject: String, agreed: bool, cc0: bool },
-    /// The person continues with a session.
+    /// The person resumes a session.
     Resume { session: String },
-    /// The next run is requested.
+    /// The page requests the next run.
     Next {},
-    /// Tick 0 of the run that was sent.
+    /// The run that was sent is at tick 0.
     Begin {
         number: usize,
         input: InputMap,
@@ -53,7 +53,7 @@ pub enum FromPage {
         refresh_ms: f64,
         zero_ms: f64,
     },
-    /// Events since the last batch.
+    /// Ticks, events and frames since the last batch.
     Batch { number: usize, batch: Batch },
     /// The run reached its end.
     Finish {
@@ -61,20 +61,20 @@ pub enum FromPage {
         #[serde(default)]
         counted: BTreeMap<String, f64>,
     },
-    /// The run was broken off.
+    /// The run was aborted.
     Abort { number: usize },
-    /// The pages about the session are requested.
+    /// The page requests the pages about the session.
     Reports {},
 }
 
-/// Report of the server.
+/// Message from the server to a page.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]
 #[allow(missing_docs)]
 pub enum ToPage<'a> {
     /// State of the session.
     State(Box<State>),
-    /// A run; its tables follow.
+    /// A run, followed by its tables.
     Run {
         number: usize,
         condition: &'a Condition,
@@ -82,63 +82,62 @@ pub enum ToPage<'a> {
         run_in: usize,
         ticks: usize,
         phases: &'a [Phase],
-        /// Lengths of the tables that follow: target, disturbance, and the noise of a simulated
-        /// operator.
+        /// Lengths of the tables that follow: target, disturbance, and noise of a simulated operator.
         tables: Vec<usize>,
         operator: Option<&'a SimulatedOperator>,
     },
-    /// Reliability of a run.
+    /// Verdict on a run.
     Verdict { done: &'a Done, measures: &'a Measures },
-    /// The estimate while a run continues.
+    /// Live estimate during a run.
     Live { number: usize, line: &'a LiveLine },
-    /// The request is refused; `elsewhere` if the session is in another window.
+    /// A request is refused; `elsewhere` is true if the session continues in another window.
     Refused { words: String, elsewhere: bool },
-    /// The session continues in this window, whose other window is gone.
+    /// The session continues in this window, because its other window was closed.
     Yours {},
 }
 
 /// State of a session.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct State {
-    /// `consent`, `runs`, `finished` or `replay`.
+    /// Phase of the session: `consent`, `runs`, `finished` or `replay`.
     pub phase: &'static str,
     /// Name of the experiment.
     pub name: String,
-    /// Items to be confirmed.
+    /// Consent text that the person must confirm.
     pub consent: String,
-    /// When the person sees the live estimate.
+    /// When the live estimate is shown to the person.
     pub live: LiveFor,
     /// True if a simulated operator replaces the person.
     pub calibrate: bool,
-    /// The session, such as `sub-P01/ses-01`.
+    /// Name of the session, such as `sub-P01/ses-01`.
     pub session: Option<String>,
-    /// Sessions that can be resumed.
+    /// Names of the sessions that can be resumed.
     pub open: Vec<String>,
-    /// Runs that ended.
+    /// Runs that have ended.
     pub done: Vec<Done>,
     /// Names of the conditions of all planned runs; `next` is the index of the next one.
     pub planned: Vec<String>,
-    /// See `planned`.
+    /// Index of the next run in `planned`.
     pub next: Option<usize>,
     /// The condition of the next run.
     pub condition: Option<Condition>,
-    /// Whether it is a training run.
+    /// Whether the next run is a training run.
     pub training: bool,
-    /// The run that continues, where one does.
+    /// Number of the run in progress, if there is one.
     pub running: Option<usize>,
-    /// True while pages are being made.
+    /// True while pages are being created.
     pub reporting: bool,
-    /// Pages that were written: titles and paths.
+    /// Titles and paths of the existing pages.
     pub reports: Vec<(String, String)>,
-    /// Answers of the calibration.
+    /// Results of the calibration: names and values.
     pub calibration: Vec<(String, String)>,
 }
 
-/// The operator of a calibration: `u = (H e)(t - delay) + n`, H held over a tick.
+/// Simulated operator of a calibration: `u = (H e)(t - delay) + n`, with the input of H held over a tick.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SimulatedOperator {
-    /// H.
+    /// The transfer function H as matrices.
     pub plant: crate::plant::Plant,
-    /// Delay, in ticks.
+    /// Delay in ticks.
     pub delay: usize,
 }

@@ -19,7 +19,7 @@ use disk::{Disk, copied, fill};
 use hoid_lab::{
     config::{Condition, Config, Signal},
     plant::InputMap,
-    session::{Batch, Event, Frame, How, Logged, RunLog, Session, Stem},
+    session::{Batch, Event, Frame, RunEnd, Logged, RunLog, Session, Stem},
     task::{Task, held_inputs},
     verify::check,
 };
@@ -106,7 +106,7 @@ fn session(out: &Path, full: usize, until: usize, told: &mut LoggedBefore) -> Op
         let log = begun
             .write(&stem, &task)
             .and_then(|()| RunLog::create(&stem, task.ticks));
-        let mut how = How::Finished;
+        let mut how = RunEnd::Finished;
         if let Ok(mut log) = log {
             told.ticks.push((stem.clone(), 0));
             for batch in batches(&task) {
@@ -118,7 +118,7 @@ fn session(out: &Path, full: usize, until: usize, told: &mut LoggedBefore) -> Op
                 }
                 instant += 1;
                 if log.append(&batch).is_err() {
-                    how = How::Interrupted;
+                    how = RunEnd::Interrupted;
                     break;
                 }
                 told.ticks.last_mut().unwrap().1 = batch.first + batch.u.len();
@@ -236,7 +236,7 @@ fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     // A run that cannot be closed is not verified.
     fill(&ballast);
     let said = person.finish(number).unwrap_err();
-    assert!(said.contains("free space on the disk and start it again"), "{said}");
+    assert!(said.contains("free space on the disk and start the run again"), "{said}");
     assert_eq!(person.state()["next"], 0);
     fs::remove_file(&ballast).unwrap();
     person.next(number + 1).unwrap();

@@ -55,7 +55,7 @@ fn a_run_of_one_session_does_not_start_in_another() {
         .say(json!({"type": "resume", "session": "sub-P02/ses-01"}))
         .unwrap();
     let said = person.say(person::begin(2)).unwrap_err();
-    assert!(said.contains("run 2 was not asked for"), "{said}");
+    assert!(said.contains("run 2 was not requested"), "{said}");
     // The run of that session starts.
     person.next(1).unwrap();
 }

@@ -222,7 +222,12 @@ fn a_run_goes_through_and_its_live_estimate_is_told() {
     assert_eq!(verdict["done"]["verdict"], "verified", "{verdict}");
     // A second window cannot control the session.
     other.say(&json!({"type": "next"}));
-    assert!(other.hear("refused")["words"].as_str().unwrap().contains("looks on"));
+    assert!(
+        other.hear("refused")["words"]
+            .as_str()
+            .unwrap()
+            .contains("only watches")
+    );
     let zip = at.get(&format!("/{}/export.zip", at.token), "");
     assert!(status(&zip) == "200" && zip.contains("sub-P01/ses-01/lab.toml"));
     let data = at.get(&format!("/{}/data/{number}.json", at.token), "");

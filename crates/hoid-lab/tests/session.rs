@@ -10,7 +10,7 @@ use std::{collections::BTreeMap, fs, path::Path};
 use hoid_lab::{
     config::{Condition, Config, Signal},
     plant::InputMap,
-    session::{Batch, Event, Frame, How, RunLog, RunStart, Session, Stem},
+    session::{Batch, Event, Frame, RunEnd, RunLog, RunStart, Session, Stem},
     task::{Task, held_inputs},
     verify::{Checked, check},
 };
@@ -93,7 +93,7 @@ fn finished(out: &Path) -> (Session, Stem, Checked) {
     let mut session = Session::begin(out, &config(), "P01", false).unwrap();
     let (stem, log) = run(&mut session, usize::MAX);
     drop(log);
-    let checked = session.end(&stem, How::Finished, BTreeMap::new()).unwrap();
+    let checked = session.end(&stem, RunEnd::Finished, BTreeMap::new()).unwrap();
     (session, stem, checked)
 }
 
@@ -196,7 +196,7 @@ fn a_session_goes_on_after_its_server_was_killed() {
     let mut session = Session::open(&folder[0]).unwrap();
     assert_eq!((session.done.len(), session.next()), (1, Some(0)));
     let lost = &session.done[0];
-    assert_eq!((lost.how, lost.verdict.as_str()), (How::Interrupted, "unverified"));
+    assert_eq!((lost.how, lost.verdict.as_str()), (RunEnd::Interrupted, "unverified"));
     assert!(
         lost.reasons.contains("ended after 1233 of 4000 ticks"),
         "{}",
@@ -208,7 +208,7 @@ fn a_session_goes_on_after_its_server_was_killed() {
         drop(log);
         assert!(
             session
-                .end(&stem, How::Finished, BTreeMap::new())
+                .end(&stem, RunEnd::Finished, BTreeMap::new())
                 .unwrap()
                 .is_verified()
         );
@@ -300,7 +300,7 @@ fn every_session_opens_whatever_was_cut_or_lost() {
         if round % 100 == 0 {
             let (stem, log) = run(&mut opened, usize::MAX);
             drop(log);
-            assert!(opened.end(&stem, How::Finished, BTreeMap::new()).unwrap().is_verified());
+            assert!(opened.end(&stem, RunEnd::Finished, BTreeMap::new()).unwrap().is_verified());
         }
         for name in hoid_io::file_names(copy.path()).unwrap() {
             fs::remove_file(copy.path().join(name)).unwrap();
@@ -337,7 +337,7 @@ fn numbers_of_files_are_no_places() {
     value["condition"]["preview_s"] = serde_json::json!(1e6);
     fs::write(&json, value.to_string()).unwrap();
     let said = check(&stem).unwrap().reasons();
-    assert!(said.contains("the condition cannot be rebuilt"), "{said}");
+    assert!(said.contains("the task cannot be built from its condition"), "{said}");
     let toml = session.folder.join("lab.toml");
     let facts = fs::read_to_string(&toml).unwrap();
     let other = facts.replacen("condition = 0", "condition = 9", 1);
@@ -364,7 +364,7 @@ fn reading_a_session_changes_no_file() {
     let mut session = Session::open(&session.folder).unwrap();
     let (stem, log) = run(&mut session, usize::MAX);
     drop(log);
-    session.end(&stem, How::Finished, BTreeMap::new()).unwrap();
+    session.end(&stem, RunEnd::Finished, BTreeMap::new()).unwrap();
     let text = fs::read_to_string(&runs).unwrap();
     assert!(text.lines().count() == 3 && !text.contains("half"), "{text}");
 }

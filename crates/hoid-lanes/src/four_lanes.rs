@@ -1,9 +1,9 @@
-//! Four numbers in one register or two.
+//! Four numbers in one or two registers.
 //!
-//! A sum over a record is a recursion: each term has to wait for the sum of those before it. Four partial sums, each
-//! of every fourth term, are independent of each other. Their number is four for all registers, since it determines
-//! the last digits of the sum: with AVX2 they fill one register, elsewhere two. Products and sums are those of each
-//! number by itself, without contraction: the same bits in all registers.
+//! A sum over a record is a recursion: each term has to wait for the sum of the preceding terms. Four partial sums,
+//! each over every fourth term, are independent of each other. Their number is four for all registers, since it
+//! determines the last digits of the sum. With AVX2 four numbers fill one register, otherwise two. Products and sums
+//! act on each number separately, without contraction, so all registers give bit-identical results.
 
 use std::ops::{Add, Mul, Sub};
 
@@ -13,23 +13,23 @@ use crate::instruction_set::InstructionSet;
 pub trait FourLanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     /// Returns the same number in all four lanes.
     fn splat(self, value: f64) -> Self;
-    /// Returns these numbers.
+    /// Loads four numbers from an array.
     fn load(self, values: &[f64; 4]) -> Self;
     /// Returns the four numbers as an array.
     fn to_array(self) -> [f64; 4];
 }
 
-/// A computation on four numbers at a time.
+/// Computation on four numbers at a time.
 pub trait FourLaneTask {
-    /// Its result.
+    /// Result of the computation.
     type Output;
-    /// Runs the computation, with numbers of the type of `zero`.
+    /// Runs the computation with numbers of the type of `zero`.
     ///
-    /// Mark it `#[inline(always)]`, and all functions that it calls at every sample.
+    /// Mark this function, and all functions that it calls at every sample, as `#[inline(always)]`.
     fn run<F: FourLanes>(self, zero: F) -> Self::Output;
 }
 
-/// The registers of every processor of the compilation target.
+/// Registers that every processor of the compilation target has.
 impl FourLanes for wide::f64x4 {
     #[inline(always)]
     fn splat(self, value: f64) -> Self {
@@ -55,7 +55,7 @@ mod avx2 {
 
     use super::{FourLaneTask, FourLanes};
 
-    /// Four numbers in a register of AVX2.
+    /// Four numbers in an AVX2 register.
     #[derive(Debug, Clone, Copy)]
     pub(super) struct Register {
         simd: V3,
@@ -96,7 +96,7 @@ mod avx2 {
         }
     }
 
-    /// The task in registers of AVX2.
+    /// Task that runs in AVX2 registers.
     pub(super) struct InAvx2<T>(pub V3, pub T);
 
     impl<T: FourLaneTask> NullaryFnOnce for InAvx2<T> {
@@ -111,7 +111,7 @@ mod avx2 {
     }
 }
 
-/// Runs a task in registers of AVX2, or returns the task if this processor has none.
+/// Runs a task in AVX2 registers, or returns the task if this processor has none.
 fn in_avx2<T: FourLaneTask>(task: T) -> Result<T::Output, T> {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     if let Some(simd) = pulp::x86::V3::try_new() {
@@ -126,10 +126,10 @@ pub fn with_four_lanes<T: FourLaneTask>(task: T) -> T::Output {
 }
 
 impl InstructionSet {
-    /// Runs a task as [`with_four_lanes`] in these registers; `None` if this processor does not have them.
+    /// Runs a task like [`with_four_lanes`], but in these registers; `None` if this processor does not have them.
     ///
-    /// Four numbers fill half of a register of AVX-512, so that [`InstructionSet::Avx512`] selects AVX2 here.
-    /// [`InstructionSet::Scalar`] selects the registers of a processor without either.
+    /// Four numbers fill only half of an AVX-512 register, so [`InstructionSet::Avx512`] selects AVX2 here.
+    /// [`InstructionSet::Scalar`] selects the registers of a processor with neither AVX2 nor AVX-512.
     pub fn with_four_lanes<T: FourLaneTask>(self, task: T) -> Option<T::Output> {
         match self {
             Self::Best => Some(with_four_lanes(task)),

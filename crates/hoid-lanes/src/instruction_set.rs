@@ -1,13 +1,13 @@
-//! Choice of the vector registers, and tasks that run in them.
+//! Selection of the vector registers, and tasks that run in them.
 
 use pulp::{NullaryFnOnce, Scalar, Simd, WithSimd};
 
 use crate::{number::Number, registers::TwoRegisters};
 
-/// The vector registers in use. All give the same bits.
+/// Vector registers in use. All give bit-identical results.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum InstructionSet {
-    /// The widest registers of this processor.
+    /// Widest registers of this processor.
     #[default]
     Best,
     /// One number per register, on any processor.
@@ -18,18 +18,18 @@ pub enum InstructionSet {
     Avx512,
 }
 
-/// A computation that is written once for registers of any width.
+/// Computation that is written once for registers of any width.
 pub trait LaneTask {
-    /// Its result.
+    /// Result of the computation.
     type Output;
-    /// Runs the computation, with numbers of the type of `zero`.
+    /// Runs the computation with numbers of the type of `zero`.
     ///
-    /// Mark it `#[inline(always)]`, and all functions that it calls at every sample: a separate function is compiled
-    /// for the narrowest registers.
+    /// Mark this function, and all functions that it calls at every sample, as `#[inline(always)]`: a function that is
+    /// not inlined is compiled for the narrowest registers.
     fn run<R: Number>(self, zero: R) -> Self::Output;
 }
 
-/// The task for [`pulp::Arch`], which chooses the registers.
+/// Task for [`pulp::Arch`], which selects the registers.
 struct Dispatched<T>(T);
 
 impl<T: LaneTask> WithSimd for Dispatched<T> {
@@ -41,7 +41,7 @@ impl<T: LaneTask> WithSimd for Dispatched<T> {
     }
 }
 
-/// The task in the registers of `S`.
+/// Task that runs in the registers of `S`.
 struct InRegisters<T, S>(T, S);
 
 impl<T: LaneTask, S: Simd> NullaryFnOnce for InRegisters<T, S> {
@@ -57,7 +57,7 @@ fn in_registers<T: LaneTask, S: Simd>(simd: S, task: T) -> T::Output {
     simd.vectorize(InRegisters(task, simd))
 }
 
-/// The task for one run.
+/// Task for a single run.
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 struct OneLane<T>(T);
 
@@ -71,10 +71,10 @@ impl<T: LaneTask> NullaryFnOnce for OneLane<T> {
     }
 }
 
-/// Runs a task for one run, with f64 numbers.
+/// Runs a task for a single run, with f64 numbers.
 ///
-/// It is compiled with the instructions of AVX2 if this processor has them. They name three registers, so that an
-/// operand need not be copied before it is overwritten. Products and sums are not contracted: the bits are the same.
+/// If this processor has AVX2, the task uses AVX2 instructions. They have three register operands, so an operand need
+/// not be copied before it is overwritten. Products and sums are not contracted, so the results are bit-identical.
 pub fn with_one_lane<T: LaneTask>(task: T) -> T::Output {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     if let Some(simd) = pulp::x86::V3::try_new() {
@@ -84,13 +84,13 @@ pub fn with_one_lane<T: LaneTask>(task: T) -> T::Output {
 }
 
 impl InstructionSet {
-    /// Returns all instruction sets of this processor, including [`InstructionSet::Best`].
+    /// Returns all instruction sets that this processor supports, including [`InstructionSet::Best`].
     pub fn available() -> Vec<Self> {
         let all = [Self::Best, Self::Scalar, Self::Avx2, Self::Avx512];
         all.into_iter().filter(|set| set.lanes().is_some()).collect()
     }
 
-    /// Returns the number of runs at a time; `None` if this processor does not have these registers.
+    /// Returns the number of runs computed at a time; `None` if this processor does not have these registers.
     pub fn lanes(self) -> Option<usize> {
         self.with_lanes(CountLanes)
     }

@@ -1,17 +1,17 @@
-//! Runs of a recursion in the lanes of vector registers, with the same bits as each run alone.
+//! Simultaneous runs of a recursion in the lanes of vector registers, bit-identical to each run alone.
 //!
-//! A recursion `y(t) = x(t) - f y(t-1)` has to wait at each sample for its last result, so that one run leaves most of
-//! a processor idle, and no vector instruction can shorten it: sample t + 1 cannot start before sample t has ended.
-//! Several runs can be computed at the same time, one in each lane of a register:
+//! A recursion `y(t) = x(t) - f y(t-1)` has to wait at each sample for its previous result. A single run therefore
+//! leaves most of a processor idle, and no vector instruction can speed it up: sample t + 1 cannot start before sample
+//! t has finished. Several runs can be computed simultaneously, one in each lane of a register:
 //!
 //! `[y_1(t) .. y_L(t)] = [x_1(t) .. x_L(t)] - [f_1 .. f_L] [y_1(t-1) .. y_L(t-1)]`, lane by lane.
 //!
-//! The same holds for a sum over a record, `s(t) = s(t-1) + a(t) b(t)`: four partial sums, each of every fourth term,
+//! The same holds for a sum over a record, `s(t) = s(t-1) + a(t) b(t)`: four partial sums, each over every fourth term,
 //! are independent of each other.
 //!
-//! The registers are chosen at run time (AVX-512, AVX2, else scalar ones; Neon on ARM). The operations on each lane
-//! are those of the run alone, in their order and without contraction (no fused multiply-add). The result is therefore
-//! independent of the registers and of the other lanes, to the last bit.
+//! The registers are selected at run time (AVX-512, AVX2 or scalar; Neon on ARM). Each lane performs the operations of
+//! a single run, in the same order and without contraction (no fused multiply-add). The result is therefore
+//! bit-identical for all registers and independent of the other lanes.
 //!
 //! A task is written once, for a [`Number`], and runs in the registers of an [`InstructionSet`]:
 //!
@@ -50,10 +50,10 @@
 //!
 //! | item | meaning |
 //! |---|---|
-//! | [`Number`] | an f64, or several in lanes |
-//! | [`LaneTask`], [`InstructionSet::with_lanes`] | a computation over numbers, and its run in the lanes of the chosen registers |
-//! | [`with_one_lane`] | the same for one run |
-//! | [`FourLanes`], [`FourLaneTask`], [`with_four_lanes`] | four partial sums of one record, in one register or two |
+//! | [`Number`] | one f64, or several f64 in lanes |
+//! | [`LaneTask`], [`InstructionSet::with_lanes`] | computation over numbers, and its execution in the lanes of the selected registers |
+//! | [`with_one_lane`] | execution for a single run |
+//! | [`FourLanes`], [`FourLaneTask`], [`with_four_lanes`] | four partial sums over one record, in one or two registers |
 
 mod four_lanes;
 mod instruction_set;

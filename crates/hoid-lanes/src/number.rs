@@ -1,12 +1,12 @@
-//! A number, or one number for each of several runs.
+//! Number type for one run or for several runs in lanes.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// An f64, or several in lanes.
+/// One f64, or several f64 in lanes.
 ///
-/// Code that is written for a `Number` runs for one record with f64 and for several at a time in vector registers.
-/// Every operation acts on each lane separately and in the order of the code, so that a lane has the same bits as its
-/// run alone; products and sums are never contracted.
+/// Code written for a `Number` processes one record with f64, or several records at a time in vector registers. Every
+/// operation acts on each lane separately and in the order of the code, so each lane is bit-identical to its run alone;
+/// products and sums are never contracted.
 pub trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
@@ -15,11 +15,11 @@ pub trait Number:
     fn splat(self, value: f64) -> Self;
     /// Returns the number of lanes.
     fn lanes(self) -> usize;
-    /// Returns the number in a lane.
+    /// Returns the number in the given lane.
     fn lane(self, lane: usize) -> f64;
-    /// Sets the number in a lane.
+    /// Sets the number in the given lane.
     fn set_lane(&mut self, lane: usize, value: f64);
-    /// Returns the first numbers of a slice, one for each lane.
+    /// Loads the first numbers of a slice, one for each lane.
     ///
     /// # Panics
     /// If the slice is shorter than the number of lanes.

@@ -1,7 +1,7 @@
-//! A number in each lane of two registers.
+//! One number in each lane of two registers.
 //!
-//! Two, because the result of an operation takes several cycles while the next operation can start in each cycle: two
-//! independent registers hide the latency of a recursion.
+//! Two registers are used because the result of an operation takes several cycles, while another operation can start in
+//! each cycle: two independent registers hide the latency of a recursion.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -9,7 +9,7 @@ use pulp::Simd;
 
 use crate::number::Number;
 
-/// A number for each of [`TwoRegisters::LANES`] runs.
+/// One number for each of [`TwoRegisters::LANES`] runs.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TwoRegisters<S: Simd> {
     simd: S,

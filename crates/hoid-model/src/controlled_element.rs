@@ -10,7 +10,7 @@ use crate::{ModelError, transfer_function::ContinuousTransferFunction};
 pub struct ControlledElement {
     /// Control gain K_c, deg/deg.
     pub k_c: f64,
-    /// Break frequency omega_b, rad/s; 0 is the double integrator, a negative value is an unstable element.
+    /// Break frequency omega_b, rad/s; 0 gives a double integrator, a negative value an unstable element.
     pub omega_b_rad_s: f64,
 }
 

@@ -1,39 +1,37 @@
-//! Exact zero-order hold of the operator with a real delay: any fraction of a sample.
+//! Exact zero-order hold of the operator with a delay of any length, including fractions of a sample.
 //!
-//! `H(s) = (K_e + K_e_dot s) omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}` with
-//! `tau = l Ts + delta`, `0 <= delta < Ts`, is
-//! `q^-nk (b0 + b1 q^-1 + b2 q^-2)/(1 + f1 q^-1 + f2 q^-2)` with `nk = l + 1` after a zero-order
-//! hold, by the formulas of [`hoid_core::held_operator`]. delta = 0 gives b2 = 0 and the hold of
-//! [`crate::operator`].
+//! After a zero-order hold, the operator `H(s) = (K_e + K_e_dot s) omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}`
+//! with `tau = l Ts + delta`, `0 <= delta < Ts`, is exactly `q^-nk (b0 + b1 q^-1 + b2 q^-2)/(1 + f1 q^-1 + f2 q^-2)`
+//! with `nk = l + 1`. The formulas are those of [`hoid_core::held_operator`]. For delta = 0, b2 is zero and the model
+//! is the same as in [`crate::operator`].
 //!
-//! The model is linear in K_e and K_e_dot. Its response is continuous in tau and has a kink where tau is an integer
-//! number of samples: the step response starts with the slope `omega^2 K_e_dot`. At such a delay, the derivatives are
-//! those for increasing tau.
+//! The model is linear in K_e and K_e_dot. Its response is a continuous function of tau with a kink wherever tau is an
+//! integer number of samples, because the step response starts with the slope `omega^2 K_e_dot`. At such a delay, the
+//! derivatives are those for increasing tau.
 
 use hoid_core::held_operator::held_operator_delayed;
 
 use crate::{ModelError, OperatorParameters, SampleTime};
 
-/// `q^-nk (b0 + b1 q^-1 + b2 q^-2) / (1 + f1 q^-1 + f2 q^-2)`: the operator with any delay after a
-/// zero-order hold.
+/// The operator with any delay after a zero-order hold: `q^-nk (b0 + b1 q^-1 + b2 q^-2) / (1 + f1 q^-1 + f2 q^-2)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DelayedOperator {
-    /// Delay of b0 in samples: the whole samples of tau_e plus the one of the hold.
+    /// Delay of b0 in samples: the number of whole samples in tau_e plus the one-sample delay of the hold.
     pub nk: usize,
-    /// `[b0, b1, b2]`; b2 = 0 for an integer number of samples.
+    /// `[b0, b1, b2]`; b2 = 0 if the delay is an integer number of samples.
     pub b: [f64; 3],
     /// `[f1, f2]`.
     pub f: [f64; 2],
 }
 
-/// Names of the parameters, in the order of every array in this module; units deg/deg, s, rad/s, 1, s.
+/// Names of the parameters, in the order of every array in this module. The units are deg/deg, s, rad/s, 1 and s.
 pub const DELAYED_NAMES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 
-/// Distance from an integer number of samples, in samples, that counts as rounding: `0.29 / 0.01` is
-/// `28.999999999999996`.
+/// Largest distance from an integer number of samples, in samples, that is attributed to rounding; for example,
+/// `0.29 / 0.01` is `28.999999999999996`.
 const ROUNDING: f64 = 1e-12;
 
-/// Returns `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` of operator parameters.
+/// Converts operator parameters to the array `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`.
 pub fn delayed_parameters(operator: &OperatorParameters) -> [f64; 5] {
     [
         operator.k_e,
@@ -54,11 +52,12 @@ pub fn delayed_operator(parameters: [f64; 5], sample_time: SampleTime) -> Result
     delayed_operator_within(whole_samples, parameters, sample_time)
 }
 
-/// As [`delayed_operator`], for a given number l of whole samples in the delay: for `l Ts <= tau <= (l + 1) Ts`, both
-/// ends included, so that within each sample the model and its derivatives are smooth functions up to the borders.
+/// As [`delayed_operator`], for a given number l of whole samples in the delay. Both ends of
+/// `l Ts <= tau <= (l + 1) Ts` are included, so that the model and its derivatives are smooth functions of tau over the
+/// whole interval.
 ///
 /// # Errors
-/// As [`delayed_operator`]; also if tau_e is not within that sample.
+/// As [`delayed_operator`]; also if tau_e is outside this interval.
 pub fn delayed_operator_within(
     whole_samples: usize,
     parameters: [f64; 5],
@@ -120,7 +119,7 @@ pub fn delayed_operator_and_jacobian_within(
     Ok((operator, jacobian))
 }
 
-/// Returns the whole samples l of a delay: the largest integer with `l Ts <= tau`, up to rounding.
+/// Returns the number l of whole samples in a delay: the largest integer with `l Ts <= tau`, up to rounding.
 ///
 /// # Errors
 /// [`ModelError::OutOfRange`] if the delay is negative, not finite or longer than 1e9 samples.
@@ -130,7 +129,7 @@ pub fn whole_samples(tau_e_s: f64, sample_time: SampleTime) -> Result<usize, Mod
         return Err(ModelError::OutOfRange {
             quantity: "delay tau_e in s",
             found: tau_e_s,
-            expected: "zero or more, and fewer than 1e9 samples; check its unit against that of the sample time",
+            expected: "zero or more, and fewer than 1e9 samples; check the units of the delay and the sample time",
         });
     }
     let nearest = samples.round();
@@ -138,7 +137,7 @@ pub fn whole_samples(tau_e_s: f64, sample_time: SampleTime) -> Result<usize, Mod
     Ok(if near { nearest } else { samples.floor() } as usize)
 }
 
-/// Returns the fraction delta in s after the whole samples, for valid parameters.
+/// Checks the parameters and returns `delta = tau - l Ts` in s, without rounding errors at 0 and Ts.
 fn fraction(whole_samples: usize, parameters: [f64; 5], sample_time: SampleTime) -> Result<f64, ModelError> {
     let quantities = [
         "error gain K_e",
@@ -167,7 +166,7 @@ fn fraction(whole_samples: usize, parameters: [f64; 5], sample_time: SampleTime)
             expected: "a time within the sample that is requested",
         });
     }
-    // A whole number of samples, or one more, up to rounding.
+    // A delta within rounding of 0 or of one sample is set to that value.
     Ok(match delta {
         d if d <= rounding => 0.0,
         d if d >= ts - rounding => ts,

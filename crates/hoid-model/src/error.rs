@@ -5,7 +5,7 @@ use thiserror::Error;
 use crate::UnknownName;
 
 /// The reason why a model, a record or a conversion is not possible. Each message contains the quantity, the value
-/// found, the expected value and, if useful, the remedy.
+/// found, the expected value and, where useful, the remedy.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ModelError {
@@ -14,7 +14,7 @@ pub enum ModelError {
     OutOfRange {
         /// Name of the quantity, with its symbol and unit.
         quantity: &'static str,
-        /// The value given.
+        /// The given value.
         found: f64,
         /// The valid range.
         expected: &'static str,
@@ -37,13 +37,13 @@ pub enum ModelError {
     /// Channels of one record that differ in length.
     #[error("channel {channel} has {found} samples, expected {expected} as in channel {reference}")]
     LengthMismatch {
-        /// The channel that differs.
+        /// Name of the channel with a different length.
         channel: String,
-        /// Its length.
+        /// Length of this channel in samples.
         found: usize,
-        /// The length of the reference channel.
+        /// Length of the reference channel in samples.
         expected: usize,
-        /// The channel that it is compared with.
+        /// Name of the reference channel.
         reference: String,
     },
     /// Invalid parameters of an operator.
@@ -69,10 +69,10 @@ pub enum ModelError {
     NoSuchChannel {
         /// The requested name.
         name: String,
-        /// The names that exist.
+        /// The available names.
         available: String,
     },
-    /// A sampling rate that cannot be lowered in this way.
+    /// A decimation that is not possible for a record.
     #[error("decimation of {label}: found {found}, expected {expected}")]
     Decimation {
         /// Label of the record.
@@ -120,25 +120,26 @@ pub enum ModelError {
         /// The problem, and the remedy.
         expected: String,
     },
-    /// A discrete model without a continuous one.
+    /// A discrete model without a continuous counterpart.
     #[error("not convertible: {0}")]
     NotConvertible(#[from] NotConvertible),
-    /// A noise level that no remnant gain reaches.
+    /// A noise level that cannot be reached with any remnant gain.
     #[error(
-        "noise level P_n = {demanded} = var(n)/var(u) cannot be reached with remnant order {order}: the largest reachable level is {largest:.4}; ask for less or use the definition var(u_n)/var(u)"
+        "noise level P_n = {demanded} = var(n)/var(u) cannot be reached with remnant order {order}: the largest \
+         reachable level is {largest:.4}; request a lower level or use the definition var(u_n)/var(u)"
     )]
     UnreachableNoiseLevel {
         /// The requested level.
         demanded: f64,
         /// Order of the remnant filter.
         order: usize,
-        /// The limit for an infinite gain.
+        /// The noise level in the limit of an infinite gain.
         largest: f64,
     },
     /// An unstable closed loop, which has no stationary variance and no margins.
     #[error("the closed loop of operator and controlled element is not stable: {reason}")]
     UnstableLoop {
-        /// The evidence.
+        /// Evidence of the instability.
         reason: String,
     },
 }
@@ -147,7 +148,7 @@ pub enum ModelError {
 #[derive(Debug, Clone, PartialEq, Error, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum NotConvertible {
-    /// The operator is of another form than a gain with a lead.
+    /// The form of the operator is not a gain with a lead.
     #[error("the operator has the form {form}, which has parameters other than K_e, T_L and K_e_dot")]
     OtherForm {
         /// Name of the form.
@@ -173,31 +174,31 @@ pub enum NotConvertible {
         "the continuous denominator s^2 + {a1:.4} s + {a2:.3e} has no positive omega_nm^2: the poles are real and lie on both sides of (or at) the origin of s"
     )]
     NoNaturalFrequency {
-        /// Coefficient of s.
+        /// Coefficient of s in the continuous denominator.
         a1: f64,
-        /// Coefficient of 1.
+        /// Constant coefficient of the continuous denominator.
         a2: f64,
     },
     /// `b0 + b1 = 0`: no response to a constant error, so that T_L = K_e_dot / K_e does not exist.
     #[error("the gain K_e is zero (b0 + b1 = 0), so that the lead time T_L = K_e_dot / K_e does not exist")]
     ZeroGain,
-    /// Polynomials with other orders than those of the operator model.
+    /// Polynomial orders that differ from those of the operator model.
     #[error("the operator model has two coefficients in B and two poles, found nb = {nb} and {poles} poles")]
     OtherOrders {
-        /// Coefficients in B.
+        /// Number of coefficients of B.
         nb: usize,
-        /// Poles of B/F (or B/A).
+        /// Number of poles of B/F (or B/A).
         poles: usize,
     },
-    /// Poles of the system in A and in F.
+    /// The poles of the system are divided between A and F.
     #[error("the operator model has its two poles in A or in F, found na = {na} and nf = {nf}")]
     PolesInBoth {
-        /// Coefficients of A.
+        /// Number of coefficients of A.
         na: usize,
-        /// Coefficients of F.
+        /// Number of coefficients of F.
         nf: usize,
     },
-    /// A model without delay: a zero-order hold has at least one sample of delay.
+    /// A model without delay: after a zero-order hold the delay is at least one sample.
     #[error("nk = 0: a zero-order hold delays by at least one sample, so that tau_e = (nk - 1) Ts would be negative")]
     NoDelay,
     /// A parameter that is not a finite number.
@@ -205,13 +206,13 @@ pub enum NotConvertible {
     NotFinite {
         /// Name of the coefficient.
         name: String,
-        /// Its value.
+        /// Value of the coefficient.
         value: f64,
     },
     /// A noise polynomial that does not correspond to a remnant filter.
     #[error("the noise model has no remnant filter of order {order}: {reason}")]
     NotARemnantFilter {
-        /// Order m.
+        /// Order m of the noise polynomial.
         order: usize,
         /// The problem.
         reason: String,

@@ -4,17 +4,18 @@ use std::fmt;
 
 use crate::numbers::{DASH, with_uncertainty};
 
-/// A number with its standard error; `None` if the data determine none (a fixed delay, a singular information matrix).
+/// A number with its standard error; the standard error is `None` if the data do not determine it (a fixed delay, a
+/// singular information matrix).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Estimate {
     /// The estimate.
     pub value: f64,
-    /// Its standard error.
+    /// Standard error of the estimate.
     pub standard_error: Option<f64>,
 }
 
 impl Estimate {
-    /// Returns an estimate with the variance of its error; a variance that is not finite or negative gives no standard
+    /// Returns an estimate whose error has this variance. A variance that is negative or not finite gives no standard
     /// error.
     pub fn with_variance(value: f64, variance: f64) -> Self {
         Self {
@@ -33,7 +34,7 @@ impl Estimate {
 }
 
 impl fmt::Display for Estimate {
-    /// Formats `value ± standard error` with two digits of the error, or only the value if there is no error.
+    /// Formats `value ± standard error` with two significant digits of the error; without an error, only the value.
     ///
     /// ```
     /// # use hoid_model::uncertainty::Estimate;

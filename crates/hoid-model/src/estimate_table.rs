@@ -10,11 +10,11 @@ use crate::{
     numbers::{DASH, with_uncertainty},
 };
 
-/// Writes a row for each name, estimate and unit (empty if there is none), each preceded by a line feed except for the
-/// first.
+/// Writes one row per estimate: name, estimate and unit (empty if there is no unit). A line feed precedes each row
+/// except the first.
 ///
 /// # Errors
-/// The errors of the formatter.
+/// The errors returned by the formatter.
 ///
 /// ```
 /// use hoid_model::{estimate_table::write_rows, uncertainty::Estimate};

@@ -1,9 +1,9 @@
-//! A fault of recorded data: kind, place, size, and action.
+//! A fault of recorded data: kind, location, size, and action.
 //!
-//! A [`Fault`] is a place in one channel of a record (or in all of them) where the values cannot be those of the
-//! channel. The detection is documented in its own modules; this module describes a fault, so that a file, a fit and a
-//! stream report it in the same way. [`fault_findings`] converts faults to the findings of a
-//! [`Verdict`](crate::Verdict): a repaired fault gives a note, one that is still in the data a doubt.
+//! A [`Fault`] is a stretch of one channel of a record (or of all channels) where the recorded values cannot be those
+//! of the signal. Detection is documented in the modules that implement it; this module describes a fault, so that it
+//! is reported in the same way for files, fits and streams. [`fault_findings`] converts faults to the findings of a
+//! [`Verdict`](crate::Verdict): a repaired fault becomes a note, a fault that is still in the data a warning.
 
 use std::fmt;
 
@@ -13,23 +13,23 @@ use crate::Finding;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum FaultKind {
-    /// One or few samples that are inconsistent with their neighbours.
+    /// One or a few samples that are inconsistent with their neighbours.
     Spike,
-    /// A constant that the channel jumps to and back from.
+    /// A constant value to which the channel jumps and from which it returns.
     Dropout,
-    /// A channel that holds its value while the others continue.
+    /// A channel that holds its value while the other channels vary.
     Frozen,
-    /// A stretch in which all channels are constant.
+    /// A stretch in which all channels, or a single named channel, are at rest.
     Idle,
-    /// A value that left one end of its range and re-entered at the other.
+    /// A value that left its range at one end and re-entered at the other.
     Wrap,
-    /// A level that changes from one sample to the next, permanently.
+    /// A permanent change of level from one sample to the next.
     Step,
-    /// A stretch in other units, larger by orders of magnitude.
+    /// A stretch in another unit, with values larger by orders of magnitude.
     Scale,
-    /// A time that is not in seconds.
+    /// A time column that is not in seconds.
     TimeUnit,
-    /// Input and output that are probably exchanged.
+    /// Input and output that have probably been exchanged.
     Exchanged,
     /// An output that responds with the wrong sign.
     Sign,
@@ -53,12 +53,12 @@ crate::named_choice!(FaultKind, "kind of fault", 10, {
 pub enum FaultHandling {
     /// Faults are reported, and the data remain unchanged.
     Report,
-    /// Short faults are bridged, and the record is cut at long ones.
+    /// Short faults are bridged, and the record is cut at long faults.
     #[default]
     Bridge,
     /// The record is cut at all faults.
     Cut,
-    /// Faults are not searched for.
+    /// The data are not searched for faults.
     Keep,
 }
 
@@ -72,11 +72,11 @@ crate::named_choice!(FaultHandling, "handling of faults", 4, {
 /// Action for a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum FaultAction {
-    /// It is reported; the data are unchanged.
+    /// The fault is reported; the data are unchanged.
     Reported,
-    /// Its samples were interpolated from their neighbours; a wrap was unwrapped.
+    /// The faulty samples were interpolated from their neighbours; a wrap was unwrapped.
     Bridged,
-    /// The record ends before it and another starts after it.
+    /// The record ends before the fault, and another record starts after it.
     Cut,
 }
 
@@ -89,33 +89,33 @@ crate::named_choice!(FaultAction, "action on a fault", 3, {
 /// One fault.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Fault {
-    /// Its kind.
+    /// Kind of the fault.
     pub kind: FaultKind,
-    /// The channel; empty for all channels and for the time.
+    /// Name of the channel; empty if the fault concerns all channels or the time.
     pub channel: String,
-    /// Time of its first sample, s.
+    /// Time of the first faulty sample, s.
     pub from_s: f64,
-    /// Time of the sample after its last, s.
+    /// Time of the first sample after the fault, s.
     pub to_s: f64,
-    /// Number of samples.
+    /// Number of faulty samples.
     pub samples: usize,
-    /// Its size in the unit of the channel: the deviation of a spike or a step, the modulus of a wrap, the duration in
-    /// s of a frozen or idle stretch, the factor of a scale, the sample time in s.
+    /// Size of the fault: deviation of a spike or a step and modulus of a wrap in the unit of the channel, duration of
+    /// a frozen or idle stretch in s, factor of a change of scale, or the sample time in s.
     pub size: f64,
-    /// The size in robust standard deviations of the statistic of this kind for good data; `None` if the kind has no
+    /// Size of the fault in robust standard deviations of its test statistic for good data; `None` if the kind has no
     /// such statistic.
     pub deviations: Option<f64>,
-    /// The action.
+    /// Action taken.
     pub action: FaultAction,
 }
 
 impl Fault {
-    /// Returns the manual remedy.
+    /// Returns advice on how to remove the fault by hand.
     pub fn remedy(&self) -> &'static str {
         match self.kind {
             FaultKind::TimeUnit => "t must be in s: divide a t in ms by 1000, or give the sampling frequency with --fs",
             FaultKind::Exchanged => "exchange them: --input and --output",
-            FaultKind::Sign => "reverse the sign of one: --output=-u, or --input=-e",
+            FaultKind::Sign => "reverse the sign of one of them: --output=-u, or --input=-e",
             FaultKind::Step => "cut there with --from and --to, or --faults cut",
             _ => "look at the recording there; cut it out with --from and --to or --faults cut",
         }
@@ -183,13 +183,14 @@ fn short(value: f64, digits: usize) -> String {
     }
 }
 
-/// Number of faults of one kind that are reported individually; further faults are only counted.
-const TOLD: usize = 3;
-/// Share of the samples that may be repaired without casting doubt on the rest.
+/// Maximum number of faults of one kind that are reported individually; further faults are only counted.
+const LISTED_INDIVIDUALLY: usize = 3;
+/// Largest share of repaired samples for which no warning is given.
 pub const MOST_MENDED: f64 = 0.2;
 
-/// Returns the findings about faults: a note if all faults of a kind were repaired, a doubt if they were not, and a
-/// doubt if more than [`MOST_MENDED`] of the samples are lost.
+/// Returns the findings about faults: a note for repaired faults of a kind, a warning for faults that remain in the
+/// data ([`Finding::undetermined`] for a wrong unit of time), and a warning if more than [`MOST_MENDED`] of the samples
+/// were interpolated or cut out.
 pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
     let mut all = Vec::new();
     for kind in FaultKind::ALL {
@@ -201,9 +202,9 @@ pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
             if of.is_empty() {
                 continue;
             }
-            let mut words: Vec<String> = of.iter().take(TOLD).map(|fault| fault.to_string()).collect();
-            if of.len() > TOLD {
-                words.push(format!("and {} more of this kind", of.len() - TOLD));
+            let mut words: Vec<String> = of.iter().take(LISTED_INDIVIDUALLY).map(|fault| fault.to_string()).collect();
+            if of.len() > LISTED_INDIVIDUALLY {
+                words.push(format!("and {} more of this kind", of.len() - LISTED_INDIVIDUALLY));
             }
             let words = words.join("; ");
             all.push(match (left, kind) {
@@ -219,7 +220,7 @@ pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
         .filter(|fault| fault.action != FaultAction::Reported && fault.kind != FaultKind::Wrap)
         .map(|fault| fault.samples)
         .sum();
-    // Idle stretches are not a part of the run.
+    // Idle stretches that were cut out are not part of the run.
     let idle: usize = (faults.iter())
         .filter(|fault| fault.action == FaultAction::Cut && fault.kind == FaultKind::Idle)
         .map(|fault| fault.samples)
@@ -229,7 +230,7 @@ pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
         all.push(Finding::doubt(
             "faults",
             format!(
-                "{:.0} % of the samples are faults; look at the recording",
+                "{:.0} % of the samples are faulty; look at the recording",
                 100.0 * share
             ),
         ));

@@ -1,8 +1,9 @@
 //! Findings about a result, as text and in a form for programs.
 //!
 //! A [`Finding`] is one observation about a result: the termination of a search, a parameter at its bound, methods that
-//! do not agree, a quantity that the data do not determine. It has a kind (a name that does not change), a severity and
-//! a sentence for the user. The [`Verdict`] depends only on the findings: the highest severity is decisive.
+//! do not agree, a quantity that the data do not determine. It has a kind (a name that does not change between
+//! versions), a severity and a sentence for the user. The [`Verdict`] depends only on the findings: the highest
+//! severity determines its level.
 //!
 //! | highest severity | level |
 //! |---|---|
@@ -10,7 +11,7 @@
 //! | [`Severity::Doubt`] | doubtful |
 //! | [`Severity::Undetermined`] | not determined |
 //!
-//! Code with a new test adds findings; no other code decides about the verdict.
+//! A new test contributes to the verdict only by adding findings.
 
 use std::fmt;
 
@@ -37,7 +38,7 @@ pub struct Finding {
     /// Kind of the observation, as a name for programs: `not-converged`, `delay-at-bound`.
     #[serde(deserialize_with = "crate::interned::name")]
     pub kind: crate::interned::Name,
-    /// Its severity.
+    /// Severity of the observation.
     pub severity: Severity,
     /// The observation as a sentence, with its numbers, without a full stop.
     #[serde(rename = "words")]
@@ -55,7 +56,7 @@ impl Finding {
         Self::new(kind, Severity::Doubt, message)
     }
 
-    /// Returns a finding that the data do not determine the result.
+    /// Returns a finding which states that the data do not determine the result.
     pub fn undetermined(kind: &'static str, message: impl Into<String>) -> Self {
         Self::new(kind, Severity::Undetermined, message)
     }
@@ -72,11 +73,11 @@ impl Finding {
 /// Reliability of a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum VerdictLevel {
-    /// There is no evidence against it.
+    /// There is no evidence against the result.
     Trustworthy,
-    /// There is evidence against it, stated by the reasons.
+    /// There is evidence against the result, given by the reasons.
     Doubtful,
-    /// The data do not determine it.
+    /// The data do not determine the result.
     NotDetermined,
 }
 
@@ -86,7 +87,7 @@ crate::named_choice!(VerdictLevel, "verdict", 3, {
     NotDetermined => "not determined",
 });
 
-/// The level with its findings, the highest severity first.
+/// Reliability of a result, with the findings that determine it, in descending order of severity.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Verdict {
     /// Level of the verdict.
@@ -106,22 +107,22 @@ impl Verdict {
         Self { level, findings }
     }
 
-    /// Returns the verdict of these findings followed by others.
+    /// Returns the verdict with further findings appended.
     pub fn append(self, more: impl IntoIterator<Item = Finding>) -> Self {
         Self::of(self.findings.into_iter().chain(more).collect())
     }
 
-    /// Returns the verdict of these findings preceded by others, from which they may follow.
+    /// Returns the verdict with further findings, which may be the cause of the present ones, inserted before them.
     pub fn prepend(self, first: impl IntoIterator<Item = Finding>) -> Self {
         Self::of(first.into_iter().chain(self.findings).collect())
     }
 
-    /// Returns all findings, the highest severity first.
+    /// Returns all findings in descending order of severity.
     pub fn findings(&self) -> &[Finding] {
         &self.findings
     }
 
-    /// Returns the findings against the result: all except notes.
+    /// Returns the findings against the result, which are all findings except notes.
     pub fn reasons(&self) -> impl Iterator<Item = &str> {
         let weighs = |finding: &&Finding| finding.severity > Severity::Note;
         self.findings

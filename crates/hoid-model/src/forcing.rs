@@ -2,12 +2,13 @@
 //!
 //! `f_t(t) = sum A_k sin(omega_k t + phi_k)` (eq. 42), with t = 0 at the start of the measurement.
 //!
-//! The sinusoids also run before t = 0, so that the loop is settled after the run-in. The reference frequencies are
-//! integer multiples of `2 pi / 81.92 s`: the measurement contains an integer number of periods of each sinusoid, and
-//! there is no leakage.
+//! The sinusoids also run before t = 0, so that the loop has settled by the end of the run-in. The reference
+//! frequencies are integer multiples of `2 pi / 81.92 s`: the measurement contains an integer number of periods of each
+//! sinusoid, and there is no leakage.
 //!
-//! [`ForcingFunction::samples`] uses `sin(a + b) = sin a cos b + cos a sin b` with b from a table over one block: two
-//! products per sinusoid and sample instead of a sine, and no error that grows along the record as in a recurrence.
+//! [`ForcingFunction::samples`] uses `sin(a + b) = sin a cos b + cos a sin b` with b from a table over one block. This
+//! takes two products per sinusoid and sample instead of a sine; unlike with a recurrence, the error does not grow
+//! along the record.
 
 use std::f64::consts::TAU;
 
@@ -47,12 +48,12 @@ const TABLE_1: [(f64, f64, f64); 10] = [
     (229.0, 0.025, 0.604),
 ];
 
-/// Samples of one block of the table of angles: near the square root of the length of a record, where the total number
-/// of sines is smallest.
+/// Number of samples in one block of the table of angles: near the square root of the record length, which minimises
+/// the total number of sines.
 const BLOCK: usize = 96;
 
 impl ForcingFunction {
-    /// Returns a forcing function of any number of sinusoids; without any it is a target at rest.
+    /// Returns a forcing function of any number of sinusoids. With no sinusoid, the target is at rest.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] if a number is not finite, a frequency is not positive, or two frequencies are equal.
@@ -79,7 +80,7 @@ impl ForcingFunction {
                 return refuse(
                     quantity,
                     s.omega_rad_s,
-                    "a different frequency for each sinusoid; merge those of equal frequency",
+                    "a different frequency for each sinusoid; merge sinusoids of equal frequency",
                 );
             }
         }
@@ -103,7 +104,7 @@ impl ForcingFunction {
         &self.sinusoids
     }
 
-    /// Returns amplitudes and frequencies, as needed for the remnant gain.
+    /// Returns the amplitudes and frequencies that the computation of the remnant gain needs.
     pub fn lines(&self) -> Vec<SpectralLine> {
         let line = |s: &Sinusoid| SpectralLine {
             amplitude: s.amplitude_deg,

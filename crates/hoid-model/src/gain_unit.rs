@@ -1,18 +1,18 @@
 //! Units of an operator's gains.
 //!
 //! A gain is a ratio of the output u to the input e, so that its unit is the ratio of their units. It is reported only
-//! if the units of both channels are declared; a recording without units has gains without units. An operator
-//! `K (1 + T_L s) / (1 + T_I s)` has the gain `K` in u/e, the gain of the error rate `K_e_dot = K T_L` in u s/e, and
-//! the ratio `K / T_I` in u/(e s).
+//! if the units of both channels are declared; for a recording without units, gains are reported without units. An
+//! operator `K (1 + T_L s) / (1 + T_I s)` has the gain `K` in u/e, the gain of the error rate `K_e_dot = K T_L` in u
+//! s/e, and the ratio `K / T_I` in u/(e s).
 
 use crate::Record;
 
-/// Units of the two channels of a gain, input and output.
+/// Units of input and output, from which the unit of a gain follows.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct GainUnit(Option<(String, String)>);
 
 impl GainUnit {
-    /// Returns the units of a record; none if one of the two is not declared.
+    /// Returns the units of a record, or no units if the input or the output has none.
     pub fn of(record: &Record) -> Self {
         let units = record
             .input_channel()
@@ -21,8 +21,9 @@ impl GainUnit {
         Self(declared.map(|(e, u)| (e.to_owned(), u.to_owned())))
     }
 
-    /// Returns the unit of a parameter from its name and the unit `own` by which that of the gain is multiplied ("s" of
-    /// K_e_dot, "1/s" of K/T_I, "deg/deg" or "" of K). The unit of a parameter that is not a gain is unchanged.
+    /// Returns the unit of a parameter from its name and from `own`, the factor by which the unit u/e is multiplied
+    /// ("s" for K_e_dot, "1/s" for K/T_I, "deg/deg" or "" for K). For a parameter that is not a gain, `own` is returned
+    /// unchanged.
     ///
     /// ```
     /// # use hoid_model::{Channel, GainUnit, Record, SampleTime};
@@ -50,7 +51,7 @@ impl GainUnit {
     }
 }
 
-/// True if a parameter is proportional to u/e. The gain of the remnant K_n is not: it is a ratio of u to white noise.
+/// True if a parameter is proportional to u/e. The remnant gain K_n is not, because it is a ratio of u to white noise.
 fn is_gain(parameter: &str) -> bool {
     let name = parameter.trim_end_matches(|c: char| c.is_ascii_digit());
     matches!(name, "K" | "K_e" | "K_e_dot" | "K_over_T_I" | "K_I")

@@ -7,21 +7,22 @@
 //! `Phi = e^{A Ts}`, `Gamma_0 = Gamma(Ts - delta)`, `Gamma_1 = e^{A (Ts - delta)} Gamma(delta)`,
 //! `Gamma(h) = int_0^h e^{A s} ds B`
 //!
-//! (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 3.2). Exponential and integral are
-//! those of `[A B; 0 0] h` (C. F. Van Loan, IEEE Trans. Automatic Control 23 (1978) 395-404). Internally, time is in
-//! samples, so that the entries are of moderate size. Poles may be anywhere: at the origin, multiple, or in the right
-//! half plane.
+//! (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 3.2). The exponential and the integral
+//! are blocks of the exponential of `[A B; 0 0] h` (C. F. Van Loan, IEEE Trans. Automatic Control 23 (1978) 395-404).
+//! Internally, time is in samples, so that the entries are of moderate size. Poles may be anywhere: at the origin,
+//! multiple, or in the right half plane.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use crate::{ModelError, SampleTime};
 
-/// A held system; its state is that of `1/den`, and the numerator is in the output row.
+/// A rational transfer function after a zero-order hold. Its state is that of `1/den`; the numerator is contained in
+/// the output row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldSystem {
     order: usize,
-    /// The matrix by rows.
+    /// The matrix Phi by rows.
     transition: Vec<f64>,
     /// Gamma_0.
     now: Vec<f64>,
@@ -42,7 +43,7 @@ impl HeldSystem {
     pub fn new(num: &[f64], den: &[f64], late: f64, sample_time: SampleTime) -> Result<Self, ModelError> {
         if !(0.0..1.0).contains(&late) {
             return Err(ModelError::OutOfRange {
-                quantity: "part of a sample by which a held input is late",
+                quantity: "delay of a held input as a fraction of a sample",
                 found: late,
                 expected: "zero or more, below one",
             });
@@ -55,7 +56,7 @@ impl HeldSystem {
         }
         let order = den.len() - 1;
         let ts = sample_time.s();
-        // By ascending powers of s Ts: the state is z^(i) Ts^i / Ts^n.
+        // In ascending powers of s Ts: the state is z^(i) Ts^i / Ts^n.
         let scaled = |p: &[f64], i: usize| {
             let coefficient = if i < p.len() { p[p.len() - 1 - i] } else { 0.0 };
             coefficient * ts.powi((order - i) as i32)
@@ -90,7 +91,7 @@ impl HeldSystem {
         Err(ModelError::OutOfRange {
             quantity: "the held model of a transfer function",
             found: f64::INFINITY,
-            expected: "finite numbers; check its poles against the sample time",
+            expected: "finite numbers; check the poles against the sample time",
         })
     }
 
@@ -104,7 +105,8 @@ impl HeldSystem {
         &self.transition
     }
 
-    /// Returns the contribution of the input v(k) to the state; without a delay this is the whole contribution.
+    /// Returns Gamma_0, the contribution of the input v(k) to the next state; without a delay, v(k-1) does not
+    /// contribute.
     pub fn input(&self) -> &[f64] {
         &self.now
     }

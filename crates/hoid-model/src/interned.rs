@@ -1,8 +1,8 @@
 //! Names with static lifetime, for results that are read from files.
 //!
 //! Kinds of findings and units are literals of the program (`&'static str`). A result of another version may contain a
-//! name that this program does not have: it is stored once, in a set that only grows. Names that are too long or too
-//! many are refused, so that no file can exhaust the memory.
+//! name that this program does not have. Such a name is stored once, in a set that only grows. The length and the
+//! number of these names are limited, so that no file can exhaust the memory.
 
 use std::{
     collections::BTreeSet,
@@ -11,7 +11,7 @@ use std::{
 
 use serde::{Deserialize, Deserializer, de::Error};
 
-/// A name, as a type alias: serde would borrow a plain reference from its input.
+/// A name. It is a type alias because serde would try to borrow a plain reference from its input.
 pub type Name = &'static str;
 
 /// Longest name in bytes.
@@ -21,7 +21,7 @@ const MOST: usize = 10_000;
 
 static NAMES: LazyLock<Mutex<BTreeSet<Name>>> = LazyLock::new(Mutex::default);
 
-/// Returns the name with static lifetime; `None` if it is too long, or if there are too many.
+/// Returns the name with static lifetime; `None` if it is too long, or if too many names are stored.
 pub fn interned(name: &str) -> Option<Name> {
     let mut names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(known) = names.get(name) {
@@ -38,7 +38,7 @@ pub fn interned(name: &str) -> Option<Name> {
 /// Reads a name: `#[serde(deserialize_with = "hoid_model::interned::name")]`.
 ///
 /// # Errors
-/// The errors of the reader, and an error for a name that is too long.
+/// The errors of the deserializer, and an error for a name that cannot be stored ([`interned`]).
 pub fn name<'de, D: Deserializer<'de>>(reader: D) -> Result<Name, D::Error> {
     let text = String::deserialize(reader)?;
     interned(&text).ok_or_else(|| {

@@ -4,7 +4,8 @@
 //! A person who tracks a target sees the error e and responds with the control u. The operator model is a gain, a lead,
 //! a delay and the neuromuscular dynamics, `K_e (1 + T_L s) omega^2 / (s^2 + 2 zeta omega s + omega^2) e^{-tau s}`,
 //! with a remnant of filtered white noise. The model estimated from samples is a polynomial model in `q^-1`. This crate
-//! converts one to the other, in both directions and with derivatives, and describes the loop around the operator.
+//! converts the operator model to the polynomial model and back, with derivatives, and describes the loop around the
+//! operator.
 //!
 //! ```
 //! use hoid_model::{
@@ -45,19 +46,19 @@
 //! | [`second_order`] | exact zero-order hold of second-order systems, in both directions, with derivatives |
 //! | [`operator`] | [`OperatorParameters`] and their discrete model |
 //! | [`delayed_operator`](mod@delayed_operator) | the operator with a delay of any fraction of a sample |
-//! | [`operator_family`] | gain, lead and lag with their powers: the operators found for people |
-//! | [`resampling`] | other sampling rates: the filter, and [`Decimation`] of records and streams |
+//! | [`operator_family`] | operators with other combinations of gain, lead and lag, as identified for people |
+//! | [`resampling`] | changes of the sampling rate: the filter, and [`Decimation`] of records and streams |
 //! | [`remnant`] | the remnant filter, its discretisations and its retrieval |
 //! | [`remnant_noise`] | the noise model of the exactly held remnant as a function of T_n, with derivatives |
 //! | [`uncertainty`] | standard errors of derived quantities by the delta method |
 //! | [`numbers`], [`estimate_table`] | numbers with as many digits as their standard error allows, also as a table |
 //! | [`controlled_element`], [`forcing`], [`schedule`], [`scenario`] | the task: plant, target signal, change over time, conditions C1-C6 |
-//! | [`family_scenario`] | tasks of people: any operator of the family, any controlled element, a rich remnant |
+//! | [`family_scenario`] | tasks of people: any operator of the family, any controlled element, a remnant of several parts |
 //! | [`held_system`] | exact zero-order hold of any rational transfer function |
 //! | [`margins`] | crossover frequency, phase and gain margin |
-//! | [`remnant_gain`] | the gain K_n for a demanded noise level |
-//! | [`GainUnit`] | the units of gains, from those of the channels |
-//! | [`Finding`], [`Verdict`] | reasons to doubt a result, and its reliability |
+//! | [`remnant_gain`] | the gain K_n for a given noise level |
+//! | [`GainUnit`] | units of gains, derived from the units of the channels |
+//! | [`Finding`], [`Verdict`] | observations about a result, and its reliability |
 //! | [`named_choice!`], [`NamedChoice`] | the names that users type |
 
 mod error;

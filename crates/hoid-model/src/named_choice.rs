@@ -46,7 +46,7 @@ pub struct UnknownName {
     pub expected: String,
 }
 
-/// Gives an enum without fields the names that users type: `ALL`, `NAMES`, `name`,
+/// Defines the names that users type for an enum without fields: `ALL`, `NAMES`, `name`,
 /// [`Display`](std::fmt::Display), [`FromStr`](std::str::FromStr) and [`NamedChoice`].
 ///
 /// ```
@@ -68,7 +68,7 @@ macro_rules! named_choice {
         impl $type {
             /// All choices, in the order in which they are listed.
             pub const ALL: [Self; $count] = [$(Self::$variant),+];
-            /// Their names.
+            /// The names of all choices.
             pub const NAMES: [&'static str; $count] = [$($name),+];
 
             /// The name that users type.
@@ -95,7 +95,7 @@ macro_rules! named_choice {
             }
         }
 
-        /// The names that users type, in any case.
+        /// Parses the name that users type, case-insensitively.
         impl ::std::str::FromStr for $type {
             type Err = $crate::UnknownName;
 

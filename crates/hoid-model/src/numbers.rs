@@ -1,8 +1,8 @@
 //! Numbers with as many digits as their standard error allows.
 //!
-//! A standard error is itself known to a few per cent at best, so that it is given with two
-//! significant digits and the value with the same decimals (ISO/IEC Guide 98-3, 7.2.6). Numbers
-//! without a standard error get five significant digits.
+//! A standard error is itself known to a few per cent at best, so that it is given with two significant digits, and the
+//! value with the same number of decimals (ISO/IEC Guide 98-3, 7.2.6). Numbers without a standard error are given with
+//! five significant digits.
 
 /// Text for a missing number.
 pub const DASH: &str = "\u{2013}";
@@ -13,13 +13,14 @@ pub const Z_95: f64 = 1.959_963_984_540_054;
 const DIGITS_OF_ERROR: i32 = 2;
 const DIGITS_ALONE: i32 = 5;
 
-/// Relative error below which an error is rounding of the last digits and not an uncertainty.
+/// Relative standard error below which the error is attributed to rounding.
 const LAST_DIGITS: f64 = 16.0 * f64::EPSILON;
-/// Number of digits of a value that is exact to rounding.
+/// Number of digits of a value whose error is only rounding.
 const ALL_DIGITS: i32 = 15;
 
-/// Returns value and standard error as text, both with the decimals for two significant digits of the error; the value
-/// has all its digits if its error is rounding. Returns a dash for non-finite values.
+/// Returns value and standard error as text, with as many decimals as two significant digits of the error need. If the
+/// error is only rounding, the value has all its digits and the error is a dash. A value that is not finite gives
+/// dashes.
 pub fn with_uncertainty(value: f64, standard_error: Option<f64>) -> (String, String) {
     if !value.is_finite() {
         return (DASH.to_owned(), DASH.to_owned());
@@ -35,7 +36,8 @@ pub fn with_uncertainty(value: f64, standard_error: Option<f64>) -> (String, Str
     }
 }
 
-/// Returns the interval `value +- factor * standard_error` with the same decimals; a dash without a standard error.
+/// Returns the interval `value +- factor * standard_error` with the decimals of [`with_uncertainty`]; a dash without a
+/// standard error.
 pub fn interval(value: f64, standard_error: Option<f64>, factor: f64) -> String {
     match standard_error.filter(|s| s.is_finite() && *s > 0.0 && value.is_finite()) {
         None => DASH.to_owned(),
@@ -48,7 +50,7 @@ pub fn interval(value: f64, standard_error: Option<f64>, factor: f64) -> String 
     }
 }
 
-/// Returns a number without standard error: five significant digits. A dash for non-finite values.
+/// Returns a number without a standard error, with five significant digits; a dash for non-finite values.
 pub fn plain(value: f64) -> String {
     significant(value, DIGITS_ALONE)
 }
@@ -79,13 +81,13 @@ pub fn fixed(value: f64, decimals: usize) -> String {
 
 /// Power of ten of the last significant digit.
 fn last_digit(value: f64, digits: i32) -> i32 {
-    // Rounding first: 0.0996 with two digits is 0.10, not 0.100.
+    // The number is rounded first: 0.0996 with two digits is 0.10, not 0.100.
     let text = format!("{:.*e}", (digits - 1) as usize, value.abs());
     let exponent: i32 = text.split_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or(0);
     exponent - (digits - 1)
 }
 
-/// Returns zero if the number is readable with plain decimals, otherwise its power of ten.
+/// Returns the power of ten of a number; zero if the number is readable without an exponent.
 fn exponent_for(size: f64) -> i32 {
     let exponent = size.log10().floor();
     if (-3.0..6.0).contains(&exponent) {
@@ -100,7 +102,7 @@ fn written(value: f64, last: i32, exponent: i32) -> String {
     if exponent == 0 {
         return without_negative_zero(format!("{value:.decimals$}"));
     }
-    // Through the decimal text of the scaled number: powi overflows for the smallest exponents.
+    // The number is scaled in two steps, because 10^exponent is out of range for the smallest numbers.
     let scaled = value / 10f64.powi(exponent / 2) / 10f64.powi(exponent - exponent / 2);
     without_negative_zero(format!("{scaled:.decimals$}e{exponent}"))
 }

@@ -29,7 +29,7 @@ pub struct OperatorParameters {
     pub tau_e_s: f64,
 }
 
-/// The discrete operator of the estimators: two coefficients in B, two poles, and a delay in samples.
+/// The discrete operator that estimators fit: two coefficients in B, two poles, and a delay in samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DiscreteOperator {
     /// `(b0 + b1 q^-1) q^-1 / (1 + f1 q^-1 + f2 q^-2)`.
@@ -40,18 +40,18 @@ pub struct DiscreteOperator {
     pub sample_time: SampleTime,
 }
 
-/// Value of `1 + f1 + f2` below which a pole counts as being at the origin of s: four digits above rounding.
+/// Value of `1 + f1 + f2` below which a pole counts as a pole at s = 0: four orders of magnitude above rounding.
 const AT_ORIGIN: f64 = 1e-12;
 
-/// Names of the physical parameters in the order of rows and columns of every Jacobian in this module.
+/// Names of the physical parameters, in the order of the rows or columns of every Jacobian in this module.
 pub const PHYSICAL_NAMES: [&str; 4] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm"];
 
 impl OperatorParameters {
-    /// Creates an operator from the parameters by name: `K_e`, `T_L` or `K_e_dot`, `omega_nm`, `zeta_nm`, and `tau_e`,
-    /// which is zero by default.
+    /// Creates an operator from named parameters: `K_e`, `T_L` or `K_e_dot`, `omega_nm`, `zeta_nm`, and `tau_e`, which
+    /// is zero by default.
     ///
     /// # Errors
-    /// [`ModelError::Operator`] for a name that is unknown or missing, or for two names of the same quantity.
+    /// [`ModelError::Operator`] for a name that is unknown or missing, or if one quantity is given under two names.
     pub fn of_names(pairs: &[(String, f64)]) -> Result<Self, ModelError> {
         const NAMES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
         let wrong = |reason: String| ModelError::Operator { reason };
@@ -153,14 +153,14 @@ impl DiscreteOperator {
     /// Returns the operator with this discrete model (eq. 12).
     ///
     /// # Errors
-    /// [`NotConvertible`] with the reason; numbers are never clipped.
+    /// [`NotConvertible`] with the reason; values are never clipped.
     pub fn parameters(&self) -> Result<OperatorParameters, NotConvertible> {
         if self.nk == 0 {
             return Err(NotConvertible::NoDelay);
         }
         let c = self.held.inverse_zoh(self.sample_time)?;
-        // K_e and omega_nm depend on 1 + f1 + f2, a difference of numbers of order 1: below this value only rounding is
-        // left.
+        // K_e and omega_nm depend on 1 + f1 + f2, a difference of numbers of order 1, which consists only of rounding
+        // errors below this value.
         let at_one = (1.0 + self.held.f1 + self.held.f2).abs();
         if c.a2 <= 0.0 || at_one < AT_ORIGIN {
             return Err(NotConvertible::NoNaturalFrequency { a1: c.a1, a2: c.a2 });
@@ -186,7 +186,7 @@ pub fn discretisation_jacobian(operator: &OperatorParameters, sample_time: Sampl
 }
 
 /// Returns the Jacobian of `[K_e, K_e_dot, omega_nm, zeta_nm]` (rows) with respect to `[b0, b1, f1, f2]` (columns): the
-/// inverse of [`discretisation_jacobian`]. `None` if that is singular.
+/// inverse of [`discretisation_jacobian`]. `None` if that Jacobian is singular.
 pub fn retrieval_jacobian(operator: &OperatorParameters, sample_time: SampleTime) -> Option<[[f64; 4]; 4]> {
     let forward = discretisation_jacobian(operator, sample_time);
     let matrix = Matrix4::from_fn(|i, j| forward[i][j]);

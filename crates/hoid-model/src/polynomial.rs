@@ -133,7 +133,7 @@ pub fn reflected_inside(coefficients: &[f64]) -> Option<Vec<f64>> {
         .into_iter()
         .map(|z| match z.norm() {
             r if r > 1.0 => 1.0 / z.conj(),
-            // A root on the circle is moved inwards slightly, or the filter would never forget.
+            // A root on the circle is moved inwards slightly; otherwise the transient of the filter would never decay.
             r if r > 0.999 => z * (0.999 / r),
             _ => z,
         })

@@ -120,7 +120,8 @@ impl PolynomialModel {
         self.part(self.orders.parameters() - self.orders.nf, self.orders.nf)
     }
 
-    /// True if the predictor `D A/C u`, `B D/(F C) e` is stable: all roots of C and F are inside the unit circle.
+    /// True if the predictor, with the filters `D A/C` of u and `B D/(F C)` of e, is stable: all roots of C and F are
+    /// inside the unit circle.
     pub fn predictor_is_stable(&self) -> bool {
         roots_inside(self.c(), 1.0) && roots_inside(self.f(), 1.0)
     }
@@ -133,7 +134,7 @@ impl PolynomialModel {
     /// Returns `B q^-nk / (A F)`.
     ///
     /// # Errors
-    /// None for a valid model; the signature is that of the constructor of the transfer function.
+    /// None for a valid model; the error type is that of [`DiscreteTransferFunction::new`].
     pub fn system(&self) -> Result<DiscreteTransferFunction, ModelError> {
         let mut num = vec![0.0; self.orders.nk];
         num.extend_from_slice(self.b());
@@ -167,7 +168,7 @@ impl PolynomialModel {
         (h, gradient)
     }
 
-    /// Returns the model as a discrete operator if it has two coefficients in B and two poles.
+    /// Returns the model as a discrete operator, which requires two coefficients in B and two poles.
     ///
     /// # Errors
     /// [`NotConvertible::OtherOrders`], [`NotConvertible::PolesInBoth`].
@@ -209,7 +210,7 @@ impl PolynomialModel {
     }
 }
 
-/// Returns the polynomial with its leading one.
+/// Returns the coefficients preceded by a leading 1.
 pub fn monic(coefficients: &[f64]) -> Vec<f64> {
     let mut p = Vec::with_capacity(coefficients.len() + 1);
     p.push(1.0);

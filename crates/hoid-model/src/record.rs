@@ -28,7 +28,7 @@ impl Channel {
     }
 }
 
-/// Trend to be removed from input and output before a fit.
+/// Trend that is removed from input and output before a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Detrend {
     /// No trend: the data remain unchanged.
@@ -152,7 +152,7 @@ impl Record {
 
     /// Time of sample `k` in s.
     pub fn time_s(&self, k: usize) -> f64 {
-        // From the index, not by summation: no rounding error grows along the record.
+        // The time follows from the index and not from a sum, so that no rounding error grows along the record.
         self.start_s + k as f64 * self.sample_time.s()
     }
 
@@ -186,7 +186,7 @@ impl Record {
         self.input.iter().chain([&self.output]).chain(&self.others)
     }
 
-    /// Returns its channels by value, without a copy: input, output, others.
+    /// Returns the channels by value, without a copy: input, output, others.
     pub fn into_channels(self) -> (Option<Channel>, Channel, Vec<Channel>) {
         (self.input, self.output, self.others)
     }
@@ -199,10 +199,10 @@ impl Record {
     /// Returns the samples with `from_s <= t < to_s`.
     ///
     /// # Errors
-    /// [`ModelError::EmptySpan`] if there are none.
+    /// [`ModelError::EmptySpan`] if there are no such samples.
     pub fn span(&self, from_s: f64, to_s: f64) -> Result<Self, ModelError> {
         let ts = self.sample_time.s();
-        // A bound at a sample, up to rounding, includes that sample.
+        // A bound that equals the time of a sample, up to rounding, is treated as that time.
         let index = |time_s: f64| ((time_s - self.start_s) / ts - 1e-6).ceil().max(0.0) as usize;
         let (first, end) = (index(from_s), index(to_s).min(self.len()));
         if from_s.is_nan() || to_s.is_nan() || first >= end {
@@ -224,14 +224,14 @@ impl Record {
         })
     }
 
-    /// Returns this record followed, from its next sample on, by another; any event at the boundary between the two
-    /// therefore has a known time.
+    /// Returns this record followed by another one, which starts one sample time after the last sample of this record,
+    /// so that the time of the boundary is known.
     ///
-    /// Channels that only one of them has are omitted; label, names and units are those of the first.
+    /// Channels that only one of the two records has are omitted; label, names and units are those of the first record.
     ///
     /// # Errors
-    /// [`ModelError::Joined`] if their sample times differ by more than one part in a million, or only one of them has
-    /// an input.
+    /// [`ModelError::Joined`] if the sample times differ by more than one part in a million, or if only one of the two
+    /// records has an input.
     pub fn joined(mut self, next: &Self) -> Result<Self, ModelError> {
         let (first, second) = (self.sample_time.s(), next.sample_time.s());
         let refuse = |found: String, expected: &'static str| ModelError::Joined {
@@ -242,7 +242,7 @@ impl Record {
         if (first - second).abs() > 1e-6 * first {
             return Err(refuse(
                 format!("a sample time of {second} s after {first} s"),
-                "the same: read both at one rate",
+                "the same sample time: read both records at one rate",
             ));
         }
         match (&mut self.input, &next.input) {
@@ -250,8 +250,8 @@ impl Record {
             (None, None) => {}
             _ => {
                 return Err(refuse(
-                    "an input in one of them only".to_owned(),
-                    "an input in both or in none",
+                    "an input in only one of the records".to_owned(),
+                    "an input in both records or in neither",
                 ));
             }
         }
@@ -267,8 +267,8 @@ impl Record {
         Ok(self)
     }
 
-    /// Returns the same record with the mean or the line removed from input and output; other channels remain
-    /// unchanged.
+    /// Returns the same record with its mean or its least squares line removed from input and output; other channels
+    /// remain unchanged.
     pub fn detrended(mut self, how: Detrend) -> Self {
         self.signals_mut().for_each(|values| take_out(how, values));
         self

@@ -1,6 +1,6 @@
-//! The remnant gain K_n for a demanded noise level P_n (appendix A of the thesis).
+//! The remnant gain K_n for a given noise level P_n (appendix A of the thesis).
 //!
-//! With `S = 1/(1 + H_HO H_CE)`, unit white noise drawn once per sample (its power is spread evenly over 0 to pi/Ts),
+//! With `S = 1/(1 + H_HO H_CE)`, unit white noise drawn once per sample (with its power spread evenly over 0 to pi/Ts),
 //! and
 //!
 //! - `V_f = 1/2 sum A_k^2 |S H_HO (j omega_k)|^2`, the variance of u due to the forcing function,
@@ -8,18 +8,18 @@
 //!   K_n = 1,
 //! - `V_n = Ts/pi  integral_0^{pi/Ts} 1 / (1 + T_n^2 omega^2)^m d omega`, the variance of the remnant itself,
 //!
-//! the two definitions give
+//! the two definitions of P_n give
 //!
 //! - `P_n = var(u_n)/var(u)`: `K_n^2 = P_n/(1 - P_n) V_f/V_u` (eq. 43, A.14), for every P_n from 0
 //!   to below 1;
 //! - `P_n = var(n)/var(u)`: `K_n^2 = P_n V_f / (V_n - P_n V_u)` (A.17), for P_n from 0 to below
 //!   `V_n/V_u`.
 //!
-//! All quantities are those of the continuous loop, as in the thesis. V_n has a closed form. V_u is integrated by the
-//! adaptive Gauss-Kronrod rule of 7 and 15 points to 1e-10 relative, from a partition at the local maxima of the
+//! All quantities are computed for the continuous loop, as in the thesis. V_n has a closed form. V_u is integrated by
+//! the adaptive Gauss-Kronrod rule of 7 and 15 points to 1e-10 relative, from a partition at the local maxima of the
 //! integrand: the peaks near crossover and at lightly damped closed-loop modes. S is evaluated from polynomials,
-//! `D / (D + N e^{-j omega tau})`, which is 0 at an integrator of the loop where `1/(1 + infinity)` would not be a
-//! number.
+//! `D / (D + N e^{-j omega tau})`, which is 0 at a pole of the loop on the imaginary axis, where `1/(1 + infinity)`
+//! would not be a number.
 
 use num_complex::Complex64;
 
@@ -30,11 +30,10 @@ use crate::{
 /// Definition of the noise level P_n.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum NoiseDefinition {
-    /// `var(u_n)/var(u)`: the part of the operator's output that is caused by the remnant, through the loop (eq. 43,
-    /// A.14).
+    /// `var(u_n)/var(u)`: share of the variance of u that the remnant causes through the loop (eq. 43, A.14).
     #[default]
     Response,
-    /// `var(n)/var(u)`: the remnant itself (A.17).
+    /// `var(n)/var(u)`: variance of the remnant itself, relative to that of u (A.17).
     Remnant,
 }
 
@@ -54,8 +53,8 @@ const TOLERANCE: f64 = 1e-10;
 
 /// Computes the remnant gain K_n for a noise level P_n.
 ///
-/// `order` and `time_constant_s` are those of the remnant filter, `lines` the forcing function,
-/// `sample_time` that of the noise draws. K_n is 0 for a level of 0.
+/// `order` and `time_constant_s` describe the remnant filter and `lines` the forcing function; `sample_time` is the
+/// time between noise draws. K_n is 0 for a level of 0.
 ///
 /// # Errors
 /// [`ModelError::OutOfRange`] for a level below 0 (or not below 1 for [`NoiseDefinition::Response`]), a remnant order
@@ -104,7 +103,7 @@ pub fn remnant_gain(
             }
         }
     }
-    // A level of zero needs no gain, also in an unstable loop.
+    // A level of zero needs no gain, even in an unstable loop.
     if level == 0.0 {
         return Ok(0.0);
     }
@@ -200,8 +199,7 @@ fn remnant_integral(order: usize, x: f64) -> f64 {
     integral
 }
 
-/// Nodes of the 15-point Kronrod rule on [-1, 1], from the outermost to 0; every second one belongs
-/// to the Gauss rule.
+/// Nodes of the 15-point Kronrod rule on [-1, 1], from the outermost to 0; every second node belongs to the Gauss rule.
 const NODES: [f64; 8] = [
     0.991_455_371_120_812_6,
     0.949_107_912_342_758_5,
@@ -229,7 +227,7 @@ const GAUSS_WEIGHTS: [f64; 4] = [
     0.417_959_183_673_469_4,
 ];
 
-/// An interval with its integral and the difference of the two rules.
+/// An interval with its integral and the difference between the two rules.
 struct Interval {
     from: f64,
     to: f64,
@@ -280,7 +278,7 @@ fn integrate(f: impl Fn(f64) -> f64, band: f64) -> f64 {
     let mut intervals: Vec<Interval> = edges.windows(2).map(|e| Interval::new(&f, e[0], e[1])).collect();
     while intervals.len() < MOST_INTERVALS {
         let total: f64 = intervals.iter().map(|i| i.integral).sum();
-        // Each interval has its share of the tolerance; all that exceed it are halved.
+        // Each interval has its share of the tolerance; intervals that exceed it are halved.
         let allowed = TOLERANCE * total / intervals.len() as f64;
         let (good, poor): (Vec<Interval>, Vec<Interval>) = intervals.into_iter().partition(|i| i.error <= allowed);
         intervals = good;

@@ -1,9 +1,10 @@
 //! The noise model of the exactly held remnant as a function of T_n, with its derivatives.
 //!
 //! `K_n/(T_n s + 1)^m`, driven by one normal deviate of unit variance per sample, has the innovation form `C/D eps`
-//! with `D = (1 - p q^-1)^m`, `p = e^{-Ts/T_n}`, C the monic spectral factor of the numerator of the zero-order hold
-//! ([`crate::remnant`]), and `sigma = K_n g(T_n)`. The derivatives: `dp/dT_n = p Ts/T_n^2`; a zero zeta of the
-//! numerator N moves by `-N_a/N_zeta` with `a = Ts/T_n`, its mirror image `1/conj zeta` accordingly.
+//! with `D = (1 - p q^-1)^m`, `p = e^{-Ts/T_n}`, and `sigma = K_n g(T_n)`; C is the monic spectral factor of the
+//! numerator of the zero-order hold ([`crate::remnant`]). The derivatives follow from `dp/dT_n = p Ts/T_n^2` and from
+//! the derivative `-N_a/N_zeta` of a zero zeta of the numerator N with respect to `a = Ts/T_n`, which also gives that
+//! of its mirror image `1/conj zeta`.
 
 use crate::{
     ModelError, SampleTime,
@@ -19,11 +20,11 @@ pub struct RemnantNoise {
     pub d: Vec<f64>,
     /// Standard deviation of the innovation for K_n = 1.
     pub gain: f64,
-    /// Derivatives of c, 1/s.
+    /// Derivatives of c with respect to T_n, 1/s.
     pub c_slope: Vec<f64>,
-    /// Derivatives of d, 1/s.
+    /// Derivatives of d with respect to T_n, 1/s.
     pub d_slope: Vec<f64>,
-    /// Derivative of `ln g`, 1/s.
+    /// Derivative of `ln g` with respect to T_n, 1/s.
     pub log_gain_slope: f64,
 }
 
@@ -52,7 +53,7 @@ pub fn remnant_noise(time_constant_s: f64, order: usize, sample_time: SampleTime
     let held = Factored::new(order, a);
     let a_slope = -a / time_constant_s;
     let d = denominator(order, (-a).exp());
-    // Zeros that vanish for a fast filter make C shorter than its order.
+    // For a fast filter some zeros vanish; C is then padded with zero coefficients.
     let padded = |p: &[f64], factor: f64| -> Vec<f64> {
         (1..order).map(|i| factor * p.get(i).copied().unwrap_or(0.0)).collect()
     };

@@ -44,8 +44,8 @@ impl SampleTime {
         }
     }
 
-    /// Returns the nearest delay of b0 in samples, `nk = tau_e/Ts + 1`, for a delay tau_e in s; the largest number if
-    /// it is out of range.
+    /// Returns the nearest delay of b0 in samples, `nk = tau_e/Ts + 1`, for a delay tau_e in s; `usize::MAX` if the
+    /// delay is too long.
     pub fn nk(self, tau_e_s: f64) -> usize {
         ((tau_e_s / self.0).round() as usize).saturating_add(1)
     }
@@ -60,7 +60,7 @@ impl SampleTime {
         std::f64::consts::PI / self.0
     }
 
-    /// Returns a time in s as an integer number of samples if it is one within `1e-6` of a sample.
+    /// Returns a time in s as a number of samples if it is within `1e-6` of an integer number.
     ///
     /// The quotient is rounded, never truncated: `0.29 / 0.01` is `28.999999999999996` in floating point and means 29.
     pub fn whole_samples(self, time_s: f64) -> Option<usize> {

@@ -1,9 +1,8 @@
 //! Scenarios: operator, controlled element, remnant, and their change.
 //!
-//! The thesis's two states of adaptation (Table 2) and its six conditions (Table 4.4) are here as
-//! data:
+//! This module defines the two states of adaptation (Table 2) and the six conditions (Table 4.4) of the thesis:
 //!
-//! | condition | operator and controlled element | rate of change G |
+//! | condition | operator and controlled element | transition rate G |
 //! |---|---|---|
 //! | C1 | s1 throughout | - |
 //! | C2 | s2 throughout | - |
@@ -12,8 +11,8 @@
 //!
 //! The gains, time constants and frequencies of operator and controlled element and the remnant gain K_n follow one
 //! sigmoid (eq. 5); the remnant time constant is constant. The delay is constant in the conditions of the thesis; if it
-//! changes, it follows the same sigmoid, in steps of a sample. The remnant gain of each state gives the demanded noise
-//! level in that state (eq. 43 or A.17).
+//! changes, it follows the same sigmoid, in steps of one sample. The remnant gain of each state is the gain that gives
+//! the required noise level in that state (eq. 43 or A.17).
 
 use crate::{
     ModelError, OperatorParameters, SampleTime,
@@ -24,7 +23,8 @@ use crate::{
     schedule::Schedule,
 };
 
-/// Longest run, in samples: 11 days at 100 Hz. A wrong exponent of a time is reported before all memory is allocated.
+/// Longest run, in samples: 11 days at 100 Hz. Because of this limit, a time with a wrong exponent is reported before
+/// memory is exhausted.
 const MOST_SAMPLES: usize = 100_000_000;
 
 /// A state of adaptation: the operator and the controlled element.
@@ -92,7 +92,7 @@ crate::named_choice!(Condition, "condition", 6, {
     C6 => "C6",
 });
 
-/// Strength of the remnant.
+/// Strength of the remnant, given as a noise level or as a gain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RemnantStrength {
     /// The gain is computed for this noise level in each state.
@@ -104,16 +104,16 @@ pub enum RemnantStrength {
     },
     /// The gain K_n itself, before and after the change.
     Gain {
-        /// K_n of the initial state.
+        /// K_n before the change.
         initial: f64,
-        /// K_n of the last state.
+        /// K_n after the change.
         last: f64,
     },
 }
 
 impl RemnantStrength {
-    /// Returns the strength with another level, another definition of it, or both. `None` for a definition without a
-    /// level if the gain itself is given.
+    /// Returns the strength with another level, another definition of the level, or both. `None` if a definition is
+    /// given without a level while the strength is a gain.
     pub fn changed(self, level: Option<f64>, definition: Option<NoiseDefinition>) -> Option<Self> {
         match (self, level, definition) {
             (same, None, None) => Some(same),
@@ -137,12 +137,12 @@ pub struct RemnantSetting {
     pub order: usize,
     /// Time constant T_n, s.
     pub time_constant_s: f64,
-    /// Its strength.
+    /// Strength of the remnant.
     pub strength: RemnantStrength,
 }
 
 impl Default for RemnantSetting {
-    /// First order, T_n = 0.06 s, noise level 0.1 of the variance of the control.
+    /// First order, T_n = 0.06 s, noise level P_n = 0.1.
     fn default() -> Self {
         Self {
             order: 1,
@@ -188,7 +188,7 @@ pub struct Scenario {
     pub measurement_s: f64,
     /// Run-in t_0 before the measurement, s. Default 10 s.
     pub run_in_s: f64,
-    /// Realisation of the controlled element.
+    /// Position of K_c in the state-space form of the controlled element.
     pub realisation: Realisation,
 }
 
@@ -245,7 +245,8 @@ impl Scenario {
         }
     }
 
-    /// Returns the remnant gain of a state: the given one, or the one for the demanded noise level.
+    /// Returns the remnant gain of a state: `given` if the strength is a gain, otherwise the gain for the required
+    /// noise level.
     ///
     /// # Errors
     /// As [`remnant_gain`].
@@ -285,7 +286,7 @@ impl Scenario {
     /// Checks the scenario and computes the quantities for a simulation.
     ///
     /// # Errors
-    /// [`ModelError`] with the parameter.
+    /// [`ModelError`], which names the parameter.
     pub fn resolve(&self) -> Result<ResolvedScenario, ModelError> {
         self.schedule.check()?;
         let samples = |quantity: &'static str, time_s: f64| {

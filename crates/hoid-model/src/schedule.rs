@@ -2,7 +2,7 @@
 //!
 //! `p(t) = p_i + (p_f - p_i) / (1 + e^{-G (t - t_M)})`   (eq. 5)
 //!
-//! Repeated changes of a person are sigmoids of alternating sign every T seconds,
+//! Repeated changes are sigmoids of alternating sign, one every T seconds:
 //! `p(t) = p_i + (p_f - p_i) sum over k of (-1)^k / (1 + e^{-G (t - t_M - k T)})`.
 
 use crate::ModelError;
@@ -17,14 +17,14 @@ pub enum Schedule {
     Sigmoid {
         /// Transition rate G, 1/s.
         rate_per_s: f64,
-        /// Time t_M of the largest rate of change, s from the start of the measurement.
+        /// Time t_M of the largest rate of change, in s from the start of the measurement.
         midpoint_s: f64,
     },
     /// Repeated changes back and forth, for the whole run.
     Alternating {
         /// Transition rate G of each change, 1/s.
         rate_per_s: f64,
-        /// Time of the first change t_M, s from the start of the measurement.
+        /// Time t_M of the first change, in s from the start of the measurement.
         midpoint_s: f64,
         /// Time T from one change to the next, s.
         interval_s: f64,
@@ -32,15 +32,16 @@ pub enum Schedule {
 }
 
 /// Number of time constants 1/G after which a transition is complete: e^-40 is below half a unit in the last place.
-const OVER: f64 = 40.0;
-/// Least interval between two changes, in time constants 1/G.
+const COMPLETE_AFTER: f64 = 40.0;
+/// Shortest interval between two changes, in time constants 1/G.
 const SHORTEST: f64 = 1.0;
 
 impl Schedule {
-    /// Checks rate and midpoint.
+    /// Checks the rate, the time and the interval of the changes.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] unless the rate is positive and both are finite.
+    /// [`ModelError::OutOfRange`] if the rate is not positive, a number is not finite, or the interval is shorter than
+    /// 1/G.
     pub fn check(&self) -> Result<(), ModelError> {
         let (rate_per_s, midpoint_s, interval_s) = match *self {
             Self::Constant => return Ok(()),
@@ -55,7 +56,7 @@ impl Schedule {
             return Err(ModelError::OutOfRange {
                 quantity: "transition rate G in 1/s",
                 found: rate_per_s,
-                expected: "a positive finite number; exchange the initial and the final state to go the other way",
+                expected: "a positive finite number; exchange the initial and the final state to reverse the change",
             });
         }
         if !midpoint_s.is_finite() {
@@ -93,7 +94,7 @@ impl Schedule {
         }
     }
 
-    /// Returns the times t_M + k T of all changes up to `end_s`.
+    /// Returns the times t_M + k T of all changes before `end_s`; a single change is always included.
     pub fn changes_s(&self, end_s: f64) -> Vec<f64> {
         match *self {
             Self::Constant => Vec::new(),
@@ -107,24 +108,26 @@ impl Schedule {
         }
     }
 
-    /// Returns p(t) between `initial` and `finally`. Far from t_M it equals one of them to the last bit.
-    pub fn value(&self, initial: f64, finally: f64, t_s: f64) -> f64 {
+    /// Returns p(t) between `initial` and `final_value`. Far from a single change, it equals one of the two to the last
+    /// bit.
+    pub fn value(&self, initial: f64, final_value: f64, t_s: f64) -> f64 {
         match *self {
             Self::Constant => initial,
             Self::Sigmoid { rate_per_s, midpoint_s } => {
                 let x = rate_per_s * (t_s - midpoint_s);
-                // The exponential of the nearer end: it cannot overflow, and that end is exact.
+                // The value is computed from the nearer end: the exponential cannot overflow, and far from t_M that end
+                // is exact.
                 let far = (-x.abs()).exp();
-                let part = (finally - initial) * (far / (1.0 + far));
-                if x < 0.0 { initial + part } else { finally - part }
+                let part = (final_value - initial) * (far / (1.0 + far));
+                if x < 0.0 { initial + part } else { final_value - part }
             }
             Self::Alternating {
                 rate_per_s,
                 midpoint_s,
                 interval_s,
             } => {
-                let (since, reach) = ((t_s - midpoint_s) / interval_s, OVER / (rate_per_s * interval_s));
-                // Changes before the first of these are complete: in pairs they cancel.
+                let (since, reach) = ((t_s - midpoint_s) / interval_s, COMPLETE_AFTER / (rate_per_s * interval_s));
+                // Earlier changes are complete, and their sum is zero because their number is even.
                 let first = 2.0 * ((since - reach).max(0.0) / 2.0).floor();
                 let last = (since + reach).ceil();
                 let (mut covered, mut k) = (0.0, first);
@@ -134,7 +137,7 @@ impl Schedule {
                     covered += sign / (1.0 + (-x).exp());
                     k += 1.0;
                 }
-                initial + (finally - initial) * covered
+                initial + (final_value - initial) * covered
             }
         }
     }

@@ -13,11 +13,11 @@
 //!   frequency gives `b0_d + b1_d = b1 Ts^2 chi`,
 //!   `chi = (1 + f1 + f2) / q = exp[0, z1] exp[0, z2]`.
 //!
-//! All of these are symmetric in the poles and entire in (s, q): complex, real and double poles and poles at the origin
-//! of s are described by the same formulas ([`hoid_core::divided_differences`]). This replaces the matrix exponential
-//! and logarithm of the extended matrix (eq. B.7); the results are the same. The inverse exists if no pole in z is on
-//! the closed negative real axis (then the logarithm is the principal one). Source: N. J. Higham, *Functions of
-//! Matrices*, 2008, sections 2.4 and B.16 (divided differences); eq. B.3-B.10 of the thesis.
+//! These quantities are symmetric in the poles and entire functions of (s, q): the same formulas hold for complex, real
+//! and double poles and for poles at the origin of s ([`hoid_core::divided_differences`]). They replace the matrix
+//! exponential and logarithm of the extended matrix (eq. B.7) and give the same results. The inverse exists if no pole
+//! in z is on the closed negative real axis; the logarithm is then the principal one. Sources: N. J. Higham, *Functions
+//! of Matrices*, 2008, sections 2.4 and B.16 (divided differences); eq. B.3-B.10 of the thesis.
 
 use hoid_core::divided_differences::DividedDifferences;
 
@@ -70,7 +70,7 @@ impl SecondOrder {
 }
 
 impl HeldSecondOrder {
-    /// Returns the model itself if no exponential has overflowed.
+    /// Returns the model if its coefficients are finite, so that no exponential has overflowed.
     pub(crate) fn finite(self) -> Result<Self, ModelError> {
         for (quantity, found) in [("b0", self.b0), ("b1", self.b1), ("f1", self.f1), ("f2", self.f2)] {
             if !found.is_finite() {
@@ -161,7 +161,7 @@ pub fn hold_biproper(
     if den[0] == 0.0 {
         return Err(ModelError::TransferFunction {
             found: format!("{num:?} / {den:?}"),
-            expected: "a denominator of second order, with a leading coefficient that is not zero".to_owned(),
+            expected: "a denominator of second order, with a nonzero leading coefficient".to_owned(),
         });
     }
     let [d, n1, n2] = num.map(|c| c / den[0]);

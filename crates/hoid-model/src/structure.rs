@@ -2,10 +2,10 @@
 //!
 //! The general family is `A(q^-1) u(t) = B(q^-1)/F(q^-1) e(t-nk) + C(q^-1)/D(q^-1) eps(t)` (eq. 5.1 times A). A
 //! structure defines which polynomials are present. Orders follow the convention of common identification software: nb
-//! is the number of coefficients `b0 ... b_{nb-1}` of B, the others are the numbers of coefficients after the leading
-//! one, nk is the delay of b0 in samples.
+//! is the number of coefficients `b0 ... b_{nb-1}` of B, each other order is the number of coefficients after the
+//! leading 1, and nk is the delay of b0 in samples.
 //!
-//! This is the only list of structures: the command line, plans and Python take their names from it.
+//! This is the only list of structures: the command line, plans and Python use its names.
 //!
 //! ```
 //! use hoid_model::Structure;
@@ -23,7 +23,7 @@ pub use hoid_core::stability::MAX_ORDER;
 
 use crate::ModelError;
 
-/// The polynomials of a model (Table 5.1).
+/// Structure of a model: the polynomials that are present (Table 5.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum Structure {
@@ -80,9 +80,9 @@ impl Structure {
         matches!(self, Self::Fir | Self::Ar | Self::Arx)
     }
 
-    /// Returns the orders with which the structure is nearest to the human operator (two poles, b0 and b1) with a
-    /// remnant of first order: `ARX(na=2, nb=2)`, `BJ(nb=2, nc=0, nd=1, nf=2)`. For a structure without poles or input,
-    /// these are typical orders.
+    /// Returns the orders for which the structure is nearest to the human operator (two poles, b0 and b1) with a
+    /// remnant of first order: `ARX(na=2, nb=2)`, `BJ(nb=2, nc=0, nd=1, nf=2)`. If the structure has no poles or no
+    /// input, the orders are typical values.
     pub fn operator_orders(self, nk: usize) -> Orders {
         let base = Orders {
             nb: 2,
@@ -90,7 +90,7 @@ impl Structure {
             ..Orders::default()
         };
         match self {
-            // One time constant of the neuromuscular system at 100 Hz.
+            // 0.2 s at 100 Hz, about one time constant of the neuromuscular system.
             Self::Fir => Orders { nb: 20, ..base },
             Self::Ar => Orders {
                 na: 2,
@@ -128,7 +128,7 @@ impl Structure {
     }
 }
 
-// In the order of Table 5.1, and the general form after them.
+// The structures are in the order of Table 5.1, followed by the general form.
 crate::named_choice!(Structure, "structure", 11, {
     Fir => "fir",
     Ar => "ar",
@@ -192,7 +192,7 @@ impl Orders {
             .collect()
     }
 
-    /// Returns the first sample at which the regression needs no input or output from before the record:
+    /// Returns the first sample whose regression needs no input or output from before the record:
     /// `max(na, nk + nb - 1)`.
     pub fn first_regressed_sample(&self) -> usize {
         self.na.max(self.nk.saturating_add(self.nb.saturating_sub(1)))
@@ -201,7 +201,7 @@ impl Orders {
     /// Checks the orders against the structure.
     ///
     /// # Errors
-    /// [`ModelError::Orders`] with the problem.
+    /// [`ModelError::Orders`], which describes the problem.
     pub fn check(&self, structure: Structure) -> Result<(), ModelError> {
         let refuse = |expected: String| {
             Err(ModelError::Orders {

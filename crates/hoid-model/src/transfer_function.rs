@@ -1,4 +1,4 @@
-//! Transfer functions in s and in z. The module `text` reads and formats those in s.
+//! Transfer functions in s and in z. The module `text` parses and formats transfer functions in s.
 
 mod text;
 
@@ -77,7 +77,7 @@ impl ContinuousTransferFunction {
         self.delay_s
     }
 
-    /// Returns the series connection: the product of both, with the delays added.
+    /// Returns the series connection: the product of both transfer functions, with the sum of their delays.
     pub fn series(&self, other: &Self) -> Self {
         Self {
             num: polynomial::product(&self.num, &other.num),
@@ -127,7 +127,7 @@ impl DiscreteTransferFunction {
                 sample_time,
             }),
             _ => Err(refuse(
-                "the denominator must start with a coefficient that is not zero (causality)",
+                "the denominator must start with a nonzero coefficient (causality)",
             )),
         }
     }

@@ -1,10 +1,9 @@
 //! Standard errors of derived quantities by the delta method.
 //!
-//! For `y = g(theta)` and an estimate with covariance P, `var y ~ G P G'` with `G = dg/dtheta` at
-//! the estimate. For the operator, G is the inverse of the Jacobian of the exact zero-order hold
-//! ([`crate::operator::retrieval_jacobian`]); the lead time is the ratio `T_L = K_e_dot / K_e`,
-//! whose first-order error is accurate as long as K_e is several standard errors away from zero. Source: A. W. van der
-//! Vaart, *Asymptotic Statistics*, 1998, section 3.1.
+//! For `y = g(theta)` and an estimate with covariance P, `var y ~ G P G'` with `G = dg/dtheta` at the estimate. For the
+//! operator, G is the inverse of the Jacobian of the exact zero-order hold ([`crate::operator::retrieval_jacobian`]).
+//! The lead time constant is the ratio `T_L = K_e_dot / K_e`, whose first-order error is accurate as long as K_e is
+//! several standard errors away from zero. Source: A. W. van der Vaart, *Asymptotic Statistics*, 1998, section 3.1.
 
 use std::fmt;
 
@@ -20,17 +19,17 @@ pub use crate::estimate::Estimate;
 /// The operator with the standard errors of its parameters.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OperatorEstimate {
-    /// Error gain K_e, in the unit of u divided by that of e.
+    /// Error gain K_e, in the unit of u divided by the unit of e.
     pub k_e: Estimate,
     /// Lead time constant T_L, s.
     pub t_l_s: Estimate,
-    /// Error-rate gain K_e_dot, s.
+    /// Error-rate gain K_e_dot, in s times the unit of u divided by the unit of e.
     pub k_e_dot: Estimate,
     /// Neuromuscular frequency omega_nm, rad/s.
     pub omega_nm_rad_s: Estimate,
-    /// Neuromuscular damping zeta_nm.
+    /// Neuromuscular damping ratio zeta_nm.
     pub zeta_nm: Estimate,
-    /// Delay tau_e = (nk - 1) Ts, s: an integer number of samples, without a standard error if it was given.
+    /// Delay tau_e = (nk - 1) Ts, s: an integer number of samples, without a standard error if the delay was given.
     pub tau_e_s: Estimate,
 }
 
@@ -60,8 +59,8 @@ impl OperatorEstimate {
         }
     }
 
-    /// Returns name, unit and estimate of each parameter, in the order of the tables; the names of gains are those of
-    /// [`GainUnit`](crate::GainUnit).
+    /// Returns name, unit and estimate of each parameter, in the order of the tables; the names of the gains are those
+    /// that [`GainUnit`](crate::GainUnit) uses.
     pub fn rows(&self) -> [(&'static str, &'static str, Estimate); 6] {
         [
             ("K_e", "", self.k_e),
@@ -93,7 +92,7 @@ impl fmt::Display for OperatorEstimate {
 pub struct RemnantEstimate {
     /// Order m of the filter.
     pub order: usize,
-    /// Discretisation that was inverted.
+    /// Discretisation whose inverse gave these estimates.
     pub discretisation: RemnantDiscretisation,
     /// Time constant T_n, s.
     pub t_n_s: Estimate,
@@ -108,7 +107,7 @@ impl fmt::Display for RemnantEstimate {
     }
 }
 
-/// `gradient' P gradient` for a covariance by rows.
+/// `gradient' P gradient`, with the covariance P by rows.
 pub fn variance_along(gradient: &[f64], covariance: &[f64]) -> f64 {
     let p = gradient.len();
     let mut total = 0.0;
@@ -125,7 +124,7 @@ pub fn variance_along(gradient: &[f64], covariance: &[f64]) -> f64 {
     }
 }
 
-/// Returns the operator parameters of a model with the covariance of its theta (by rows).
+/// Returns the operator parameters of a model, with standard errors from the covariance of theta (by rows).
 ///
 /// # Errors
 /// [`NotConvertible`] with the reason.
@@ -155,9 +154,9 @@ pub fn operator_estimate(model: &PolynomialModel, covariance: &[f64]) -> Result<
     })
 }
 
-/// Returns T_n and K_n of a model's noise polynomial D, with the covariance of its theta (by rows) and the standard
-/// deviation of the innovation, whose own variance is `innovation_sd_variance` and which is uncorrelated with theta
-/// (Gaussian innovations).
+/// Returns T_n and K_n from the noise polynomial D of a model. Their standard errors follow from the covariance of
+/// theta (by rows) and from `innovation_sd_variance`, the variance of the standard deviation of the innovation, which
+/// is uncorrelated with theta for Gaussian innovations.
 ///
 /// # Errors
 /// [`NotConvertible`] with the reason.

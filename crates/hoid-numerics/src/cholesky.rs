@@ -1,18 +1,17 @@
-//! Positive definite systems by `A = L L'` and two triangular systems, in place (A. L. Cholesky, by
-//! E. Benoit, *Bulletin géodésique* 2 (1924) 67-77; G. H. Golub and C. F. Van Loan, *Matrix
-//! Computations*, 2013, section 4.2).
+//! Solution of positive definite systems in place, by the factorisation `A = L L'` and two triangular systems (A. L.
+//! Cholesky, by E. Benoit, *Bulletin géodésique* 2 (1924) 67-77; G. H. Golub and C. F. Van Loan, *Matrix Computations*,
+//! 2013, section 4.2).
 //!
-//! Matrices are N by N, of which the first n rows and columns are used. [`solve`] subtracts each known term as soon as
-//! it is known.
-//! [`forward`] and [`backward`] sum the known terms and subtract the sum: both together equal [`solve`] except for
-//! rounding.
+//! Matrices are N by N; only the first n rows and columns are used. [`solve`] subtracts each known term as soon as it
+//! is known, whereas [`forward`] and [`backward`] sum the known terms and subtract the sum. The two together equal
+//! [`solve`] except for rounding.
 
-/// Replaces the lower triangle of A by L; false if A is not positive definite.
+/// Replaces the lower triangle of A by L. Returns false if A is not positive definite.
 pub fn factor<const N: usize>(a: &mut [[f64; N]; N], n: usize) -> bool {
     factor_above(a, n, 0.0)
 }
 
-/// Replaces the lower triangle of A by L; false if the square of a number on its diagonal is not above `least`.
+/// Replaces the lower triangle of A by L. Returns false if the square of a diagonal element of L is not above `least`.
 pub fn factor_above<const N: usize>(a: &mut [[f64; N]; N], n: usize, least: f64) -> bool {
     for i in 0..n {
         for j in 0..=i {
@@ -32,7 +31,7 @@ pub fn factor_above<const N: usize>(a: &mut [[f64; N]; N], n: usize, least: f64)
     true
 }
 
-/// Replaces b by the solution of `A x = b`, with L of [`factor`].
+/// Replaces b by the solution of `A x = b`, given L from [`factor`].
 pub fn solve<const N: usize>(l: &[[f64; N]; N], n: usize, b: &mut [f64; N]) {
     for i in 0..n {
         let mut sum = b[i];
@@ -50,7 +49,7 @@ pub fn solve<const N: usize>(l: &[[f64; N]; N], n: usize, b: &mut [f64; N]) {
     }
 }
 
-/// Returns `scale A^-1`, with L of [`factor`]; zeros beyond the first n rows and columns.
+/// Returns `scale A^-1`, given L from [`factor`], with zeros beyond the first n rows and columns.
 pub fn scaled_inverse<const N: usize>(l: &[[f64; N]; N], n: usize, scale: f64) -> [[f64; N]; N] {
     let mut inverse = [[0.0; N]; N];
     for (i, row) in inverse.iter_mut().enumerate().take(n) {

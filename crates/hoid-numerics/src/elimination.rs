@@ -1,19 +1,18 @@
-//! Solution of linear systems in place, by elimination without roots.
+//! Solution of linear systems in place, by elimination without square roots.
 //!
-//! **Positive definite**, one right-hand side ([`solve`]). With rows `u_k` and pivots `p_k = u_kk`,
-//! `A = sum_k u_k' u_k/p_k` (C. F. Gauss, *Disquisitio de elementis ellipticis Palladis*, 1810): the right-hand side
-//! is eliminated together with A. In the back substitution each unknown is subtracted from all equations before it as
-//! soon as it is known, so that no step waits for a whole sum. If the factor itself is needed, use
-//! [`crate::cholesky`].
+//! **Positive definite matrices**, one right-hand side ([`solve`]). With rows `u_k` and pivots `p_k = u_kk`,
+//! `A = sum_k u_k' u_k/p_k` (C. F. Gauss, *Disquisitio de elementis ellipticis Palladis*, 1810). The right-hand side is
+//! eliminated together with A. In the back substitution each unknown is subtracted from all preceding equations as soon
+//! as it is known, so that no step waits for a complete sum. If the factor itself is needed, use [`crate::cholesky`].
 //!
-//! **Any matrix**, several right-hand sides ([`solve_any`]): with row pivots (G. H. Golub and C. F. Van Loan, *Matrix
-//! Computations*, 2013, section 3.4).
+//! **General matrices**, several right-hand sides ([`solve_any`]), with row pivoting (G. H. Golub and C. F. Van Loan,
+//! *Matrix Computations*, 2013, section 3.4).
 
 /// Number of columns that are computed at a time.
 const WIDE: usize = 4;
 
-/// Replaces b by the solution, for the first n of N unknowns; false if A is not positive definite. Only the upper
-/// triangle of A is read, and it is overwritten. N is a multiple of four.
+/// Replaces b by the solution for the first n of N unknowns. Returns false if A is not positive definite. Only the
+/// upper triangle of A is read, and it is overwritten. N must be a multiple of four.
 #[inline(always)]
 pub fn solve<const N: usize>(a: &mut [[f64; N]; N], n: usize, b: &mut [f64; N]) -> bool {
     const { assert!(N.is_multiple_of(WIDE)) };
@@ -53,8 +52,7 @@ pub fn solve<const N: usize>(a: &mut [[f64; N]; N], n: usize, b: &mut [f64; N]) 
     true
 }
 
-/// Replaces B by the solution X of `A X = B`, and returns `ln |det A|`. For a singular matrix the numbers are not
-/// finite.
+/// Replaces B by the solution X of `A X = B` and returns `ln |det A|`. If A is singular, the results are not finite.
 pub fn solve_any<const N: usize>(a: &mut [[f64; N]; N], b: &mut [[f64; N]; N]) -> f64 {
     let mut log_determinant = 0.0;
     for i in 0..N {

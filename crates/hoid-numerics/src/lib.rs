@@ -1,18 +1,18 @@
-//! Small numerical routines that the crates of hoid share, each written once.
+//! Small numerical routines shared by the crates of hoid.
 //!
 //! | module | contents |
 //! |---|---|
 //! | [`statistics`] | mean, variance, root mean square; quantiles by three definitions |
-//! | [`products`] | the product of two vectors |
-//! | [`cholesky`] | small positive definite systems by their factor, and its triangular systems |
-//! | [`elimination`] | small systems without a factor, positive definite or any |
+//! | [`products`] | product of two vectors |
+//! | [`cholesky`] | small positive definite systems by Cholesky factorisation, and triangular systems |
+//! | [`elimination`] | small positive definite or general systems by elimination, without a stored factor |
 //!
 //! The order of operations of each function is part of its specification: sums run from the first to the last term,
-//! nothing is contracted, and roots are those of `libm`, so that results are the same to the last bit on every
-//! machine. The docs of two functions that differ only in rounding state it.
+//! nothing is contracted, and square roots are those of `libm`, so that results are bit-identical on every machine. If
+//! two functions differ only in rounding, their documentation mentions it.
 //!
-//! `no_std`, without allocation; the feature `alloc` adds the statistics that sort their values. Matrices whose size
-//! is known only at run time are those of nalgebra, and sums over records those of `hoid-lanes`.
+//! The crate is `no_std` and allocates no memory; the feature `alloc` adds the statistics that sort their values.
+//! Matrices whose size is known only at run time use nalgebra, and sums over records use `hoid-lanes`.
 //!
 //! ```
 //! use hoid_numerics::{cholesky, statistics};

@@ -1,9 +1,10 @@
 //! Products of vectors.
 
-/// Returns `sum_i a_i b_i` over the length of the shorter one, from the first to the last; zero for empty slices.
+/// Returns `sum_i a_i b_i` over the length of the shorter slice, summed from the first term to the last; zero for empty
+/// slices.
 #[inline(always)]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // Does not start from zero: every addition adds to the latency of a recursion.
+    // The sum does not start from zero, since every addition adds to the latency of a recursion.
     let mut pairs = a.iter().zip(b);
     let Some((a, b)) = pairs.next() else {
         return 0.0;

@@ -1,17 +1,17 @@
 //! Statistics of values.
 //!
-//! **Quantiles** are those of R. J. Hyndman and Y. Fan, *The American Statistician* 50 (1996) 361-365.
-//! With the order statistics `x_0 <= .. <= x_(n-1)` and a share p:
+//! **Quantiles** follow R. J. Hyndman and Y. Fan, *The American Statistician* 50 (1996) 361-365. With the order
+//! statistics `x_0 <= .. <= x_(n-1)` and a fraction p:
 //!
-//! | function | value | |
+//! | function | value | definition |
 //! |---|---|---|
-//! | [`quantile`] | x at the place `(n-1) p`, by linear interpolation | type 7, the default of NumPy and R |
-//! | [`nearest_quantile`] | `x_k`, k the whole number nearest to `(n-1) p` | type 7 without interpolation |
-//! | [`upper_quantile`] | `x_k`, k the largest whole number not above `n p` | right-continuous inverse of the distribution of the values, type 1 but where `n p` is whole |
+//! | [`quantile`] | x at the position `(n-1) p`, by linear interpolation | type 7, the default of NumPy and R |
+//! | [`nearest_quantile`] | `x_k`, where k is the integer nearest to `(n-1) p` | type 7 without interpolation |
+//! | [`upper_quantile`] | `x_k`, where k is the largest integer not above `n p` | right-continuous inverse of the empirical distribution, type 1 except where `n p` is an integer |
 //!
-//! The first is used in tables and figures. The others return one of the values and do not need a full sort: they are
-//! used for scales of many samples, and for thresholds whose results depend on that definition. Their medians are the
-//! same, the upper one of the two in the middle.
+//! The first function is used in tables and figures. The other two return one of the values and do not need a full
+//! sort. They are used for scales of many samples, and for thresholds whose results depend on the definition. For the
+//! median both return the upper of the two middle values.
 //!
 //! Values are ordered by [`f64::total_cmp`].
 
@@ -43,7 +43,7 @@ pub fn sample_variance(values: &[f64]) -> f64 {
     squared_deviations(values) / (values.len() as f64 - 1.0)
 }
 
-/// Returns the root of the variance about the mean with the divisor n; zero for no values, unlike [`variance`].
+/// Returns the square root of the variance about the mean with the divisor n; zero for no values, unlike [`variance`].
 #[inline]
 pub fn standard_deviation(values: &[f64]) -> f64 {
     libm::sqrt(squared_deviations(values) / values.len().max(1) as f64)
@@ -61,34 +61,34 @@ pub fn root_mean_square(values: &[f64]) -> f64 {
     libm::sqrt(mean_square(values))
 }
 
-/// Returns the value below which this share of sorted values lies, by linear interpolation; `None` for no values.
-pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+/// Returns the quantile of sorted values for a fraction from 0 to 1, by linear interpolation; `None` for no values.
+pub fn quantile(sorted: &[f64], fraction: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
-    let at = share.clamp(0.0, 1.0) * last as f64;
+    let at = fraction.clamp(0.0, 1.0) * last as f64;
     let below = at as usize;
     let (low, high) = (sorted[below], sorted[(below + 1).min(last)]);
     Some(low + (at - below as f64) * (high - low))
 }
 
-/// Returns the value nearest to the position of a quantile, the upper one of two; reorders the values. `None` for no
-/// values.
-pub fn nearest_quantile(values: &mut [f64], share: f64) -> Option<f64> {
+/// Returns the value nearest to the position of a quantile, or the upper of two equally near values. Reorders the
+/// values. Returns `None` for no values.
+pub fn nearest_quantile(values: &mut [f64], fraction: f64) -> Option<f64> {
     let last = values.len().checked_sub(1)?;
-    order_statistic(values, libm::round(last as f64 * share) as usize)
+    order_statistic(values, libm::round(last as f64 * fraction) as usize)
 }
 
-/// Returns the smallest value with more than this share of the values at or below it, at most the largest; reorders
-/// the values. `None` for no values.
-pub fn upper_quantile(values: &mut [f64], share: f64) -> Option<f64> {
-    order_statistic(values, (share * values.len() as f64) as usize)
+/// Returns the smallest value for which more than the given fraction of the values is at or below it, or the largest
+/// value if there is none. Reorders the values. Returns `None` for no values.
+pub fn upper_quantile(values: &mut [f64], fraction: f64) -> Option<f64> {
+    order_statistic(values, (fraction * values.len() as f64) as usize)
 }
 
-/// Returns the median, the upper one of two in the middle; reorders the values. `None` for no values.
+/// Returns the median, or the upper of the two middle values. Reorders the values. Returns `None` for no values.
 pub fn upper_median(values: &mut [f64]) -> Option<f64> {
     order_statistic(values, values.len() / 2)
 }
 
-/// Returns the value at this index in ascending order, at most the largest.
+/// Returns the value at this index in ascending order, or the largest value if the index is too large.
 fn order_statistic(values: &mut [f64], place: usize) -> Option<f64> {
     let last = values.len().checked_sub(1)?;
     Some(*values.select_nth_unstable_by(place.min(last), f64::total_cmp).1)
@@ -102,11 +102,11 @@ pub fn finite_sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     finite
 }
 
-/// Returns the value below which this share of the finite values lies, by linear interpolation; `None` if none is
+/// Returns the quantile of the finite values for a fraction from 0 to 1, by linear interpolation; `None` if no value is
 /// finite.
 #[cfg(feature = "alloc")]
-pub fn quantile_of(values: &[f64], share: f64) -> Option<f64> {
-    quantile(&finite_sorted(values.iter().copied()), share)
+pub fn quantile_of(values: &[f64], fraction: f64) -> Option<f64> {
+    quantile(&finite_sorted(values.iter().copied()), fraction)
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
-//! Conversion of arrays and records.
+//! Conversion of arrays and records between Python and Rust.
 //!
-//! A Python record holds NumPy arrays. A call makes a record of the library from the required
-//! channels while it holds the interpreter, so that it does not see later modifications of the
-//! arrays by another thread. Vectors from the library become arrays without a copy.
+//! A Python record holds NumPy arrays. A call copies the required channels into a record of the library while it holds
+//! the interpreter lock, so that later changes to the arrays by another thread have no effect. Vectors from the library
+//! become arrays without a copy.
 
 use hoid_model::{Channel, ModelError, Record, SampleTime};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
@@ -10,18 +10,18 @@ use pyo3::{prelude::*, types::PyDict};
 
 use crate::errors::{Outcome, bad_option};
 
-/// One-dimensional array from a vector, without a copy.
+/// Converts a vector to a one-dimensional array without a copy.
 pub fn array<'py>(py: Python<'py>, values: Vec<f64>) -> Bound<'py, PyArray1<f64>> {
     values.into_pyarray(py)
 }
 
-/// Two-dimensional array from a matrix stored by rows, without a copy.
+/// Converts a matrix stored by rows to a two-dimensional array without a copy.
 pub fn matrix<'py>(py: Python<'py>, values: Vec<f64>, columns: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let rows = values.len().checked_div(columns).unwrap_or(0);
     values.into_pyarray(py).reshape([rows, columns])
 }
 
-/// A vector from a contiguous array of float64 created by the package.
+/// Copies a contiguous float64 array, as created by the package, to a vector.
 fn vector(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let array: PyReadonlyArray1<'_, f64> = values.extract()?;
     Ok(array.as_slice()?.to_vec())
@@ -34,7 +34,7 @@ pub enum Wanted<'a> {
     Only(&'a [&'a str]),
 }
 
-/// The record of the library from a `pyhoid.Record`.
+/// Converts a `pyhoid.Record` to a record of the library.
 pub fn record(found: &Bound<'_, PyAny>, wanted: Wanted<'_>) -> Outcome<Record> {
     let text = |name: &str| -> PyResult<String> { found.getattr(name)?.extract() };
     let sample_time = SampleTime::new(found.getattr("sample_time")?.extract()?)?;
@@ -73,7 +73,7 @@ pub fn record(found: &Bound<'_, PyAny>, wanted: Wanted<'_>) -> Outcome<Record> {
     Ok(record)
 }
 
-/// Checks the parts of a `pyhoid.Record` as [`record`] would, without a copy of the arrays.
+/// Checks the parts of a `pyhoid.Record` as [`record`] does, but without a copy of the arrays.
 pub fn check(found: &Bound<'_, PyAny>) -> Outcome<()> {
     SampleTime::new(found.getattr("sample_time")?.extract()?)?;
     let mut named: Vec<(String, Bound<'_, PyAny>)> = Vec::new();
@@ -121,7 +121,7 @@ pub fn check(found: &Bound<'_, PyAny>) -> Outcome<()> {
     Ok(())
 }
 
-/// The records from a single one, or from a sequence of them.
+/// Converts one `pyhoid.Record` or several to records of the library.
 pub fn records(found: &[Bound<'_, PyAny>], wanted: Wanted<'_>) -> Outcome<Vec<Record>> {
     if found.is_empty() {
         return Err(bad_option("there is no record; give one or more"));
@@ -129,7 +129,7 @@ pub fn records(found: &[Bound<'_, PyAny>], wanted: Wanted<'_>) -> Outcome<Vec<Re
     found.iter().map(|one| record(one, wanted)).collect()
 }
 
-/// The parts of a `pyhoid.Record` from a record of the library. No vector is copied.
+/// Converts a record of the library to the parts of a `pyhoid.Record` without copying any vector.
 pub fn parts<'py>(py: Python<'py>, record: Record) -> PyResult<Bound<'py, PyDict>> {
     let parts = PyDict::new(py);
     parts.set_item("sample_time", record.sample_time().s())?;

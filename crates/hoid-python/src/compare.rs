@@ -14,7 +14,8 @@ use pyo3::prelude::*;
 
 use crate::{errors::Outcome, interrupt, names};
 
-/// Compares results, or recordings that are analysed into `directory` first, and returns the result as JSON.
+/// Compares results of a group, or recordings that are first analysed in `directory`, and returns the comparison as
+/// JSON.
 #[pyfunction]
 #[pyo3(signature = (results, *, factors, variation, of, covariate, adjust, weights, directory, jobs, progress))]
 #[allow(clippy::too_many_arguments)]
@@ -36,7 +37,7 @@ pub fn compare(
         variation: variation
             .map(|name| names::choice::<Variation>("variation", name))
             .transpose()?,
-        of: of.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
+        quantities: of.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
         covariate: covariate
             .map(|name| names::choice::<Covariate>("covariate", name))
             .transpose()?,
@@ -49,7 +50,7 @@ pub fn compare(
     let manifest = Manifest::read(&path)?;
     let runs = manifest.runs.iter().filter(|run| run.counts).count() as u64;
     let base = path.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
-    // In the directory the runs that were analysed for another comparison stay.
+    // Runs that were already analysed in the directory for another comparison are reused.
     let options = RunOptions {
         jobs,
         resume: true,
@@ -58,7 +59,7 @@ pub fn compare(
     interrupt::run(py, runs, progress.as_ref(), true, move |status| {
         let estimates = comparing.estimates_of(&manifest, &directory, |manifest, place| {
             let told = |p: Progress| status.set(p.done, p.total);
-            run_group(manifest, &base, place, &options, &told, &|| status.goes_on())
+            run_group(manifest, &base, place, &options, &told, &|| status.should_continue())
                 .map(|_| ())
                 .map_err(CompareError::from)
         })?;
@@ -66,7 +67,7 @@ pub fn compare(
     })
 }
 
-/// The JSON of a comparison, checked, and its figure as SVG.
+/// Checks the JSON of a comparison and returns its figure as SVG.
 #[pyfunction]
 pub fn comparison_figure_of(text: &str) -> Outcome<String> {
     Ok(comparison_figure(&Comparison::from_json(text)?))

@@ -1,4 +1,4 @@
-//! Controlled elements as given in Python.
+//! Controlled elements in the form in which Python passes them.
 
 use hoid_model::ContinuousTransferFunction;
 use pyo3::prelude::*;

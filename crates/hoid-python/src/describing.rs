@@ -1,5 +1,4 @@
-//! `pyhoid.describe` and `pyhoid.describing_function`: the response of an operator at the lines of
-//! the excitation.
+//! `pyhoid.describe` and `pyhoid.describing_function`: response of an operator at the lines of the excitation.
 
 use hoid_analysis::{Described, Describing, Recordings};
 use hoid_ident::frequency::{
@@ -19,7 +18,7 @@ use crate::{
     files, names,
 };
 
-/// The describing function; the package wraps it in `pyhoid.DescribingFunction`.
+/// A describing function; the package wraps it in `pyhoid.DescribingFunction`.
 #[pyclass(name = "DescribingFunction", module = "pyhoid._pyhoid", frozen)]
 pub struct PyDescribingFunction {
     found: DescribingFunction,
@@ -69,43 +68,43 @@ pub fn describe<'py>(
 
 #[pymethods]
 impl PyDescription {
-    /// The settings that were used.
+    /// Returns the settings: name, value, and whether the user gave it.
     #[getter]
     fn settings(&self) -> Vec<(String, String, bool)> {
         figures::settings(&self.0.settings)
     }
 
-    /// The result as JSON.
+    /// Returns the description as JSON.
     fn to_json(&self) -> String {
         self.0.to_json()
     }
 
-    /// The records as they were described: which of those given each is a part of, the record, and the processing of
-    /// it.
+    /// Returns the records that were described: for each, the index of the given record from which it comes, the
+    /// record, and the steps applied to it.
     fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
         used_records(py, &self.0.data)
     }
 
-    /// The faults of the records: which of those given, and the fault.
+    /// Returns the faults, each with the index of the given record in which it was found.
     #[getter]
     fn faults<'py>(&self, py: Python<'py>) -> PyResult<Vec<(usize, Bound<'py, PyDict>)>> {
         faults_of(py, &self.0.data)
     }
 
-    /// Only the describing function.
+    /// Returns the describing function of the description.
     fn function(&self) -> PyDescribingFunction {
         PyDescribingFunction {
             found: self.0.found.function.clone(),
         }
     }
 
-    /// Phase in deg at each line, without jumps.
+    /// Returns the phase in deg at each line, without jumps.
     #[getter]
     fn phase_deg<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         array(py, self.0.found.phases_deg().iter().map(|p| p.value).collect())
     }
 
-    /// Crossover and margins; `None` without a controlled element.
+    /// Returns crossover and margins; `None` without a controlled element.
     #[getter]
     fn open_loop<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(margins) = &self.0.found.margins else {
@@ -119,20 +118,21 @@ impl PyDescription {
         Ok(Some(all))
     }
 
-    /// Share of the power of u at non-excited frequencies, and with the part at the lines.
+    /// Returns two shares of the power of u: the part at non-excited frequencies, and this part together with the noise
+    /// at the lines.
     #[getter]
     fn remnant(&self) -> (ValueWithError, ValueWithError) {
         let function = &self.0.found.function;
         (pair(function.off_line_share), pair(function.noise_ratio))
     }
 
-    /// Level, reasons and notes.
+    /// Returns the verdict: level, reasons and notes.
     #[getter]
     fn verdict(&self) -> VerdictParts {
         verdict(&self.0.found.verdict)
     }
 
-    /// Channel of the excitation and its period in s.
+    /// Returns the channel of the excitation and its period in s.
     #[getter]
     fn excitation(&self) -> (Option<String>, f64) {
         (self.0.found.channel.clone(), self.0.found.excitation.period_s())
@@ -174,8 +174,7 @@ pub fn describing_function<'py>(
         }
         (None, None, None, _) => {
             return Err(bad_option(
-                "there is no excitation: give the channel that holds it, \
-                 or harmonics or omega with the period",
+                "there is no excitation: give the channel that contains it, or harmonics or omega with the period",
             ));
         }
         (Some(_), Some(_), _, _) => return Err(bad_option("give harmonics or omega, not both")),
@@ -213,7 +212,7 @@ pub fn describing_function<'py>(
 
 #[pymethods]
 impl PyDescribingFunction {
-    /// Columns by name, with one value for each line.
+    /// Returns columns by name, with one value for each line.
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let lines = &self.found.lines;
         let all = PyDict::new(py);
@@ -235,7 +234,7 @@ impl PyDescribingFunction {
         Ok(all)
     }
 
-    /// The response of each run (or period) at each line: runs by rows, real and imaginary part.
+    /// Returns the complex response of each run (or period) at each line, with one array per run.
     #[getter]
     fn per_run<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyArray1<Complex64>>>> {
         let runs = self.found.lines.first().map_or(0, |line| line.per_run.len());
@@ -243,7 +242,7 @@ impl PyDescribingFunction {
         Ok((0..runs).map(row).collect())
     }
 
-    /// Frequency in rad/s, density, and its standard error.
+    /// Returns the frequencies in rad/s, the density of the remnant, and its standard error.
     #[getter]
     fn remnant_spectrum<'py>(&self, py: Python<'py>) -> [Bound<'py, PyArray1<f64>>; 3] {
         let bands = &self.found.remnant_spectrum;
@@ -265,7 +264,7 @@ impl PyDescribingFunction {
         Ok(all)
     }
 
-    /// Gain, lead (s) and delay (s) of the person, and the misfit.
+    /// Fits gain, lead (s) and delay (s) of the person to the response, and returns them with the misfit.
     #[pyo3(signature = (*, lead, weights, delay))]
     fn gain_lead_delay<'py>(
         &self,
@@ -293,7 +292,7 @@ impl PyDescribingFunction {
         Ok(all)
     }
 
-    /// Crossover frequency and phase margin with a controlled element.
+    /// Returns crossover frequency and phase margin with a controlled element.
     fn margins<'py>(&self, py: Python<'py>, element: ControlledElement) -> Outcome<Bound<'py, PyDict>> {
         let margins = self.found.open_loop(&element.transfer_function()?).margins();
         let all = PyDict::new(py);

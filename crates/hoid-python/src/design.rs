@@ -1,4 +1,4 @@
-//! `pyhoid.design`: a forcing function and the errors to be expected; the package reads the JSON of the result.
+//! `pyhoid.design`: a forcing function and the expected errors; the package reads the JSON of the result.
 
 use hoid_design::experiment::{
     Against, Between, DesignRequest, Designing, DifferenceRequest, Enters, ExperimentDesign, People, Remnant,
@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 
 use crate::{controlled_element::ControlledElement, errors::Outcome, names};
 
-/// Designs, and returns the result as JSON.
+/// Designs an experiment and returns it as JSON.
 #[pyfunction]
 #[pyo3(signature = (people, *, condition, controlled_element, form, wanted, disturbance, remnant, length, runs, lines, spacing, band, shelf, limits, against, difference, statistics, display, seed))]
 #[allow(clippy::too_many_arguments)]
@@ -81,7 +81,7 @@ pub fn design(
     Ok(found.to_json())
 }
 
-/// The files of a design, checked: scenario, experiment of the lab (empty if there is none), lines.
+/// Returns the files of a design, given as JSON: scenario, experiment for the lab (empty if there is none), and lines.
 #[pyfunction]
 pub fn design_files_of(text: &str, scenario: &str) -> Outcome<(String, String, String)> {
     let found = ExperimentDesign::from_json(text)?;
@@ -92,7 +92,7 @@ pub fn design_files_of(text: &str, scenario: &str) -> Outcome<(String, String, S
     ))
 }
 
-/// The figures of a design as SVG: lines and response, errors over runs.
+/// Returns the figures of a design as SVG: lines and response, and errors over the number of runs.
 #[pyfunction]
 pub fn design_figures_of(text: &str) -> Outcome<(String, String)> {
     let found = ExperimentDesign::from_json(text)?;

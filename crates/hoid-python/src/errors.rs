@@ -1,6 +1,6 @@
-//! Errors of the libraries as exceptions of `pyhoid.errors`, by kind.
+//! Conversion of errors of the libraries to exceptions of `pyhoid.errors`, by kind.
 //!
-//! The messages are those of the libraries, with keywords instead of command-line options.
+//! The messages are those of the libraries, with keywords in place of command-line options.
 
 use hoid_analysis::{
     AnalysisError,
@@ -28,10 +28,10 @@ import_exception!(pyhoid.errors, FileMissingError);
 import_exception!(pyhoid.errors, FormatError);
 import_exception!(pyhoid.errors, StudyStateError);
 
-/// Result of a call, or the exception.
+/// Result of a call, or the exception to raise.
 pub type Outcome<T> = Result<T, Failure>;
 
-/// An exception to raise; `?` converts every error of the libraries.
+/// An exception to raise; the operator `?` converts every error of the libraries to it.
 pub struct Failure(PyErr);
 
 impl From<Failure> for PyErr {
@@ -46,7 +46,7 @@ impl From<PyErr> for Failure {
     }
 }
 
-/// Error for an invalid option, with its Python name.
+/// Returns the error for an invalid option.
 pub fn bad_option(message: impl Into<String>) -> Failure {
     Failure(OptionError::new_err(message.into()))
 }
@@ -126,7 +126,7 @@ impl From<AnalysisError> for Failure {
     }
 }
 
-/// The call that requests an estimator.
+/// Returns the Python call that requests an estimator.
 fn estimator(name: &str) -> String {
     match name {
         OPERATOR => format!("structure=\"{OPERATOR}\""),

@@ -1,4 +1,4 @@
-//! `pyhoid.identify` by default: the operator of a person, of the family of operators.
+//! `pyhoid.identify` by default: an operator of the family of operators.
 
 use std::{borrow::Cow, path::PathBuf};
 
@@ -21,8 +21,8 @@ use crate::{
 #[pyclass(name = "OperatorFit", module = "pyhoid._pyhoid", frozen)]
 pub struct PyOperatorFit(pub Identified);
 
-/// Name, unit, value, standard error of the runs and of the person, interval, share of the prior, whether it is
-/// determined, the forms that it is the mean of.
+/// Name, unit, value, standard errors of the runs and of the person, interval, share of the prior, whether the data
+/// determine the parameter, and the forms over which it was averaged.
 type ParameterParts = (
     String,
     &'static str,
@@ -54,7 +54,7 @@ fn loop_parts<'py>(py: Python<'py>, measures: Option<LoopMeasures>) -> PyResult<
     Ok(all)
 }
 
-/// Their intervals of 95 %, Student's.
+/// Returns the 95 % intervals of crossover and phase margin from Student's t distribution.
 fn loop_intervals<'py>(py: Python<'py>, measures: Option<LoopMeasures>) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     all.set_item("crossover_rad_s", measures.and_then(|m| m.crossover_interval))?;
@@ -62,7 +62,7 @@ fn loop_intervals<'py>(py: Python<'py>, measures: Option<LoopMeasures>) -> PyRes
     Ok(all)
 }
 
-/// Every crossing, the smallest phase margin, the gain margin, and whether the closed loop is stable.
+/// Returns all crossovers, the smallest phase margin, the gain margin, and whether the closed loop is stable.
 fn shape_parts<'py>(py: Python<'py>, shape: &LoopShape) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     let crossovers: Vec<(ValueWithError, ValueWithError)> =
@@ -93,18 +93,18 @@ fn form_row<'py>(py: Python<'py>, f: &FormFigures) -> PyResult<Bound<'py, PyDict
 
 #[pymethods]
 impl PyOperatorFit {
-    /// The settings that were used.
+    /// Returns the settings: name, value, and whether the user gave it.
     #[getter]
     fn settings(&self) -> Vec<(String, String, bool)> {
         figures::settings(&self.0.settings)
     }
 
-    /// The result as JSON, from which it comes back.
+    /// Returns the result as JSON, from which it can be restored.
     fn to_json(&self) -> Outcome<String> {
         Ok(self.0.to_json()?)
     }
 
-    /// The form, and whether it has neuromuscular dynamics.
+    /// Returns the name of the form, and whether the operator includes neuromuscular dynamics.
     #[getter]
     fn form(&self) -> (&'static str, bool) {
         (self.0.fit.form.name(), self.0.fit.neuromuscular)
@@ -115,14 +115,14 @@ impl PyOperatorFit {
         self.0.fit.title()
     }
 
-    /// The entries of the common operator, or of the operator of each record.
+    /// Returns the parameters of the common operator, or of the operator of each record.
     #[getter]
     fn parameters(&self) -> Vec<Vec<ParameterParts>> {
         let of = |parameters: &Vec<Parameter>| parameters.iter().map(parameter).collect();
         self.0.fit.operators.iter().map(|o| of(&o.parameters)).collect()
     }
 
-    /// Names of the coordinates, in the order of the covariance.
+    /// Returns the names of the coordinates, in the order of the covariance.
     #[getter]
     fn coordinates(&self) -> Vec<&'static str> {
         let all = self.0.fit.form.coordinates(self.0.fit.neuromuscular);
@@ -137,7 +137,7 @@ impl PyOperatorFit {
         self.square(py, self.0.fit.operator(record).covariance.as_deref())
     }
 
-    /// As if residuals were white and nothing varied.
+    /// Returns the covariance that would be valid if the residuals were white and the person did not vary.
     fn model_based_covariance<'py>(
         &self,
         py: Python<'py>,
@@ -178,7 +178,7 @@ impl PyOperatorFit {
         Ok(Some(all))
     }
 
-    /// Reason why there is no fit at the lines of an excitation that was named.
+    /// Returns the reason why there is no fit at the lines of an excitation that the user named.
     #[getter]
     fn no_lines(&self) -> Option<&str> {
         self.0.fit.no_lines.as_deref()
@@ -239,8 +239,8 @@ impl PyOperatorFit {
         Ok(Some(all))
     }
 
-    /// Magnitude in dB and phase in deg at these frequencies, each with its standard error (NaN if there is none), of
-    /// the operator of a record.
+    /// Returns magnitude in dB and phase in deg of the operator of a record at these frequencies, each with its
+    /// standard error (NaN if there is none).
     fn frequency_response<'py>(
         &self,
         py: Python<'py>,
@@ -253,27 +253,28 @@ impl PyOperatorFit {
         ))
     }
 
-    /// Crossover and phase margin with another controlled element.
+    /// Returns crossover and phase margin with another controlled element.
     fn margins<'py>(&self, py: Python<'py>, element: ControlledElement) -> Outcome<Bound<'py, PyDict>> {
         let element = element.transfer_function()?;
         Ok(loop_parts(py, self.0.fit.loop_measures(0, &element))?)
     }
 
-    /// Crossover and phase margin; `None` without a controlled element.
+    /// Returns crossover and phase margin; `None` without a controlled element.
     #[getter]
     fn open_loop<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let of = |element| loop_parts(py, self.0.fit.loop_measures(0, element));
         self.0.controlled_element.as_ref().map(of).transpose()
     }
 
-    /// Every crossing of the loop, and whether it is stable; `None` without a controlled element.
+    /// Returns all crossovers of the loop, and whether it is stable; `None` without a controlled element.
     #[getter]
     fn loop_shape<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let of = |element| shape_parts(py, &self.0.fit.loop_shape(0, element));
         self.0.controlled_element.as_ref().map(of).transpose()
     }
 
-    /// The same with the errors of the person.
+    /// Returns crossover and phase margin with the errors of the person, not of these runs; `None` without a controlled
+    /// element.
     #[getter]
     fn open_loop_person<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let of = |element| {
@@ -302,14 +303,14 @@ impl PyOperatorFit {
         Ok(Some(all))
     }
 
-    /// Coefficients c and d.
+    /// Returns the coefficients c and d of the noise model.
     #[getter]
     fn noise<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
         let (c, d) = self.0.fit.noise.clone();
         (array(py, c), array(py, d))
     }
 
-    /// Parameter, centre, spread and source of each entry.
+    /// Returns parameter, centre, spread and source of each entry of the prior.
     #[getter]
     fn prior(&self) -> Vec<(String, f64, f64, String)> {
         let entries = self.0.fit.prior.entries().iter();
@@ -344,24 +345,26 @@ impl PyOperatorFit {
         figures::termination(py, self.0.fit.termination)
     }
 
-    /// Channel of the excitation; `None` if there was none.
+    /// Returns the channel of the excitation; `None` if there was none.
     #[getter]
     fn excitation(&self) -> Option<&str> {
         self.0.excitation.as_deref()
     }
 
-    /// The records as they were fitted: which of those given each is a part of, the record, and the processing of it.
+    /// Returns the records that were fitted: for each, the index of the given record from which it comes, the record,
+    /// and the steps applied to it.
     fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
         used_records(py, &self.0.data)
     }
 
-    /// The faults of the records: which of those given, and the fault.
+    /// Returns the faults, each with the index of the given record in which it was found.
     #[getter]
     fn faults<'py>(&self, py: Python<'py>) -> PyResult<Vec<(usize, Bound<'py, PyDict>)>> {
         faults_of(py, &self.0.data)
     }
 
-    /// Writes the page about the operator into a directory; what results of a pickle has its records next to it.
+    /// Writes the report page of the operator to a directory. `records` are used if the result was restored from a
+    /// pickle, which does not contain them.
     #[pyo3(signature = (records, directory, *, title))]
     fn report(
         &self,
@@ -382,7 +385,7 @@ impl PyOperatorFit {
         Ok(page)
     }
 
-    /// The model of a record as polynomials.
+    /// Returns the polynomial model of a record.
     fn fit(&self, record: usize) -> PyFit {
         PyFit::new(
             self.0.fit.operator(record).polynomial_fit.clone(),

@@ -1,4 +1,4 @@
-//! Faults in the records of a fit, and the steps applied to them.
+//! Faults in the records of a fit, and the records with the steps applied to them.
 
 use hoid_analysis::{FoundFault, Recordings};
 use hoid_io::Step;
@@ -6,10 +6,10 @@ use pyo3::{prelude::*, types::PyDict};
 
 use crate::arrays::parts;
 
-/// Index of the given record, and the parts of the fault.
+/// Index of the given record, and the properties of the fault as a dictionary.
 type Of<'py> = (usize, Bound<'py, PyDict>);
 
-/// Faults in recordings, with the index of the given record.
+/// Returns the faults in recordings, each with the index of the given record.
 pub fn faults_of<'py>(py: Python<'py>, data: &Recordings) -> PyResult<Vec<Of<'py>>> {
     let all = data.origins.iter().zip(&data.accounts);
     all.flat_map(|(origin, account)| account.found().into_iter().map(|found| (*origin, found)))
@@ -31,10 +31,10 @@ fn parts_of(py: Python<'_>, found: FoundFault) -> PyResult<Bound<'_, PyDict>> {
     Ok(one)
 }
 
-/// Index of the given record from which a record comes, its parts, and the steps applied to it.
+/// Index of the given record from which a record comes, the parts of the record, and the steps applied to it.
 pub type UsedRecord<'py> = (usize, Bound<'py, PyDict>, Vec<String>);
 
-/// The records of the fit.
+/// Returns the records that were fitted.
 pub fn used_records<'py>(py: Python<'py>, data: &Recordings) -> PyResult<Vec<UsedRecord<'py>>> {
     let all = data.origins.iter().zip(&data.records).zip(&data.accounts);
     all.map(|((origin, record), account)| {

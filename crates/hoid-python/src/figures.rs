@@ -1,4 +1,4 @@
-//! Conversion of small results: estimates to pairs, operators to dictionaries.
+//! Conversion of results with few numbers: estimates to pairs, operators to dictionaries.
 
 use hoid_ident::{
     MarginEstimates, ResponsePoint, Termination,
@@ -14,7 +14,7 @@ use pyo3::{prelude::*, types::PyDict};
 
 use crate::arrays::array;
 
-/// A span detected by the guard of a recursion.
+/// Converts a fault detected by the guard of a recursion to a dictionary.
 pub fn track_fault<'py>(py: Python<'py>, fault: &hoid_track::TrackFault) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     all.set_item("kind", fault.kind.name())?;
@@ -33,12 +33,12 @@ pub fn pair(e: Estimate) -> ValueWithError {
     (e.value, e.standard_error)
 }
 
-/// The standard error as an array element: NaN if there is none.
+/// Returns the standard error as an array element; NaN if there is none.
 pub fn error_or_nan(e: Estimate) -> f64 {
     e.standard_error.unwrap_or(f64::NAN)
 }
 
-/// Level, reasons and notes.
+/// Level, reasons and notes of a verdict.
 pub type VerdictParts = (&'static str, Vec<String>, Vec<String>);
 
 pub fn verdict(v: &Verdict) -> VerdictParts {
@@ -46,7 +46,7 @@ pub fn verdict(v: &Verdict) -> VerdictParts {
     (v.level.name(), reasons, v.notes().map(str::to_owned).collect())
 }
 
-/// Termination of a search.
+/// Converts the termination of a search to a dictionary.
 pub fn termination<'py>(py: Python<'py>, found: Termination) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     all.set_item("reason", found.reason.to_string())?;
@@ -63,7 +63,8 @@ pub fn orders<'py>(py: Python<'py>, o: &Orders) -> PyResult<Bound<'py, PyDict>> 
     Ok(all)
 }
 
-/// The operator, or the reason why there is none; None if the orders cannot represent one.
+/// Returns the operator, or the reason why the model cannot be converted; `None` if its orders cannot represent an
+/// operator.
 pub fn operator<'py>(
     py: Python<'py>,
     found: &Result<OperatorEstimate, NotConvertible>,
@@ -126,7 +127,7 @@ pub fn plain_margins<'py>(py: Python<'py>, m: &Margins) -> PyResult<Bound<'py, P
     Ok(all)
 }
 
-/// Settings used, by their displayed names.
+/// Returns the settings: displayed name, value, and whether the user gave it.
 pub fn settings(all: &[hoid_analysis::Setting]) -> Vec<(String, String, bool)> {
     let parts = |one: &hoid_analysis::Setting| (one.name.clone(), one.value.clone(), one.given);
     all.iter().map(parts).collect()
@@ -150,7 +151,7 @@ pub fn ljung_box<'py>(py: Python<'py>, test: Option<&LjungBox>) -> PyResult<Opti
     Ok(Some(all))
 }
 
-/// Magnitude in dB and phase in deg of points, each with its standard error (NaN if there is none).
+/// Returns magnitude in dB and phase in deg at several points, each with its standard error (NaN if there is none).
 pub fn response_columns<'py>(py: Python<'py>, points: &[ResponsePoint]) -> [Bound<'py, PyArray1<f64>>; 4] {
     let column = |of: &dyn Fn(&ResponsePoint) -> f64| array(py, points.iter().map(of).collect());
     [

@@ -14,11 +14,10 @@ use crate::{
     names,
 };
 
-/// The parts of a record, the processing applied to the numbers of the file, and notes on reading
-/// it.
+/// The parts of a record, the steps applied to the numbers of the file, and notes on reading it.
 type ReadParts<'py> = (Bound<'py, PyDict>, Vec<String>, Vec<String>);
 
-/// The record of a file, or the records between the masked parts.
+/// Reads the record of a file, or the records between its masked parts.
 #[pyfunction]
 #[pyo3(signature = (path, *, input, output, time, trial, all_trials, sampling_frequency, start, stop, resample, fill, sparse, columns, detrend, drop_repeated, unit, scale, offset, decimate,
     new_sampling_frequency, run_in, mask, shortest))]
@@ -111,7 +110,7 @@ pub fn read<'py>(
         .collect()
 }
 
-/// Scalings and offsets by channel, as they are written on the command line.
+/// Parses scalings or offsets by channel, written as on the command line.
 fn parsed<T: FromStr<Err = IoError>>(texts: BTreeMap<String, String>) -> Result<BTreeMap<String, T>, IoError> {
     texts
         .into_iter()
@@ -127,14 +126,15 @@ pub fn write(py: Python<'_>, path: PathBuf, record: &Bound<'_, PyAny>) -> Outcom
     Ok(())
 }
 
-/// Checks the parts of a record of the package.
+/// Checks the parts of a `pyhoid.Record`.
 #[pyfunction]
 #[pyo3(signature = (record))]
 pub fn check_record(record: &Bound<'_, PyAny>) -> Outcome<()> {
     arrays::check(record)
 }
 
-/// The sample time of evenly spaced times in s, or the row at which the spacing is uneven.
+/// Returns the sample time in s if the times are evenly spaced; otherwise `None` and the row at which the spacing
+/// changes.
 #[pyfunction]
 #[pyo3(signature = (times))]
 pub fn even_times(times: PyReadonlyArray1<'_, f64>) -> (Option<f64>, usize) {
@@ -144,7 +144,7 @@ pub fn even_times(times: PyReadonlyArray1<'_, f64>) -> (Option<f64>, usize) {
     }
 }
 
-/// The columns of a table that a signal is made of, each with its sign: `r-y`, `-e`.
+/// Returns the columns of a table from which a signal such as `r-y` or `-e` is computed, each with its sign.
 #[pyfunction]
 #[pyo3(signature = (text, names))]
 pub fn signal_of(text: &str, names: Vec<String>) -> Outcome<Vec<(f64, usize)>> {
@@ -152,7 +152,7 @@ pub fn signal_of(text: &str, names: Vec<String>) -> Outcome<Vec<(f64, usize)>> {
     Ok(text.parse::<ColumnExpression>()?.signed_columns(&names, "the table")?)
 }
 
-/// The record without the mean or the linear trend of input and output.
+/// Returns the record with the mean or the linear trend removed from input and output.
 #[pyfunction]
 #[pyo3(signature = (record, how))]
 pub fn detrended<'py>(py: Python<'py>, record: &Bound<'py, PyAny>, how: &str) -> Outcome<Bound<'py, PyDict>> {
@@ -161,7 +161,7 @@ pub fn detrended<'py>(py: Python<'py>, record: &Bound<'py, PyAny>, how: &str) ->
     Ok(parts(py, record.detrended(how))?)
 }
 
-/// The record at a lower rate, and the actions taken; None if nothing was.
+/// Returns the record at a lower rate and a description of the step; `None` if the rate is kept.
 #[pyfunction]
 #[pyo3(signature = (record, decimate))]
 pub fn decimated<'py>(
@@ -182,7 +182,7 @@ pub fn decimated<'py>(
     Ok(Some((parts, Step::from(done).to_string())))
 }
 
-/// A decimation as it is typed.
+/// Parses a decimation: "auto", "off" or a factor.
 pub fn decimation(text: &str) -> Outcome<Decimation> {
     text.parse().map_err(|_| {
         bad_option(format!(
@@ -191,7 +191,7 @@ pub fn decimation(text: &str) -> Outcome<Decimation> {
     })
 }
 
-/// A table that hoid has written, as columns by name: numbers, whole numbers, or text.
+/// Reads a table written by hoid, as columns by name: real numbers, whole numbers, or text.
 #[pyfunction]
 #[pyo3(signature = (path))]
 pub fn read_table<'py>(py: Python<'py>, path: PathBuf) -> Outcome<Bound<'py, PyDict>> {

@@ -26,13 +26,13 @@ use crate::{
 pub struct PyFit {
     fit: Fit,
     choice: Option<Choice>,
-    /// Number of records that the model was fitted to.
+    /// Number of records to which the model was fitted.
     records: usize,
-    /// The result that it is, where it is one by itself and not a part of another.
+    /// The result whose model this is; `None` if the model is a part of another result.
     whole: Option<Whole>,
 }
 
-/// A part of another result as it is written.
+/// A model that is a part of another result, as serialised.
 #[derive(serde::Serialize)]
 struct Part<'a> {
     fit: &'a Fit,
@@ -40,7 +40,7 @@ struct Part<'a> {
     records: usize,
 }
 
-/// The same as it is read.
+/// A model that is a part of another result, as deserialised.
 #[derive(serde::Deserialize)]
 pub struct PartRead {
     fit: Fit,
@@ -54,13 +54,13 @@ impl From<PartRead> for PyFit {
     }
 }
 
-/// A result that is shown as polynomials.
+/// A result that is presented as polynomials.
 enum Whole {
     Polynomials(Box<Identified<PolynomialFit>>),
     Remnant(Box<Identified<GreyBoxFit>>),
 }
 
-/// The same of each.
+/// Applies the same expression to each kind of result.
 macro_rules! each {
     ($whole:expr, $found:ident => $what:expr) => {
         match $whole {
@@ -71,7 +71,7 @@ macro_rules! each {
 }
 
 impl PyFit {
-    /// A part of another result.
+    /// Creates a model that is a part of another result.
     pub fn new(fit: Fit, choice: Option<Choice>, records: usize) -> Self {
         Self {
             fit,
@@ -81,7 +81,7 @@ impl PyFit {
         }
     }
 
-    /// Polynomials that were identified.
+    /// Creates a model from identified polynomials.
     pub fn of_polynomials(found: Identified<PolynomialFit>) -> Self {
         Self {
             fit: found.fit.fit.clone(),
@@ -91,7 +91,7 @@ impl PyFit {
         }
     }
 
-    /// An operator and its remnant that were identified.
+    /// Creates a model from an identified operator with its remnant.
     pub fn of_grey_box(found: Identified<GreyBoxFit>) -> Self {
         Self {
             fit: found.fit.polynomial_fit(0).clone(),
@@ -120,7 +120,7 @@ impl PyFit {
         Ok(self.fit.margins(|omega| element.response(omega), (low, high)))
     }
 
-    /// Runs over a record without the interpreter.
+    /// Evaluates the fit on a record, without the interpreter lock.
     fn over<T: Send>(
         &self,
         py: Python<'_>,
@@ -141,14 +141,14 @@ fn series(py: Python<'_>, found: Series) -> SeriesParts<'_> {
 
 #[pymethods]
 impl PyFit {
-    /// The settings that were used.
+    /// Returns the settings: name, value, and whether the user gave it.
     #[getter]
     fn settings(&self) -> Vec<(String, String, bool)> {
         let of = |whole: &Whole| each!(whole, found => figures::settings(&found.settings));
         self.whole.as_ref().map(of).unwrap_or_default()
     }
 
-    /// The result as JSON, from which it comes back.
+    /// Returns the result as JSON, from which it can be restored.
     fn to_json(&self) -> Outcome<String> {
         match &self.whole {
             Some(whole) => Ok(each!(whole, found => found.to_json())?),
@@ -160,7 +160,8 @@ impl PyFit {
         }
     }
 
-    /// For a part of another result, only its model, from which it is restored; `None` for a separate result.
+    /// Returns the serialised model if it is a part of another result; `None` for a separate result, which is restored
+    /// from JSON.
     fn state(&self) -> Option<String> {
         if self.whole.is_some() {
             return None;
@@ -209,7 +210,7 @@ impl PyFit {
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         let found = match self.grey_box() {
             Some(grey_box) => grey_box.covariance(),
-            // An operator of the family has its own covariance, of its coordinates.
+            // The covariance of an operator of the family refers to its coordinates, not to the coefficients.
             None if self.fit.is_grey_box() => None,
             None => self.fit.covariance(),
         };
@@ -218,9 +219,9 @@ impl PyFit {
         matrix(py, c.to_vec(), columns).map(Some)
     }
 
-    /// A, B, C, D and F in ascending powers of q^-1.
+    /// Returns A, B, C, D and F in ascending powers of q^-1.
     ///
-    /// A, C, D and F start with 1, B with the zeros of its delay.
+    /// A, C, D and F start with 1, B with nk zeros for the delay.
     #[getter]
     fn polynomials<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let model = self.fit.model();
@@ -269,7 +270,7 @@ impl PyFit {
         figures::operator(py, &self.fit.operator())
     }
 
-    /// The operator of each record of a grey box; empty for other fits.
+    /// Returns the operator of each record of a grey-box fit; empty for other fits.
     #[getter]
     fn operators<'py>(&self, py: Python<'py>) -> PyResult<Vec<Option<Bound<'py, PyDict>>>> {
         let Some(grey_box) = self.grey_box() else {
@@ -280,7 +281,7 @@ impl PyFit {
             .collect()
     }
 
-    /// The level of u in each record of the fit as it was read; empty if none was estimated.
+    /// Returns the constant of u in each record of the fit, in the values of the file; empty if none was estimated.
     #[getter]
     fn levels(&self) -> Vec<Option<ValueWithError>> {
         let without = |whole: &&Whole| each!(whole, found => found.is_without_means());
@@ -289,13 +290,14 @@ impl PyFit {
         accounts.map(|account| account.level.map(pair)).collect()
     }
 
-    /// The records as they were fitted: which of those given each is a part of, the record, and the processing of it.
+    /// Returns the records that were fitted: for each, the index of the given record from which it comes, the record,
+    /// and the steps applied to it.
     fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
         let data = self.data().map(|data| used_records(py, data));
         data.unwrap_or_else(|| Ok(Vec::new()))
     }
 
-    /// The faults of the records: which of those given, and the fault.
+    /// Returns the faults, each with the index of the given record in which it was found.
     #[getter]
     fn faults<'py>(&self, py: Python<'py>) -> PyResult<Vec<(usize, Bound<'py, PyDict>)>> {
         let data = self.data().map(|data| faults_of(py, data));
@@ -317,7 +319,8 @@ impl PyFit {
         Ok(figures::quality(py, &quality)?)
     }
 
-    /// The verdict on it; for a part of another result, from these records only.
+    /// Returns the verdict on the fit; if the fit is a part of another result, the verdict is based on these records
+    /// only.
     fn verdict(&self, py: Python<'_>, records: Vec<Bound<'_, PyAny>>) -> Outcome<VerdictParts> {
         if let Some(whole) = &self.whole {
             return Ok(each!(whole, found => figures::verdict(&found.verdict)));
@@ -364,8 +367,8 @@ impl PyFit {
         Ok(all)
     }
 
-    /// Magnitude in dB and phase in deg at these frequencies, each with its standard error (NaN if
-    /// there is none).
+    /// Returns magnitude in dB and phase in deg at these frequencies, each with its standard error (NaN if there is
+    /// none).
     fn frequency_response<'py>(
         &self,
         py: Python<'py>,
@@ -393,12 +396,12 @@ impl PyFit {
         self.fit.roots().into_iter().map(one).collect()
     }
 
-    /// Crossover and margins of the operator in series with a controlled element.
+    /// Returns crossover and margins of the operator in series with a controlled element.
     fn margins<'py>(&self, py: Python<'py>, element: ControlledElement) -> Outcome<Bound<'py, PyDict>> {
         Ok(figures::margins(py, &self.margins_with(&element)?)?)
     }
 
-    /// Writes the page about the model and its records into a directory.
+    /// Writes the report page of the model and its records to a directory.
     #[pyo3(signature = (records, directory, *, title, settings, controlled_element))]
     fn report(
         &self,
@@ -434,7 +437,7 @@ impl PyFit {
         Ok(page)
     }
 
-    /// The table that the model was chosen from.
+    /// Returns the candidates from which the model was selected.
     #[getter]
     fn candidates<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let list = PyList::empty(py);

@@ -17,9 +17,9 @@ use pyo3::prelude::*;
 
 use crate::{errors::Outcome, interrupt, names};
 
-/// Analyses the runs of a manifest and writes tables and pages.
+/// Analyses the runs of a manifest and writes the tables and pages.
 ///
-/// Returns whether it was finished, and the number of estimates made.
+/// Returns whether the analysis was finished, and the number of estimates made.
 #[pyfunction]
 #[pyo3(signature = (manifest, directory, *, jobs, resume, csv, progress))]
 pub fn group(
@@ -47,7 +47,7 @@ pub fn group(
             &directory,
             &options,
             &|p| standing.set(p.done, p.total),
-            &|| standing.goes_on(),
+            &|| standing.should_continue(),
         )?;
         if outcome.finished {
             write_group_pages(&found, &manifest, &directory)?;
@@ -57,7 +57,8 @@ pub fn group(
     Ok((outcome.finished, outcome.estimates))
 }
 
-/// The manifest of the files whose names match a pattern, and the other files of the directory.
+/// Returns the text of a manifest of the files whose names match a pattern, and the names of the other files in the
+/// directory.
 #[pyfunction]
 #[pyo3(signature = (directory, pattern))]
 pub fn group_manifest(directory: PathBuf, pattern: &str) -> Outcome<(String, Vec<String>)> {
@@ -65,7 +66,8 @@ pub fn group_manifest(directory: PathBuf, pattern: &str) -> Outcome<(String, Vec
     Ok((manifest.text(), others))
 }
 
-/// Simulates runs of people drawn over the family into a directory; returns their number.
+/// Simulates runs of people drawn from the family of operators and writes them to a directory; returns the number of
+/// runs.
 #[pyfunction]
 #[pyo3(signature = (directory, *, subjects, plants, form, remnants, remnant_share, sample_time, runs, between_runs, seed, trouble))]
 #[allow(clippy::too_many_arguments)]
@@ -116,7 +118,7 @@ fn defects(trouble: &[String]) -> Outcome<Vec<SamplingDefect>> {
         .collect()
 }
 
-/// Simulates the runs of a virtual experiment into a directory; returns their number.
+/// Simulates the runs of a virtual experiment and writes them to a directory; returns the number of runs.
 #[pyfunction]
 #[pyo3(signature = (directory, *, subjects, conditions, runs, between_subjects, between_runs, remnant_order, noise_level, seed, trouble))]
 #[allow(clippy::too_many_arguments)]

@@ -1,4 +1,4 @@
-//! `pyhoid.identify`: from records and options to a fit.
+//! `pyhoid.identify`: identification of a model from records.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -22,11 +22,11 @@ use crate::{
     time_varying::PyTimeVaryingFit,
 };
 
-/// Samples times models from which on a fit is long enough for a separate thread, for interrupts.
-const LONG: usize = 50_000;
+/// Number of samples times number of models above which a fit runs in a separate thread, so that it can be interrupted.
+const LONG_COMPUTATION: usize = 50_000;
 
-/// Fits a model to records: the fit, and remarks on how it was requested. The package has brought all options into the
-/// form of texts.
+/// Fits a model to records; returns the fit and notes on the request. The package has already converted all options to
+/// text.
 #[pyfunction]
 #[pyo3(signature = (records, *, structure, method, options, faults, decimate, progress))]
 #[allow(clippy::too_many_arguments)]
@@ -62,20 +62,20 @@ pub fn identify<'py>(
     Ok((native(py, fit)?, notes))
 }
 
-/// A result that `to_json` wrote.
+/// Restores a result from the text that `to_json` returned.
 #[pyfunction]
 pub fn from_json<'py>(py: Python<'py>, text: &str) -> Outcome<Bound<'py, PyAny>> {
     Ok(native(py, BatchResult::from_json(text)?)?)
 }
 
-/// A part of a result that its `state` wrote.
+/// Restores a part of a result from the text that its `state` returned.
 #[pyfunction]
 pub fn from_state(text: &str) -> PyResult<PyFit> {
     let part: PartRead = state::read(text).map_err(DataError::new_err)?;
     Ok(part.into())
 }
 
-/// The class of a result.
+/// Wraps a result in its Python class.
 fn native(py: Python<'_>, answer: BatchResult) -> PyResult<Bound<'_, PyAny>> {
     Ok(match answer {
         BatchResult::Operator(found) => Bound::new(py, PyOperatorFit(found))?.into_any(),
@@ -85,7 +85,7 @@ fn native(py: Python<'_>, answer: BatchResult) -> PyResult<Bound<'_, PyAny>> {
     })
 }
 
-/// The identification without the interpreter, in a separate thread if it is long.
+/// Runs the identification without the interpreter lock, in a separate thread if it takes long.
 fn run<E>(
     py: Python<'_>,
     how: Identification<E>,
@@ -99,16 +99,16 @@ where
 {
     let samples: usize = records.iter().map(Record::len).sum();
     let work = move |status: &Arc<RunStatus>| -> Result<_, AnalysisError> {
-        interrupt::told(status, || how.run(Recordings::of_records(records)))
+        interrupt::with_progress(status, || how.run(Recordings::of_records(records)))
     };
-    if samples * models < LONG && progress.is_none() {
+    if samples * models < LONG_COMPUTATION && progress.is_none() {
         py.detach(|| work(&Arc::default())).map_err(Failure::from)
     } else {
         interrupt::run(py, models as u64, progress, false, work)
     }
 }
 
-/// The type of a value, as the package asks for it.
+/// Returns the name of the type of a setting, from which the package derives its conversion.
 fn kind(setting: &Setting) -> &'static str {
     match setting.kind {
         Kind::Flag => "flag",
@@ -122,7 +122,7 @@ fn kind(setting: &Setting) -> &'static str {
     }
 }
 
-/// Name of each batch estimator, the structures that it supports, and its keywords with the type of each.
+/// Returns the name of each batch estimator, the structures that it supports, and its keywords with their types.
 #[pyfunction]
 pub fn batch_estimators() -> Vec<(&'static str, Vec<&'static str>, BTreeMap<&'static str, &'static str>)> {
     let structures = |spec: &MethodSpec| spec.structures.iter().map(|structure| structure.name()).collect();

@@ -1,12 +1,12 @@
-//! Conversion of messages of the libraries, which name command-line options, to Python keywords.
+//! Conversion of command-line options in messages of the libraries to Python keywords.
 //!
-//! `--new-fs 50` is `new_sampling_frequency=50`, `--fill` is `fill=True`, `--trial t=1` is `trial="t=1"`. A word after
-//! an option is its value if it is a placeholder (`HZ`), an assignment, or one of [`VALUES`]; any other word continues
-//! the sentence.
+//! `--new-fs 50` becomes `new_sampling_frequency=50`, `--fill` becomes `fill=True`, and `--trial t=1` becomes
+//! `trial="t=1"`. A word after an option is its value if it is a placeholder (`HZ`), an assignment, or one of
+//! [`VALUES`]; any other word continues the sentence.
 
 use pyo3::pyfunction;
 
-/// Options that have another name as a keyword.
+/// Options whose keyword has a different name.
 const NAMES: [(&str, &str); 6] = [
     ("fs", "sampling_frequency"),
     ("new-fs", "new_sampling_frequency"),
@@ -16,10 +16,10 @@ const NAMES: [(&str, &str); 6] = [
     ("orders", "na, nb, nc, nd, nf"),
 ];
 /// Options without a value.
-const SWITCHES: [&str; 6] = ["drop-repeated", "fill", "resample", "resume", "robust", "stable"];
-/// Options whose assignments are a dictionary.
+const FLAGS: [&str; 6] = ["drop-repeated", "fill", "resample", "resume", "robust", "stable"];
+/// Options that take a dictionary in Python.
 const DICTIONARIES: [&str; 6] = ["unit", "scale", "offset", "sparse", "fix", "bound"];
-/// Words that are values of options.
+/// Words that are recognised as values of options.
 const VALUES: [&str; 17] = [
     "t",
     "yes",
@@ -40,7 +40,7 @@ const VALUES: [&str; 17] = [
     "population",
 ];
 
-/// The message with keywords instead of options.
+/// Returns the message with keywords in place of options.
 #[pyfunction]
 pub fn in_python(message: &str) -> String {
     let mut text = String::with_capacity(message.len());
@@ -60,9 +60,9 @@ pub fn in_python(message: &str) -> String {
         let renamed = NAMES.iter().find(|(typed, _)| *typed == option);
         let keyword = renamed.map_or_else(|| option.replace('-', "_"), |(_, keyword)| (*keyword).to_owned());
         text.push_str(&keyword);
-        if SWITCHES.contains(&option) {
+        if FLAGS.contains(&option) {
             text.push_str("=True");
-        } else if let Some((value, behind)) = value_behind(rest) {
+        } else if let Some((value, behind)) = split_value(rest) {
             text.push('=');
             text.push_str(&written(option, value));
             rest = behind;
@@ -72,8 +72,8 @@ pub fn in_python(message: &str) -> String {
     text
 }
 
-/// The value that follows an option, and the remaining text.
-fn value_behind(rest: &str) -> Option<(&str, &str)> {
+/// Splits the text after an option into its value and the remaining text; `None` if the option has no value.
+fn split_value(rest: &str) -> Option<(&str, &str)> {
     let word = rest.strip_prefix(' ')?;
     let end = word.find([' ', ';', ')']).unwrap_or(word.len());
     let word_end = word[..end].trim_end_matches([',', ':', '.']).len();

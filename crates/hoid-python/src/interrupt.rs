@@ -1,6 +1,6 @@
-//! Long computations that an interrupt can end.
+//! Long computations that can be interrupted.
 //!
-//! The computation runs in a separate thread, while this one checks the interpreter for signals.
+//! The computation runs in a separate thread, while the calling thread checks the interpreter for signals.
 
 use std::{
     sync::{
@@ -17,7 +17,7 @@ use pyo3::prelude::*;
 use crate::errors::{Failure, Outcome, bad_option};
 
 /// Time between two checks for signals.
-const LOOK: Duration = Duration::from_millis(50);
+const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// State shared by the computation and the waiting thread.
 #[derive(Debug, Default)]
@@ -28,12 +28,12 @@ pub struct RunStatus {
 }
 
 impl RunStatus {
-    /// False once the computation has to stop.
-    pub fn goes_on(&self) -> bool {
+    /// False if the computation must stop.
+    pub fn should_continue(&self) -> bool {
         !self.stopped.load(Ordering::Relaxed)
     }
 
-    /// Counts one more completed unit.
+    /// Increments the number of completed units.
     pub fn inc(&self) {
         self.done.fetch_add(1, Ordering::Relaxed);
     }
@@ -46,16 +46,16 @@ impl RunStatus {
 }
 
 /// Runs a computation that reports its progress to the waiting thread.
-pub fn told<T>(status: &Arc<RunStatus>, work: impl FnOnce() -> T) -> T {
+pub fn with_progress<T>(status: &Arc<RunStatus>, work: impl FnOnce() -> T) -> T {
     let status = Arc::clone(status);
     progress::watched(move |step| status.set(step.done as u64, step.total as u64), work)
 }
 
-/// Runs the computation without the interpreter and returns its result.
+/// Runs a computation without the interpreter lock and returns its result.
 ///
-/// `progress` is called with the completed and the total work. An interrupt asks the computation to
-/// stop. `patient` computations react to it and are awaited, so that files are complete; others are
-/// left to end in their thread.
+/// `progress` is called with the completed and the total number of units. An interrupt requests the computation to
+/// stop. If `patient` is set, the computation reacts to this request and is awaited, so that its files are complete;
+/// otherwise it is left to end in its own thread.
 pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
     py: Python<'_>,
     total: u64,
@@ -83,11 +83,11 @@ pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
         }
         py.check_signals()
     };
-    // mpsc::Receiver is not Sync; it is moved into the wait and back.
+    // mpsc::Receiver is not Sync, so it is moved into the wait and back.
     let mut receive = receive;
     let mut interrupted: Option<PyErr> = None;
     loop {
-        let (outcome, back) = py.detach(move || (receive.recv_timeout(LOOK), receive));
+        let (outcome, back) = py.detach(move || (receive.recv_timeout(SIGNAL_INTERVAL), receive));
         receive = back;
         match outcome {
             Ok(result) => {

@@ -1,25 +1,25 @@
-//! The native module of the Python package `pyhoid`: conversion only.
+//! The native module of the Python package `pyhoid`; it only converts between Python and the libraries.
 //!
-//! The libraries compute; the user interface is in `python/src/pyhoid`, which converts arguments to
-//! plain types (floats, contiguous arrays, dictionaries) and wraps the results. Long computations
-//! run without the interpreter.
+//! The libraries compute the results. The user interface is in `python/src/pyhoid`, which converts arguments to plain
+//! types (floats, contiguous arrays, dictionaries) and wraps the results. Long computations run without the interpreter
+//! lock.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `arrays` | arrays and records in and out |
-//! | `errors` | errors of the libraries as exceptions, by kind |
-//! | `names`, `recursion` | words and options of Python as those of the libraries |
+//! | `arrays` | conversion of arrays and records |
+//! | `errors` | exceptions for the errors of the libraries, by kind |
+//! | `names`, `recursion` | conversion of names and options from Python |
 //! | `figures` | estimates, operators and tests as dictionaries |
 //! | `family` | the operator of a person |
 //! | `identify`, `fit`, `time_varying` | batch fits |
-//! | `track`, `tracker` | recursive estimates, over a record and live |
+//! | `track`, `tracker` | recursive estimates, over a record and online |
 //! | `simulate` | scenarios, margins, conversions |
 //! | `describing` | describing functions |
-//! | `compare` | conditions and people compared |
-//! | `design` | forcing function and errors of an experiment before it is done |
-//! | `study`, `group` | studies, the reproduction, groups |
-//! | `files`, `survey` | files of records and tables, and what is in them |
-//! | `interrupt` | long work that an interrupt can end |
+//! | `compare` | comparison of conditions and people |
+//! | `design` | design of an experiment: forcing function and expected errors |
+//! | `study`, `group` | studies, reproduction of the thesis, groups |
+//! | `files`, `survey` | files of records and tables, and a survey of their contents |
+//! | `interrupt` | long computations that can be interrupted |
 #![allow(
     missing_docs,
     reason = "every public item is a Python object; the package and its stubs document them"

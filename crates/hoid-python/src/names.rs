@@ -1,4 +1,4 @@
-//! Words of the Python interface, those of the command line, and their meaning in the libraries.
+//! Names used in the Python interface and on the command line, and their values in the libraries.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
@@ -11,7 +11,7 @@ use hoid_model::{
 
 use crate::errors::{Outcome, bad_option};
 
-/// The meaning of a word from a list.
+/// Returns the value that belongs to a name in a list.
 pub fn word<T: Clone>(option: &str, found: &str, words: &[(&str, T)]) -> Outcome<T> {
     let lower = found.to_ascii_lowercase().replace('_', "-");
     match words.iter().find(|(word, _)| *word == lower) {
@@ -26,7 +26,7 @@ pub fn word<T: Clone>(option: &str, found: &str, words: &[(&str, T)]) -> Outcome
     }
 }
 
-/// A choice of the library by its name.
+/// Returns the value of a choice, given by its name.
 pub fn choice<T: NamedChoice>(option: &str, found: &str) -> Outcome<T> {
     let words: Vec<_> = T::CHOICES
         .iter()
@@ -35,7 +35,7 @@ pub fn choice<T: NamedChoice>(option: &str, found: &str) -> Outcome<T> {
     word(option, found, &words)
 }
 
-/// Kind of fault that can be excluded from a record.
+/// Returns the kind of fault that can be excluded from a record, given by its name.
 pub fn quality_issue_kind(found: &str) -> Outcome<QualityIssueKind> {
     let kinds = [
         QualityIssueKind::Missing,
@@ -58,7 +58,7 @@ pub fn detrend(found: &str) -> Outcome<Detrend> {
     choice("detrend", found)
 }
 
-/// The handling of each sparse column.
+/// Parses the treatment of each sparse column.
 pub fn sparse(found: BTreeMap<String, String>) -> Outcome<BTreeMap<String, Sparse>> {
     let of = |(name, how): (String, String)| Ok((name, choice("sparse", &how)?));
     found.into_iter().map(of).collect()
@@ -76,7 +76,7 @@ pub fn remnant_discretisation(found: &str) -> Outcome<RemnantDiscretisation> {
     choice("discretisation", found)
 }
 
-/// The keyword of an option: its name, except for a word that is reserved in Python.
+/// Returns the keyword of an option: its name, or another word if the name is reserved in Python.
 pub fn keyword(name: &'static str) -> &'static str {
     match name {
         "lambda" => "forgetting_factor",
@@ -102,7 +102,7 @@ pub fn discretisation(found: &str, prewarp_rad_s: Option<f64>) -> Outcome<discre
     word("method", found, &words)
 }
 
-/// A range including both ends.
+/// Returns a range that includes both ends.
 pub fn range(option: &str, ends: (usize, usize)) -> Outcome<RangeInclusive<usize>> {
     if ends.0 > ends.1 {
         return Err(bad_option(format!(
@@ -113,7 +113,7 @@ pub fn range(option: &str, ends: (usize, usize)) -> Outcome<RangeInclusive<usize
     Ok(ends.0..=ends.1)
 }
 
-/// Orders by name, each a range.
+/// Returns orders by name, each as a range.
 pub fn named_orders(orders: &BTreeMap<String, (usize, usize)>) -> Outcome<NamedOrders> {
     let one = |(name, ends): (&String, &(usize, usize))| Ok((name.clone(), range(name, *ends)?));
     orders.iter().map(one).collect()

@@ -1,4 +1,4 @@
-//! The options of `pyhoid.track` and `pyhoid.Tracker`: conversion to those of the library.
+//! Conversion of the options of `pyhoid.track` and `pyhoid.Tracker` to those of the library.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ use crate::{
     names,
 };
 
-/// The value of a keyword; None if it was not given.
+/// Returns the value of a keyword; `None` if it was not given.
 fn get<'py, T>(options: &Bound<'py, PyDict>, name: &str) -> Outcome<Option<T>>
 where
     T: for<'a> FromPyObject<'a, 'py>,
@@ -61,11 +61,11 @@ pub fn request(options: &Bound<'_, PyDict>) -> Outcome<TrackRequest> {
     })
 }
 
-/// The method with its options, which are texts by name.
+/// Returns the method with its options, which are texts by name.
 fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
     let mut method = match get::<String>(options, "method")? {
         Some(name) => {
-            // A pickle may contain an earlier name.
+            // A pickle may contain an earlier name of a method.
             let name = renamed_method(&name).map_or(name, |(now, _)| now.to_owned());
             if let Some(reason) = hoid_thesis::comparators::not_tracked(&name) {
                 return Err(bad_option(reason));
@@ -76,7 +76,8 @@ fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
         None => Method::default(),
     };
     let mut given: BTreeMap<String, String> = get(options, "settings")?.unwrap_or_default();
-    // In the order of the registry: options that depend on a kind of forgetting come after it.
+    // Options are set in the order of the registry, in which the kind of forgetting precedes the options that depend on
+    // it.
     for setting in hoid_survey::registry().into_iter().flat_map(|spec| spec.settings) {
         let Some(text) = given.remove(setting.name) else {
             continue;
@@ -94,7 +95,7 @@ fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
         let wrong = |error: IdentError| bad_option(format!("{keyword}: {error}"));
         method.set(setting.name, &text).map_err(wrong)?;
     }
-    // An earlier fit of the person, and the origin of its text.
+    // An earlier fit of the person, given as text with its source.
     if let Some((text, source)) = get::<(String, String)>(options, "fit")? {
         let fit = parse_fit(&text, &source).and_then(FitFile::operator)?;
         method.start_from(fit)?;
@@ -102,13 +103,13 @@ fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
     Ok(method)
 }
 
-/// For an earlier name of a recursive method the current one, and the sentence that reports it.
+/// Returns, for an earlier name of a recursive method, the current name and a sentence that reports the change.
 #[pyfunction]
 pub fn renamed_method(name: &str) -> Option<(&'static str, String)> {
     hoid_survey::renamed(name)
 }
 
-/// Name, line of help and literature of each recursive method, and the keywords that it takes.
+/// Returns name, help text and literature of each recursive method, and the keywords that it accepts.
 #[pyfunction]
 pub fn recursive_methods() -> Vec<(&'static str, &'static str, &'static str, Vec<String>)> {
     let keywords = |spec: &MethodSpec| {

@@ -1,4 +1,4 @@
-//! `pyhoid.simulate`, `pyhoid.margins`, `pyhoid.convert`: scenarios and the operator's conversions.
+//! `pyhoid.simulate`, `pyhoid.margins`, `pyhoid.convert`: scenarios, and conversions of the operator.
 
 use std::path::PathBuf;
 
@@ -25,7 +25,7 @@ use crate::{
     figures, names,
 };
 
-/// A condition, a scenario file, or the text of one.
+/// Returns the scenario given by a condition, a file, or text.
 fn scenario(condition: Option<&str>, file: Option<PathBuf>, text: Option<&str>) -> Outcome<AnyScenario> {
     match (condition, file, text) {
         (Some(condition), None, None) => {
@@ -38,7 +38,7 @@ fn scenario(condition: Option<&str>, file: Option<PathBuf>, text: Option<&str>) 
     }
 }
 
-/// One closed-loop run.
+/// Simulates one closed-loop run.
 #[pyfunction]
 #[pyo3(signature = (*, condition, scenario_file, scenario_text, remnant_order, noise_level, noise_definition, remnant_time_constant,
     sample_time, realisation, seed, cell, replication, keep_run_in))]
@@ -71,8 +71,8 @@ pub fn simulate<'py>(
             let has_remnant = remnant_order.is_some() || remnant_time_constant.is_some();
             if has_remnant || noise_level.is_some() || noise_definition.is_some() {
                 return Err(bad_option(
-                    "remnant_order, remnant_time_constant, noise_level and noise_definition are for the thesis's \
-                     remnant: in a scenario with a form the tables [[remnant]] specify it",
+                    "remnant_order, remnant_time_constant, noise_level and noise_definition are for the remnant of the \
+                     thesis; in a scenario with a form, the tables [[remnant]] specify the remnant",
                 ));
             }
             if let Some(ts) = sample_time {
@@ -107,7 +107,7 @@ pub fn simulate<'py>(
     Ok(parts(py, record)?)
 }
 
-/// Crossover, margins and remnant gains of a scenario.
+/// Returns crossover, margins and remnant gains of a scenario.
 #[pyfunction]
 #[pyo3(signature = (*, condition, scenario_file, scenario_text, state, noise_levels, noise_definition))]
 pub fn margins<'py>(
@@ -140,7 +140,7 @@ pub fn margins<'py>(
             row.set_item("remnant_order", order)?;
             row.set_item("noise_level", level)?;
             row.set_item("definition", noise_definition)?;
-            // A level that cannot be reached is a row of the table; any other error concerns all of them.
+            // A noise level that cannot be reached is a row of the table; any other error concerns all noise levels.
             match scenario.remnant_gain_for(&state, order, level, definition) {
                 Ok(k_n) => row.set_item("K_n", k_n)?,
                 Err(reason @ ModelError::UnreachableNoiseLevel { .. }) => {
@@ -156,7 +156,7 @@ pub fn margins<'py>(
     Ok(all)
 }
 
-/// The entries of an operator of the family, with the gains of the parts of its remnant.
+/// Returns the entries for an operator of the family, including the gains of the parts of its remnant.
 fn family_margins<'py>(py: Python<'py>, scenario: &FamilyScenario, last: bool) -> Outcome<Bound<'py, PyDict>> {
     let state = if last { &scenario.last } else { &scenario.initial };
     let all = figures::plain_margins(py, &state.margins()?)?;
@@ -195,7 +195,7 @@ fn conversion<'py>(
     Ok(all)
 }
 
-/// Operator parameters from discrete coefficients.
+/// Computes operator parameters from discrete coefficients.
 #[pyfunction]
 #[pyo3(signature = (f, b, nk, sample_time))]
 pub fn convert_discrete<'py>(
@@ -218,7 +218,7 @@ pub fn convert_discrete<'py>(
     Ok(conversion(py, discrete, discrete.parameters())?)
 }
 
-/// Discrete coefficients from operator parameters.
+/// Computes discrete coefficients from operator parameters.
 #[pyfunction]
 #[pyo3(signature = (operator, sample_time))]
 pub fn convert_operator<'py>(
@@ -231,7 +231,8 @@ pub fn convert_operator<'py>(
     Ok(conversion(py, discrete, Ok(operator))?)
 }
 
-/// Discretises a transfer function: descending powers of s to ascending powers of q^-1.
+/// Discretises a transfer function. The coefficients are given in descending powers of s and returned in ascending
+/// powers of q^-1.
 #[pyfunction]
 #[pyo3(signature = (num, den, sample_time, method, prewarp))]
 pub fn discretise_transfer_function<'py>(

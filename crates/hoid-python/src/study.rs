@@ -12,15 +12,15 @@ use crate::{
     interrupt,
 };
 
-/// Finished, estimates made, and the tables.
-type Left = (bool, u64, Vec<PathBuf>);
+/// Whether the study is finished, the number of estimates made, and the paths of the tables.
+type OutcomeParts = (bool, u64, Vec<PathBuf>);
 
-fn left(py: Python<'_>, outcome: StudyOutcome) -> Outcome<Left> {
+fn outcome_parts(py: Python<'_>, outcome: StudyOutcome) -> Outcome<OutcomeParts> {
     warn(py, &outcome.notes)?;
     Ok((outcome.finished, outcome.estimates, outcome.tables))
 }
 
-/// Warnings for the user, as warnings of Python.
+/// Issues notes as Python warnings.
 pub fn warn(py: Python<'_>, notes: &[String]) -> PyResult<()> {
     for note in notes {
         let text = CString::new(note.replace('\0', " "))?;
@@ -41,7 +41,7 @@ pub struct PyPlan {
 
 #[pymethods]
 impl PyPlan {
-    /// From a file, the text of one, or the name of a plan that comes with hoid.
+    /// Creates a plan from a file, from text, or from the name of a plan included with hoid.
     #[new]
     #[pyo3(signature = (*, path=None, text=None, name=None, replications=None))]
     fn new(path: Option<PathBuf>, text: Option<&str>, name: Option<&str>, replications: Option<u64>) -> Outcome<Self> {
@@ -139,7 +139,7 @@ impl PyPlan {
         )
     }
 
-    /// Runs the plan, or a share of it, and writes its tables into a directory.
+    /// Runs the plan, or one shard of it, and writes the tables to a directory.
     #[pyo3(signature = (directory, *, shard, jobs, resume, csv, progress))]
     #[allow(clippy::too_many_arguments)]
     fn run(
@@ -151,7 +151,7 @@ impl PyPlan {
         resume: bool,
         csv: bool,
         progress: Option<Bound<'_, PyAny>>,
-    ) -> Outcome<Left> {
+    ) -> Outcome<OutcomeParts> {
         let options = RunOptions {
             shard: shard.map(|s| s.parse()).transpose()?,
             jobs,
@@ -162,14 +162,14 @@ impl PyPlan {
         let total = plan.estimates();
         let outcome = interrupt::run(py, total, progress.as_ref(), true, move |standing| {
             run(&plan, &directory, &options, &|p| standing.set(p.done, p.total), &|| {
-                standing.goes_on()
+                standing.should_continue()
             })
         })?;
-        left(py, outcome)
+        outcome_parts(py, outcome)
     }
 }
 
-/// Names and titles of the plans that come with hoid.
+/// Returns names and titles of the plans included with hoid.
 #[pyfunction]
 pub fn plan_names() -> Outcome<Vec<(String, String)>> {
     let one = |named: &NamedPlan| -> Result<(String, String), StudyError> {
@@ -178,18 +178,18 @@ pub fn plan_names() -> Outcome<Vec<(String, String)>> {
     Ok(named_plans().map(one).collect::<Result<_, _>>()?)
 }
 
-/// Joins the shards of a study.
+/// Merges the shards of a study.
 #[pyfunction]
 #[pyo3(signature = (shards, directory, csv))]
-pub fn merge_shards(py: Python<'_>, shards: Vec<PathBuf>, directory: PathBuf, csv: bool) -> Outcome<Left> {
+pub fn merge_shards(py: Python<'_>, shards: Vec<PathBuf>, directory: PathBuf, csv: bool) -> Outcome<OutcomeParts> {
     let outcome = py.detach(|| merge(&shards, &directory, csv))?;
-    left(py, outcome)
+    outcome_parts(py, outcome)
 }
 
-/// Index page, number of tables and figures, tally of the claims.
+/// Path of the index page, number of tables and figures, and counts of the claims by outcome.
 type Reproduced = (PathBuf, usize, Option<[usize; 5]>);
 
-/// Makes the tables, figures and claims of the thesis; `None` after an interrupt.
+/// Reproduces the tables, figures and claims of the thesis; `None` after an interrupt.
 #[pyfunction]
 #[pyo3(signature = (directory, *, only, replications, jobs, recordings, progress))]
 pub fn reproduce(
@@ -213,7 +213,7 @@ pub fn reproduce(
                 standing.set(p.done, p.total);
             }
         };
-        reproduce_into(&wanted, &directory, &tell, &|| standing.goes_on())
+        reproduce_into(&wanted, &directory, &tell, &|| standing.should_continue())
     })?;
     Ok(found.map(|made| (made.index, made.items, made.tally)))
 }

@@ -54,7 +54,7 @@ pub fn info<'py>(
     Ok(all)
 }
 
-/// Layout of the file, and the keywords to read it.
+/// Returns the layout of the file, and the keywords with which to read it.
 fn looked<'py>(py: Python<'py>, look: &Look) -> PyResult<Bound<'py, PyDict>> {
     let role = |role: &Role| -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
@@ -106,7 +106,7 @@ fn looked<'py>(py: Python<'py>, look: &Look) -> PyResult<Bound<'py, PyDict>> {
     Ok(all)
 }
 
-/// Advice as keywords of `pyhoid.read`.
+/// Converts advice to keywords of `pyhoid.read`.
 fn keywords<'py>(py: Python<'py>, advice: &Advice) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     for (name, column) in [("input", &advice.input), ("output", &advice.output)] {

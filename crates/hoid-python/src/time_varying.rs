@@ -12,12 +12,12 @@ use crate::{
     figures::{self, ValueWithError, VerdictParts, error_or_nan, pair},
 };
 
-/// The package wraps it in `pyhoid.TimeVaryingFit`.
+/// Fit of an operator whose gains change once; the package wraps it in `pyhoid.TimeVaryingFit`.
 #[pyclass(name = "TimeVaryingFit", module = "pyhoid._pyhoid", frozen)]
 pub struct PyTimeVaryingFit(pub Identified<SigmoidFit>);
 
-/// The operator before or after the change: of a gain and a lead as that of any fit, else its form
-/// and each parameter by its name; the poles of the family are stable by their bounds.
+/// Returns the operator before or after the change. A gain with a lead is returned as for any fit; any other form is
+/// returned with its name and each parameter by name. Poles of the family are stable because of their bounds.
 fn operator<'py>(py: Python<'py>, of: &ChangedOperator) -> PyResult<Option<Bound<'py, PyDict>>> {
     if let Some(lead) = of.lead() {
         return figures::operator(py, &Ok(lead));
@@ -34,13 +34,13 @@ fn operator<'py>(py: Python<'py>, of: &ChangedOperator) -> PyResult<Option<Bound
 
 #[pymethods]
 impl PyTimeVaryingFit {
-    /// The settings that were used.
+    /// Returns the settings: name, value, and whether the user gave it.
     #[getter]
     fn settings(&self) -> Vec<(String, String, bool)> {
         figures::settings(&self.0.settings)
     }
 
-    /// The result as JSON, from which it comes back.
+    /// Returns the result as JSON, from which it can be restored.
     fn to_json(&self) -> Outcome<String> {
         Ok(self.0.to_json()?)
     }
@@ -50,7 +50,7 @@ impl PyTimeVaryingFit {
         self.0.fit.form().name()
     }
 
-    /// Name, estimate, unit and remark of each parameter.
+    /// Returns name, estimate, unit and remark for each parameter.
     #[getter]
     fn parameters(&self) -> Vec<(String, ValueWithError, &'static str, Option<String>)> {
         let one = |p: hoid_ident::ChangeParameter| (p.name, pair(p.estimate), p.unit, p.remark.map(|r| r.to_string()));
@@ -83,7 +83,7 @@ impl PyTimeVaryingFit {
         Ok(all)
     }
 
-    /// Whether there is a change, and the comparison with an operator that does not change.
+    /// Returns whether there is a change, and the comparison with an operator that does not change.
     #[getter]
     fn change<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (c, all) = (self.0.fit.comparison(), PyDict::new(py));
@@ -96,7 +96,7 @@ impl PyTimeVaryingFit {
         Ok(all)
     }
 
-    /// The level of u in each record, where it was estimated.
+    /// Returns the constant of u in each record; `None` where it was not estimated.
     #[getter]
     fn levels(&self) -> Vec<Option<ValueWithError>> {
         self.0
@@ -107,12 +107,13 @@ impl PyTimeVaryingFit {
             .collect()
     }
 
-    /// The records as they were fitted: which of those given each is a part of, the record, and the processing of it.
+    /// Returns the records that were fitted: for each, the index of the given record from which it comes, the record,
+    /// and the steps applied to it.
     fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
         used_records(py, &self.0.data)
     }
 
-    /// The faults of the records: which of those given, and the fault.
+    /// Returns the faults, each with the index of the given record in which it was found.
     #[getter]
     fn faults<'py>(&self, py: Python<'py>) -> PyResult<Vec<(usize, Bound<'py, PyDict>)>> {
         faults_of(py, &self.0.data)
@@ -128,13 +129,13 @@ impl PyTimeVaryingFit {
         operator(py, self.0.fit.last_operator())
     }
 
-    /// `t`, and what changes (K_e, T_L and K_e_dot of a gain and a lead) at these times, each with
-    /// its standard error.
+    /// Returns `t` and the parameters that change (for a gain with a lead: K_e, T_L and K_e_dot) at these times, each
+    /// with its standard error.
     fn gains<'py>(&self, py: Python<'py>, times: Vec<f64>) -> PyResult<Bound<'py, PyDict>> {
         let gains: Vec<GainsAt> = times.iter().map(|t| self.0.fit.gains_at(*t)).collect();
         let all = PyDict::new(py);
         all.set_item("t", array(py, times))?;
-        // The names exist even without times.
+        // The names are defined even if no times are given.
         for (i, of) in self.0.fit.gains_at(0.0).gains.iter().enumerate() {
             all.set_item(
                 of.name,
@@ -171,7 +172,7 @@ impl PyTimeVaryingFit {
         figures::verdict(&self.0.verdict)
     }
 
-    /// Whiteness of the residuals of a record.
+    /// Tests the residuals of a record for whiteness.
     fn ljung_box<'py>(&self, py: Python<'py>, record: &Bound<'py, PyAny>) -> Outcome<Option<Bound<'py, PyDict>>> {
         let record = arrays::record(record, Wanted::Only(&[]))?;
         let fit = &self.0.fit;

@@ -17,7 +17,7 @@ use crate::{
     interrupt, recursion,
 };
 
-/// Tracks a record; `options` are those of the recursion, the others concern the record.
+/// Tracks a record. `options` are the options of the recursion; the other arguments concern the record.
 #[pyfunction]
 #[pyo3(signature = (record, options, *, start_span, update_from, moving_average, every, decimate, validate, update_covariance, progress))]
 #[allow(clippy::too_many_arguments)]
@@ -54,7 +54,7 @@ pub fn track<'py>(
     Ok(PyTrace(tracked))
 }
 
-/// The estimate at every sample that was kept; the package wraps it in `pyhoid.Trace`.
+/// A trace, with the estimate at each stored sample; the package wraps it in `pyhoid.Trace`.
 #[pyclass(name = "Trace", module = "pyhoid._pyhoid", frozen)]
 pub struct PyTrace(Tracked);
 
@@ -64,12 +64,12 @@ impl PyTrace {
         self.0.trace.len()
     }
 
-    /// The result as JSON: the object of `hoid track --json`.
+    /// Returns the result as JSON, the same object as `hoid track --json` prints.
     fn to_json(&self) -> Outcome<String> {
         Ok(self.0.to_json()?)
     }
 
-    /// The record as it was tracked: which of those given it is, the record, and the processing of it.
+    /// Returns the record that was tracked: the index of the given record, the record, and the steps applied to it.
     fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
         used_records(py, &self.0.data)
     }
@@ -115,7 +115,7 @@ impl PyTrace {
         Ok(all)
     }
 
-    /// Events found by the guard, and its actions.
+    /// Returns the faults that the guard found, and its actions.
     #[getter]
     fn faults<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         self.0
@@ -126,7 +126,7 @@ impl PyTrace {
             .collect()
     }
 
-    /// The changes that were declared, for the methods adaptive and multiple-model.
+    /// Returns the declared changes, for the methods adaptive and multiple-model.
     #[getter]
     fn changes<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let one = |(t, c): &(f64, hoid_track::Change)| {
@@ -148,7 +148,8 @@ impl PyTrace {
         self.0.trace.changes().iter().map(one).collect()
     }
 
-    /// The start covariances that were tried on a second run, and the one that was taken.
+    /// Returns the start covariances that were tried on a second run, and the one selected; `None` if there was no
+    /// second run.
     #[getter]
     fn covariance_choice<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some((_, choice)) = self.0.chosen_covariance() else {
@@ -169,33 +170,34 @@ impl PyTrace {
         Ok(Some(all))
     }
 
-    /// Number of fits that failed, and why the last did, for the method window.
+    /// Returns the number of fits that failed and the reason for the last failure, for the method window.
     #[getter]
     fn failures(&self) -> Option<(usize, String)> {
         self.0.trace.failures().cloned()
     }
 
-    /// The batch fit that the recursion started from.
+    /// Returns the batch fit from which the recursion started.
     #[getter]
     fn start(&self) -> Option<PyFit> {
         let fit = self.0.trace.start()?.clone();
         Some(PyFit::new(fit, self.0.choice.clone(), 1))
     }
 
-    /// Verdict on the trace.
+    /// Returns the verdict on the trace.
     #[getter]
     fn verdict(&self) -> figures::VerdictParts {
         figures::verdict(&self.0.verdict)
     }
 
-    /// Number of rows without a crossover, and their most frequent reason; None without a controlled element.
+    /// Returns the number of rows without a crossover and the most frequent reason; `None` without a controlled
+    /// element.
     #[getter]
     fn no_crossover(&self) -> Option<(usize, Option<&'static str>)> {
         let (rows, reason) = self.0.without_crossover()?;
         Some((rows, reason.map(|reason| reason.words())))
     }
 
-    /// All columns by name, as in a trace file; whole numbers stay whole.
+    /// Returns all columns by name, as in a trace file; whole numbers remain integers.
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let table = py.detach(|| self.0.table());
         let all = PyDict::new(py);
@@ -214,7 +216,7 @@ impl PyTrace {
         PyArray1::from_slice(py, self.0.trace.innovation_variance())
     }
 
-    /// The operator of a row.
+    /// Returns the operator of a row.
     fn operator<'py>(&self, py: Python<'py>, row: usize) -> PyResult<Option<Bound<'py, PyDict>>> {
         if row >= self.0.trace.len() {
             return Err(pyo3::exceptions::PyIndexError::new_err(format!(
@@ -225,8 +227,7 @@ impl PyTrace {
         figures::operator(py, &self.0.trace.operator(row))
     }
 
-    /// Writes the page about the trace into a directory, with the batch fits of the start and of
-    /// the last third.
+    /// Writes the report page of the trace to a directory, including the batch fits of the start and of the last third.
     #[pyo3(signature = (directory, *, title))]
     fn report(&self, py: Python<'_>, directory: PathBuf, title: Option<String>) -> Outcome<PathBuf> {
         let page = py.detach(|| {
@@ -242,7 +243,7 @@ impl PyTrace {
         Ok(page)
     }
 
-    /// Writes the columns into a file, with comments where the format has them.
+    /// Writes the columns to a file, with comments if the format supports them.
     fn write(&self, py: Python<'_>, path: PathBuf, comments: Vec<String>) -> Outcome<()> {
         py.detach(|| {
             let table = OutputTable {

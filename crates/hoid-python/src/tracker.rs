@@ -1,4 +1,4 @@
-//! `pyhoid.Tracker`: a recursive estimate, online.
+//! `pyhoid.Tracker`: an online recursive estimate.
 
 use hoid_ident::Choice;
 use hoid_model::{Decimation, Orders, SampleTime};
@@ -14,16 +14,16 @@ use crate::{
     recursion,
 };
 
-/// The state of a tracker, to restore it: orders, numbers of the tracker, numbers of the warm-up.
+/// The saved state of a tracker: its orders, and all changing values as numbers.
 type Saved<'py> = (Option<Bound<'py, PyDict>>, Bound<'py, PyArray1<f64>>);
 
-/// Crossover and margin, or the reason why not.
+/// Crossover and margin, or the reason why there are none.
 type OpenLoopParts = (
     Option<(figures::ValueWithError, figures::ValueWithError)>,
     Option<&'static str>,
 );
 
-/// The package derives `pyhoid.Tracker` from it.
+/// An online tracker; the package derives `pyhoid.Tracker` from it.
 #[pyclass(name = "Tracker", module = "pyhoid._pyhoid", subclass)]
 pub struct PyTracker {
     live: Live,
@@ -76,18 +76,18 @@ impl PyTracker {
         Ok(Self { live, choice })
     }
 
-    /// Takes one sample. Returns the innovation: NaN at a fault and during the warm-up.
+    /// Processes one sample and returns the innovation, which is NaN at a fault and during the warm-up.
     #[pyo3(signature = (e, u, f_t=None, update=true))]
     fn step(&mut self, py: Python<'_>, e: f64, u: f64, f_t: Option<f64>, update: bool) -> f64 {
         let sample = Sample { e, u, reference: f_t };
         match self.live.stage() {
             Stage::Tracking(_) => self.take(sample, update),
-            // The last sample of the warm-up starts the fit.
+            // The last sample of the warm-up triggers the start fit, which takes long.
             Stage::Collecting(_) => py.detach(|| self.take(sample, update)),
         }
     }
 
-    /// Takes samples one after the other; returns their innovations.
+    /// Processes samples one after the other and returns their innovations.
     #[pyo3(signature = (e, u, f_t, update))]
     fn take_all<'py>(
         &mut self,
@@ -133,7 +133,7 @@ impl PyTracker {
         self.live.tracker().is_some()
     }
 
-    /// Reason why the last start fit failed or the warm-up restarted.
+    /// Returns the reason why the last fit failed or the warm-up restarted.
     #[getter]
     fn trouble(&self) -> Option<String> {
         match self.live.stage() {
@@ -147,7 +147,7 @@ impl PyTracker {
         self.live.sample_time().s()
     }
 
-    /// Treatment of a high rate; None if it is not.
+    /// Returns the decimation that a high sampling frequency required; `None` if there is none.
     #[getter]
     fn decimation(&self) -> Option<String> {
         self.live.decimated().map(|done| done.to_string())
@@ -200,27 +200,27 @@ impl PyTracker {
         Ok(figures::operator(py, &self.tracker()?.operator())?)
     }
 
-    /// The settings of responses: frequencies in rad/s.
+    /// Returns the frequencies in rad/s at which the response is evaluated.
     #[getter]
     fn at(&self) -> Vec<f64> {
         self.live.plan().options().at_rad_s.clone()
     }
 
-    /// The controlled element.
+    /// Returns the controlled element as text.
     #[getter]
     fn controlled_element(&self) -> Option<String> {
         let element = self.live.plan().options().controlled_element.as_ref();
         element.map(ToString::to_string)
     }
 
-    /// Gain in dB and phase in deg at a frequency in rad/s, each with its standard error.
+    /// Returns gain in dB and phase in deg at a frequency in rad/s, each with its standard error.
     fn response(&self, omega: f64) -> Outcome<Option<(figures::ValueWithError, figures::ValueWithError)>> {
         let found = self.tracker()?.response(omega);
         Ok(found.map(|r| (figures::pair(r.gain_db()), figures::pair(r.phase_deg()))))
     }
 
-    /// Crossover in rad/s and phase margin in deg, or why there are none; None without a controlled
-    /// element.
+    /// Returns crossover in rad/s and phase margin in deg, or the reason why there are none; `None` without a
+    /// controlled element.
     #[getter]
     fn open_loop(&self) -> Outcome<Option<OpenLoopParts>> {
         let found = self.tracker()?.open_loop();
@@ -236,7 +236,7 @@ impl PyTracker {
         }))
     }
 
-    /// Whether the data determine each parameter of the operator.
+    /// Returns for each parameter of the operator whether the data determine it.
     #[getter]
     fn determined(&self) -> Outcome<std::collections::BTreeMap<&'static str, bool>> {
         let tracker = self.tracker()?;
@@ -261,7 +261,7 @@ impl PyTracker {
         Ok(all)
     }
 
-    /// Event of the guard at the last sample, its times in s before that sample.
+    /// Returns the event of the guard at the last sample, with times in s relative to that sample.
     #[getter]
     fn event<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(tracker) = self.live.tracker() else {
@@ -272,27 +272,28 @@ impl PyTracker {
         event.map(|fault| figures::track_fault(py, &fault)).transpose()
     }
 
-    /// True while the guard lets the estimate stay constant.
+    /// True while the guard keeps the estimate constant.
     #[getter]
     fn paused(&self) -> bool {
         self.live.tracker().is_some_and(Tracker::is_paused)
     }
 
-    /// The batch fit that the tracker started from; None with a given start, or from a pickle.
+    /// Returns the batch fit from which the tracker started; `None` if the start was given or the tracker was restored
+    /// from a pickle.
     #[getter]
     fn start(&self) -> Option<PyFit> {
         let start = self.live.tracker()?.start()?.clone();
         Some(PyFit::new(start, self.choice.clone(), 1))
     }
 
-    /// The orders, once there is a tracker, and all that changes as numbers.
+    /// Returns the orders, once the tracker has started, and all changing values as numbers.
     fn saved<'py>(&mut self, py: Python<'py>) -> PyResult<Saved<'py>> {
         let (orders, numbers) = self.live.saved();
         let orders = orders.map(|orders| figures::orders(py, &orders)).transpose()?;
         Ok((orders, array(py, numbers)))
     }
 
-    /// Restores the state that `saved` returned.
+    /// Restores a state that `saved` returned.
     fn restore(
         &mut self,
         orders: Option<std::collections::BTreeMap<String, usize>>,

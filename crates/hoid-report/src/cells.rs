@@ -1,4 +1,4 @@
-//! Symbols and numbers of the pages as template values.
+//! Symbols and numbers as template values for the pages.
 
 use hoid_model::{Record, uncertainty::Estimate};
 use minijinja::Value;
@@ -9,8 +9,8 @@ pub fn html(text: impl Into<String>) -> Value {
     Value::from_safe_string(text.into())
 }
 
-/// Name and unit of an operator parameter for the page; gains have units only if the record gives
-/// them, as [`hoid_model::GainUnit`] states.
+/// HTML symbol and unit of an operator parameter. Gains have no unit here, because their unit depends on the record
+/// ([`hoid_model::GainUnit`]).
 pub fn symbol(name: &str) -> (Value, &'static str) {
     let (symbol, unit) = match name {
         "K_e" => ("<i>K</i><sub>e</sub>", ""),
@@ -37,7 +37,7 @@ pub fn cell(estimate: Estimate) -> Value {
     })
 }
 
-/// Label of a record, or its number if it has none.
+/// Label of a record; `record N`, counted from 1, if it has no label.
 pub fn record_name(record: &Record, index: usize) -> String {
     match record.label() {
         "" => format!("record {}", index + 1),

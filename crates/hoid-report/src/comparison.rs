@@ -1,10 +1,10 @@
-//! A comparison as a figure.
+//! The figure of a comparison of conditions or groups.
 
 use hoid_design::compare::{Comparison, Mean, PersonEstimate, Quantity};
 
 use crate::figures::{PeopleGrid, PeoplePanel, people_by_condition};
 
-/// Name of a quantity in a figure: of a parameter its symbol.
+/// Name of a quantity in a figure: the symbol of a parameter, the description of any other quantity.
 fn name(quantity: &Quantity) -> String {
     match quantity {
         Quantity::Parameter(name) => name.clone(),
@@ -12,7 +12,7 @@ fn name(quantity: &Quantity) -> String {
     }
 }
 
-/// Persons by condition, with the means and their intervals, one panel for each quantity.
+/// Draws the estimates of each person by condition, with the means and their intervals, in one panel for each quantity.
 pub fn comparison_figure(comparison: &Comparison) -> String {
     let mut places: Vec<(&str, &str)> = Vec::new();
     let mut people: Vec<&str> = Vec::new();
@@ -56,11 +56,11 @@ pub fn comparison_figure(comparison: &Comparison) -> String {
     let grid = PeopleGrid {
         panels: comparison.quantities().into_iter().map(panel).collect(),
         people: people.iter().map(|who| (*who).to_owned()).collect(),
-        places: places.iter().map(place).collect(),
+        categories: places.iter().map(place).collect(),
         abscissa: String::new(),
     };
     let title = format!(
-        "{}: people by condition, and the mean over people with its interval of 95 %",
+        "{}: people by condition, and the mean over people with its 95 % interval",
         comparison.group
     );
     people_by_condition("people", &title, &grid)

@@ -1,4 +1,5 @@
-//! A designed experiment as figures: the forcing function with the response of the person, and errors over runs.
+//! Figures of a designed experiment: the forcing function with the response of the person, and the expected errors over
+//! the number of runs.
 
 use hoid_design::experiment::{DesignedLine, Enters, Expected, ExpectedResponse, ExperimentDesign};
 use hoid_model::uncertainty::Estimate;
@@ -8,8 +9,9 @@ use crate::{
     numbers::Z_95,
 };
 
-/// Amplitudes of the lines, and gain and phase of the person: the operator with its band, and the lines with their bars,
-/// each of 95 % over all runs; likewise the response to a target that is shown, at the lines of the target.
+/// Draws the amplitudes of the lines and the gain and phase of the person. The operator has a 95 % band and each line a
+/// 95 % error bar, both expected from all runs. If the target is displayed, the response to it is drawn in the same
+/// way.
 pub fn design_figure(design: &ExperimentDesign) -> String {
     let is_seen = design.task.feedforward.is_some();
     let amplitude = |(shade, enters): (usize, Enters)| {
@@ -55,7 +57,8 @@ pub fn design_figure(design: &ExperimentDesign) -> String {
     curves("design", &title, &grid)
 }
 
-/// Gain and phase of a response: between the lines, and at them.
+/// Panels of gain and phase of a response: the operator as a curve with its band, and the response at each line with
+/// its error bar.
 fn responses(of: &str, between: &[ExpectedResponse], at: &[&DesignedLine]) -> [CurvePanel; 2] {
     let one = |name: &str, unit: &str, part: fn(&ExpectedResponse) -> Estimate| {
         let band: Vec<Estimate> = between.iter().map(part).collect();
@@ -85,13 +88,13 @@ fn responses(of: &str, between: &[ExpectedResponse], at: &[&DesignedLine]) -> [C
     [one("gain", "dB", |r| r.gain_db), one("phase", "deg", |r| r.phase_deg)]
 }
 
-/// Fewest runs of the abscissa.
+/// Smallest upper end of the abscissa, in runs.
 const FEWEST_RUNS: usize = 8;
-/// Most runs of the abscissa.
+/// Largest upper end of the abscissa, in runs.
 const MOST_RUNS: usize = 200;
 
-/// Errors over the number of runs: relative to the accepted ones, or in percent of the values; and the people that a
-/// difference takes.
+/// Draws the expected errors over the number of runs, relative to the accepted errors, or in percent of the values if
+/// no accepted errors are given. A second panel shows the number of people needed to detect a planned difference.
 pub fn runs_figure(design: &ExperimentDesign) -> String {
     let last = (2 * design.runs_needed).max(design.runs).clamp(FEWEST_RUNS, MOST_RUNS);
     let runs: Vec<f64> = (1..=last).map(|runs| runs as f64).collect();
@@ -158,12 +161,12 @@ pub fn runs_figure(design: &ExperimentDesign) -> String {
     curves("runs", "expected errors by number of runs", &grid)
 }
 
-/// The quantities of the figure, each with the factor of its relative error.
+/// The quantities of the figure, each with the factor that scales its relative error.
 fn shown(design: &ExperimentDesign) -> Vec<(String, f64)> {
     if !design.wanted.is_empty() {
         return design.wanted.iter().map(|w| (w.name.clone(), 1.0 / w.error)).collect();
     }
-    // The margin has no relative error.
+    // A relative error of the phase margin is not defined.
     let names = design
         .expected
         .names()

@@ -4,27 +4,27 @@ use hoid_io::IoError;
 use hoid_study::StudyError;
 use thiserror::Error;
 
-/// Errors that prevent a report. A model that cannot be converted or a record that cannot be
-/// validated is not an error: the page shows the reason instead.
+/// Errors that prevent a report. A model that cannot be converted or a record that cannot be validated does not prevent
+/// it: the page shows the reason instead.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ReportError {
-    /// No model to report.
+    /// The report contains no model.
     #[error("the report has no model; expected at least one fitted model")]
     NoModels,
-    /// No recursive estimate to report.
-    #[error("the report has no trace; expected one to {most} recursive estimates")]
+    /// The report contains no recursive estimate.
+    #[error("the report has no trace; expected one to {maximum} recursive estimates")]
     NoTraces {
-        /// Maximum number of traces of a page.
-        most: usize,
+        /// Maximum number of traces on a page.
+        maximum: usize,
     },
     /// More recursive estimates than a figure can show.
-    #[error("the report has {found} traces, expected at most {most}: write a second report for the others")]
+    #[error("the report has {found} traces, expected at most {maximum}: write a second report for the others")]
     TooManyTraces {
         /// Number of traces given.
         found: usize,
-        /// Maximum number of traces of a page.
-        most: usize,
+        /// Maximum number of traces on a page.
+        maximum: usize,
     },
     /// A recursive estimate without rows.
     #[error("the trace {name:?} has no row, expected one or more: track a record that has samples")]
@@ -41,13 +41,13 @@ pub enum ReportError {
     /// A figure that cannot be written in the requested format.
     #[error("the figure cannot be written in this format: {reason}")]
     Figure {
-        /// Reason.
+        /// Reason why the figure cannot be written.
         reason: String,
     },
     /// A page template that could not be rendered: a defect of this crate.
     #[error("the page template could not be filled: {reason}; please report this as a defect")]
     Template {
-        /// Error of the template engine.
+        /// Error message of the template engine.
         reason: String,
     },
 }

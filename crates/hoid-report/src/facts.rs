@@ -1,10 +1,11 @@
-//! Contents of the table of settings of every page.
+//! Contents of the table of settings on every page.
 
 use hoid_analysis::{Account, Setting};
 use hoid_io::{QualityIssue, Step};
 use hoid_model::Fault;
 
-/// Inputs and processing: version, records, settings, steps applied to the records and their problems.
+/// Inputs and processing as pairs of name and value: version, records, settings, the processing steps applied to the
+/// records and the problems found in them.
 pub fn facts(names: &[String], settings: &[Setting], accounts: &[Account]) -> Vec<(String, String)> {
     let records = if names.len() == 1 { "record" } else { "records" };
     let mut rows = vec![

@@ -1,34 +1,34 @@
-//! The head of a page: the verdict on the result, a summary in one sentence, and the parameters
-//! with their errors. The rest of the page supports it.
+//! The head of a page: the verdict on the result, a summary in one sentence, and the parameters with their errors. The
+//! remainder of the page supports it.
 
 use hoid_model::{Verdict, VerdictLevel, numbers::significant, uncertainty::Estimate};
 use minijinja::{Value, context};
 
 use crate::cells;
 
-/// Results of a fit.
+/// Summary of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitSummary {
     /// Verdict on the fit.
     pub verdict: Verdict,
-    /// The result as a sentence, made by [`sentence`].
+    /// The result as a sentence, from [`sentence`].
     pub sentence: Option<String>,
-    /// The parameters; none if the models of the page list them.
+    /// The parameters; empty if the models on the page list them.
     pub parameters: Vec<ParameterRow>,
 }
 
 /// A parameter of a result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterRow {
-    /// Its name, such as `T_L`.
+    /// Name of the parameter, such as `T_L`.
     pub name: String,
-    /// Its unit, empty if it has none or none was declared.
+    /// Unit of the parameter; empty if it has none or none was declared.
     pub unit: String,
-    /// Value and standard error; `None` if it is not determined.
+    /// Value and standard error; `None` if the data do not determine the parameter.
     pub estimate: Option<Estimate>,
     /// The 95 % interval; an open end is infinite.
     pub interval: Option<(f64, f64)>,
-    /// Notes on it, such as the share of a prior.
+    /// Remarks on the parameter, such as the share of a prior.
     pub remark: String,
 }
 
@@ -55,7 +55,7 @@ impl FitSummary {
     }
 }
 
-/// A verdict for a template: level, whether it is trustworthy, reasons, notes.
+/// A verdict as template values: its level, whether the result is trustworthy, reasons, and notes.
 pub(crate) fn verdict(v: &Verdict) -> Value {
     context! {
         level => v.level.name(),
@@ -65,7 +65,7 @@ pub(crate) fn verdict(v: &Verdict) -> Value {
     }
 }
 
-/// Names of the parameters of an operator in sentences, in order.
+/// Words, names and units for the parameters of an operator, in their order in a sentence.
 const WORDS: [(&str, &str, &str); 7] = [
     ("gain", "K", ""),
     ("gain", "K_e", ""),
@@ -76,15 +76,15 @@ const WORDS: [(&str, &str, &str); 7] = [
     ("delay", "tau_e", " s"),
 ];
 
-/// The result as text: "gain 6.1, lead 0.60 s, delay 0.15 s; crossover 2.9 ± 0.1 rad/s, phase margin 34 ± 3°". A
-/// parameter that is missing or not finite is omitted, and so is the loop; `None` if nothing remains.
+/// The result as text, such as "gain 6.1, lead 0.60 s, delay 0.15 s; crossover 2.9 ± 0.1 rad/s, phase margin 34 ± 3°".
+/// Quantities that are missing or not finite are omitted; `None` if nothing remains.
 pub fn sentence<'a>(
     parameters: impl IntoIterator<Item = (&'a str, f64)>,
     crossover_rad_s: Option<Estimate>,
     phase_margin_deg: Option<Estimate>,
 ) -> Option<String> {
     let known: Vec<(&str, f64)> = parameters.into_iter().filter(|(_, value)| value.is_finite()).collect();
-    // K/T_I is given if the gain itself is not determined.
+    // K/T_I is given only if the gain K is not determined.
     let has_gain = known.iter().any(|(name, _)| *name == "K");
     let of = |(word, name, unit): &(&str, &str, &str)| {
         let found = known.iter().find(|(known, _)| known == name);

@@ -1,8 +1,8 @@
 //! Figures and HTML pages about identified models.
 //!
-//! A fit is a list of numbers; its reliability is seen in figures: the frequency response with its
-//! bands, the residual tests, the simulated and the measured output. A [`Report`] puts them on one
-//! page, with styles and figures inside the file:
+//! A fit is a list of numbers; figures show how reliable it is: the frequency response with its bands, the residual
+//! tests, the simulated and the measured output. A [`Report`] puts them on one page, which contains all styles and
+//! figures:
 //!
 //! ```
 //! use hoid_ident::Estimator;
@@ -37,20 +37,20 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`FitSummary`], [`sentence`] | the head of a page: verdict, the answer as text, parameters with errors |
+//! | [`FitSummary`], [`sentence`] | the head of a page: verdict, the result as text, parameters with errors |
 //! | [`Report`], [`ModelSection`], [`model_figure`] | one self-contained HTML page about one or several fitted models |
 //! | [`Report::of_operator`], [`operator_figure`], [`sentence_of_operator`] | the page of the operator of a person |
-//! | [`TrackReport`], [`TraceSection`], [`BatchLine`], [`batch_fit`], [`default_batch_fits`] | one such page about recursive estimates over a record |
-//! | [`GroupReport`], [`GroupTables`], [`write_group_pages`], [`group_figures`] | one such page about a group of recorded runs |
-//! | [`comparison_figure`] | people by condition, with the means |
+//! | [`TrackReport`], [`TraceSection`], [`BatchLine`], [`batch_fit`], [`default_batch_fits`] | one self-contained HTML page about recursive estimates over a record |
+//! | [`GroupReport`], [`GroupTables`], [`write_group_pages`], [`group_figures`] | one self-contained HTML page about a group of recorded runs |
+//! | [`comparison_figure`] | people by condition, with the means over people |
 //! | [`design_figure`], [`runs_figure`] | a designed experiment: lines and response, errors over runs |
 //! | [`PaperTable`] | a result as a table for a paper |
-//! | [`facts`] | the settings on all of these pages |
-//! | [`figures`] | the figures of these pages, each as an SVG text of its own |
+//! | [`facts`] | the table of settings on these pages |
+//! | [`figures`] | the figures of these pages, each as separate SVG text |
 //! | [`numbers`] | numbers with as many digits as their standard error allows |
-//! | [`render_with`], [`write_page`], [`write_report`] | templates of one's own in the same style, and pages into files |
+//! | [`render_with`], [`write_page`], [`write_report`] | additional templates in the same style, and pages written to files |
 //!
-//! This crate prints nothing, and the same data give the same bytes.
+//! This crate prints nothing. Equal data give identical bytes.
 
 mod cells;
 mod comparison;

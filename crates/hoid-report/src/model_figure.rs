@@ -1,5 +1,5 @@
-//! The figure of a polynomial model: the model with the describing function of the records, if they have a periodic
-//! excitation; otherwise its frequency response with the bands of its coefficients.
+//! The figure of a polynomial model. If the records have a periodic excitation, it shows the model with the describing
+//! function of the records; otherwise it shows the frequency response with its bands.
 
 use hoid_ident::{Fit, frequency::Description};
 use hoid_model::Record;
@@ -9,10 +9,10 @@ use crate::{
     figures::{BodeModel, ModelCurve, bode, describing},
 };
 
-/// The figure of a polynomial model.
+/// Draws the figure of a polynomial model.
 pub fn model_figure(fit: &Fit, records: &[Record], described: Option<&Description>) -> String {
     let title = fit.title();
-    // The text after the semicolon does not fit below a figure with one column.
+    // The part of the text after the semicolon does not fit below a single-column figure.
     let title = title.split(';').next().unwrap_or(&title).to_owned();
     let delay_s = fit.orders().nk as f64 * fit.model().sample_time().s();
     match described {
@@ -32,7 +32,8 @@ pub fn model_figure(fit: &Fit, records: &[Record], described: Option<&Descriptio
     }
 }
 
-/// The same for a page; `None` without a describing function, since the page contains the response anyway.
+/// Draws a polynomial model with the describing function, for a page; `None` without a describing function, since the
+/// page contains the frequency response in any case.
 pub fn model_picture(fit: &Fit, records: &[Record], described: Option<&Description>) -> Option<Picture> {
     let svg = model_figure(fit, records, Some(described?));
     Some(Picture {

@@ -1,4 +1,4 @@
-//! One model of a page: the fit, its records, and additional information.
+//! One model on a page: the fit, its records, and additional information.
 
 use hoid_ident::{
     Choice, Fit, MarginEstimates,
@@ -6,7 +6,7 @@ use hoid_ident::{
 };
 use hoid_model::{OperatorParameters, Record};
 
-/// One model of the page.
+/// One model on a page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelSection<'a> {
     /// Heading and legend text, such as `BJ(nb=2, nd=1, nf=2, nk=29)`.
@@ -15,22 +15,22 @@ pub struct ModelSection<'a> {
     pub fit: &'a Fit,
     /// The records of the fit.
     pub records: &'a [Record],
-    /// The search that selected its orders, if there was one.
+    /// The search that selected the orders of the model, if there was one.
     pub candidates: Option<&'a Choice>,
-    /// The true operator, if known (simulation).
+    /// The true operator, if known (for simulated records).
     pub truth: Option<OperatorParameters>,
-    /// Margins of the loop of this model and the controlled element, if known.
+    /// Margins of the loop formed by this model and the controlled element, if known.
     pub margins: Option<MarginEstimates>,
 }
 
 impl ModelSection<'_> {
-    /// The validation of the model on each of its records, or the reason why there is none.
+    /// The validation of the model on each of its records, or the reason why it failed.
     pub(crate) fn validate(&self) -> Vec<Result<Validation, String>> {
         let validation = |record| self.fit.validate(record).map_err(|e| e.to_string());
         self.records.iter().map(validation).collect()
     }
 
-    /// VAF and NRMSE over all records together, or the reason why there are none.
+    /// VAF and NRMSE over all records together, or the reason why they cannot be computed.
     pub(crate) fn quality(&self, validations: &[Result<Validation, String>]) -> Result<GoodnessOfFit, String> {
         if self.records.is_empty() {
             return Err("no record was given".to_owned());
@@ -41,12 +41,12 @@ impl ModelSection<'_> {
     }
 }
 
-/// The operator of records that contain the true parameters, if they are constant throughout (a
-/// simulated run without a change).
+/// The true operator, if the records contain the true parameters and these are constant throughout (simulated runs
+/// without a change).
 pub fn known_operator(records: &[Record]) -> Option<OperatorParameters> {
     let constant = |name: &str| {
         let first = *records.first()?.channel(name)?.first()?;
-        // A sigmoid far from its middle still changes the last digits.
+        // Far from its midpoint a sigmoid still changes the last digits.
         let same = |v: &f64| (v - first).abs() <= 1e-6 * first.abs();
         records
             .iter()

@@ -1,4 +1,4 @@
-//! The page and the figure of the operator of a person, as written by `hoid identify` and in Python.
+//! The page and the figure of the operator of a person, for `hoid identify` and Python.
 
 use hoid_analysis::Identified;
 use hoid_ident::{
@@ -15,7 +15,7 @@ use crate::{
 };
 
 impl<'a> Report<'a> {
-    /// The page about the operator of a person.
+    /// Creates the page about the operator of a person.
     pub fn of_operator(found: &'a Identified) -> Self {
         let fit = &found.fit;
         let element = found.controlled_element.as_ref();
@@ -37,7 +37,7 @@ impl<'a> Report<'a> {
         }
     }
 
-    /// Heading and settings of the page of any result, without its models.
+    /// Creates a page with the heading and the settings of any result, without models.
     pub fn of_identified<F>(found: &Identified<F>) -> Self {
         let data = &found.data;
         Self {
@@ -54,8 +54,8 @@ impl<'a> Report<'a> {
     }
 }
 
-/// The figure of an operator: with the describing function of its records, if they have a periodic excitation;
-/// otherwise its frequency response with its bands.
+/// Draws the figure of an operator. If the records have a periodic excitation, it shows the operator with their
+/// describing function; otherwise it shows the frequency response with its bands.
 pub fn operator_figure(found: &Identified) -> String {
     match &found.described {
         Some(described) => picture(&found.fit, described),
@@ -63,7 +63,7 @@ pub fn operator_figure(found: &Identified) -> String {
     }
 }
 
-/// The result for an operator as a sentence.
+/// The identified operator as a sentence.
 pub fn sentence_of_operator(found: &Identified) -> Option<String> {
     let known = found.fit.operator(0).parameters.iter().filter(|p| p.determined);
     let element = found.controlled_element.as_ref();
@@ -75,7 +75,7 @@ pub fn sentence_of_operator(found: &Identified) -> Option<String> {
     )
 }
 
-/// Mark of a parameter that the data do not determine; otherwise empty.
+/// Remark for a parameter that the data do not determine; empty for a parameter that they determine.
 pub fn undetermined(p: &Parameter) -> &'static str {
     match (p.determined, p.prior_share > 0.5) {
         (true, _) => "",
@@ -84,7 +84,7 @@ pub fn undetermined(p: &Parameter) -> &'static str {
     }
 }
 
-/// The same with the share of the prior.
+/// Remark on a parameter: whether the data determine it, and the share of the prior.
 fn remark(p: &Parameter) -> String {
     let words = undetermined(p);
     match (words, p.prior_share > 0.01) {
@@ -94,7 +94,7 @@ fn remark(p: &Parameter) -> String {
     }
 }
 
-/// The head of a page.
+/// Creates the head of a page.
 fn answer(found: &Identified) -> FitSummary {
     let gain = found.data.records.first().map(GainUnit::of).unwrap_or_default();
     let row = |p: &Parameter| ParameterRow {
@@ -114,7 +114,7 @@ fn answer(found: &Identified) -> FitSummary {
     }
 }
 
-/// Crossover and margin in the form of all reports.
+/// Crossover and margins in the form that all reports use.
 fn margins(fit: &FamilyFit, element: &ContinuousTransferFunction) -> Option<MarginEstimates> {
     let found = fit.loop_measures(0, element)?;
     let gain_margin = fit.loop_shape(0, element).gain_margin;
@@ -126,18 +126,20 @@ fn margins(fit: &FamilyFit, element: &ContinuousTransferFunction) -> Option<Marg
     })
 }
 
-/// Frequencies beyond the peak of the neuromuscular system that a figure shows, of its natural frequency.
-const BEYOND_PEAK: f64 = 1.5;
+/// Highest frequency shown in a figure with a neuromuscular peak, as a multiple of the natural frequency.
+const SHOWN_ABOVE_PEAK: f64 = 1.5;
 
-/// The frequency to which the curves reach, also where the last line is below the peak that is reported; 0 if none is.
+/// Frequency up to which the curves extend in order to show the reported neuromuscular peak, even if all lines are
+/// below it; 0 if no peak is reported.
 fn reach_rad_s(fit: &FamilyFit) -> f64 {
     let all = &fit.operator(0).parameters;
     let peak = all.iter().find(|p| p.name == "omega_nm" && p.determined);
     let nyquist = std::f64::consts::PI / fit.sample_time.s();
-    peak.map_or(0.0, |omega_nm| (BEYOND_PEAK * omega_nm.value).min(0.9 * nyquist))
+    peak.map_or(0.0, |omega_nm| (SHOWN_ABOVE_PEAK * omega_nm.value).min(0.9 * nyquist))
 }
 
-/// The fitted operator: by prediction error with its band, at the lines, by instrumental variables.
+/// Curves of the fitted operator: by prediction error with its band, from the fit at the lines, and by instrumental
+/// variables.
 fn curves(fit: &FamilyFit, described: &Description) -> Vec<ModelCurve> {
     let half = 0.5 * fit.sample_time.s();
     let reach = reach_rad_s(fit);
@@ -175,7 +177,7 @@ fn through_describing_function(fit: &FamilyFit, described: &Description) -> Pict
     }
 }
 
-/// The figure of the operator with the describing function.
+/// Draws the operator with the describing function.
 fn picture(fit: &FamilyFit, described: &Description) -> String {
     let title = format!("{} through the describing function", fit.form);
     describing("describing", &title, described, &curves(fit, described))

@@ -15,16 +15,16 @@ const TEMPLATES: [(&str, &str); 5] = [
     ("style.css", include_str!("../templates/style.css")),
 ];
 
-/// Renders a template of this crate with its values.
+/// Renders a template of this crate with these values.
 ///
 /// # Errors
-/// [`ReportError::Template`] for a defect of this crate.
+/// [`ReportError::Template`] if the template cannot be rendered, which is a defect of this crate.
 pub(crate) fn render(name: &str, values: Value) -> Result<String, ReportError> {
     render_with(&[], name, values)
 }
 
-/// Renders a template, which may be one of `own`: names and texts of additional templates, which
-/// can use the parts and style of those of this crate.
+/// Renders a template of this crate or one of `own`, the names and texts of additional templates. Additional templates
+/// can use the parts and the style of the templates of this crate.
 ///
 /// # Errors
 /// [`ReportError::Template`] if the template cannot be rendered.
@@ -52,7 +52,7 @@ pub(crate) fn facts(pairs: &[(String, String)]) -> Vec<Value> {
 /// Writes a page to a directory.
 ///
 /// # Errors
-/// [`ReportError::Io`] if it cannot be written.
+/// [`ReportError::Io`] if the page cannot be written.
 pub fn write_page(directory: &Path, name: &str, html: &str) -> Result<PathBuf, ReportError> {
     let path = directory.join(name);
     write_atomically(&path, |file| file.write_all(html.as_bytes()))?;
@@ -62,7 +62,7 @@ pub fn write_page(directory: &Path, name: &str, html: &str) -> Result<PathBuf, R
 /// Writes a page as `report.html` to a directory, which is created if it does not exist.
 ///
 /// # Errors
-/// [`ReportError::Io`] if it cannot be written.
+/// [`ReportError::Io`] if the page cannot be written.
 pub fn write_report(directory: &Path, html: &str) -> Result<PathBuf, ReportError> {
     make_directory(directory)?;
     write_page(directory, "report.html", html)

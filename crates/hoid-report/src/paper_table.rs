@@ -1,9 +1,9 @@
-//! A result as a table for a paper: estimates with errors and intervals, in LaTeX (`.tex`, booktabs), Markdown
-//! (`.md`), or as data (CSV and the other formats of tables).
+//! A result as a table for a paper: estimates with errors and intervals, in LaTeX (`.tex`, booktabs), Markdown (`.md`),
+//! or as data (CSV and other table formats).
 //!
-//! The table is read from the JSON object of the result ([`hoid_analysis::json`]), so that both agree. In LaTeX and
-//! Markdown a value has the digits that two digits of its error need; in data files every number has all digits, and an
-//! error is in the column after its value.
+//! The table is made from the JSON object of the result ([`hoid_analysis::json`]), so that the two agree. In LaTeX and
+//! Markdown a value is rounded to the second significant digit of its error. In data files every number has all digits,
+//! and the error is in the column after the value.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use hoid_io::{ColumnValues, IoError, OutputColumn, OutputTable, check_table_path
 use hoid_model::numbers::{DASH, Z_95, plain, with_uncertainty};
 use serde_json::{Map, Value};
 
-/// A table of a result.
+/// A result as a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PaperTable {
     /// Comments, one per line.
@@ -29,13 +29,13 @@ struct Column {
 enum Cells {
     Text(Vec<String>),
     Number(Vec<f64>),
-    /// Values with their standard errors, which are in a column of this name in data files.
+    /// Values with their standard errors; in data files the errors are in a column with this name.
     Estimate(Vec<[f64; 2]>, String),
-    /// Ends of intervals, written with the digits of these errors.
+    /// Ends of intervals with the standard errors that determine their digits.
     End(Vec<[f64; 2]>),
 }
 
-/// An estimate of the object.
+/// An estimate in the JSON object.
 struct Row {
     quantity: String,
     value: f64,
@@ -46,7 +46,7 @@ struct Row {
 }
 
 impl PaperTable {
-    /// The table of a result, from its object; `None` if it contains no estimate.
+    /// Creates the table of a result from its JSON object; `None` if the object contains no estimate.
     pub fn of(object: &Map<String, Value>) -> Option<Self> {
         let text = |key: &str| object.get(key).and_then(Value::as_str).unwrap_or_default();
         let level = object.get("verdict").and_then(|verdict| verdict["level"].as_str());
@@ -57,7 +57,7 @@ impl PaperTable {
             level.unwrap_or_default()
         )];
         let columns = match (object.get("people"), object.get("lines")) {
-            // People of a design are next to the typical one, whom the table represents.
+            // The `people` of a design are listed in addition to the typical person, whom the table represents.
             _ if text("kind") == "design" => of_estimates(object),
             _ if text("kind") == "comparison" => of_differences(object.get("differences")?.as_array()?),
             (Some(people), _) => of_people(people.as_array()?),
@@ -68,10 +68,10 @@ impl PaperTable {
         filled.then_some(Self { comments, columns })
     }
 
-    /// Checks that a table can be written to a file of this name.
+    /// Checks that the format given by the extension of a file name is known.
     ///
     /// # Errors
-    /// [`IoError::UnknownFormat`].
+    /// [`IoError::UnknownFormat`] for any other extension.
     pub fn check(path: &Path) -> Result<(), IoError> {
         match Markup::of(path) {
             Some(_) => Ok(()),
@@ -79,10 +79,10 @@ impl PaperTable {
         }
     }
 
-    /// Writes the table atomically, in the format of the extension.
+    /// Writes the table atomically, in the format given by the extension.
     ///
     /// # Errors
-    /// Those of [`PaperTable::check`] and of writing.
+    /// The errors of [`PaperTable::check`], and [`IoError`] if the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), IoError> {
         match Markup::of(path) {
             Some(markup) => {
@@ -123,7 +123,7 @@ impl PaperTable {
         let shown: Vec<&Column> = self
             .columns
             .iter()
-            .filter(|column| column.cells.says_something())
+            .filter(|column| column.cells.has_content())
             .collect();
         let rows = self.columns.first().map_or(0, |column| column.cells.len());
         let headings = shown.iter().map(|column| markup.name(&column.name)).collect();
@@ -145,8 +145,8 @@ impl Cells {
         }
     }
 
-    /// True unless all cells are empty; an empty column is left out of a text.
-    fn says_something(&self) -> bool {
+    /// True unless all cells are empty; LaTeX and Markdown tables omit an empty column.
+    fn has_content(&self) -> bool {
         match self {
             Self::Text(all) => all.iter().any(|text| !text.is_empty()),
             Self::Number(all) => all.iter().any(|v| v.is_finite()),
@@ -174,12 +174,12 @@ fn column(name: &str, cells: Cells) -> Column {
     }
 }
 
-/// A number of the object; NaN for null.
+/// A number of the JSON object; NaN for null.
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or(f64::NAN)
 }
 
-/// Parameters (those of the operator by position) and the loop.
+/// Columns for the parameters, including those of the operator, and the quantities of the loop.
 fn of_estimates(object: &Map<String, Value>) -> Vec<Column> {
     let none = Value::Null;
     let at = |object: &Map<String, Value>, key: &str| object.get(key).cloned().unwrap_or_default();
@@ -250,7 +250,7 @@ fn row(name: &str, p: &Value, worth: &Value) -> Row {
     }
 }
 
-/// The lines of a describing function.
+/// Columns for the lines of a describing function.
 fn of_lines(lines: &[Value]) -> Vec<Column> {
     let all = |key: &str| lines.iter().map(|line| number(&line[key])).collect::<Vec<f64>>();
     let both = |value: &str, error: &str| {
@@ -265,7 +265,7 @@ fn of_lines(lines: &[Value]) -> Vec<Column> {
     ]
 }
 
-/// The people of a group, one per row.
+/// Columns for the people of a group, one person per row.
 fn of_people(people: &[Value]) -> Vec<Column> {
     let text =
         |of: &dyn Fn(&Value) -> Option<String>| Cells::Text(people.iter().map(|p| of(p).unwrap_or_default()).collect());
@@ -310,7 +310,7 @@ fn of_people(people: &[Value]) -> Vec<Column> {
     columns
 }
 
-/// The differences of a comparison, one per row.
+/// Columns for the differences of a comparison, one difference per row.
 fn of_differences(all: &[Value]) -> Vec<Column> {
     let text = |of: &dyn Fn(&Value) -> String| Cells::Text(all.iter().map(of).collect());
     let word = |d: &Value, key: &str| d[key].as_str().unwrap_or_default().to_owned();
@@ -363,7 +363,7 @@ impl Markup {
         }
     }
 
-    /// A name or a word; for a parameter its symbol.
+    /// Returns a name or a word in this markup; a parameter becomes its symbol.
     fn name(self, text: &str) -> String {
         let text = match text {
             "low" => "95 % from",

@@ -1,4 +1,4 @@
-//! One self-contained HTML page about the models fitted to a record or to several.
+//! One self-contained HTML page about the models fitted to one or several records.
 
 use hoid_ident::{
     Choice,
@@ -17,34 +17,34 @@ use crate::{
 /// Maximum number of records of a model whose time response is drawn.
 const MOST_TIME_RESPONSES: usize = 4;
 
-/// Content of the page.
+/// Contents of the page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report<'a> {
     /// Heading of the page.
     pub title: String,
-    /// Inputs and processing, as name and value: command, versions, records, span, seed.
+    /// Inputs and processing, as pairs of name and value: command, versions, records, span, seed.
     pub settings: Vec<(String, String)>,
-    /// The models, one section each.
+    /// The models, each in its own section.
     pub models: Vec<ModelSection<'a>>,
     /// Remarks for the reader, such as warnings of the command.
     pub notes: Vec<String>,
-    /// Summary of the fit, at the top of the page.
+    /// Summary of the fit at the top of the page.
     pub answer: Option<FitSummary>,
-    /// Figures of the main result, before all others.
+    /// Figures of the main result, placed before all other figures.
     pub pictures: Vec<Picture>,
 }
 
 /// A figure with its caption.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
-    /// The figure, as SVG text.
+    /// The figure as SVG text.
     pub svg: String,
-    /// Caption, one sentence.
+    /// Caption of the figure.
     pub caption: String,
 }
 
 impl<'a> Report<'a> {
-    /// A report about a fit to records, with the search that selected its orders.
+    /// Creates a report about a fit to records, with the search that selected the orders.
     pub fn of(title: &str, records: &'a [Record], choice: &'a Choice) -> Self {
         Self {
             title: title.to_owned(),
@@ -68,11 +68,11 @@ impl<'a> Report<'a> {
 }
 
 impl Report<'_> {
-    /// The page as HTML text, with all styles and figures inside it. The same data give the same
-    /// bytes.
+    /// Returns the page as HTML text, which contains all styles and figures. Equal data give identical bytes.
     ///
     /// # Errors
-    /// [`ReportError::NoModels`]; [`ReportError::Template`] for a defect of this crate.
+    /// [`ReportError::NoModels`]; [`ReportError::Template`] if a template cannot be rendered, which is a defect of this
+    /// crate.
     pub fn to_html(&self) -> Result<String, ReportError> {
         if self.models.is_empty() {
             return Err(ReportError::NoModels);
@@ -208,7 +208,7 @@ fn residual_tests(index: usize, name: &str, record: &Record, validation: &Valida
     }
 }
 
-/// Number of values outside the bounds among the selected lags.
+/// Number of values outside the bounds at the selected lags.
 fn outside(correlation: &Correlation, of: impl Fn(i64) -> bool) -> usize {
     let pairs = correlation.lags.iter().zip(&correlation.values);
     pairs.filter(|(k, v)| of(**k) && v.abs() > correlation.bound_99).count()

@@ -1,5 +1,4 @@
-//! The tables of the page as template values. A missing number is a dash, with the reason next to
-//! it.
+//! The tables of the page as template values. A missing number is shown as a dash, with the reason next to it.
 
 use hoid_ident::{
     Choice, Fit, InitialState, MarginEstimates,
@@ -32,7 +31,7 @@ fn true_value(name: &str, truth: &OperatorParameters) -> Option<f64> {
 
 const OPERATOR_NAMES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 
-/// One column per model, one row per quantity.
+/// Comparison of the models: one column per model, one row per quantity.
 pub fn comparison(models: &[ModelSection<'_>], qualities: &[Result<GoodnessOfFit, String>]) -> Value {
     let row = |label: Value, unit: &str, cells: Vec<Value>, truth: Option<String>| {
         context! { label, unit, cells, truth => truth.unwrap_or_default() }
@@ -98,7 +97,7 @@ pub fn comparison(models: &[ModelSection<'_>], qualities: &[Result<GoodnessOfFit
     }
 }
 
-/// The true operator, if it is the same for all models that have one.
+/// The true operator, if all models with a true operator have the same; otherwise `None`.
 fn common_truth(models: &[ModelSection<'_>]) -> Option<OperatorParameters> {
     let mut known = models.iter().filter_map(|m| m.truth);
     let first = known.next()?;
@@ -112,7 +111,7 @@ fn output_unit(records: &[Record]) -> String {
         .unwrap_or_default()
 }
 
-/// The unit of the outputs, if it is the same for all models.
+/// The unit of the outputs, if it is the same for all models; otherwise empty.
 fn common_output_unit(models: &[ModelSection<'_>]) -> String {
     let first = models.first().map(|m| output_unit(m.records)).unwrap_or_default();
     if models.iter().all(|m| output_unit(m.records) == first) {
@@ -130,7 +129,7 @@ fn squared(unit: &str) -> String {
     }
 }
 
-/// Coefficient, value, standard error, 95 % interval.
+/// The coefficients of a fit: name, value, standard error and 95 % interval of each.
 pub fn coefficients(fit: &Fit) -> Vec<Value> {
     let rows = fit.parameters().into_iter().map(|(name, estimate)| {
         let (value, error) = with_uncertainty(estimate.value, estimate.standard_error);
@@ -145,7 +144,7 @@ pub fn coefficients(fit: &Fit) -> Vec<Value> {
     rows.collect()
 }
 
-/// The parameters of the operator, or the reason why there are none.
+/// The parameters of the operator, or the reason why the model cannot be converted to an operator.
 pub fn operator(fit: &Fit, truth: Option<&OperatorParameters>, gain: &GainUnit) -> Value {
     let estimate = match fit.operator() {
         Ok(estimate) => estimate,
@@ -171,12 +170,12 @@ pub fn operator(fit: &Fit, truth: Option<&OperatorParameters>, gain: &GainUnit) 
     context! { rows, has_truth => truth.is_some() }
 }
 
-/// The units of gains, from those of the records.
+/// The units of the gains, derived from the units of the first record.
 pub fn gain_unit(records: &[Record]) -> GainUnit {
     records.first().map(GainUnit::of).unwrap_or_default()
 }
 
-/// T_n and K_n by each discretisation, or the reason why there are none.
+/// T_n and K_n for each discretisation, or the reason why they cannot be computed.
 pub fn remnant(fit: &Fit) -> Vec<Value> {
     let ways = [
         (
@@ -185,7 +184,7 @@ pub fn remnant(fit: &Fit) -> Vec<Value> {
         ),
         (RemnantDiscretisation::BackwardEuler, "backward Euler"),
     ];
-    // A grey-box model includes the hold of the remnant.
+    // The hold of the remnant is part of a grey-box model.
     let count = if fit.is_grey_box() { 1 } else { ways.len() };
     let rows = ways.into_iter().take(count).map(|(how, name)| match fit.remnant(how) {
         Ok(r) => context! { how => name, order => r.order, t_n => cell(r.t_n_s), k_n => cell(r.k_n) },
@@ -194,7 +193,7 @@ pub fn remnant(fit: &Fit) -> Vec<Value> {
     rows.collect()
 }
 
-/// The reason why no discretisation gives T_n and K_n, if it is the same for all.
+/// The reason why no discretisation gives T_n and K_n, if it is the same for all discretisations.
 pub fn no_remnant(fit: &Fit) -> Option<String> {
     if fit.orders().nd == 0 {
         return Some("the model has no polynomial D".to_owned());
@@ -204,7 +203,7 @@ pub fn no_remnant(fit: &Fit) -> Option<String> {
     (reason(RemnantDiscretisation::BackwardEuler)? == first).then_some(first)
 }
 
-/// Course of the fit: label and text.
+/// The course of the fit, as pairs of label and text.
 pub fn course(fit: &Fit, records: &[Record]) -> Vec<Value> {
     let end = fit.termination();
     let (n, p, s) = (fit.residual_count(), fit.free_count(), fit.state_count());
@@ -256,7 +255,7 @@ pub fn course(fit: &Fit, records: &[Record]) -> Vec<Value> {
     rows.into_iter().map(|(label, text)| context! { label, text }).collect()
 }
 
-/// VAF and NRMSE of each record.
+/// VAF and NRMSE for each record.
 pub fn qualities(records: &[Record], validations: &[Result<Validation, String>]) -> Vec<Value> {
     let rows = records
         .iter()
@@ -320,7 +319,7 @@ pub fn margins(margins: &MarginEstimates) -> Vec<Value> {
     rows.collect()
 }
 
-/// Candidates of an order search, best first.
+/// Candidates of an order search, with the best first.
 pub fn candidates(choice: &Choice) -> Value {
     let name = choice.criterion.label();
     let mut fitted = Vec::new();
@@ -333,7 +332,7 @@ pub fn candidates(choice: &Choice) -> Value {
             Err(reason) => failed.push((candidate.orders, reason.to_string())),
         }
     }
-    // Stable sort: equal candidates stay in the order of the search.
+    // The sort is stable: equal candidates stay in the order of the search.
     fitted.sort_by(|a, b| a.0.total_cmp(&b.0));
     let best = fitted.first().map_or(0.0, |f| f.0);
     let all = fitted.len() + failed.len();

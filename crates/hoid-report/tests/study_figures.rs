@@ -119,9 +119,9 @@ fn map_grid(colours: MapColours, columns: usize, bar_per_row: bool) -> MapGrid {
         columns,
         titles: if columns > 1 { orders() } else { Vec::new() },
         abscissa: "n_k^*".to_owned(),
-        x_places: (25..=30).map(|n| n.to_string()).collect(),
+        x_categories: (25..=30).map(|n| n.to_string()).collect(),
         ordinate: "m^*".to_owned(),
-        y_places: (1..=4).map(|m| m.to_string()).collect(),
+        y_categories: (1..=4).map(|m| m.to_string()).collect(),
         value: match colours {
             MapColours::Sequential => "VAF (%)".to_owned(),
             MapColours::Diverging => "\u{394}VAF (%)".to_owned(),

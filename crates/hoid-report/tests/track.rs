@@ -312,14 +312,14 @@ fn reports_of_no_trace_or_of_too_many_are_errors() {
     let record = run();
     assert!(matches!(
         report(&record, Vec::new()).to_html(),
-        Err(ReportError::NoTraces { most: 4 })
+        Err(ReportError::NoTraces { maximum: 4 })
     ));
     let mut options = options(Method::rls());
     options.start = StartAt::Nothing;
     let trace = track(&record, &options, 100).unwrap();
     let five = (0..5).map(|_| section("RLS", &trace, &[])).collect();
     let error = report(&record, five).to_html().unwrap_err();
-    assert!(matches!(error, ReportError::TooManyTraces { found: 5, most: 4 }));
+    assert!(matches!(error, ReportError::TooManyTraces { found: 5, maximum: 4 }));
     assert_eq!(
         error.to_string(),
         "the report has 5 traces, expected at most 4: write a second report for the others"

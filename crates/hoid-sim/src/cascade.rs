@@ -1,29 +1,29 @@
-//! Exact zero-order hold of the cascade `1/(T_n s + 1)^m` driven by noise that is held over each sample.
+//! Exact zero-order hold of the cascade `1/(T_n s + 1)^m`, driven by noise that is held over each sample.
 //!
-//! The states are the outputs of the m first-order sections, `T_n z_1' = eps - z_1`,
-//! `T_n z_i' = z_{i-1} - z_i`. With `h = Ts/T_n` the transition matrix is lower triangular Toeplitz
-//! with `e^-h h^k/k!` on diagonal k, and the input enters section k (from 0) with
-//! `1 - e^-h sum_{j<=k} h^j/j!`, computed from its tail `e^-h sum_{j>k} h^j/j!` to avoid cancellation.
+//! The states are the outputs of the m first-order sections, `T_n z_1' = eps - z_1`, `T_n z_i' = z_{i-1} - z_i`. With
+//! `h = Ts/T_n` the transition matrix is lower triangular Toeplitz with `e^-h h^k/k!` on diagonal k. The input enters
+//! section k (counted from 0) with the factor `1 - e^-h sum_{j<=k} h^j/j!`, computed from its tail
+//! `e^-h sum_{j>k} h^j/j!` to avoid cancellation.
 
 use hoid_lanes::Number;
 
 /// Highest order of the remnant filter.
-pub(crate) const MOST: usize = hoid_model::remnant::HIGHEST_ORDER;
+pub(crate) const HIGHEST_ORDER: usize = hoid_model::remnant::HIGHEST_ORDER;
 
-/// Coefficients for one sample.
+/// Coefficients of the cascade for one sample.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Cascade {
     order: usize,
-    transition: [f64; MOST],
-    input: [f64; MOST],
+    transition: [f64; HIGHEST_ORDER],
+    input: [f64; HIGHEST_ORDER],
 }
 
 impl Cascade {
-    /// Builds the cascade for `h = Ts/T_n > 0` and an order of 1 to [`MOST`].
+    /// Builds the cascade for `h = Ts/T_n > 0` and an order from 1 to [`HIGHEST_ORDER`].
     pub fn new(order: usize, h: f64) -> Self {
         let decay = (-h).exp();
-        let mut transition = [0.0; MOST];
-        let mut input = [0.0; MOST];
+        let mut transition = [0.0; HIGHEST_ORDER];
+        let mut input = [0.0; HIGHEST_ORDER];
         let mut term = decay;
         for k in 0..order {
             transition[k] = term;
@@ -60,7 +60,7 @@ impl Cascade {
     }
 }
 
-/// `sum over j >= first of term h^(j-first) first!/j!`, with `term` that of `first`.
+/// Returns `sum over j >= first of term h^(j-first) first!/j!`, where `term` is the first term of the sum.
 fn tail(mut term: f64, first: usize, h: f64) -> f64 {
     let mut sum = 0.0;
     for j in first..first + 40 {
@@ -81,14 +81,14 @@ mod tests {
 
     #[test]
     fn impulse_response_is_that_of_the_exact_transfer_function() {
-        for order in 1..=MOST {
+        for order in 1..=HIGHEST_ORDER {
             for (ts, t_n) in [(0.01, 0.06), (0.001, 0.06), (0.05, 0.02)] {
                 let h = RemnantFilter::new(1.0, t_n, order)
                     .unwrap()
                     .discrete(SampleTime::new(ts).unwrap(), RemnantDiscretisation::ZeroOrderHold)
                     .unwrap();
                 let cascade = Cascade::new(order, ts / t_n);
-                let mut z = [0.0; MOST];
+                let mut z = [0.0; HIGHEST_ORDER];
                 let mut y: Vec<f64> = Vec::new();
                 for t in 0..60_usize {
                     let eps = f64::from(u8::from(t == 0));
@@ -112,9 +112,9 @@ mod tests {
 
     #[test]
     fn constant_input_ends_at_itself() {
-        for order in 1..=MOST {
+        for order in 1..=HIGHEST_ORDER {
             let cascade = Cascade::new(order, 0.5);
-            let mut z = [0.0; MOST];
+            let mut z = [0.0; HIGHEST_ORDER];
             for _ in 0..200 {
                 z = cascade.step(z, 3.0);
             }

@@ -15,32 +15,32 @@ pub enum SimError {
         "the loop diverges: {signal} is not finite at t = {time_s:.2} s; check gains, delay and controlled element of {scenario}"
     )]
     Diverged {
-        /// The signal.
+        /// Signal that is not finite.
         signal: &'static str,
-        /// Time of the first bad sample, s.
+        /// Time of the first sample that is not finite, in s.
         time_s: f64,
         /// Name of the scenario.
         scenario: String,
     },
-    /// An operator whose control depends on the error of the same sample.
+    /// The control of the operator depends on the error of the same sample.
     #[error(
         "the operator of {scenario} responds to an error within the same sample: its delay is {tau_e_s} s, it has no \
          neuromuscular part and its response is not strictly proper; expected a delay of at least half a sample \
          ({half_a_sample_s} s): make tau_e longer or the sample time shorter, or give omega_nm and zeta_nm"
     )]
-    AnswersAtOnce {
+    DirectResponse {
         /// Name of the scenario.
         scenario: String,
-        /// Delay of the operator, s.
+        /// Delay of the operator in s.
         tau_e_s: f64,
-        /// Half the sample time, s.
+        /// Half the sample time in s.
         half_a_sample_s: f64,
     },
-    /// Ranges in which no acceptable person is found.
+    /// No acceptable person was found in the ranges of a population.
     #[error(
         "none of {draws} draws of the form {form} on the element {plant} gives an acceptable loop: widen the ranges of the population, or reduce its spreads"
     )]
-    NobodyFound {
+    NoAcceptablePerson {
         /// Form of the operator.
         form: String,
         /// Controlled element.
@@ -48,23 +48,23 @@ pub enum SimError {
         /// Number of draws.
         draws: usize,
     },
-    /// Noise whose length differs from that of the run.
+    /// The length of the noise differs from that of the run.
     #[error("the noise has {found} samples, but the run needs {expected} (run-in and measurement)")]
     NoiseLength {
-        /// Number of samples given.
+        /// Number of given samples.
         found: usize,
-        /// Number of samples needed.
+        /// Number of required samples.
         expected: usize,
     },
-    /// An instruction set that this processor does not have.
+    /// This processor does not support the instruction set.
     #[error("this processor does not have the instruction set that was requested; use InstructionSet::Best")]
     NoSuchInstructionSet,
-    /// Noise that is not a number.
+    /// A value of the noise is not finite.
     #[error("the noise at sample {index} is {value}, expected a finite number")]
     NoiseNotFinite {
-        /// Index of the sample, from 0.
+        /// Index of the sample, counted from 0.
         index: usize,
-        /// The value.
+        /// Value of the noise at this sample.
         value: f64,
     },
 }

@@ -1,8 +1,8 @@
-//! The closed loop of operator, remnant and controlled element, simulated sample by sample.
+//! Sample-by-sample simulation of the closed loop of operator, remnant and controlled element.
 //!
-//! Operator, remnant filter and controlled element are each held exactly over a sample (zero-order hold), so that the
+//! Operator, remnant filter and controlled element are each discretised exactly (zero-order hold), so that the
 //! simulated record follows the model of an estimator without integration errors. The random numbers of a run are
-//! identified by seed, cell and replication, not by a thread: any run can be repeated alone.
+//! identified by seed, cell and replication, not by a thread, so any run can be repeated alone.
 //!
 //! ```
 //! use hoid_model::scenario::{Condition, Scenario};
@@ -21,14 +21,14 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | `simulator` | [`Simulator`]: a scenario made ready, and its runs |
-//! | `operator_run` | [`OperatorRun`]: the operator alone, a sample at a time |
-//! | `run_seed` | [`RunSeed`]: what names the random numbers of one run |
-//! | `normal_deviates` | standard normal deviates by the ziggurat |
+//! | `simulator` | [`Simulator`]: a prepared scenario and its runs |
+//! | `operator_run` | [`OperatorRun`]: the operator alone, sample by sample |
+//! | `run_seed` | [`RunSeed`]: identifier of the random numbers of one run |
+//! | `normal_deviates` | standard normal deviates by the ziggurat method |
 //! | `cascade` | exact zero-order hold of the remnant filter |
-//! | [`family`] | the loop of any operator of the family: [`FamilySimulator`], and that operator alone |
-//! | [`people`] | virtual people drawn over the family |
-//! | `error` | [`SimError`]: why a simulation gives no record |
+//! | [`family`] | loop of any operator of the family: [`FamilySimulator`]; the operator alone |
+//! | [`people`] | virtual people drawn from the family |
+//! | `error` | [`SimError`]: reasons why a simulation gives no record |
 
 mod cascade;
 mod error;

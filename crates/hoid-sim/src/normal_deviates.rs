@@ -1,10 +1,11 @@
 //! Standard normal deviates from a generator of random bits.
 //!
-//! Normal deviates are those of `rand_distr`, by the ziggurat: the area below the density is divided into 256 layers
-//! of equal area; a random layer i and a random position in it give a deviate directly if it lies below the edge of
-//! the next layer, 99 times out of 100 (G. Marsaglia and W. W. Tsang, *J. Statistical Software* 5 (2000) 8; J. A.
-//! Doornik, *An Improved Ziggurat Method to Generate Normal Random Samples*, 2005). Such deviates are computed here,
-//! many at a time, and the others by the crate, from the same numbers: the deviates are the same, in less time.
+//! The deviates are those of `rand_distr`, by the ziggurat method. The area below the density is divided into 256
+//! layers of equal area. A random layer i and a random position in it give a deviate directly if the position lies
+//! below the edge of the next layer, which happens 99 times out of 100 (G. Marsaglia and W. W. Tsang, *J. Statistical
+//! Software* 5 (2000) 8; J. A. Doornik, *An Improved Ziggurat Method to Generate Normal Random Samples*, 2005). Such
+//! deviates are computed here, many at a time; the other deviates are computed by `rand_distr` from the same random
+//! numbers. The results are therefore the same and take less time.
 
 use std::{convert::Infallible, sync::OnceLock};
 
@@ -14,7 +15,7 @@ use rand_chacha::{
 };
 use rand_distr::{Distribution, StandardNormal};
 
-/// Writes standard normal deviates, each from the numbers that [`StandardNormal`] would use for it.
+/// Writes standard normal deviates, each computed from the random numbers that [`StandardNormal`] would use for it.
 pub(crate) fn normal_deviates(generator: ChaCha8Rng, deviates: &mut [f64]) {
     let generator = &mut Buffered::new(generator);
     let edges = EDGES.get_or_init(edges);
@@ -37,22 +38,22 @@ pub(crate) fn normal_deviates(generator: ChaCha8Rng, deviates: &mut [f64]) {
     }
 }
 
-/// Edges of the layers of the ziggurat, from the widest to zero.
+/// Edges of the layers of the ziggurat, from the widest layer to zero.
 static EDGES: OnceLock<[f64; LAYERS + 1]> = OnceLock::new();
 const LAYERS: usize = 256;
 
-/// Returns the deviate of a random number if it is accepted directly: layer and position are its lowest and highest
-/// bits.
+/// Returns the deviate for random bits if it is accepted directly; the lowest bits give the layer, the highest bits the
+/// position in the layer.
 #[inline(always)]
 fn quick(edges: &[f64; LAYERS + 1], bits: u64) -> Option<f64> {
     let layer = bits as usize % LAYERS;
-    // In the range [2, 4).
+    // A number in the range [2, 4), minus 3.
     let place = f64::from_bits(1024 << 52 | bits >> 12) - 3.0;
     let deviate = place * edges[layer];
     (deviate.abs() < edges[layer + 1]).then_some(deviate)
 }
 
-/// Returns the edges of the crate: the middle of each layer, which it accepts, times two.
+/// Returns the edges used by `rand_distr`: each edge is twice the middle of its layer, which is always accepted.
 fn edges() -> [f64; LAYERS + 1] {
     let mut edges = [0.0; LAYERS + 1];
     for (layer, edge) in (0..).zip(&mut edges[..LAYERS]) {
@@ -62,7 +63,7 @@ fn edges() -> [f64; LAYERS + 1] {
     edges
 }
 
-/// Returns the number for the middle of a layer, and then the largest number.
+/// Generator that first returns the number for the middle of a layer, and after that the largest number.
 struct Middle(u64);
 
 impl TryRng for Middle {
@@ -85,7 +86,7 @@ impl TryRng for Middle {
 /// Number of bytes that are drawn at a time.
 const DRAWN: usize = 2048;
 
-/// The numbers of a generator, drawn many at a time: the same numbers in half the time.
+/// Random numbers of a generator, drawn many at a time, which gives the same numbers in half the time.
 struct Buffered {
     generator: ChaCha8Rng,
     bytes: [u8; DRAWN],
@@ -101,13 +102,13 @@ impl Buffered {
         }
     }
 
-    /// Returns the unused part of the drawn numbers.
+    /// Returns the drawn numbers that have not been used.
     #[inline(always)]
     fn drawn(&self) -> &[[u8; 8]] {
         self.bytes[self.at..].as_chunks().0
     }
 
-    /// Skips a number of values.
+    /// Marks a number of values as used.
     #[inline(always)]
     fn pass(&mut self, numbers: usize) {
         self.at += 8 * numbers;

@@ -1,38 +1,38 @@
-//! Only the operator of a scenario, sample by sample: for a loop that is closed elsewhere.
+//! Operator of a scenario alone, sample by sample, for a loop that is closed elsewhere.
 //!
-//! Simulates, as [`Simulator`] does in a loop, `u = y(k - tau_e/Ts) + n`, with the same random numbers: a loop that
-//! responds to u like its controlled element gives the same run to the last bit. The control of a sample does not
-//! depend on the error of the same sample, since the response of the operator first holds e over a sample.
+//! Simulates `u = y(k - tau_e/Ts) + n` as [`Simulator`] does in a loop, with the same random numbers. A loop that
+//! responds to u like the controlled element of the scenario therefore gives a bit-identical run. The control at a
+//! sample does not depend on the error of the same sample, since the operator holds e over a sample before it responds.
 
-use crate::{RunSeed, Simulator, cascade::MOST};
+use crate::{RunSeed, Simulator, cascade::HIGHEST_ORDER};
 
-/// Largest number of samples of a restored operator, eight hours at 1 kHz: its random numbers are drawn again, and an
+/// Largest number of samples of a restored operator: eight hours at 1 kHz. Its random numbers are drawn again, and an
 /// invalid larger number must not exhaust the memory.
 const MOST_SAMPLES: f64 = 3e7;
 
-/// Returns the number of a saved sample; `None` if it is not valid.
+/// Returns the index of the next sample from a saved state; `None` if it is not valid.
 pub(crate) fn saved_sample(k: f64) -> Option<usize> {
     ((0.0..=MOST_SAMPLES).contains(&k) && k.fract() == 0.0).then_some(k as usize)
 }
 
-/// A running operator.
+/// Running operator.
 #[derive(Debug, Clone)]
 pub struct OperatorRun {
     simulator: Simulator,
     run: RunSeed,
-    /// White noise of the remnant, from the first sample of the run-in on.
+    /// White noise of the remnant, from the first sample of the run-in.
     noise: Vec<f64>,
     operator: [f64; 2],
-    remnant: [f64; MOST],
-    /// The last responses, that of sample k at index k of a ring.
+    remnant: [f64; HIGHEST_ORDER],
+    /// Ring of the last responses, with the response of sample k at index k.
     memory: Vec<f64>,
-    /// The next sample.
+    /// Index of the next sample.
     k: usize,
 }
 
 impl OperatorRun {
-    /// Starts an operator at rest before the sample at `start_s`, in s from the start of the measurement. The part of
-    /// the run-in before it is left out; its random numbers are skipped.
+    /// Starts an operator at rest before the sample at `start_s`, in s relative to the start of the measurement. The
+    /// part of the run-in before `start_s` is omitted, and its random numbers are skipped.
     pub fn new(simulator: Simulator, run: RunSeed, start_s: f64) -> Self {
         let scenario = simulator.scenario();
         let after_run_in = (start_s / scenario.scenario().sample_time.s()).round() as isize;
@@ -41,28 +41,28 @@ impl OperatorRun {
             noise: run.white_noise(simulator.samples()),
             run,
             operator: [0.0; 2],
-            remnant: [0.0; MOST],
+            remnant: [0.0; HIGHEST_ORDER],
             memory: vec![0.0; (simulator.longest_delay() + 1).next_power_of_two()],
             k,
             simulator,
         };
-        run.respond();
+        run.store_response();
         run
     }
 
-    /// Returns the control u of the next sample, deg.
+    /// Returns the control u of the next sample in deg.
     pub fn control(&self) -> f64 {
         let m = self.matrices();
         let response = self.memory[self.k.wrapping_sub(m.delay) & (self.memory.len() - 1)];
         response + self.remnant()
     }
 
-    /// Returns the remnant n of the next sample, deg.
+    /// Returns the remnant n of the next sample in deg.
     pub fn remnant(&self) -> f64 {
         self.matrices().k_n * self.remnant[self.simulator.cascade.order() - 1]
     }
 
-    /// Takes the error e of the sample, deg, and advances by one sample.
+    /// Takes the error e of the sample in deg and advances by one sample.
     pub fn take(&mut self, e: f64) {
         self.operator = self.matrices().operator.step(self.operator, e);
         let white = self.white();
@@ -70,13 +70,13 @@ impl OperatorRun {
             1 => self.filtered::<1>(white),
             2 => self.filtered::<2>(white),
             3 => self.filtered::<3>(white),
-            _ => self.filtered::<MOST>(white),
+            _ => self.filtered::<HIGHEST_ORDER>(white),
         };
         self.k += 1;
-        self.respond();
+        self.store_response();
     }
 
-    /// Returns its state as numbers.
+    /// Returns the state as numbers.
     pub fn saved(&self) -> Vec<f64> {
         let mut numbers = vec![self.k as f64];
         numbers.extend(self.operator);
@@ -85,8 +85,8 @@ impl OperatorRun {
         numbers
     }
 
-    /// Continues from a saved state of an operator of the same scenario and run ([`OperatorRun::saved`]), with the
-    /// same digits. Returns false, without any change, for numbers of another operator.
+    /// Continues from the saved state ([`OperatorRun::saved`]) of an operator with the same scenario and run, with
+    /// bit-identical results. Returns false, without any change, if the numbers belong to another operator.
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let Some(([k], rest)) = numbers.split_first_chunk::<1>() else {
             return false;
@@ -94,7 +94,7 @@ impl OperatorRun {
         let Some((operator, rest)) = rest.split_first_chunk::<2>() else {
             return false;
         };
-        let Some((remnant, memory)) = rest.split_first_chunk::<MOST>() else {
+        let Some((remnant, memory)) = rest.split_first_chunk::<HIGHEST_ORDER>() else {
             return false;
         };
         let Some(k) = saved_sample(*k).filter(|_| memory.len() == self.memory.len()) else {
@@ -105,8 +105,8 @@ impl OperatorRun {
         true
     }
 
-    /// Updates the ring for the next sample.
-    fn respond(&mut self) {
+    /// Stores the response of the next sample in the ring.
+    fn store_response(&mut self) {
         let [of_output, of_rate] = self.matrices().operator_output;
         let last = self.memory.len() - 1;
         self.memory[self.k & last] = of_output * self.operator[0] + of_rate * self.operator[1];
@@ -117,7 +117,7 @@ impl OperatorRun {
         all[self.k.min(all.len() - 1)]
     }
 
-    /// Returns the white noise of the next sample; it continues after the end of the scenario.
+    /// Returns the white noise of the next sample. The noise continues after the end of the scenario.
     fn white(&mut self) -> f64 {
         if self.k >= self.noise.len() {
             self.noise = self.run.white_noise(2 * self.k + 1);
@@ -125,10 +125,10 @@ impl OperatorRun {
         self.noise[self.k]
     }
 
-    fn filtered<const M: usize>(&self, white: f64) -> [f64; MOST] {
+    fn filtered<const M: usize>(&self, white: f64) -> [f64; HIGHEST_ORDER] {
         let mut sections: [f64; M] = [0.0; M];
         sections.copy_from_slice(&self.remnant[..M]);
-        let mut next = [0.0; MOST];
+        let mut next = [0.0; HIGHEST_ORDER];
         next[..M].copy_from_slice(&self.simulator.cascade.step(sections, white));
         next
     }

@@ -1,7 +1,7 @@
 //! Random streams that belong to a run, not to a thread.
 //!
-//! A run is identified by (seed, cell, replication). These three numbers are the key of a ChaCha8 generator, so that
-//! any run can be repeated alone, in any order and on any number of threads, and no two runs share a stream.
+//! A run is identified by (seed, cell, replication). These three numbers are the key of a ChaCha8 generator. Any run
+//! can therefore be repeated alone, in any order and on any number of threads, and no two runs share a stream.
 
 use rand_chacha::{
     ChaCha8Rng,
@@ -21,8 +21,7 @@ pub struct RunSeed {
     pub replication: u64,
 }
 
-/// Last eight bytes of each key: other uses of (seed, cell, replication) have another tag and therefore another
-/// stream.
+/// Last eight bytes of the key. Other uses of (seed, cell, replication) have another tag and therefore another stream.
 const REMNANT: u64 = u64::from_le_bytes(*b"remnant\0");
 const UNIFORM: u64 = u64::from_le_bytes(*b"uniform\0");
 
@@ -39,22 +38,22 @@ impl RunSeed {
         normal_deviates(self.generator(REMNANT), noise);
     }
 
-    /// Returns uniform numbers from `[0, 1)`, for callers that draw persons or phases of a run.
+    /// Returns uniform random numbers in `[0, 1)`, for callers that draw people, or phases of a run.
     pub fn uniform(&self, n: usize) -> Vec<f64> {
         self.uniform_of(UNIFORM, n)
     }
 
-    /// Returns white Gaussian noise of unit variance for another use of the run.
+    /// Returns white Gaussian noise of unit variance from a separate stream of the run.
     pub(crate) fn white_noise_of(&self, tag: u64, n: usize) -> Vec<f64> {
         let mut noise = vec![0.0; n];
         normal_deviates(self.generator(tag), &mut noise);
         noise
     }
 
-    /// Returns uniform numbers from `[0, 1)` for another use of the run.
+    /// Returns uniform random numbers in `[0, 1)` from a separate stream of the run.
     pub(crate) fn uniform_of(&self, tag: u64, n: usize) -> Vec<f64> {
         let mut generator = self.generator(tag);
-        // The 53 bits of a number from [0, 1).
+        // The 53 highest bits give a number in [0, 1).
         (0..n)
             .map(|_| (generator.next_u64() >> 11) as f64 / (1u64 << 53) as f64)
             .collect()

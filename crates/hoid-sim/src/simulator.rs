@@ -1,19 +1,20 @@
-//! One run of the loop.
+//! Simulation of one run of the closed loop.
 //!
 //! At sample k, with the parameters at that time,
 //!
 //! `e = f_t - x`, `u = y(k - tau_e/Ts) + n`, `n = K_n z`,
 //!
-//! where y is the operator's response without delay, x the output of the controlled element and z that of the unit
-//! remnant cascade. Each block is then advanced by one sample exactly, for a held input: the operator driven by e, the
-//! controlled element by u, the cascade by one normal deviate. The hold delays the response by one more sample, so
-//! that `nk = tau_e/Ts + 1`. The remnant is not delayed. A changing delay has its value at the sample at which the
-//! response arrives: if it grows, parts of the response are repeated; if it shrinks, some are skipped.
+//! where y is the response of the operator without delay, x the output of the controlled element, and z the output of
+//! the remnant cascade for unit variance. Each block is then advanced exactly by one sample, for a held input: the
+//! operator is driven by e, the controlled element by u, and the cascade by one normal deviate. The hold delays the
+//! response by one more sample, so that `nk = tau_e/Ts + 1`. The remnant is not delayed. A changing delay has its value
+//! at the sample at which the response arrives: if the delay increases, parts of the response are repeated; if it
+//! decreases, parts are skipped.
 //!
-//! Operator and controlled element are in controllable canonical form (states: output and rate of
-//! `1/den`). The operator's gains are in its output matrix; those of the controlled element are placed according to
-//! [`Realisation`]. For changing parameters the matrices of each sample are those of the continuous model with the
-//! values at that sample.
+//! Operator and controlled element are in controllable canonical form (the states are the output of `1/den` and its
+//! rate). The gains of the operator are in its output matrix; those of the controlled element are placed according to
+//! [`Realisation`]. For changing parameters, the matrices at each sample are those of the continuous model with the
+//! parameter values at that sample.
 
 use std::ops::Range;
 
@@ -28,15 +29,15 @@ use hoid_model::{
 
 use crate::{
     RunSeed, SimError,
-    cascade::{Cascade, MOST},
+    cascade::{Cascade, HIGHEST_ORDER},
 };
 
-/// A prepared scenario: forcing function, parameters and matrices of every sample.
+/// Prepared scenario: forcing function, parameters and matrices for every sample.
 #[derive(Debug, Clone)]
 pub struct Simulator {
     scenario: ResolvedScenario,
     forcing_deg: Vec<f64>,
-    /// One entry if nothing changes, else one per sample.
+    /// One entry if nothing changes, otherwise one entry per sample.
     parameters: Vec<TrueParameters>,
     pub(crate) matrices: Vec<Matrices>,
     pub(crate) cascade: Cascade,
@@ -53,9 +54,9 @@ pub(crate) struct Matrices {
     pub delay: usize,
 }
 
-/// A held system by rows, `[a x_0 + b x_1 + g u, d x_1 - c x_0 - h u]`, with the same bits as
-/// [`HeldStates::step`]. If both rows were sums, the compiler would pack the states into one register, and each sample
-/// would also wait for the shuffles.
+/// Held system by rows, `[a x_0 + b x_1 + g u, d x_1 - c x_0 - h u]`, bit-identical to [`HeldStates::step`]. If both
+/// rows were sums, the compiler would pack the states into one register, and each sample would also wait for the
+/// shuffles.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Rows {
     plus: [f64; 3],
@@ -82,21 +83,21 @@ impl Rows {
     }
 }
 
-/// The signals of one run, run-in included.
+/// Signals of one run, including the run-in.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Signals {
-    /// Tracking error e, deg.
+    /// Tracking error e in deg.
     pub e: Vec<f64>,
-    /// Control output u, deg.
+    /// Control output u in deg.
     pub u: Vec<f64>,
-    /// Output of the controlled element x, deg.
+    /// Output x of the controlled element in deg.
     pub x: Vec<f64>,
-    /// Remnant n, deg.
+    /// Remnant n in deg.
     pub n: Vec<f64>,
 }
 
 impl Simulator {
-    /// Prepares a scenario. Its runs share the results.
+    /// Prepares a scenario. All runs share the result.
     ///
     /// # Errors
     /// [`SimError::Model`] if the scenario is invalid.
@@ -129,22 +130,22 @@ impl Simulator {
         &self.scenario
     }
 
-    /// Returns the number of samples of a run: run-in and measurement.
+    /// Returns the number of samples of a run, including the run-in.
     pub fn samples(&self) -> usize {
         self.forcing_deg.len()
     }
 
-    /// Returns one run as a record of the measurement (or from the start of the run-in): e, u, f_t, x, n and the true
-    /// parameters.
+    /// Returns one run as a record, from the start of the measurement or, with `keep_run_in`, of the run-in: e, u, f_t,
+    /// x, n and the true parameters.
     ///
     /// # Errors
-    /// [`SimError::Diverged`].
+    /// [`SimError::Diverged`] if a signal is not finite.
     pub fn run(&self, run_seed: RunSeed, keep_run_in: bool) -> Result<Record, SimError> {
         let signals = self.signals(&run_seed.white_noise(self.samples()))?;
         self.record(signals, keep_run_in)
     }
 
-    /// Returns the signals of a run driven by given white noise of unit variance, one value per sample.
+    /// Returns the signals of a run driven by the given white noise of unit variance, one value per sample.
     ///
     /// # Errors
     /// [`SimError::NoiseLength`], [`SimError::NoiseNotFinite`], [`SimError::Diverged`].
@@ -154,10 +155,10 @@ impl Simulator {
         Ok(signals)
     }
 
-    /// Computes [`Simulator::signals`] into existing memory: new memory costs half as much as the run.
+    /// Writes [`Simulator::signals`] into existing memory; allocating new memory costs half as much time as the run.
     ///
     /// # Errors
-    /// As [`Simulator::signals`]; the signals are then invalid.
+    /// As [`Simulator::signals`]. After an error the signals are invalid.
     pub fn signals_into(&self, noise: &[f64], signals: &mut Signals) -> Result<(), SimError> {
         self.check_length(noise)?;
         signals.resize_to(self.samples());
@@ -173,19 +174,20 @@ impl Simulator {
         }
     }
 
-    /// Returns the signals of several runs, each driven by its own white noise, in parallel lanes of vector registers:
-    /// with the same bits as [`Simulator::signals`] for each alone, with every instruction set.
+    /// Returns the signals of several runs, each driven by its own white noise and computed in its own lane of vector
+    /// registers. With every instruction set, the results are bit-identical to those of [`Simulator::signals`] for each
+    /// run.
     ///
     /// # Errors
-    /// As [`Simulator::signals`], for the first run with an error;
-    /// [`SimError::NoSuchInstructionSet`].
+    /// As [`Simulator::signals`], for the first run with an error; [`SimError::NoSuchInstructionSet`] if this processor
+    /// does not support the instruction set.
     pub fn batched_signals(&self, noises: &[Vec<f64>], instructions: InstructionSet) -> Result<Vec<Signals>, SimError> {
         let mut all = Vec::new();
         self.batched_signals_into(noises, instructions, &mut all)?;
         Ok(all)
     }
 
-    /// Computes [`Simulator::batched_signals`] into existing memory: new memory costs more than the runs.
+    /// Writes [`Simulator::batched_signals`] into existing memory; allocating new memory costs more time than the runs.
     ///
     /// # Errors
     /// As [`Simulator::batched_signals`].
@@ -229,14 +231,15 @@ impl Simulator {
         })
     }
 
-    /// Computes the samples of `range`, from noise into e, u, x and n, in which the lanes of each sample are adjacent.
+    /// Computes the samples of `range` from noise into e, u, x and n. In these arrays the lanes of each sample are
+    /// adjacent.
     #[inline(always)]
     fn pass<R: Number>(&self, state: &mut LoopState<R>, range: Range<usize>, noise: &[f64], out: [&mut [f64]; 4]) {
         match self.cascade.order() {
             1 => self.pass_of_order::<R, 1>(state, range, noise, out),
             2 => self.pass_of_order::<R, 2>(state, range, noise, out),
             3 => self.pass_of_order::<R, 3>(state, range, noise, out),
-            _ => self.pass_of_order::<R, MOST>(state, range, noise, out),
+            _ => self.pass_of_order::<R, HIGHEST_ORDER>(state, range, noise, out),
         }
     }
 
@@ -255,7 +258,7 @@ impl Simulator {
         }
     }
 
-    /// Compiled in two versions, so that constant numbers stay in the registers.
+    /// Compiled in two versions, so that constant matrices stay in registers.
     #[inline(always)]
     fn pass_through<R: Number, const M: usize, const CHANGES: bool>(
         &self,
@@ -303,7 +306,7 @@ impl Simulator {
         state.remnant[..M].copy_from_slice(&remnant);
     }
 
-    /// Returns the signals of a whole run with time, units and true values.
+    /// Returns the signals of a run as a record with time, units and true values.
     fn record(&self, signals: Signals, keep_run_in: bool) -> Result<Record, SimError> {
         let run_in = self.scenario.run_in_samples();
         let first = if keep_run_in { 0 } else { run_in };
@@ -372,8 +375,8 @@ fn first_not_finite(values: &[f64]) -> Option<usize> {
 struct LoopState<R> {
     operator: [R; 2],
     element: [R; 2],
-    remnant: [R; MOST],
-    /// The last responses, that of sample k at index k of a ring.
+    remnant: [R; HIGHEST_ORDER],
+    /// Ring of the last responses, with the response of sample k at index k.
     memory: Vec<R>,
 }
 
@@ -382,13 +385,13 @@ impl<R: Number> LoopState<R> {
         Self {
             operator: [zero; 2],
             element: [zero; 2],
-            remnant: [zero; MOST],
+            remnant: [zero; HIGHEST_ORDER],
             memory: vec![zero; (longest_delay + 1).next_power_of_two()],
         }
     }
 
-    /// True if all values of a lane were finite. A value that is not finite remains in the states: its product with
-    /// zero is not finite either.
+    /// True if all values of a lane were finite. A value that is not finite remains in the states, since its product
+    /// with zero is not finite either.
     fn is_finite(&self, lane: usize) -> bool {
         let states = self.operator.iter().chain(&self.element).chain(&self.remnant);
         states.chain(&self.memory).all(|state| state.lane(lane).is_finite())
@@ -400,7 +403,7 @@ impl Signals {
         let Self { e, u, x, n } = self;
         for values in [e, u, x, n] {
             if values.capacity() < samples {
-                // Zeros from the operating system cost nothing before they are written.
+                // Zeroed memory from the operating system costs nothing until it is written.
                 *values = vec![0.0; samples];
             }
             values.resize(samples, 0.0);
@@ -411,11 +414,11 @@ impl Signals {
 /// Number of samples that are interleaved at a time.
 const BLOCK: usize = 64;
 
-/// One run.
+/// Task for a single run.
 struct SingleRun<'a> {
     simulator: &'a Simulator,
     noise: &'a [f64],
-    /// Signals of the length of the run.
+    /// Memory for the signals, with the length of the run.
     into: &'a mut Signals,
 }
 
@@ -433,11 +436,11 @@ impl LaneTask for SingleRun<'_> {
     }
 }
 
-/// Parallel runs.
+/// Task for several runs in parallel lanes.
 struct BatchedRuns<'a> {
     simulator: &'a Simulator,
     noises: &'a [Vec<f64>],
-    /// Signals of the length of the runs, as many as there are runs.
+    /// Memory for the signals of each run, with the length of the run.
     into: &'a mut [Signals],
 }
 

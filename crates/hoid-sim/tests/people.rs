@@ -129,7 +129,7 @@ fn other_rates_and_forms_are_drawn_too() {
     // A lag on 1/s has no phase left for a margin.
     assert!(matches!(
         draw(Plant::Integrator, Form::Lag),
-        Err(SimError::NobodyFound { .. })
+        Err(SimError::NoAcceptablePerson { .. })
     ));
 }
 

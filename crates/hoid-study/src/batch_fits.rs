@@ -1,8 +1,7 @@
-//! The batch fits that the estimators of a cell need, each computed once for all runs of a block.
+//! The batch fits that the estimators of a cell need; each is computed once for a batch of runs.
 //!
-//! A recursion that starts from a fit of a span and an estimator that makes the same fit share it,
-//! and the fits of all runs are searched in one batch ([`Estimator::fit_each`]). The results do not
-//! depend on this sharing.
+//! If a recursion starts from the fit of a span and an estimator makes the same fit, they share it. The fits of these
+//! runs are searched in one batch ([`Estimator::fit_each`]). The results do not depend on this sharing.
 
 use std::borrow::Cow;
 
@@ -14,24 +13,24 @@ use crate::{
     prepared::Preparation,
 };
 
-/// A requested fit: the estimator, and the preparation of the record.
+/// A requested fit: the estimator and the preparation of the record.
 type FitRequest = (Estimator, Preparation);
 
-/// The fits of some runs.
+/// Batch fits of some runs of a block.
 pub(crate) struct BatchFits {
-    /// For each estimator, the index of its request.
+    /// For each estimator, the index of the fit that it requests; `None` if it requests none.
     requested: Vec<Option<usize>>,
-    /// For each request, the fit of each run.
+    /// For each requested fit, its result for each run.
     fits: Vec<Vec<Result<Fit, String>>>,
 }
 
 impl BatchFits {
-    /// Computes all fits that these estimators need for these runs. None if `go_on` returns false
-    /// before one of them.
+    /// Computes all fits that these estimators need for these runs. Returns `None` if `should_continue` returns false
+    /// before one of the fits.
     pub fn of(
         estimators: &[(&EstimatorCell, Task)],
         runs: &[&Record],
-        go_on: &(dyn Fn() -> bool + Sync),
+        should_continue: &(dyn Fn() -> bool + Sync),
     ) -> Option<Self> {
         let mut requests: Vec<FitRequest> = Vec::new();
         let (mut requested, mut fits) = (Vec::with_capacity(estimators.len()), Vec::new());
@@ -45,7 +44,7 @@ impl BatchFits {
             if known.is_some() {
                 continue;
             }
-            if !go_on() {
+            if !should_continue() {
                 return None;
             }
             fits.push(fit_all(&request, runs));
@@ -54,8 +53,8 @@ impl BatchFits {
         Some(Self { requested, fits })
     }
 
-    /// The fit of a run for an estimator (by index); `None` if it needs none.
-    pub fn of_run(&self, estimator: usize, run: usize) -> Option<&Result<Fit, String>> {
+    /// Returns the fit of a run that an estimator uses, both given by index; `None` if the estimator uses no fit.
+    pub fn fit_of(&self, estimator: usize, run: usize) -> Option<&Result<Fit, String>> {
         let request = (*self.requested.get(estimator)?)?;
         self.fits.get(request)?.get(run)
     }
@@ -65,7 +64,7 @@ fn request(estimator: &EstimatorCell, task: &Task, record: &Record) -> Option<Fi
     let preparation = Preparation::of(estimator);
     match task {
         Task::Fit(options) => Some(((**options).clone(), preparation)),
-        // The start span refers to the prepared record.
+        // The start span refers to the prepared record, so the fit is shared only if the record is not prepared.
         Task::Track(options) if preparation.is_none() => {
             let span_s = Some(options.start_span(record)?);
             Some((options.start_estimator(), Preparation { span_s, ..preparation }))

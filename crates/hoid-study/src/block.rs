@@ -1,4 +1,4 @@
-//! One block of a study: some replications of a cell, with all estimators of the cell.
+//! One block of a study: several replications of a cell, with all estimators of the cell.
 
 use hoid_analysis::{AnalysisError, Recordings, ResolvedRequest};
 use hoid_ident::{Fit, IdentError};
@@ -14,26 +14,27 @@ use crate::{
     prepared::Preparation,
 };
 
-/// Samples between two points of a trace at which its errors are evaluated: far less than any memory length.
+/// Maximum number of samples between two points of a trace at which its errors are evaluated; much shorter than any
+/// memory length.
 const ERRORS_EVERY: usize = 4;
 
-/// Replications whose fits are searched in one batch; a run of 82 s at 100 Hz takes 1 MB.
-const AT_A_TIME: usize = 50;
+/// Number of replications whose fits are searched in one batch. A run of 82 s at 100 Hz takes 1 MB.
+const BATCH_REPLICATIONS: usize = 50;
 
-/// Some replications of a cell.
+/// A block: consecutive replications of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Block {
     /// Number of the block in the study.
     pub index: u64,
-    /// Index of its cell.
+    /// Index of the cell.
     pub cell: usize,
-    /// First replication.
+    /// Number of the first replication.
     pub first: u64,
     /// Number of replications.
     pub count: u64,
 }
 
-/// All blocks of a plan in their order.
+/// Returns all blocks of a plan in order.
 pub(crate) fn blocks(plan: &Plan) -> Vec<Block> {
     let mut all: Vec<Block> = Vec::new();
     for (cell, of) in plan.cells.iter().enumerate() {
@@ -52,13 +53,14 @@ pub(crate) fn blocks(plan: &Plan) -> Vec<Block> {
     all
 }
 
-/// Runs a block. `done` is called with the number of completed estimates; `None` if `go_on` returns false.
+/// Runs a block. `done` is called with the number of newly completed estimates. Returns `None` if `should_continue`
+/// returns false.
 pub(crate) fn run_block(
     plan: &Plan,
     schemas: &Schemas,
     block: &Block,
     done: &(dyn Fn(u64) + Sync),
-    go_on: &(dyn Fn() -> bool + Sync),
+    should_continue: &(dyn Fn() -> bool + Sync),
 ) -> Option<BlockTables> {
     let cell = &plan.cells[block.cell];
     let mut cell_run = CellRun {
@@ -80,7 +82,7 @@ pub(crate) fn run_block(
         }
     };
     let all: Vec<u64> = (block.first..block.first + block.count).collect();
-    for replications in all.chunks(AT_A_TIME) {
+    for replications in all.chunks(BATCH_REPLICATIONS) {
         let run = |&replication: &u64| {
             let run_seed = RunSeed {
                 seed: plan.seed,
@@ -91,36 +93,36 @@ pub(crate) fn run_block(
             (replication, record)
         };
         let runs: Vec<Run> = replications.iter().map(run).collect();
-        cell_run.estimate_all(&simulator, &runs, done, go_on)?;
+        cell_run.estimate_all(&simulator, &runs, done, should_continue)?;
     }
     Some(cell_run.rows.into_tables(schemas))
 }
 
-/// A replication and its record, or the reason why there is none.
+/// The number of a replication and its record, or the reason why there is no record.
 type Run = (u64, Result<Record, String>);
 
-/// The estimators of a cell on its runs.
+/// Applies the estimators of a cell to its runs.
 struct CellRun<'a> {
     plan: &'a Plan,
     estimators: Vec<(&'a EstimatorCell, Task)>,
-    /// Output of the run without remnant, simulated if an estimator needs it.
+    /// Output of the run without remnant, simulated when an estimator first needs it.
     without_remnant: Option<Vec<f64>>,
     rows: EstimateRows<'a>,
 }
 
 impl<'a> CellRun<'a> {
-    /// Estimates of these runs. None if `go_on` returns false; it is called before each estimator,
-    /// some of which take 0.1 s.
+    /// Applies all estimators to these runs. `should_continue` is called before each estimator, some of which take
+    /// 0.1 s; if it returns false, the result is `None`.
     fn estimate_all(
         &mut self,
         simulator: &Simulator,
         runs: &[Run],
         done: &(dyn Fn(u64) + Sync),
-        go_on: &(dyn Fn() -> bool + Sync),
+        should_continue: &(dyn Fn() -> bool + Sync),
     ) -> Option<()> {
         let estimators = self.estimators.clone();
         let records: Vec<&Record> = runs.iter().filter_map(|(_, run)| run.as_ref().ok()).collect();
-        let fits = BatchFits::of(&estimators, &records, go_on)?;
+        let fits = BatchFits::of(&estimators, &records, should_continue)?;
         let mut records = records.into_iter().enumerate();
         for (replication, run) in runs {
             if let Err(reason) = run {
@@ -130,11 +132,11 @@ impl<'a> CellRun<'a> {
             let (index, record) = records.next()?;
             self.rows.begin_replication();
             for (place, (estimator, task)) in estimators.iter().enumerate() {
-                if !go_on() {
+                if !should_continue() {
                     return None;
                 }
                 self.rows.begin(estimator, *replication);
-                let fit = fits.of_run(place, index);
+                let fit = fits.fit_of(place, index);
                 let outcome = match task {
                     Task::Describe => self.describe(simulator, record),
                     task => Preparation::of(estimator)
@@ -180,7 +182,7 @@ impl<'a> CellRun<'a> {
             Task::Track(options) => {
                 let kept = self.plan.trace_every.unwrap_or(ERRORS_EVERY);
                 let every = greatest_common_divisor(kept, ERRORS_EVERY);
-                // The recursion reports the error of its start fit.
+                // If the start fit failed, the recursion reports the error itself.
                 let start = fit.and_then(|fit| fit.as_ref().ok());
                 let trace = track_from(record, options, every, start).map_err(text)?;
                 self.rows.track_row(&trace, record);
@@ -192,7 +194,7 @@ impl<'a> CellRun<'a> {
         Ok(())
     }
 
-    /// Analysis as by `hoid identify`.
+    /// Analyses a record as `hoid identify` does.
     fn analyse(
         &mut self,
         asked: &ResolvedRequest,
@@ -239,7 +241,7 @@ impl<'a> CellRun<'a> {
         }
     }
 
-    /// Noise levels of a run, compared with the same run without remnant.
+    /// Computes the noise levels of a run by comparison with the same run without remnant.
     fn describe(&mut self, simulator: &Simulator, record: &Record) -> Result<(), String> {
         let u0 = match self.without_remnant.take() {
             Some(known) => known,

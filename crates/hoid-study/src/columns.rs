@@ -1,13 +1,13 @@
-//! The tables of a study: their columns, and rows filled by column name.
+//! The tables of a study: their columns, and rows whose cells are set by column name.
 //!
-//! | table | a row is | columns |
+//! | table | content of a row | columns |
 //! |---|---|---|
-//! | fits | one estimator on one replication | the simulated scenario and estimated; how it ended, its reliability; theta, operator, remnant with standard errors; error measures |
-//! | traces | one kept point of a recursion | cell, replication, estimator, t; theta and operator |
-//! | cells | one scenario of the grid | its settings and its true parameters |
+//! | fits | one estimator on one replication | settings of scenario and estimator; status and verdict; theta, operator and remnant with standard errors; error measures |
+//! | traces | one stored point of a recursion | cell, replication, estimator, t; theta and operator |
+//! | cells | one scenario of the grid | settings and true parameters |
 //!
-//! A number that does not exist (the operator of a model that cannot be converted, nk of an output
-//! model) is an empty cell.
+//! A cell is empty if its number does not exist, such as a parameter of the operator if the model cannot be converted,
+//! or nk of a model without input.
 
 use std::collections::BTreeMap;
 
@@ -16,13 +16,13 @@ use hoid_io::{ColumnKind, ColumnSchema, ColumnValues, OutputColumn, OutputTable,
 
 use crate::plan::{Plan, Task, analysis};
 
-/// Parameters of the operator, in the order of all tables.
+/// Parameters of the operator, in the order used by all tables.
 pub const OPERATOR: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
-/// Quantities evaluated in a trace: these and the delay, in the order of
+/// Quantities evaluated in a trace: the parameters of the operator and the delay, in the order of
 /// [`hoid_model::uncertainty::OperatorEstimate::rows`].
 pub(crate) const TRACED: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 
-/// Rows with given columns.
+/// Rows of a table with given columns.
 #[derive(Debug, Clone)]
 pub(crate) struct Rows {
     columns: Vec<OutputColumn>,
@@ -52,7 +52,7 @@ impl Rows {
         }
     }
 
-    /// Starts a row with empty cells and zero counts.
+    /// Starts a row: texts and real numbers are empty, whole numbers are zero.
     pub fn begin(&mut self) {
         self.rows += 1;
         for column in &mut self.columns {
@@ -64,7 +64,7 @@ impl Rows {
         }
     }
 
-    /// Sets a number of the row; a column that the table does not have is ignored: the plan
+    /// Sets a real number of the current row. A column that the table does not have is ignored, since the plan
     /// determines the columns.
     pub fn real(&mut self, name: &str, value: f64) {
         if let Some(ColumnValues::Real(values)) = self.column(name)
@@ -94,12 +94,12 @@ impl Rows {
         self.at.get(name).map(|i| &mut self.columns[*i].values)
     }
 
-    /// Position of a column, for tables with many rows.
+    /// Returns the position of a column, for faster access in tables with many rows.
     pub fn position(&self, name: &str) -> Option<usize> {
         self.at.get(name).copied()
     }
 
-    /// Sets a number of the row by position.
+    /// Sets a real number of the current row, with the column given by position.
     pub fn real_at(&mut self, position: usize, value: f64) {
         if let Some(OutputColumn {
             values: ColumnValues::Real(values),
@@ -123,7 +123,7 @@ impl Rows {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Schemas {
     pub fits: TableSchema,
-    /// None if traces are not kept.
+    /// `None` if traces are not stored.
     pub traces: Option<TableSchema>,
 }
 
@@ -138,7 +138,7 @@ impl Schemas {
     }
 }
 
-/// Comments on each table of a study.
+/// Returns the comments that every table of a study carries.
 pub(crate) fn comments(plan: &Plan) -> Vec<String> {
     vec![
         format!("hoid {} study {}", env!("CARGO_PKG_VERSION"), plan.name),
@@ -147,7 +147,7 @@ pub(crate) fn comments(plan: &Plan) -> Vec<String> {
     ]
 }
 
-/// Axes without a dedicated column: each gets a column with its name.
+/// Returns the axes without a dedicated column; each of them gets a column of its own name.
 pub(crate) fn extra_axes(plan: &Plan) -> Vec<String> {
     const KNOWN: [&str; 15] = [
         "name",

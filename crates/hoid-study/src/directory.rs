@@ -11,7 +11,7 @@ use crate::{Plan, StudyError};
 
 pub(crate) const PLAN: &str = "plan.toml";
 
-/// Path of the parts of a block.
+/// Path of the part that holds one table of a block.
 pub(crate) fn part(directory: &Path, block: u64, table: &str) -> PathBuf {
     directory.join("parts").join(format!("{block:06}-{table}.parquet"))
 }
@@ -21,25 +21,26 @@ pub(crate) fn seal_path(directory: &Path, block: u64) -> PathBuf {
     directory.join("parts").join(format!("{block:06}-seal.json"))
 }
 
-/// Writes the plan to the directory of the results.
+/// Writes a copy of the plan to the directory of the results.
 pub(crate) fn write_plan(plan: &Plan, directory: &Path) -> Result<(), StudyError> {
     write_source(&directory.join(PLAN), plan.text())
 }
 
-/// Writes a copy of a source to the directory of the results, without replacing another file of the same name.
+/// Writes a copy of a plan or manifest to the directory of the results; a different file of the same name is not
+/// replaced.
 pub(crate) fn write_source(path: &Path, text: &str) -> Result<(), StudyError> {
     if path.exists() {
         if hoid_io::read_bytes(path)? == text.as_bytes() {
             return Ok(());
         }
-        return Err(StudyError::SourceThere {
+        return Err(StudyError::SourceExists {
             file: path.display().to_string(),
         });
     }
     Ok(hoid_io::write_atomically(path, |file| file.write_all(text.as_bytes()))?)
 }
 
-/// Removes the partial output of a killed run: all files in `parts` without their final names.
+/// Removes the partial output of a killed run: all files in `parts` that still have temporary names.
 pub(crate) fn sweep(parts: &Path) -> Result<(), StudyError> {
     hoid_io::make_directory(parts)?;
     let unwritable = |source| IoError::Unwritable {
@@ -63,7 +64,7 @@ fn is_hidden(path: &Path) -> bool {
         .is_some_and(|name| name.to_string_lossy().starts_with('.'))
 }
 
-/// Removes the parts of a study whose tables are written.
+/// Removes the parts of a study after its tables have been written.
 pub(crate) fn remove_parts(directory: &Path) -> Result<(), StudyError> {
     let parts = directory.join("parts");
     if !parts.exists() {
@@ -82,7 +83,7 @@ pub(crate) fn table_path(directory: &Path, table: &str, csv: bool) -> PathBuf {
     directory.join(format!("{table}.{}", if csv { "csv" } else { "parquet" }))
 }
 
-/// The existing tables.
+/// Returns the paths of the tables that exist.
 pub(crate) fn tables(directory: &Path) -> Vec<PathBuf> {
     let all = ["cells", "fits", "summary", "traces", "trace-summary"]
         .into_iter()

@@ -3,172 +3,171 @@
 use hoid_io::IoError;
 use thiserror::Error;
 
-/// Errors of a study as a whole. A failed fit is a row of the results with its reason, not an
-/// error.
+/// An error of a study as a whole. A failed fit is not an error: it is a row of the results with its reason.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StudyError {
-    /// An invalid plan.
+    /// The plan is invalid.
     #[error("plan {path}{}: {reason}", .line.map_or_else(String::new, |line| format!(", line {line}")))]
     Plan {
-        /// The file.
+        /// Path of the plan.
         path: String,
-        /// Line, from 1, if known.
+        /// Line of the plan, counted from 1, if known.
         line: Option<usize>,
-        /// The problem and the expected value.
+        /// The problem, and what was expected instead.
         reason: String,
     },
-    /// A file that cannot be read or written.
+    /// A file cannot be read or written.
     #[error(transparent)]
     Io(#[from] IoError),
-    /// An invalid shard.
+    /// The text does not name a shard.
     #[error("shard {found:?}: expected I/N with 1 <= I <= N, such as 2/7")]
     BadShard {
-        /// The value given.
+        /// The text given.
         found: String,
     },
-    /// An invalid `study.json`.
+    /// The file `study.json` is invalid.
     #[error(
-        "{file}: {reason}; expected the file that hoid wrote: choose another directory, or remove this one to start \
-         again"
+        "{file}: {reason}; expected the file that hoid wrote: choose another directory, or remove this directory to \
+         start again"
     )]
     Manifest {
-        /// The file.
+        /// Path of the file `study.json`.
         file: String,
-        /// The problem.
+        /// The problem with the file.
         reason: String,
     },
-    /// Results that would be overwritten.
+    /// The run would overwrite existing results.
     #[error("{directory} already holds a study: continue with --resume, or choose another directory")]
     Occupied {
-        /// The directory.
+        /// Directory of the existing results.
         directory: String,
     },
-    /// A plan or manifest of the user that the copy with the results would replace.
+    /// The copy written with the results would replace a plan or manifest of the user.
     #[error("{file} is already present and would be replaced by this run; choose another directory for the results")]
-    SourceThere {
-        /// The file.
+    SourceExists {
+        /// Path of the plan or manifest of the user.
         file: String,
     },
-    /// Parts without checksums.
+    /// The parts have no checksums.
     #[error(
         "the blocks of {directory} have no checksums, because an earlier hoid wrote them: run that shard again with \
-         --resume, which computes them again"
+         --resume, which computes the blocks again"
     )]
     Unsealed {
-        /// The directory.
+        /// Directory of the parts.
         directory: String,
     },
-    /// Results that do not belong together.
+    /// The results belong to different studies.
     #[error("{directory} holds another study: {reason}; choose another directory")]
     OtherStudy {
-        /// The directory.
+        /// Directory of the other study.
         directory: String,
-        /// The differences.
+        /// The differences between the studies.
         reason: String,
     },
-    /// No results where some were expected.
+    /// A directory that should hold results holds none.
     #[error("{directory:?} holds no study: expected a directory that `hoid study run` has written")]
     NoStudy {
-        /// The directory.
+        /// The directory without results.
         directory: String,
     },
-    /// A study without tables.
+    /// The tables of the study have not been written yet.
     #[error("{directory} holds a study that is not finished: continue with --resume, or merge its shards")]
     Unfinished {
-        /// The directory.
+        /// Directory of the unfinished study.
         directory: String,
     },
-    /// A table that does not fit the plan.
+    /// A table does not match the plan.
     #[error("{file}: {reason}; expected the table that hoid wrote: run the study again")]
     Table {
-        /// The file.
+        /// Path of the table.
         file: String,
-        /// The problem.
+        /// The problem with the table.
         reason: String,
     },
-    /// A study that is already complete.
+    /// The study is already complete, so there is nothing to merge.
     #[error(
         "{directory} holds a complete study, so that there is nothing to merge: expected directories written with \
              --shard"
     )]
     Whole {
-        /// The directory.
+        /// Directory of the complete study.
         directory: String,
     },
-    /// A duplicated part.
+    /// Two directories contain the same block.
     #[error("block {block} is both in {first} and in {second}: name each shard once")]
-    Overlap {
-        /// The block.
+    DuplicateBlock {
+        /// Number of the block.
         block: u64,
-        /// Location of its first copy.
+        /// Directory of the first copy.
         first: String,
-        /// Location of its second copy.
+        /// Directory of the second copy.
         second: String,
     },
-    /// Missing parts.
+    /// Some blocks are missing.
     #[error(
-        "{missing} of {blocks} blocks of {plan} are missing, the first is {first}: run the missing shards, or finish those that were stopped with --resume"
+        "{missing} of {blocks} blocks of {plan} are missing, the first is {first}: run the missing shards, or finish the stopped shards with --resume"
     )]
-    Gap {
+    MissingBlocks {
         /// Number of missing blocks.
         missing: u64,
-        /// Number of all blocks.
+        /// Number of blocks of the study.
         blocks: u64,
-        /// The first missing block.
+        /// Number of the first missing block.
         first: u64,
         /// Name of the study.
         plan: String,
     },
-    /// Threads that the system cannot provide.
+    /// The operating system cannot provide the threads.
     #[error("no threads: {reason}; try --jobs 1")]
     Threads {
         /// Error reported by the operating system.
         reason: String,
     },
-    /// An invalid pattern of file names.
-    #[error("pattern {pattern:?}: {reason}; expected something like {{subject}}_{{condition}}_{{run}}.csv")]
+    /// The pattern of file names is invalid.
+    #[error("pattern {pattern:?}: {reason}; expected a pattern such as {{subject}}_{{condition}}_{{run}}.csv")]
     Pattern {
-        /// The pattern.
+        /// Text of the pattern.
         pattern: String,
-        /// The problem.
+        /// The problem with the pattern.
         reason: String,
     },
-    /// A missing manifest of a group.
+    /// The manifest of a group is missing.
     #[error("there is no {path}; `hoid group init DIR` writes one")]
     NoManifest {
-        /// The manifest.
+        /// Path where the manifest was expected.
         path: String,
     },
-    /// A recorded run that cannot be read.
+    /// A recorded run cannot be read.
     #[error("{reason}")]
     Recording {
-        /// File, reason and remedy.
+        /// Path of the file, reason for the error, and remedy.
         reason: String,
     },
-    /// A directory without runs.
+    /// No file of the directory matches the pattern.
     #[error(
-        "no file in {directory} matches {pattern}; it has {found}: state with --pattern what their names mean, such as \
+        "no file in {directory} matches {pattern}; it has {found}: describe the file names with --pattern, such as \
          {{subject}}_{{run}}.csv"
     )]
     NoRuns {
-        /// The directory.
+        /// Directory that was searched.
         directory: String,
-        /// The pattern.
+        /// Pattern of the file names.
         pattern: String,
-        /// Some of the existing files.
+        /// Some of the files in the directory.
         found: String,
     },
-    /// A virtual experiment that would overwrite another.
+    /// A virtual experiment would overwrite another one.
     #[error("{directory} already holds an experiment; choose another directory")]
     ExperimentThere {
-        /// The directory.
+        /// Directory of the existing experiment.
         directory: String,
     },
-    /// A virtual experiment that cannot be simulated.
+    /// A virtual experiment cannot be simulated.
     #[error("the virtual experiment cannot be simulated: {reason}")]
     Virtual {
-        /// Reason and remedy.
+        /// Reason for the error, and remedy.
         reason: String,
     },
 }

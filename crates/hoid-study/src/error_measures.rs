@@ -1,25 +1,25 @@
 //! Error measures of an estimate whose true value is known.
 //!
-//! - `vaf`, %: `100 (1 - sum (u - u_s)^2 / sum u^2)` of the simulated output u_s, without removing a mean.
-//! - `delta_vaf`, %: `vaf` minus that of another estimator with the same nk on the same run.
-//! - `response_error`, %: root of the mean over the lines of the forcing function of
-//!   `|H - H0|^2 / |H0|^2`, where H0 is the simulated operator with a hold at the sample time of
-//!   the simulation. It needs no conversion, so that models of any order can be compared.
-//! - `rms_<p>`, %: root mean square of the relative error of a trace from 10 s after the start,
-//!   over the rows that can be converted.
-//! - `settle50_<p>`, `settle90_<p>`, s: time from t_M until the trace first covers 50 or 90 % of
-//!   the step of a parameter.
-//! - `before_<p>`, `after_<p>`, %: mean relative error of a trace from 10 s after the start to t_M,
-//!   and over the last 10 s: their spread over the replications is that of the summary.
-//!   `covered_<p>`, `covered_through_<p>`, %: points of a trace, after its start fit and within 5 s
-//!   after a change, at which 1.96 standard errors cover the true value.
-//! - `false_alarms`: changes declared more than 5 s after a true one, or before the first; `hours`:
-//!   the time in which they could occur. `found`, %: true changes after the start fit that were
-//!   declared within 5 s; `lag`, s: mean time to their declaration.
-//! - `diverged`: a coefficient is not a number, or its magnitude exceeds 10.
-//! - `noise_level_obtained`: `(var u - var u0) / var u` with u0 of the run without remnant,
-//!   `noise_level_response`: `var(u - u0) / var u`, which lacks the chance correlation of the two,
-//!   and `noise_level_remnant`: `var n / var u`.
+//! - `vaf`, %: `100 (1 - sum (u - u_s)^2 / sum u^2)` with the simulated output u_s; the mean is not removed.
+//! - `delta_vaf`, %: `vaf` of this estimator minus `vaf` of another one with the same nk on the same run.
+//! - `response_error`, %: root mean square of `|H - H0| / |H0|` over the lines of the forcing function, where H0 is the
+//!   simulated operator with a hold at the sample time of the simulation. The model need not be converted to operator
+//!   parameters, so that models of any order can be compared.
+//! - `rms_<p>`, %: root mean square of the relative error of a trace, from 10 s after its start, over the rows that can
+//!   be converted to operator parameters.
+//! - `settle50_<p>`, `settle90_<p>`, s: time from t_M until the trace first covers 50 or 90 % of the step of a
+//!   parameter.
+//! - `before_<p>`, `after_<p>`, %: mean relative error of a trace from 10 s after its start to t_M, and over its last
+//!   10 s; the summary gives the spread over the replications. `covered_<p>`, `covered_through_<p>`, %: share of the
+//!   points of a trace at which the true value is within 1.96 standard errors of the estimate, after the start fit and
+//!   within 5 s after a change, respectively.
+//! - `false_alarms`: number of changes declared more than 5 s after a true change or before the first one; `hours`:
+//!   time in which false alarms could occur. `found`, %: share of the true changes after the start fit that were
+//!   declared within 5 s; `lag`, s: mean time from these changes to their declaration.
+//! - `diverged`: true if a coefficient is not finite or its magnitude exceeds 10.
+//! - `noise_level_obtained`: `(var u - var u0) / var u`, where u0 is the output of the run without remnant;
+//!   `noise_level_response`: `var(u - u0) / var u`, which excludes the chance correlation between u0 and u - u0;
+//!   `noise_level_remnant`: `var n / var u`.
 
 use hoid_ident::Fit;
 use hoid_model::{Complex64, Orders, PolynomialModel, Record, Structure, uncertainty::OperatorEstimate};
@@ -28,12 +28,12 @@ use hoid_track::{StartAt, Trace};
 
 use crate::{columns::TRACED, plan::Cell};
 
-/// Time from which the errors of a trace are evaluated, s.
+/// Time after which the errors of a trace are evaluated, s.
 const ERRORS_FROM_S: f64 = 10.0;
 /// Magnitude of a coefficient above which a recursion has diverged.
 const DIVERGED: f64 = 10.0;
 
-/// The true response at the lines of the forcing function.
+/// True response of the operator at the lines of the forcing function.
 pub(crate) struct TrueResponse {
     omega_rad_s: Vec<f64>,
     response: Vec<Complex64>,
@@ -70,7 +70,7 @@ impl TrueResponse {
 /// Errors of a trace relative to the true parameters of its record.
 pub(crate) struct TraceErrors {
     pub rms_percent: [f64; TRACED.len()],
-    /// 50 and 90 % of the step.
+    /// Times from the change until 50 and 90 % of the step are covered, s.
     pub settled_s: [[f64; TRACED.len()]; 2],
     pub diverged: bool,
     pub share_not_convertible: f64,
@@ -125,18 +125,18 @@ impl TraceErrors {
 }
 
 /// Time after a change within which a method should declare it, and during which bands are evaluated separately, s.
-const THROUGH_S: f64 = 5.0;
-/// Length of the end of a trace whose mean error is evaluated, s.
+const DECLARATION_TIME_S: f64 = 5.0;
+/// Length of the final part of a trace whose mean error is evaluated, s.
 const END_S: f64 = 10.0;
 /// Half width of a 95 % band, standard errors.
 const BAND: f64 = 1.96;
 
-/// Response of a trace to a change, its bands, and its declared changes.
+/// Measures of how a trace responds to a change: its bias, its bands and its declared changes.
 pub(crate) struct ChangeMeasures {
-    /// Mean relative error before the change and at the end, %.
+    /// Mean relative error before the change and, in `after_percent`, at the end, %.
     pub before_percent: [f64; TRACED.len()],
     pub after_percent: [f64; TRACED.len()],
-    /// Coverage after the start fit, and within 5 s after a change, %.
+    /// Coverage of the bands after the start fit and, in `covered_through_percent`, within 5 s after a change, %.
     pub covered_percent: [f64; TRACED.len()],
     pub covered_through_percent: [f64; TRACED.len()],
     pub false_alarms: f64,
@@ -145,7 +145,7 @@ pub(crate) struct ChangeMeasures {
     pub lag_s: f64,
 }
 
-/// Sum and count for a mean over points.
+/// Sum and number of values, from which the mean is computed.
 #[derive(Clone, Copy, Default)]
 struct Mean(f64, f64);
 
@@ -167,12 +167,12 @@ impl ChangeMeasures {
         let end_s = record.time_s(record.len());
         let changes_s = scenario.schedule.changes_s(end_s);
         let first_s = changes_s.first().copied().unwrap_or(f64::INFINITY);
-        // A two-sided estimate is valid from the start; its alarms are those of the causal estimate.
+        // A two-sided estimate is valid from the start; its declared changes are those of the causal estimate.
         let fitted_s = match trace.options().start {
             StartAt::Span(Some((_, to))) => to,
             _ => trace.updated_from_s(),
         };
-        let within = |t: f64| changes_s.iter().any(|c| (*c..*c + THROUGH_S).contains(&t));
+        let within = |t: f64| changes_s.iter().any(|c| (*c..*c + DECLARATION_TIME_S).contains(&t));
         let [mut before, mut after, mut covered, mut through] = [[Mean::default(); TRACED.len()]; 4];
         for (row, t) in trace.times_s().iter().enumerate() {
             let Ok(found) = trace.operator(row) else { continue };
@@ -199,7 +199,7 @@ impl ChangeMeasures {
         let declared: Vec<f64> = trace.changes().iter().map(|(t, _)| *t).collect();
         let to_be_found: Vec<f64> = changes_s.iter().copied().filter(|c| *c > fitted_s).collect();
         let lag = |change: &f64| {
-            let first = declared.iter().find(|t| (*change..change + THROUGH_S).contains(*t));
+            let first = declared.iter().find(|t| (*change..change + DECLARATION_TIME_S).contains(*t));
             first.map(|t| t - change)
         };
         let lags: Vec<f64> = to_be_found.iter().filter_map(lag).collect();
@@ -211,7 +211,7 @@ impl ChangeMeasures {
             covered_percent: covered.map(Mean::percent),
             covered_through_percent: through.map(Mean::percent),
             false_alarms: known(declared.iter().filter(|t| !within(**t)).count() as f64),
-            hours: known((end_s - fitted_s - THROUGH_S * to_be_found.len() as f64).max(0.0) / 3600.0),
+            hours: known((end_s - fitted_s - DECLARATION_TIME_S * to_be_found.len() as f64).max(0.0) / 3600.0),
             found_percent: known(100.0 * lags.len() as f64 / to_be_found.len() as f64),
             lag_s: known(mean(&lags)),
         }

@@ -1,4 +1,4 @@
-//! The estimates of a cell as rows of the tables of fits and traces.
+//! The estimates of a cell, written as rows of the tables of fits and traces.
 
 use hoid_analysis::Identified;
 use hoid_ident::{Fit, Series, SigmoidFit, Termination};
@@ -19,20 +19,20 @@ use crate::{
     plan::{Cell, EstimatorCell, Plan},
 };
 
-/// The rows of a block.
+/// The tables of one block.
 pub(crate) struct BlockTables {
     pub fits: OutputTable,
     pub traces: Option<OutputTable>,
 }
 
-/// The tables of a block in progress.
+/// Rows of the tables of a block, written estimate by estimate.
 pub(crate) struct EstimateRows<'a> {
     plan: &'a Plan,
     cell: &'a Cell,
-    /// Axes with a dedicated column.
+    /// Axes that have a column of their own name.
     extra: Vec<String>,
     true_response: Option<TrueResponse>,
-    /// VAF of the estimators in this replication, by name and nk.
+    /// VAF of the estimators applied so far to the current replication, by name and nk.
     vafs: Vec<(&'a str, usize, f64)>,
     fits: Rows,
     traces: Option<Rows>,
@@ -61,12 +61,12 @@ impl<'a> EstimateRows<'a> {
         }
     }
 
-    /// Starts a replication, within which estimators are compared.
+    /// Starts a replication; `delta_vaf` compares estimators within it.
     pub fn begin_replication(&mut self) {
         self.vafs.clear();
     }
 
-    /// The simulated and the estimated quantities.
+    /// Starts the row of an estimate with the settings of the scenario and the estimator.
     pub fn begin(&mut self, estimator: &EstimatorCell, replication: u64) {
         let (cell, rows) = (self.cell, &mut self.fits);
         let scenario = cell.resolved.scenario();
@@ -114,7 +114,7 @@ impl<'a> EstimateRows<'a> {
         self.fits.text("reason", reason);
     }
 
-    /// Noise levels and powers of a run; `u0` is the output of the same run without remnant.
+    /// Writes the noise levels and RMS values of a run; `u0` is the output of the same run without remnant.
     pub fn noise_row(&mut self, record: &Record, u0: &[f64]) {
         let u = record.output();
         let difference: Vec<f64> = u.iter().zip(u0).map(|(u, u0)| u - u0).collect();
@@ -130,7 +130,7 @@ impl<'a> EstimateRows<'a> {
         rows.text("status", "ok");
     }
 
-    /// Termination of a search.
+    /// Writes how a search ended.
     pub fn termination(&mut self, termination: Termination) {
         let rows = &mut self.fits;
         rows.text("termination", &termination.reason.to_string());
@@ -190,7 +190,7 @@ impl<'a> EstimateRows<'a> {
         Ok(())
     }
 
-    /// The operator of an analysis.
+    /// Writes the operator found by an analysis.
     pub fn operator_row(&mut self, found: &Identified) -> Result<(), String> {
         let (fit, record) = (&found.fit, &found.data.records[0]);
         let of = fit.operator(0);
@@ -206,7 +206,7 @@ impl<'a> EstimateRows<'a> {
         if let Some(true_response) = &self.true_response {
             rows.real("response_error", true_response.error_percent(&of.polynomial_fit));
         }
-        // T_I of a pure integration is not a number.
+        // For a pure integration, T_I is infinite.
         for p in of.parameters.iter().filter(|p| p.value.is_finite()) {
             let estimate = Estimate {
                 value: p.value,
@@ -218,7 +218,7 @@ impl<'a> EstimateRows<'a> {
         Ok(())
     }
 
-    /// An operator with changing gains: each before (1) and after (2) the change.
+    /// Writes an operator with changing gains; each gain is given before (1) and after (2) the change.
     pub fn change_row(&mut self, found: &Identified<SigmoidFit>) -> Result<(), String> {
         let (fit, record) = (&found.fit, &found.data.records[0]);
         let simulated = fit.simulate(record).map_err(|error| error.to_string())?;
@@ -242,7 +242,7 @@ impl<'a> EstimateRows<'a> {
         Ok(())
     }
 
-    /// Verdict on the estimate, and the kinds of its findings.
+    /// Writes the verdict on the estimate and the kinds of its findings.
     pub fn verdict(&mut self, verdict: &Verdict) {
         let against = verdict
             .findings()
@@ -342,7 +342,7 @@ impl<'a> EstimateRows<'a> {
     }
 }
 
-/// Share of the output that a model simulates, %.
+/// Returns the VAF, in %: the share of the output that the simulated model explains.
 fn vaf(record: &Record, simulated: &Series) -> f64 {
     hoid_ident::validation::vaf(&record.output()[simulated.first..], &simulated.values)
 }

@@ -1,4 +1,4 @@
-//! The tables of a study from its parts.
+//! Joins the parts of a study into its tables.
 
 use std::path::Path;
 

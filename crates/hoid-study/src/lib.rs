@@ -1,9 +1,9 @@
 //! Monte Carlo studies of estimators, and groups of recorded runs.
 //!
 //! The bias and spread of an estimate, and the coverage of its standard errors, cannot be determined from a single
-//! record. A study simulates many: a [`Plan`] contains scenarios (operator, task, remnant) and estimators, each list in
-//! it is an axis of a grid, and [`run`] estimates every cell of the grid in many replications, each with its own random
-//! stream. [`Results`] reads the tables, and a [`Query`] selects rows:
+//! record. A study therefore simulates many records. A [`Plan`] contains scenarios (operator, task, remnant) and
+//! estimators; each list in it is an axis of a grid. [`run`] applies the estimators to every cell of the grid in many
+//! replications, each with its own random stream. [`Results`] reads the tables, and a [`Query`] selects rows:
 //!
 //! ```
 //! use hoid_study::{Plan, Query, Results, RunOptions, run};
@@ -41,21 +41,21 @@
 //! # Ok::<(), hoid_study::StudyError>(())
 //! ```
 //!
-//! Replications are run and stored in blocks. A study that was stopped continues from there (`resume`), shards of a
-//! study can run on several machines and are joined by [`merge`], and the bytes of the tables depend on neither.
+//! Replications are run and stored in blocks. A stopped study can be continued (`resume`), and the shards of a study
+//! can run on several machines and are joined by [`merge`]. Neither affects the bytes of the tables.
 //!
 //! | module | contents |
 //! |---|---|
 //! | [`plan`] | [`Plan`]: scenarios and estimators as grids, read from TOML and checked |
-//! | [`plans`] | plans that come with the program |
-//! | `run`, `merge`, `join` | [`run`]: blocks over threads, parts on disk; [`merge`]: shards; the tables from the parts |
+//! | [`plans`] | plans included with the program |
+//! | `run`, `merge`, `join` | [`run`]: distribution of the blocks over threads, parts on disk; [`merge`]: merging of shards; `join`: joining of the parts into tables |
 //! | `directory`, `run_record`, `shard` | layout of the directory of a study, `study.json`, [`Shard`] |
-//! | `seal` | checksums of the blocks, and which are damaged |
-//! | `block`, `batch_fits`, `prepared` | the estimators of one cell on its replications |
-//! | `estimate_rows`, `error_measures` | the rows of an estimate, and its errors against the truth |
-//! | `columns`, `truth`, `true_value` | the tables of a study: fits, traces, cells; the true value of each column |
+//! | `seal` | checksums of the blocks, and detection of damaged blocks |
+//! | `block`, `batch_fits`, `prepared` | application of the estimators of a cell to its replications |
+//! | `estimate_rows`, `error_measures` | table rows of an estimate, and its errors relative to the true values |
+//! | `columns`, `truth`, `true_value` | columns of the tables fits, traces and cells; true value of each column |
 //! | `summary`, [`statistics`] | statistics over the replications of a cell, with Monte Carlo errors |
-//! | `results`, `query`, `tables` | [`Results`]: a finished study read back, [`Query`]: a selection of its rows |
+//! | `results`, `query`, `tables` | [`Results`]: reading of a finished study; [`Query`]: selection of its rows |
 //! | [`group`] | recorded runs by subject and condition |
 
 mod batch_fits;

@@ -21,9 +21,9 @@ use crate::{
 /// Merges the shards of a study.
 ///
 /// # Errors
-/// [`StudyError::OtherStudy`] for shards of different plans, seeds or versions, [`StudyError::Overlap`] and
-/// [`StudyError::Gap`] for duplicated and missing blocks, [`StudyError::NoStudy`] for a directory without a study,
-/// [`StudyError::Unsealed`] for one whose blocks have no checksums.
+/// [`StudyError::OtherStudy`] for shards of different plans, seeds or versions, [`StudyError::DuplicateBlock`] and
+/// [`StudyError::MissingBlocks`] for duplicated and missing blocks, [`StudyError::NoStudy`] for a directory without a
+/// study, [`StudyError::Unsealed`] for a directory whose blocks have no checksums.
 pub fn merge(shards: &[PathBuf], directory: &Path, csv: bool) -> Result<Outcome, StudyError> {
     let mut plan: Option<(Plan, RunRecord)> = None;
     let mut owners: BTreeMap<u64, &Path> = BTreeMap::new();
@@ -62,7 +62,7 @@ pub fn merge(shards: &[PathBuf], directory: &Path, csv: bool) -> Result<Outcome,
                 OnDisk::Damaged(why) => damaged.push((block, why)),
             }
             if let Some(other) = owners.insert(block, shard) {
-                return Err(StudyError::Overlap {
+                return Err(StudyError::DuplicateBlock {
                     block,
                     first: other.display().to_string(),
                     second: shard.display().to_string(),
@@ -93,7 +93,7 @@ pub fn merge(shards: &[PathBuf], directory: &Path, csv: bool) -> Result<Outcome,
         .filter(|block| !owners.contains_key(block))
         .collect();
     if let Some(first) = missing.first() {
-        return Err(StudyError::Gap {
+        return Err(StudyError::MissingBlocks {
             missing: missing.len() as u64,
             blocks: manifest.blocks,
             first: *first,

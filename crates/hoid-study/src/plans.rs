@@ -1,27 +1,27 @@
-//! Plans that come with the program.
+//! Plans included with the program.
 
 use crate::{Plan, StudyError};
 
-/// A plan that comes with the program.
+/// A plan included with the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NamedPlan {
-    /// Its name.
+    /// Name of the plan.
     pub name: &'static str,
-    /// Its text, to be read, copied and changed.
+    /// TOML text of the plan, which users may copy and change.
     pub text: &'static str,
 }
 
-/// The named plans of this crate.
+/// The plans included in this crate.
 pub const PLANS: &[NamedPlan] = &[NamedPlan {
     name: "adaptation",
     text: include_str!("../plans/adaptation.toml"),
 }];
 
 impl NamedPlan {
-    /// Replications of each named plan.
+    /// Number of replications of each of these plans.
     pub const REPLICATIONS: u64 = 100;
 
-    /// The plan, read.
+    /// Parses the plan.
     ///
     /// # Errors
     /// As [`Plan::parse`].

@@ -1,4 +1,4 @@
-//! The record as used by an estimator: a span, every n-th sample, without mean or linear trend.
+//! The record as an estimator uses it: a span of it, every n-th sample, with mean or linear trend removed.
 
 use std::borrow::Cow;
 
@@ -9,16 +9,16 @@ use crate::plan::EstimatorCell;
 /// Preparation of a record before an estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Preparation {
-    /// Span that is used, s; `None` for the whole record.
+    /// Span of the record that is used, s; `None` for the whole record.
     pub span_s: Option<(f64, f64)>,
-    /// Every `decimate`-th sample.
+    /// Number n if only every n-th sample is used.
     pub decimate: usize,
-    /// The trend removed.
+    /// Trend removed from e and u.
     pub detrend: Detrend,
 }
 
 impl Preparation {
-    /// The preparation of an estimator.
+    /// Returns the preparation that an estimator specifies.
     pub fn of(estimator: &EstimatorCell) -> Self {
         Self {
             span_s: estimator.span_s,
@@ -48,7 +48,7 @@ impl Preparation {
     }
 }
 
-/// Every `n`-th sample of all channels, without a filter.
+/// Returns every `n`-th sample of all channels, without a filter.
 fn decimated(record: &Record, n: usize) -> Result<Record, String> {
     let text = |error: hoid_model::ModelError| error.to_string();
     let thinned = |channel: &Channel| {

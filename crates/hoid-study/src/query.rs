@@ -1,8 +1,8 @@
-//! Queries, which select rows of a study.
+//! Queries that select rows of the results of a study.
 
 use std::collections::BTreeMap;
 
-/// A selection of rows; unspecified keys may have any value.
+/// A selection of rows. A property that is not specified may have any value.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Query {
     quantity: Option<String>,
@@ -51,7 +51,7 @@ impl std::fmt::Display for Query {
     }
 }
 
-/// Description of a cell and an estimator.
+/// Properties of a cell and an estimator by which rows are selected.
 #[derive(Debug, Clone)]
 pub(crate) struct RowKey {
     pub cell: u64,
@@ -71,12 +71,12 @@ pub(crate) struct RowKey {
 }
 
 impl Query {
-    /// All rows of a quantity.
+    /// Selects all rows of a quantity.
     pub fn of(quantity: &str) -> Self {
         Self::default().quantity_of(quantity)
     }
 
-    /// The same rows of another quantity.
+    /// Selects the same cells and estimators for another quantity.
     #[must_use]
     pub fn quantity_of(mut self, quantity: &str) -> Self {
         self.quantity = Some(quantity.to_owned());
@@ -102,35 +102,35 @@ impl Query {
         self
     }
 
-    /// Selects the cells based on this condition.
+    /// Selects the cells whose scenario is based on this condition.
     #[must_use]
     pub fn condition(mut self, condition: &str) -> Self {
         self.condition = Some(condition.to_owned());
         self
     }
 
-    /// Selects a simulated remnant of this order m0.
+    /// Selects cells with a simulated remnant of this order m0.
     #[must_use]
     pub fn remnant_order(mut self, order: usize) -> Self {
         self.remnant_order = Some(order);
         self
     }
 
-    /// Selects this specified noise level.
+    /// Selects cells with this specified noise level.
     #[must_use]
     pub fn noise_level(mut self, level: f64) -> Self {
         self.noise_level = Some(level);
         self
     }
 
-    /// Selects this time constant of the simulated remnant, s.
+    /// Selects cells with this time constant of the simulated remnant, s.
     #[must_use]
     pub fn t_n_s(mut self, t_n_s: f64) -> Self {
         self.t_n_s = Some(t_n_s);
         self
     }
 
-    /// Selects this entry of a list of the plan, such as ("memory", "1s").
+    /// Selects this entry of a list of the plan; for example, the key "memory" with the value "1s".
     #[must_use]
     pub fn axis(mut self, key: &str, value: &str) -> Self {
         self.axes.push((key.to_owned(), value.to_owned()));
@@ -151,28 +151,28 @@ impl Query {
         self
     }
 
-    /// Selects this method.
+    /// Selects the estimators with this method.
     #[must_use]
     pub fn method(mut self, method: &str) -> Self {
         self.method = Some(method.to_owned());
         self
     }
 
-    /// Selects noise models of this order m*.
+    /// Selects estimators with a noise model of this order m*.
     #[must_use]
     pub fn nd(mut self, nd: usize) -> Self {
         self.nd = Some(nd);
         self
     }
 
-    /// Selects models with this delay n_k*, samples.
+    /// Selects estimators with this delay n_k*, in samples.
     #[must_use]
     pub fn nk(mut self, nk: usize) -> Self {
         self.nk = Some(nk);
         self
     }
 
-    /// Selects the start with this label.
+    /// Selects the estimators whose start has this label.
     #[must_use]
     pub fn start(mut self, start: &str) -> Self {
         self.start = Some(start.to_owned());
@@ -190,7 +190,8 @@ impl Query {
         fn is<T: PartialEq>(asked: Option<&T>, found: &T) -> bool {
             asked.is_none_or(|asked| asked == found)
         }
-        // Levels and time constants have the same few digits in a plan and in a query.
+        // Noise levels and time constants have few decimal places in a plan and in a query, so they agree except for
+        // rounding.
         let near = |asked: Option<f64>, found: f64| asked.is_none_or(|asked| (asked - found).abs() <= 1e-9);
         is(self.cell.as_ref(), &s.cell)
             && is(self.remnant_order.as_ref(), &s.remnant_order)

@@ -1,9 +1,10 @@
-//! Execution of a study: blocks over threads, parts on disk, resume.
+//! Execution of a study: distribution of the blocks over threads, parts on disk, and continuation of a stopped study.
 //!
-//! A finished block is written as one file per table, traces first, each under a temporary name in the same directory
-//! and then renamed, and finally its seal (`seal`). A killed study therefore has complete blocks only, and continues
-//! with the blocks that have no seal or do not agree with it. When all blocks are complete, the parts are joined in the
-//! order of the plan; the result does not depend on the thread or machine that computed a part.
+//! A finished block is written as one file per table, traces first. Each file is written under a temporary name in the
+//! same directory and then renamed; the seal of the block follows last (`seal`). A killed study therefore has only
+//! complete blocks, and it continues with the blocks that have no seal or do not match their seal. When all blocks are
+//! complete, the parts are joined in the order of the plan. The result does not depend on the thread or machine that
+//! computed a part.
 
 use std::{
     path::{Path, PathBuf},
@@ -28,13 +29,13 @@ use crate::{
 /// Options of running a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RunOptions {
-    /// Shard of the study; `None` for all.
+    /// Shard to run; `None` for the whole study.
     pub shard: Option<Shard>,
     /// Number of threads; `None` for one per core.
     pub jobs: Option<usize>,
-    /// Continue a stopped study.
+    /// Whether a stopped study is continued.
     pub resume: bool,
-    /// Write the tables as CSV instead of Parquet.
+    /// Whether the tables are written as CSV instead of Parquet.
     pub csv: bool,
 }
 
@@ -49,32 +50,32 @@ pub struct Progress {
     pub known: u64,
 }
 
-/// Result of a run.
+/// Result of running a study.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outcome {
     /// True if all blocks of the study (or of its shard) are complete.
     pub finished: bool,
-    /// Estimates made by this run.
+    /// Number of estimates made by this run.
     pub estimates: u64,
-    /// The tables; empty for a shard, which must be merged first.
+    /// Paths of the tables; empty for a shard, which must first be merged.
     pub tables: Vec<PathBuf>,
-    /// Warnings about the directory: damaged blocks that were computed again.
+    /// Warnings about the directory: damaged blocks, which were computed again.
     pub notes: Vec<String>,
 }
 
-/// Runs a study in a directory. `progress` is called from any thread after each estimate; `go_on`
-/// is called before each estimate, and a study that it stops can be resumed.
+/// Runs a study in a directory. `progress` may be called from any thread, after each estimate. `should_continue` is
+/// called before each estimate; if it returns false, the study stops and can be continued later.
 ///
 /// # Errors
-/// [`StudyError::Occupied`] if the directory holds a study and `resume` is not set, [`StudyError::OtherStudy`] if it is
-/// a different one, [`StudyError::SourceThere`] if there is another plan, [`StudyError::Io`] if a file cannot be
-/// written or another process uses the directory.
+/// [`StudyError::Occupied`] if the directory holds a study and `resume` is not set, [`StudyError::OtherStudy`] if the
+/// directory holds a different study, [`StudyError::SourceExists`] if it contains another plan, [`StudyError::Io`] if a
+/// file cannot be written or another process uses the directory.
 pub fn run(
     plan: &Plan,
     directory: &Path,
     options: &RunOptions,
     progress: &(dyn Fn(Progress) + Sync),
-    go_on: &(dyn Fn() -> bool + Sync),
+    should_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Outcome, StudyError> {
     hoid_io::make_directory(directory)?;
     let _lock = DirectoryLock::take(directory)?;
@@ -102,17 +103,17 @@ pub fn run(
     let known: u64 = there.iter().map(estimates).sum();
     let total: u64 = mine.iter().map(estimates).sum();
     let done = AtomicU64::new(known);
-    let tell = |n: u64| {
+    let report_progress = |n: u64| {
         let done = done.fetch_add(n, Ordering::Relaxed) + n;
         progress(Progress { done, total, known });
     };
-    // After a block has been stopped, the next ones do not start to simulate their runs.
+    // Once a block has been stopped, no further block is started.
     let stopped = AtomicBool::new(false);
     let one = |block: &Block| -> Result<bool, StudyError> {
         if stopped.load(Ordering::Relaxed) {
             return Ok(false);
         }
-        let Some(tables) = run_block(plan, &schemas, block, &tell, go_on) else {
+        let Some(tables) = run_block(plan, &schemas, block, &report_progress, should_continue) else {
             stopped.store(true, Ordering::Relaxed);
             return Ok(false);
         };
@@ -157,7 +158,7 @@ pub(crate) fn write_tables(
     write_block(directory, plan_sha256, block.index, &all)
 }
 
-/// Complete blocks, those to be computed, and the reasons why some of these are damaged.
+/// Returns the complete blocks, the blocks to be computed, and the number of each damaged block with the reason.
 fn sorted(directory: &Path, plan_sha256: &str, mine: &[Block]) -> (Vec<Block>, Vec<Block>, Vec<(u64, String)>) {
     let (mut there, mut open, mut damaged) = (Vec::new(), Vec::new(), Vec::new());
     for block in mine {
@@ -173,7 +174,7 @@ fn sorted(directory: &Path, plan_sha256: &str, mine: &[Block]) -> (Vec<Block>, V
     (there, open, damaged)
 }
 
-/// Prepares the directory, or reads what it holds.
+/// Prepares an empty directory, or reads the record of the study that it holds.
 fn prepare(plan: &Plan, directory: &Path, manifest: &RunRecord, resume: bool) -> Result<RunRecord, StudyError> {
     let shown = || directory.display().to_string();
     if let Some(found) = RunRecord::read(directory)? {
@@ -199,8 +200,8 @@ fn prepare(plan: &Plan, directory: &Path, manifest: &RunRecord, resume: bool) ->
     Ok(manifest.clone())
 }
 
-/// Prepares a directory for continuation: partial output is removed, and one that an earlier
-/// version left without seals is marked as sealed, since it has no block yet.
+/// Prepares a directory for continuation. Partial output is removed. A directory of an earlier version, which wrote no
+/// seals, is marked as sealed, since all of its blocks are computed again.
 pub(crate) fn ready(directory: &Path, found: &RunRecord, record: &RunRecord) -> Result<(), StudyError> {
     if found.complete {
         return remove_parts(directory);
@@ -212,7 +213,7 @@ pub(crate) fn ready(directory: &Path, found: &RunRecord, record: &RunRecord) -> 
     Ok(())
 }
 
-/// Runs the open blocks on `jobs` threads, or one per core; true if all were finished.
+/// Runs the open blocks on `jobs` threads, by default one per core. Returns true if all blocks were finished.
 pub(crate) fn on_threads<T: Sync>(
     jobs: Option<usize>,
     open: &[T],

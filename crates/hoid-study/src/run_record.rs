@@ -1,8 +1,7 @@
-//! The file `study.json` of the directory of results.
+//! The file `study.json` in the directory of the results.
 //!
-//! It records which plan and which program produced the parts of a directory, and which shard of
-//! the study they are. Two directories belong together if plan, replications, seed and version are
-//! equal.
+//! It records which plan and which version of hoid produced the parts in a directory, and to which shard of the study
+//! they belong. Two directories belong together if plan, number of replications, seed and version are equal.
 
 use std::path::Path;
 
@@ -13,18 +12,18 @@ use crate::{Plan, Shard, StudyError};
 /// The content of `study.json`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct RunRecord {
-    /// Version of the program.
+    /// Version of hoid.
     pub hoid: String,
     pub study: String,
     pub plan_sha256: String,
     pub seed: u64,
     pub replications: u64,
-    /// Blocks of the whole study.
+    /// Number of blocks of the whole study.
     pub blocks: u64,
     pub shard: Option<Shard>,
-    /// True once the tables are written.
+    /// True once the tables have been written.
     pub complete: bool,
-    /// True if blocks have seals; earlier versions wrote none.
+    /// True if the blocks have seals; earlier versions of hoid wrote none.
     #[serde(default)]
     pub sealed: bool,
 }
@@ -46,7 +45,7 @@ impl RunRecord {
         }
     }
 
-    /// Note on a directory whose blocks have no seals.
+    /// Returns a note if the blocks in the directory have no seals.
     pub fn note_on_seals(&self) -> Option<String> {
         let unsealed = !self.sealed && !self.complete;
         unsealed.then(|| {
@@ -54,7 +53,7 @@ impl RunRecord {
         })
     }
 
-    /// The record of a directory; `None` if it holds no study.
+    /// Reads the record of a directory; `None` if the directory holds no study.
     pub fn read(directory: &Path) -> Result<Option<Self>, StudyError> {
         let path = directory.join(NAME);
         if !path.exists() {
@@ -75,10 +74,10 @@ impl RunRecord {
         Ok(hoid_io::write_atomically(&path, |file| writeln!(file, "{text}"))?)
     }
 
-    /// Difference that prevents merging two parts into one study; `None` if they match.
+    /// Returns the difference that prevents two parts from being merged into one study; `None` if they match.
     pub fn differs(&self, other: &Self) -> Option<String> {
-        // Settings that a user may have changed first: each of these also changes the hash of the
-        // plan, which is less informative.
+        // Settings that a user may have changed come first. Each of them also changes the hash of the plan, but a
+        // different hash is less informative.
         let pairs = [
             ("hoid version", self.hoid.clone(), other.hoid.clone()),
             ("study", self.study.clone(), other.study.clone()),

@@ -1,9 +1,8 @@
-//! Seal of a block on disk: its plan, its number, and the checksum of each of its tables.
+//! The seal of a block on disk: hash of the plan, number of the block, and checksum of each of its tables.
 //!
-//! The seal of a block is written after its tables. A block is complete if its seal names this plan
-//! and this block and each table has the checksum in the seal; this detects a damaged disk, a
-//! truncated file and a misplaced block, and the block is computed again. A block without a seal
-//! was in progress when its process was stopped.
+//! The seal of a block is written after its tables. A block is complete if its seal names this plan and this block and
+//! each table has the checksum in the seal. This detects damaged disks, truncated files and misplaced blocks; such a
+//! block is computed again. If a block has no seal, its process was stopped before the block was finished.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -21,7 +20,7 @@ use crate::{
 struct Seal {
     plan_sha256: String,
     block: u64,
-    /// SHA-256 of the file of each table, by its name.
+    /// SHA-256 of the file of each table, by name of the table.
     tables: BTreeMap<String, String>,
 }
 
@@ -30,11 +29,11 @@ struct Seal {
 pub(crate) enum OnDisk {
     Whole,
     Missing,
-    /// Reason why its content does not match its seal.
+    /// The content does not match the seal, for this reason.
     Damaged(String),
 }
 
-/// Writes the tables of a block, and its seal.
+/// Writes the tables of a block and then its seal.
 pub(crate) fn write_block(
     directory: &Path,
     plan_sha256: &str,
@@ -58,7 +57,7 @@ pub(crate) fn write_block(
     })?)
 }
 
-/// State of a block on disk.
+/// Returns the state of a block on disk.
 pub(crate) fn on_disk(directory: &Path, plan_sha256: &str, block: u64) -> OnDisk {
     let path = seal_path(directory, block);
     if !path.exists() {
@@ -84,15 +83,15 @@ pub(crate) fn on_disk(directory: &Path, plan_sha256: &str, block: u64) -> OnDisk
     OnDisk::Whole
 }
 
-/// SHA-256 in hexadecimal digits.
+/// Returns the SHA-256 of some bytes in hexadecimal digits.
 pub(crate) fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Maximum number of damaged blocks named individually.
+/// Maximum number of damaged blocks that are reported individually.
 const MOST_NAMED: usize = 5;
 
-/// Notes on blocks that are computed again.
+/// Returns notes on damaged blocks, which are computed again.
 pub(crate) fn notes_on(damaged: &[(u64, String)]) -> Vec<String> {
     let mut notes: Vec<String> = damaged
         .iter()

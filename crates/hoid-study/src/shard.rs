@@ -1,10 +1,10 @@
-//! Shards: parts of a study that are run separately.
+//! Shards: parts of a study that run separately.
 
 use serde::{Deserialize, Serialize};
 
 use crate::StudyError;
 
-/// A shard of a study: part `index` of `of`, from 1.
+/// A shard of a study: part `index` of `of`, counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
     /// Index of the shard.
@@ -16,7 +16,7 @@ pub struct Shard {
 impl std::str::FromStr for Shard {
     type Err = StudyError;
 
-    /// `I/N` with `1 <= I <= N`.
+    /// Parses `I/N` with `1 <= I <= N`.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let parts = text.split_once('/').map(|(i, n)| (i.trim().parse(), n.trim().parse()));
         match parts {
@@ -33,8 +33,8 @@ impl std::fmt::Display for Shard {
 }
 
 impl Shard {
-    /// True if a block belongs to the shard: blocks are distributed in turn, so that shards take
-    /// about the same time.
+    /// True if a block belongs to the shard. Blocks are assigned to the shards in turn, so that all shards take about
+    /// the same time.
     pub(crate) fn has(self, block: u64) -> bool {
         block % self.of == self.index - 1
     }

@@ -2,21 +2,21 @@
 //!
 //! - Quantiles interpolate linearly between order statistics (type 7 of Hyndman and Fan, *The
 //!   American Statistician* 50, 1996; the default of NumPy and R).
-//! - Whiskers reach to the last value within 1.5 interquartile ranges of the box; anything beyond
-//!   is an outlier (Tukey, 1977).
-//! - Monte Carlo errors: `s / sqrt(n)` of the mean; `sqrt((m4 - s^4 (n-3)/(n-1)) / n) / (2 s)` of the standard
-//!   deviation, with the fourth central moment m4 (Rao, *Linear Statistical Inference*, 1973); of the median half the
-//!   distance between the order statistics one binomial standard deviation to each side of the middle, for any
-//!   distribution; of a rate `sqrt(p (1 - p) / n)`.
+//! - Whiskers extend to the last value within 1.5 interquartile ranges of the box; any value beyond them is an outlier
+//!   (Tukey, 1977).
+//! - Monte Carlo errors: for the mean, `s / sqrt(n)`; for the standard deviation,
+//!   `sqrt((m4 - s^4 (n-3)/(n-1)) / n) / (2 s)` with the fourth central moment m4 (Rao, *Linear Statistical Inference*,
+//!   1973); for the median of any distribution, half the distance between the order statistics one binomial standard
+//!   deviation on either side of the middle; for a rate, `sqrt(p (1 - p) / n)`.
 
 use hoid_numerics::statistics::{self, finite_sorted, mean};
 
-/// Statistics of values for a box plot and a table.
+/// Statistics of a set of values, for box plots and tables.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Statistics {
-    /// Number of values, excluding those that are not numbers.
+    /// Number of values, without those that are not finite.
     pub count: usize,
-    /// Number of excluded values.
+    /// Number of values that are not finite.
     pub missing: usize,
     /// Mean.
     pub mean: f64,
@@ -27,31 +27,31 @@ pub struct Statistics {
     /// Monte Carlo error of the standard deviation.
     pub sd_se: f64,
     /// Smallest value.
-    pub least: f64,
+    pub min: f64,
     /// Lower end of the lower whisker.
     pub lower_whisker: f64,
-    /// Quantile of 25 %.
+    /// 25 % quantile.
     pub lower_quartile: f64,
     /// Median.
     pub median: f64,
     /// Monte Carlo error of the median.
     pub median_se: f64,
-    /// Quantile of 75 %.
+    /// 75 % quantile.
     pub upper_quartile: f64,
     /// Upper end of the upper whisker.
     pub upper_whisker: f64,
     /// Largest value.
-    pub most: f64,
-    /// Values beyond the whiskers, ascending.
+    pub max: f64,
+    /// Values beyond the whiskers, in ascending order.
     pub outliers: Vec<f64>,
 }
 
 impl Statistics {
-    /// Computes the statistics of values; without values, all but the counts are not numbers.
+    /// Computes the statistics of values. If there are no finite values, all statistics except the counts are NaN.
     pub fn of(values: &[f64]) -> Self {
         let sorted = finite_sorted(values.iter().copied());
         let (n, missing) = (sorted.len(), values.len() - sorted.len());
-        let (Some(&least), Some(&most)) = (sorted.first(), sorted.last()) else {
+        let (Some(&min), Some(&max)) = (sorted.first(), sorted.last()) else {
             return Self {
                 missing,
                 ..Self::nothing()
@@ -63,13 +63,13 @@ impl Statistics {
         let [lower_quartile, median, upper_quartile] = [0.25, 0.5, 0.75].map(|p| quantile(&sorted, p));
         let reach = 1.5 * (upper_quartile - lower_quartile);
         let within = |v: &&f64| (lower_quartile - reach..=upper_quartile + reach).contains(*v);
-        let lower_whisker = sorted.iter().find(within).copied().unwrap_or(least).min(lower_quartile);
+        let lower_whisker = sorted.iter().find(within).copied().unwrap_or(min).min(lower_quartile);
         let upper_whisker = sorted
             .iter()
             .rev()
             .find(within)
             .copied()
-            .unwrap_or(most)
+            .unwrap_or(max)
             .max(upper_quartile);
         Self {
             count: n,
@@ -78,14 +78,14 @@ impl Statistics {
             mean_se: sd / (n as f64).sqrt(),
             sd,
             sd_se,
-            least,
+            min,
             lower_whisker,
             lower_quartile,
             median,
             median_se: error_of_median(&sorted),
             upper_quartile,
             upper_whisker,
-            most,
+            max,
             outliers: sorted.iter().filter(|v| !within(v)).copied().collect(),
         }
     }
@@ -96,14 +96,14 @@ impl Statistics {
             mean_se: f64::NAN,
             sd: f64::NAN,
             sd_se: f64::NAN,
-            least: f64::NAN,
+            min: f64::NAN,
             lower_whisker: f64::NAN,
             lower_quartile: f64::NAN,
             median: f64::NAN,
             median_se: f64::NAN,
             upper_quartile: f64::NAN,
             upper_whisker: f64::NAN,
-            most: f64::NAN,
+            max: f64::NAN,
             ..Self::default()
         }
     }
@@ -125,17 +125,17 @@ fn deviation(second: f64, fourth: f64, n: usize) -> (f64, f64) {
     (sd, se)
 }
 
-/// Quantile of sorted values, interpolated; not a number if there are none.
+/// Returns a quantile of sorted values by linear interpolation; NaN if there are no values.
 pub fn quantile(sorted: &[f64], p: f64) -> f64 {
     statistics::quantile(sorted, p).unwrap_or(f64::NAN)
 }
 
-/// Median of values; those that are not numbers are excluded.
+/// Returns the median of the finite values; NaN if there are none.
 pub fn median(values: &[f64]) -> f64 {
     statistics::quantile_of(values, 0.5).unwrap_or(f64::NAN)
 }
 
-/// Standard error of the median of sorted values.
+/// Returns the standard error of the median of sorted values.
 fn error_of_median(sorted: &[f64]) -> f64 {
     let n = sorted.len();
     if n < 2 {
@@ -149,7 +149,7 @@ fn error_of_median(sorted: &[f64]) -> f64 {
     0.5 * (high - low)
 }
 
-/// A rate and its Monte Carlo error.
+/// Returns a rate and its Monte Carlo error.
 pub fn rate(hits: usize, of: usize) -> (f64, f64) {
     if of == 0 {
         return (f64::NAN, f64::NAN);

@@ -1,4 +1,4 @@
-//! Tables of a study by their columns, as Parquet or CSV.
+//! Access to the tables of a study by column, in Parquet or CSV format.
 
 use std::{
     collections::HashMap,
@@ -9,7 +9,7 @@ use hoid_io::{ColumnValues, OutputTable};
 
 use crate::StudyError;
 
-/// Path of a table: as Parquet if it exists, otherwise as CSV.
+/// Returns the path of a table: the Parquet file if it exists, otherwise the CSV file.
 pub(crate) fn table_path(directory: &Path, table: &str) -> PathBuf {
     let parquet = directory.join(format!("{table}.parquet"));
     if parquet.exists() {
@@ -19,7 +19,7 @@ pub(crate) fn table_path(directory: &Path, table: &str) -> PathBuf {
     }
 }
 
-/// A table by its columns. The kind of a CSV column of integers or without values is unknown.
+/// A table with access by column. In CSV the kind of a column is unknown if it has only whole numbers or no values.
 pub(crate) struct Columns {
     file: String,
     table: OutputTable,
@@ -47,7 +47,7 @@ impl Columns {
         }
     }
 
-    /// Names of the columns that are not texts.
+    /// Returns the names of the columns that contain no text.
     pub(crate) fn numbers(&self) -> impl Iterator<Item = &str> {
         let numbers = self.table.columns.iter().filter(|column| match &column.values {
             ColumnValues::Text(values) => values.iter().all(String::is_empty),

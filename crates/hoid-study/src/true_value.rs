@@ -11,11 +11,11 @@ use crate::{
     plan::{Cell, EstimatorCell, Task},
 };
 
-/// True value of a column of the table of fits, if it is known and constant within the span.
+/// Returns the true value of a column of the table of fits; NaN if it is unknown or changes within the span.
 pub fn true_value(cell: &Cell, estimator: &EstimatorCell, name: &str) -> f64 {
     let scenario = cell.resolved.scenario();
     let (from, to) = match estimator.task {
-        // A recursion ends in the last state.
+        // The final estimate of a recursion is compared with the last state.
         Task::Track(_) => (scenario.measurement_s, scenario.measurement_s),
         _ => estimator.span_s.unwrap_or((0.0, scenario.measurement_s)),
     };
@@ -32,7 +32,7 @@ pub fn true_value(cell: &Cell, estimator: &EstimatorCell, name: &str) -> f64 {
     } else {
         after
     };
-    // For a form other than the lead, K is the static gain too.
+    // The static gain K_e is also the true value of K, the name used by forms without a lead.
     let named = if name == "K" { "K_e" } else { name };
     if let Some(i) = OPERATOR.iter().position(|p| *p == named) {
         return state.operator[i];
@@ -58,7 +58,8 @@ fn close(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-2 * a.abs().max(b.abs())
 }
 
-/// For an operator with changing gains: before (1) and after (2) the change, its time and its rate.
+/// True values for an operator with changing gains: before (1) and after (2) the change, and the time and rate of the
+/// change.
 fn of_change(cell: &Cell, name: &str) -> f64 {
     let scenario = cell.resolved.scenario();
     let ends = cell.truth();
@@ -80,7 +81,7 @@ fn of_change(cell: &Cell, name: &str) -> f64 {
     }
 }
 
-/// Coefficients of D and the innovation variance of the remnant with a hold over each sample.
+/// Coefficients of D and innovation variance of the noise model of the remnant, held over each sample.
 fn of_noise_model(cell: &Cell, estimator: &EstimatorCell, k_n: f64, name: &str) -> f64 {
     let remnant = cell.resolved.scenario().remnant;
     let by_polynomials = matches!(estimator.task, Task::Fit(_))

@@ -1,4 +1,4 @@
-//! The simulated scenario: the settings and true parameters of each cell.
+//! The simulated scenarios: settings and true parameters of each cell.
 
 use hoid_io::{ColumnKind, ColumnSchema, OutputTable, TableSchema};
 use hoid_model::{
@@ -12,23 +12,23 @@ use crate::{
     plan::{Cell, Plan},
 };
 
-/// True parameters of one state of a cell.
+/// True parameters of a cell before or after the change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrueState {
     /// K_e, T_L, K_e_dot, omega_nm, zeta_nm.
     pub operator: [f64; 5],
-    /// f1, f2 (a1, a2 of an ARX model), b0, b1 at the sample time of the simulation.
+    /// f1, f2 (a1, a2 of an ARX model), b0, b1, at the sample time of the simulation.
     pub discrete: [f64; 4],
-    /// K_n, deg.
+    /// Remnant gain K_n, deg.
     pub k_n: f64,
 }
 
 impl Cell {
-    /// True parameters before and after the change; equal if nothing changes.
+    /// Returns the true parameters before and after the change; both are equal if nothing changes.
     pub fn truth(&self) -> [TrueState; 2] {
         let scenario = self.resolved.scenario();
-        // Long before the change, and long after it or in the middle of the interval until the
-        // operator changes back.
+        // Evaluated long before the change, and long after it or in the middle of the interval until the operator
+        // changes back.
         let ends = match scenario.schedule {
             Schedule::Constant => [0.0; 2],
             Schedule::Sigmoid { .. } => [-1e9, 1e9],
@@ -54,7 +54,7 @@ fn state(of: &OperatingState, k_n: f64, sample_time: hoid_model::SampleTime) -> 
     }
 }
 
-/// The table of cells.
+/// Returns the table of cells.
 pub(crate) fn cells_table(plan: &Plan) -> OutputTable {
     use ColumnKind::{Real, Text, Whole};
     let mut columns: Vec<(String, ColumnKind)> = vec![

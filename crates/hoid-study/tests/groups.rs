@@ -72,22 +72,22 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
     // Three runs at a time on one thread: the same bytes.
     for _ in 0..5 {
         let left = AtomicU64::new(3);
-        let go_on = || {
+        let should_continue = || {
             left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1))
                 .is_ok()
         };
-        run_group(&manifest, data.path(), &pieces, &options(1, true), &|_| (), &go_on).unwrap();
+        run_group(&manifest, data.path(), &pieces, &options(1, true), &|_| (), &should_continue).unwrap();
     }
     assert!(content(&whole) == content(&pieces));
 
     // A stopped group, with a damaged table of each kind of block.
     let damaged = out.path().join("damaged");
     let left = AtomicU64::new(6);
-    let go_on = || {
+    let should_continue = || {
         left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1))
             .is_ok()
     };
-    run_group(&manifest, data.path(), &damaged, &options(1, false), &|_| (), &go_on).unwrap();
+    run_group(&manifest, data.path(), &damaged, &options(1, false), &|_| (), &should_continue).unwrap();
     for name in ["000000-traces.parquet", "000008-estimates.parquet"] {
         let path = damaged.join("parts").join(name);
         let mut bytes = fs::read(&path).unwrap();

@@ -175,7 +175,7 @@ fn a_stopped_study_goes_on_and_repeats_nothing() {
         // Three replications at a time, each requested by every estimator: unfinished blocks are
         // lost.
         let left = AtomicU64::new(3 * plan.estimators.len() as u64);
-        let go_on = || {
+        let should_continue = || {
             left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1))
                 .is_ok()
         };
@@ -185,7 +185,7 @@ fn a_stopped_study_goes_on_and_repeats_nothing() {
             directory.path(),
             &options,
             &|p| known.store(p.known, Ordering::Relaxed),
-            &go_on,
+            &should_continue,
         )
         .unwrap();
         made += outcome.estimates;
@@ -224,7 +224,7 @@ fn parts_that_do_not_belong_together_are_refused() {
     assert!(
         matches!(
             of(&["1", "2"]),
-            StudyError::Gap {
+            StudyError::MissingBlocks {
                 missing: 2,
                 first: 2,
                 ..
@@ -233,7 +233,7 @@ fn parts_that_do_not_belong_together_are_refused() {
         "{}",
         of(&["1", "2"])
     );
-    assert!(matches!(of(&["1", "2", "half"]), StudyError::Overlap { block: 0, .. }));
+    assert!(matches!(of(&["1", "2", "half"]), StudyError::DuplicateBlock { block: 0, .. }));
     assert!(matches!(of(&["1", "2", "other"]), StudyError::OtherStudy { .. }));
     assert!(matches!(of(&["1", "2", "fewer"]), StudyError::OtherStudy { .. }));
     assert!(matches!(of(&["1", "nothing"]), StudyError::NoStudy { .. }));
@@ -362,7 +362,7 @@ fn failures_are_rows() {
 /// A study that was stopped after some of its blocks.
 fn stopped(directory: &Path) {
     let left = AtomicU64::new(40);
-    let go_on = || {
+    let should_continue = || {
         left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1))
             .is_ok()
     };
@@ -370,7 +370,7 @@ fn stopped(directory: &Path) {
         jobs: Some(1),
         ..RunOptions::default()
     };
-    assert!(!run(&plan(), directory, &options, &|_| (), &go_on).unwrap().finished);
+    assert!(!run(&plan(), directory, &options, &|_| (), &should_continue).unwrap().finished);
 }
 
 fn parts(directory: &Path) -> Vec<PathBuf> {
@@ -495,7 +495,7 @@ fn two_runs_do_not_share_a_directory_and_no_plan_is_written_over() {
     let out = tempfile::tempdir().unwrap();
     let directory = out.path().join("study");
     let second = std::sync::Mutex::new(None);
-    let go_on = || {
+    let should_continue = || {
         let mut second = second.lock().unwrap();
         if second.is_none() {
             *second = Some(quiet(
@@ -510,7 +510,7 @@ fn two_runs_do_not_share_a_directory_and_no_plan_is_written_over() {
         true
     };
     assert!(
-        run(&plan(), &directory, &RunOptions::default(), &|_| (), &go_on)
+        run(&plan(), &directory, &RunOptions::default(), &|_| (), &should_continue)
             .unwrap()
             .finished
     );
@@ -521,6 +521,6 @@ fn two_runs_do_not_share_a_directory_and_no_plan_is_written_over() {
     fs::create_dir(&own).unwrap();
     fs::write(own.join("plan.toml"), "# mine\n").unwrap();
     let error = quiet(&plan(), &own, RunOptions::default()).unwrap_err();
-    assert!(matches!(error, StudyError::SourceThere { .. }), "{error}");
+    assert!(matches!(error, StudyError::SourceExists { .. }), "{error}");
     assert_eq!(fs::read_to_string(own.join("plan.toml")).unwrap(), "# mine\n");
 }

@@ -1,14 +1,12 @@
-//! Two methods in one, as the thesis proposes it (section VII): recursive least squares for the
-//! gains, with the neuromuscular coefficients "adjusted based on recursive Box-Jenkins
-//! calculations".
+//! Combination of two methods, as the thesis proposes (section VII): recursive least squares for the gains, with the
+//! neuromuscular coefficients "adjusted based on recursive Box-Jenkins calculations".
 //!
-//! The prediction-error method with a forgetting matrix gives F and D; least squares has only B
-//! left to find,
+//! The prediction-error method with a forgetting matrix gives F and D. Least squares estimates only B in
 //!
 //! `F u = B q^-nk e + eps`,
 //!
-//! with the F of the sample, and forgets by the memory of b. The bias that coloured noise gives to
-//! the poles is gone, that of B is not: the equation error `F n` is as coloured as in an ARX model.
+//! with the current F, and forgets with the memory length of b. This removes the bias that coloured noise causes in the
+//! poles, but not the bias in B: the equation error `F n` is as coloured as in an ARX model.
 
 use hoid_core::{
     delay::DelayLine,
@@ -30,7 +28,7 @@ use hoid_track::{
     },
 };
 
-/// Coefficients of B.
+/// Number of coefficients of B.
 const B: usize = 2;
 
 settings! {
@@ -44,9 +42,9 @@ settings! {
         pub limit: Option<f64> = None,
     }
     groups {
-        /// Memories.
+        /// Memory lengths of the parameters.
         pub memories: MemoryOptions,
-        /// Stability.
+        /// Polynomials that are kept stable.
         pub stability: StabilityOptions,
     }
 }
@@ -109,12 +107,12 @@ impl RecursiveMethod for FusedOptions {
     }
 }
 
-/// RLS in parallel with RPEM.
+/// Recursive least squares in parallel with the recursive prediction-error method.
 pub(crate) struct FusedRecursion {
     rpem: Box<dyn Recursion>,
     rls: Rls<AnyShape, B, Gain<B>>,
     delay: DelayLine<Vec<f64>>,
-    /// The last two outputs, the newest first.
+    /// The last two outputs, with the newest first.
     past: [f64; 2],
     theta: Vec<f64>,
 }
@@ -133,10 +131,10 @@ impl State for FusedRecursion {
 }
 
 impl FusedRecursion {
-    /// From the same start as the prediction-error method; least squares has no limit of its own.
+    /// Starts both methods from the same estimate. `limit_of_b` limits the innovations of least squares.
     ///
     /// # Errors
-    /// As that.
+    /// [`IdentError`] if least squares or the prediction-error method cannot be built from this start.
     pub(crate) fn new(
         setup: &Setup,
         limit_of_b: f64,
@@ -185,7 +183,7 @@ impl FusedRecursion {
         })
     }
 
-    /// `F u` with the F of the prediction-error method.
+    /// Returns `F u` with the F of the prediction-error method.
     fn filtered(&self, u: f64) -> f64 {
         let theta = self.rpem.theta();
         let p = theta.len();
@@ -197,7 +195,7 @@ impl FusedRecursion {
         self.theta[..B].copy_from_slice(&self.rls.theta()[..B]);
     }
 
-    fn remember(&mut self, u: f64) {
+    fn store(&mut self, u: f64) {
         self.past = [u, self.past[0]];
     }
 }
@@ -208,7 +206,7 @@ impl Recursion for FusedRecursion {
         let of_rpem = self.rpem.step(sample);
         let y = self.filtered(sample.u);
         let of_rls: StepOutcome = self.rls.step(x, y).into();
-        self.remember(sample.u);
+        self.store(sample.u);
         self.join();
         StepOutcome {
             innovation: of_rls.innovation,
@@ -221,17 +219,17 @@ impl Recursion for FusedRecursion {
         self.rpem.follow(sample);
         let y = self.filtered(sample.u);
         let taken = self.rls.step_without_update(x, y).into();
-        self.remember(sample.u);
+        self.store(sample.u);
         taken
     }
 
     fn bridge(&mut self, sample: Sample) {
         let x = self.delay.step(sample.e);
         self.rpem.bridge(sample);
-        // eps of an output of zero is the prediction with its sign changed.
+        // For an output of zero, eps is the prediction with opposite sign.
         let y = self.filtered(0.0);
         let predicted = -self.rls.step_without_update(x, y).innovation;
-        self.remember(bounded(predicted));
+        self.store(bounded(predicted));
     }
 
     fn scale_covariance(&mut self, factor: f64) -> bool {
@@ -242,7 +240,7 @@ impl Recursion for FusedRecursion {
         &self.theta
     }
 
-    /// The value for each method; between them nothing is known, and zero is put.
+    /// Writes the covariance of each method; the covariances between the methods are unknown and set to zero.
     fn covariance(&self, into: &mut [f64]) -> bool {
         let known = self.rpem.covariance(into);
         let p = self.theta.len();

@@ -1,5 +1,5 @@
-//! Common parts of methods in physical parameters with the noise model of a batch fit: their checks, and T_L from the
-//! gains.
+//! Functions common to methods in physical parameters with the noise model of a batch fit: validation of the options,
+//! and T_L from the gains.
 
 use hoid_ident::IdentError;
 use hoid_track::{
@@ -10,10 +10,10 @@ use hoid_track::{
 /// Largest order of the noise model.
 pub(crate) const LARGEST_ND: usize = 8;
 
-/// Checks the requirements of a method with a model of how the person changes.
+/// Checks the requirements of a method that models how the person changes.
 ///
 /// # Errors
-/// [`IdentError::BadOption`].
+/// [`IdentError::BadOption`] if the orders, the delay or the start do not suit such a method.
 pub(crate) fn check_model_of_change(name: &str, setup: &Setup) -> Result<(), IdentError> {
     check_operator_orders(name, setup)?;
     check_delay(&setup.orders)?;
@@ -35,10 +35,10 @@ pub(crate) fn check_model_of_change(name: &str, setup: &Setup) -> Result<(), Ide
     Ok(())
 }
 
-/// As [`check_model_of_change`], for a method whose noise model is of order 1.
+/// As [`check_model_of_change`], for a method that requires a noise model of order 1.
 ///
 /// # Errors
-/// [`IdentError::BadOption`].
+/// [`IdentError::BadOption`] in addition if nd is not 1.
 pub(crate) fn check_first_order(name: &str, setup: &Setup) -> Result<(), IdentError> {
     check_model_of_change(name, setup)?;
     match setup.orders.nd {
@@ -47,7 +47,7 @@ pub(crate) fn check_first_order(name: &str, setup: &Setup) -> Result<(), IdentEr
     }
 }
 
-/// Returns T_L = K_e_dot/K_e, and its variance to first order, `d T_L = (d K_e_dot - T_L d K_e)/K_e`.
+/// Returns T_L = K_e_dot/K_e and its variance to first order, from `d T_L = (d K_e_dot - T_L d K_e)/K_e`.
 pub(crate) fn lead_of(eta: [f64; OPERATOR], c: &[[f64; OPERATOR]; OPERATOR]) -> [f64; 2] {
     let t_l = eta[1] / eta[0];
     let of_ratio = c[1][1] - 2.0 * t_l * c[0][1] + t_l * t_l * c[0][0];

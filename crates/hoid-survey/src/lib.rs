@@ -1,8 +1,8 @@
-//! Recursive methods of the literature, for comparison with those of hoid.
+//! Recursive methods from the literature, for comparison with those of hoid.
 //!
-//! Each follows the source named in its file, and is a [`Method`](hoid_track::Method) like the default: all share the
-//! tracker, the guard, saved states, traces and verdicts of [`hoid_track`]. This crate contains the list of all
-//! methods by name.
+//! Each method follows the source named in its file and is a [`Method`](hoid_track::Method), as the default method is.
+//! All methods share the tracker, the guard, saved states, traces and verdicts of [`hoid_track`]. This crate contains
+//! the list of all methods by name.
 //!
 //! ```
 //! use hoid_model::scenario::{Condition, Scenario};
@@ -23,16 +23,16 @@
 //!
 //! | module | method |
 //! |---|---|
-//! | `registry` | [`methods()`]: all methods, those of [`hoid_track`] too, by name |
+//! | `registry` | [`methods()`]: all methods by name, including those of [`hoid_track`] |
 //! | `physical` | `physical`: the prediction-error method in the operator's parameters |
-//! | `window` | `window`: a batch fit of the last few seconds, repeated |
+//! | `window` | `window`: a repeated batch fit of the last few seconds |
 //! | `rriv` | `rriv`: recursive refined instrumental variable |
-//! | `multiple_model` | `multiple-model`: a bank of hypotheses of when the person changed; its two-sided estimate |
+//! | `multiple_model` | `multiple-model`: a bank of hypotheses about when the person changed; its two-sided estimate |
 //! | `fused` | `fused`: least squares for B with the poles of the prediction-error method |
-//! | [`kernel`] | the arithmetic of a sample of `physical` and `multiple-model` |
-//! | `joint_filter` | `ekf`, `ukf`: Kalman filters of state and parameters |
-//! | `dual_ekf` | `dual-ekf`: two Kalman filters that take turns, of state and of parameters |
-//! | `linear_network` | `linear-network`: one linear layer that learns the gains |
+//! | [`kernel`] | the computations of `physical` and `multiple-model` for one sample |
+//! | `joint_filter` | `ekf`, `ukf`: Kalman filters for state and parameters jointly |
+//! | `dual_ekf` | `dual-ekf`: two alternating Kalman filters, for state and for parameters |
+//! | `linear_network` | `linear-network`: a single linear layer that learns the gains |
 //! | `known_noise` | code common to methods that take the noise model from a batch fit |
 
 mod dual_ekf;

@@ -1,16 +1,17 @@
-//! A network of a single linear layer that learns the equalization parameters, as section 2.4 of the thesis describes
-//! that of its reference [14]. The rule: B. Widrow and M. E. Hoff, *Adaptive switching circuits*, IRE WESCON 1960.
+//! A network with a single linear layer that learns the equalization parameters, as section 2.4 of the thesis describes
+//! for its reference [14]. The learning rule is that of B. Widrow and M. E. Hoff, *Adaptive switching circuits*, IRE
+//! WESCON 1960.
 //!
-//! The inputs are the discretised pilot model with unit equalization: y_0 and y_1, the responses of
-//! the neuromuscular part to the delayed error and to its rate, each over its size s_i, the root mean
-//! square so far. One neuron weighs them,
+//! The inputs are the outputs of the discretised pilot model with unit equalization: y_0 and y_1, the responses of the
+//! neuromuscular part to the delayed error and to its rate. Each is divided by its size s_i, the root mean square so
+//! far. One neuron weights them,
 //!
 //! `u^(k) = w_0 y_0(k)/s_0 + w_1 y_1(k)/s_1`, `w_i <- w_i + (Ts/T) (y_i/s_i) (u - u^)`,
 //!
-//! and `K_e = w_0/s_0`, `K_e_dot = w_1/s_1`. A signal and its rate are orthogonal over time and the
-//! inputs have unit power, so that each weight forgets with the time constant T. Neuromuscular part,
-//! delay and first weights are those of the Box-Jenkins fit of the start span, and parameters outside the equalization
-//! stay constant. The rule has no covariance.
+//! and `K_e = w_0/s_0`, `K_e_dot = w_1/s_1`. A signal and its rate are orthogonal over time and the inputs have unit
+//! power, so that each weight forgets with the time constant T. The neuromuscular part, the delay and the initial
+//! weights are taken from the Box-Jenkins fit of the start span; parameters outside the equalization stay constant. The
+//! rule gives no covariance.
 
 use hoid_core::{
     delay::DelayLine,
@@ -51,7 +52,7 @@ impl RecursiveMethod for LinearNetworkOptions {
         }
     }
 
-    /// It follows from the time constant of learning.
+    /// The memory length follows from the time constant of learning.
     fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Infinite
     }
@@ -112,22 +113,22 @@ impl RecursiveMethod for LinearNetworkOptions {
     }
 }
 
-/// The neuron.
+/// The linear neuron.
 #[derive(Debug, Clone)]
 struct Neuron {
-    /// K_e and K_e_dot: the weights over the sizes of the inputs.
+    /// K_e and K_e_dot: the weights divided by the sizes of the inputs.
     gains: [f64; 2],
-    /// Mean squares of the inputs so far, of how many samples.
+    /// Mean squares of the inputs over all samples so far; `samples` is the number of these samples.
     squares: [f64; 2],
     samples: f64,
-    /// Ts/T.
+    /// Learning rate per sample, Ts/T.
     rate: f64,
 }
 
 hoid_core::state!([] Neuron { gains, squares, samples });
 
 impl Neuron {
-    fn see(&mut self, y: [f64; 2]) {
+    fn update_squares(&mut self, y: [f64; 2]) {
         self.samples += 1.0;
         for (square, y) in self.squares.iter_mut().zip(y) {
             *square = bounded(*square + (y * y - *square) / self.samples.max(1.0));
@@ -147,13 +148,13 @@ impl Neuron {
     }
 }
 
-/// The recursion.
+/// The recursion of the linear network.
 struct LinearNetwork {
     neuron: Neuron,
     first: [f64; 2],
     nms: [f64; 2],
     held: HeldStates,
-    /// y_0 and y_1 over omega^2.
+    /// y_0 and y_1 divided by omega^2.
     state: [f64; 2],
     delay: DelayLine<Vec<f64>>,
     reported: Reported,
@@ -175,12 +176,12 @@ impl State for LinearNetwork {
 }
 
 impl LinearNetwork {
-    /// Takes an error; y_0 and y_1.
+    /// Processes a sample of the error. Returns y_0 and y_1.
     fn responses(&mut self, e: f64) -> [f64; 2] {
         let square = self.nms[0] * self.nms[0];
         self.state = self.held.step(self.state, self.delay.step(e));
         let y = self.state.map(|x| bounded(square * x));
-        self.neuron.see(y);
+        self.neuron.update_squares(y);
         y
     }
 

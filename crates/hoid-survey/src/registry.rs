@@ -1,4 +1,5 @@
-//! All recursive methods by name: those of [`hoid_track`] and those of this crate. A new one needs a line in the list.
+//! All recursive methods by name: those of [`hoid_track`] and those of this crate. A new method needs an entry in this
+//! list.
 
 use hoid_ident::{IdentError, settings::MethodSpec};
 use hoid_track::{AdaptiveOptions, Method, RlsOptions, RpemOptions, building::bad};
@@ -22,28 +23,27 @@ macro_rules! methods {
 methods! {
     /// Recursive prediction-error method in physical parameters.
     physical = PhysicalOptions,
-    /// Batch fit of the last few seconds, repeated.
+    /// Repeated batch fit of the last few seconds.
     window = WindowOptions,
     /// Recursive refined instrumental variable: Box-Jenkins with nc = 0.
     rriv = RrivOptions,
-    /// A bank of hypotheses of when the person changed, in physical parameters: Box-Jenkins with nc
-    /// = 0.
+    /// A bank of hypotheses about when the person changed, in physical parameters: Box-Jenkins with nc = 0.
     multiple_model = MultipleModelOptions,
     /// Recursive least squares for B with the poles of the recursive prediction-error method:
     /// Box-Jenkins.
     fused = FusedOptions,
-    /// Extended Kalman filter of state and physical parameters: Box-Jenkins with nc = 0.
+    /// Extended Kalman filter for state and physical parameters: Box-Jenkins with nc = 0.
     ekf = EkfOptions,
-    /// Unscented Kalman filter of state and physical parameters: Box-Jenkins with nc = 0.
+    /// Unscented Kalman filter for state and physical parameters: Box-Jenkins with nc = 0.
     ukf = UkfOptions,
-    /// Two extended Kalman filters that take turns, of state and of physical parameters: Box-Jenkins with
+    /// Two alternating extended Kalman filters, one for the state and one for the physical parameters: Box-Jenkins with
     /// nc = 0 and nd = 1.
     dual_ekf = DualEkfOptions,
-    /// A linear layer that learns K_e and K_e_dot: Box-Jenkins with nc = 0 and nd = 1.
+    /// A single linear layer that learns K_e and K_e_dot: Box-Jenkins with nc = 0 and nd = 1.
     linear_network = LinearNetworkOptions,
 }
 
-/// Returns all methods with their defaults, in the order of help.
+/// Returns all methods with their default options, in the order of the help text.
 pub fn methods() -> Vec<Method> {
     vec![
         RlsOptions::default().into(),
@@ -61,30 +61,30 @@ pub fn methods() -> Vec<Method> {
     ]
 }
 
-/// True for a method of this crate: the short help omits it.
+/// True for a method of this crate; the short help text omits such methods.
 pub fn is_for_comparison(method: &Method) -> bool {
     ![Method::rls(), Method::rpem(), Method::default()]
         .iter()
         .any(|own| own.name() == method.name())
 }
 
-/// Returns the known properties of each method, for command line, plans, Python and the book.
+/// Returns the properties of each method, for the command line, plans, Python and the book.
 pub fn registry() -> Vec<MethodSpec> {
     methods().iter().map(Method::spec).collect()
 }
 
-/// A recursive method as it is listed for users.
+/// Entry of a recursive method in the list for users.
 #[derive(Debug, Clone)]
 pub struct ListedMethod {
-    /// Its description.
+    /// Description of the method.
     pub spec: MethodSpec,
-    /// True for the method that is taken if none is named.
+    /// True for the method that is used if no method is named.
     pub is_default: bool,
-    /// True for a method of the survey.
+    /// True for a method of this crate, which is listed only for comparison.
     pub is_for_comparison: bool,
 }
 
-/// Returns all methods as a list for users: the default first, those of the survey last.
+/// Returns all methods as a list for users, with the default first and the methods of this crate last.
 pub fn listed() -> Vec<ListedMethod> {
     let default = Method::default();
     let of = |method: &Method| ListedMethod {
@@ -97,16 +97,16 @@ pub fn listed() -> Vec<ListedMethod> {
     all
 }
 
-/// Converts a typed name to the form of the list.
+/// Converts a name as typed by the user to the form used in the list.
 fn plain(text: &str) -> String {
     text.trim().to_ascii_lowercase()
 }
 
-/// Returns the method of a name, with its defaults. Earlier names, which plans and saved trackers contain, are
-/// accepted as well; a caller with a connection to the user reports them ([`renamed`]).
+/// Returns the method with this name and its default options. Earlier names, which occur in plans and saved trackers,
+/// are accepted as well; callers that can show messages to the user report them ([`renamed`]).
 ///
 /// # Errors
-/// [`IdentError::BadOption`] for a name that no method has.
+/// [`IdentError::BadOption`] if no method has this name.
 pub fn method(text: &str) -> Result<Method, IdentError> {
     let plain = plain(text);
     let name = renamed(&plain).map_or(plain.as_str(), |(now, _)| now);
@@ -116,7 +116,8 @@ pub fn method(text: &str) -> Result<Method, IdentError> {
     found.ok_or_else(|| bad("the method", text.to_owned(), &format!("one of {}", names.join(", "))))
 }
 
-/// Returns the current name for an earlier name of a method, and the sentence that reports it.
+/// Returns the current name for an earlier name of a method, and the message that reports it; `None` if it is not an
+/// earlier name.
 pub fn renamed(text: &str) -> Option<(&'static str, String)> {
     let earlier = plain(text);
     let found = methods()
@@ -126,10 +127,10 @@ pub fn renamed(text: &str) -> Option<(&'static str, String)> {
     Some((name, format!("the method `{earlier}` is now called `{name}`")))
 }
 
-/// Sets an option from its text.
+/// Sets an option of a method from its text.
 ///
 /// # Errors
-/// As [`Method::set`]; for an option of other methods with their names.
+/// The errors of [`Method::set`]; if only other methods have the option, the error lists these methods.
 pub fn set(method: &mut Method, name: &str, text: &str) -> Result<(), IdentError> {
     let has = |spec: &MethodSpec| spec.settings.iter().any(|setting| setting.name == name);
     if has(&method.spec()) {

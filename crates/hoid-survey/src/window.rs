@@ -1,16 +1,15 @@
-//! The batch fit over a sliding window.
+//! A batch fit over a sliding window.
 //!
-//! The last W samples are kept, and every k samples they are fitted by the batch estimator, from
-//! the last theta; between the fits theta stays. The estimate therefore has a rectangular memory of W samples, the
-//! initial states, bounds and other properties of the estimator, and the covariance of the fit.
+//! The last W samples are kept. Every k samples the batch estimator fits them, starting from the last theta; between
+//! the fits theta stays constant. The estimate therefore has a rectangular memory of W samples, the initial states,
+//! bounds and other properties of the estimator, and the covariance of the fit.
 //!
-//! **Wrong minima.** A search from the last theta stays in the valley it is in. The estimator's own
-//! starts are searched as well where there is no last theta or that search does not converge, where
-//! the loss has risen by [`SUSPICIOUS`] since the last comparison, and at every [`COMPARE`]-th fit
-//! at the latest; the lower of the two minima is taken.
+//! **Wrong minima.** A search from the last theta may stay in a local minimum. The estimator therefore also searches
+//! from its own starts if there is no last theta, if the search from it does not converge, if the loss has risen by a
+//! fraction [`LOSS_RISE`] since the last comparison, and otherwise at every [`COMPARISON_INTERVAL`]-th fit. The lower
+//! of the two minima is used.
 //!
-//! **Failures.** Where a fit fails, as for a window without excitation, theta and covariance stay
-//! as they were.
+//! **Failures.** If a fit fails, for example for a window without excitation, theta and its covariance are unchanged.
 
 use hoid_core::state::{State, visit_all};
 use std::collections::VecDeque;
@@ -29,14 +28,14 @@ use hoid_track::{
     },
 };
 
-/// Fits from the last theta between two comparisons with the estimator's own starts.
-const COMPARE: usize = 8;
-/// Relative rise of the loss over that of the last comparison that calls for the next one.
-const SUSPICIOUS: f64 = 0.25;
-/// Share of the window that is enough for a first fit.
+/// Number of fits after which the search from the last theta is compared with searches from the estimator's own starts.
+const COMPARISON_INTERVAL: usize = 8;
+/// Relative rise of the loss since the last comparison that triggers another comparison.
+const LOSS_RISE: f64 = 0.25;
+/// Window length divided by the smallest number of samples for a first fit.
 const FIRST_SHARE: usize = 4;
-/// Residuals for each unknown that are enough for a first fit.
-const RESIDUALS_EACH: usize = 5;
+/// Number of residuals per unknown that the first fit needs.
+const RESIDUALS_PER_UNKNOWN: usize = 5;
 
 settings! {
     /// Options of the sliding window.
@@ -53,14 +52,14 @@ impl RecursiveMethod for WindowOptions {
     fn about(&self) -> About {
         About {
             name: "window",
-            help: "a batch fit of the last seconds, repeated",
+            help: "repeated batch fit of a moving window",
             source: "the thesis, section VII",
             structures: &Structure::ALL,
             defaults: &[],
         }
     }
 
-    /// Not used: the window is its memory.
+    /// The method does not use these memory lengths: its memory is the window.
     fn default_memory(&self, parameter: &str) -> Memory {
         short_for_b(parameter)
     }
@@ -103,24 +102,24 @@ impl RecursiveMethod for WindowOptions {
     }
 }
 
-/// The recursion.
+/// The recursion of the sliding window.
 #[derive(Debug, Clone)]
 pub(crate) struct WindowRecursion {
     estimator: Estimator,
     sample_time: SampleTime,
     window: usize,
     every: usize,
-    /// Samples for the first fit.
+    /// Number of samples needed for the first fit.
     enough: usize,
     e: VecDeque<f64>,
     u: VecDeque<f64>,
     predictor: Predictor,
     theta: Vec<f64>,
-    /// True when theta is an estimate, or was given.
+    /// True if theta was estimated or given.
     known: bool,
     covariance: Option<Vec<f64>>,
     variance: f64,
-    /// Innovations before the first fit.
+    /// Number of innovations before the first fit.
     innovations: f64,
     since_fit: usize,
     since_comparison: usize,
@@ -132,7 +131,7 @@ pub(crate) struct WindowRecursion {
 
 impl State for WindowRecursion {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
-        // The samples that are kept, and the covariance that may be there: first how many.
+        // The lengths are visited first: the number of samples kept, and whether there is a covariance.
         for kept in [&mut self.e, &mut self.u] {
             let mut length = kept.len();
             length.visit(each);
@@ -165,11 +164,11 @@ impl State for WindowRecursion {
 }
 
 impl WindowRecursion {
-    /// Windows of `window` samples, fitted every `every` samples, from theta and its covariance
-    /// where they are known.
+    /// Creates the recursion with a window of `window` samples, which is fitted every `every` samples. It starts from
+    /// theta and its covariance if these are known.
     ///
     /// # Errors
-    /// [`IdentError`] for options, orders, a start or a window that cannot be used.
+    /// [`IdentError`] if the options, the orders, the start or the window cannot be used.
     pub fn new(
         estimator: Estimator,
         sample_time: SampleTime,
@@ -182,7 +181,7 @@ impl WindowRecursion {
         estimator.check()?;
         let p = orders.parameters();
         let unknowns = p + orders.nf + orders.nc;
-        let least = first_residual(&orders, estimator.initial_state_in_use()) + RESIDUALS_EACH * unknowns;
+        let least = first_residual(&orders, estimator.initial_state_in_use()) + RESIDUALS_PER_UNKNOWN * unknowns;
         let refuse = |option: &str, found: String, expected: String| {
             Err(IdentError::BadOption {
                 option: option.to_owned(),
@@ -237,7 +236,7 @@ impl WindowRecursion {
             variance: 0.0,
             innovations: 0.0,
             since_fit: if given.is_some() { 0 } else { every },
-            since_comparison: COMPARE,
+            since_comparison: COMPARISON_INTERVAL,
             compared_loss: f64::INFINITY,
             fits: 0,
             failures: 0,
@@ -249,13 +248,13 @@ impl WindowRecursion {
         })
     }
 
-    /// Fits that gave theta.
+    /// Number of successful fits.
     #[cfg(test)]
     pub fn fits(&self) -> usize {
         self.fits
     }
 
-    /// Takes a sample into window and predictor; returns the innovation.
+    /// Adds a sample to the window and updates the predictor. Returns the innovation.
     fn take(&mut self, sample: Sample) -> f64 {
         self.keep(sample.e, sample.u);
         self.predictor.step(&self.theta, sample.e, sample.u)
@@ -280,8 +279,8 @@ impl WindowRecursion {
                 self.theta.copy_from_slice(fit.model().theta());
                 self.covariance = fit.covariance().map(<[f64]>::to_vec);
                 self.variance = fit.innovation_variance();
-                // Innovations of later samples must not contain the effect of the previous theta that remains in the
-                // filters.
+                // The filters still contain the effect of the previous theta, which must not enter the innovations of
+                // later samples.
                 self.predictor.reset();
                 for (e, u) in self.e.iter().zip(&self.u) {
                     self.predictor.step(&self.theta, *e, *u);
@@ -289,8 +288,8 @@ impl WindowRecursion {
             }
             Err(failure) => {
                 self.failures += 1;
-                // The loss to be compared is that of an earlier time.
-                self.since_comparison = COMPARE;
+                // The loss of the last comparison is no longer comparable.
+                self.since_comparison = COMPARISON_INTERVAL;
                 self.last_failure = Some(failure);
             }
         }
@@ -307,7 +306,8 @@ impl WindowRecursion {
         Ok(record.labelled("of the window"))
     }
 
-    /// The best minimum that the last theta and, where called for, the own starts lead to.
+    /// Returns the fit with the lowest loss found from the last theta and, if a comparison is due, from the estimator's
+    /// own starts.
     fn fit(&mut self, record: &Record) -> Result<Fit, IdentError> {
         let records = std::slice::from_ref(record);
         let own = |estimator: &Estimator| estimator.fit(records).and_then(settled);
@@ -321,8 +321,8 @@ impl WindowRecursion {
         self.estimator.start = None;
         self.since_comparison += 1;
         if let Ok(fit) = &warm
-            && self.since_comparison < COMPARE
-            && fit.loss() <= (1.0 + SUSPICIOUS) * self.compared_loss
+            && self.since_comparison < COMPARISON_INTERVAL
+            && fit.loss() <= (1.0 + LOSS_RISE) * self.compared_loss
         {
             return warm;
         }
@@ -348,8 +348,8 @@ impl WindowRecursion {
     }
 }
 
-/// A fit whose search came to rest; one that did not carries more information about the limit of
-/// iterations than about the window.
+/// Returns the fit if its search converged. A fit that did not converge reflects the limit of iterations rather than
+/// the data of the window.
 fn settled(fit: Fit) -> Result<Fit, IdentError> {
     if fit.termination().converged() {
         Ok(fit)

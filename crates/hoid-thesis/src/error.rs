@@ -12,23 +12,23 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ThesisError {
-    /// A name that is neither a table nor a figure of the reproduction.
+    /// A name that belongs to no table, figure, appendix or study of the reproduction.
     #[error("{name}: there is no table, figure or study of this name; expected {CLAIMS}, or a name, study or appendix of: {known}", CLAIMS = crate::CLAIMS)]
     UnknownItem {
-        /// The name.
+        /// The unknown name.
         name: String,
-        /// All names, separated by commas.
+        /// All known names, separated by commas.
         known: String,
     },
-    /// Recordings for something that is made without them.
+    /// Recordings were given, but something other than the experiment was requested.
     #[error("recordings apply to the experiment only: make only \"experiment\" with them")]
     NotTheExperiment,
     /// Recordings to which the procedure of the text cannot be applied.
     #[error("{place}: {reason}")]
     Recordings {
-        /// The manifest.
+        /// Manifest, group or experiment concerned.
         place: String,
-        /// The fault, and the remedy.
+        /// The problem and its remedy.
         reason: String,
     },
     /// Tables that cannot be read, or a page that cannot be written.
@@ -40,12 +40,12 @@ pub enum ThesisError {
     /// A study that failed.
     #[error(transparent)]
     Study(Box<StudyError>),
-    /// A comparator for which a record is unsuitable.
+    /// A record that is unsuitable for a comparator, or an invalid plan.
     #[error("{method}: {quantity} is {found}, expected {expected}")]
     Unsuited {
-        /// The comparator.
+        /// Comparator, plan or procedure concerned.
         method: &'static str,
-        /// The problem.
+        /// The quantity or key that is wrong.
         quantity: String,
         /// The value found.
         found: String,
@@ -58,7 +58,7 @@ pub enum ThesisError {
     /// An invalid model.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// A model that is not an operator.
+    /// A model that cannot be converted to an operator.
     #[error(transparent)]
     NotConvertible(#[from] NotConvertible),
     /// A scenario that cannot be simulated.

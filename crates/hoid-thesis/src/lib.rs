@@ -2,9 +2,9 @@
 //! *Time-Varying Human-Operator Identification with Box-Jenkins Models*, MSc thesis, Delft
 //! University of Technology, 2023).
 //!
-//! The text compares ARX and Box-Jenkins models of the human operator, in batches and recursively,
-//! by simulation. [`reproduce`] runs its studies, draws its tables and figures, tests its claims,
-//! and writes a page with the results:
+//! The text compares ARX and Box-Jenkins models of the human operator by simulation, in batch fits and recursive
+//! estimates. [`reproduce`] runs its studies, draws its tables and figures, tests its claims, and writes a page with
+//! the results:
 //!
 //! ```no_run
 //! use hoid_thesis::{Reproduction, ReproductionEvent, reproduce};
@@ -29,12 +29,12 @@
 //! |---|---|
 //! | [`plans`] | the studies of the text as named plans |
 //! | [`reproduction`] | tables, figures and claims in a directory, from the results of the studies |
-//! | [`comparators`] | the survey's other methods, to be compared with |
+//! | [`comparators`] | the other methods of the survey, for comparison |
 //! | [`survey`] | all methods of the survey on the same runs |
 //! | [`experiment`] | the experiment of the text with virtual or recorded people |
-//! | [`claims`] | statements of the text, tested by the results of the named plans |
+//! | [`claims`] | statements of the text, tested with the results of the named plans |
 //!
-//! Studies and reports do not depend on this crate.
+//! The crates for studies and reports do not depend on this crate.
 
 pub mod claims;
 pub mod comparators;

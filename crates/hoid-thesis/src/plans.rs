@@ -1,4 +1,4 @@
-//! The studies of the thesis, as named plans, in addition to the built-in ones.
+//! The studies of the thesis as named plans, in addition to the built-in plans.
 
 use hoid_study::{NamedPlan, PLANS};
 
@@ -27,18 +27,18 @@ pub const TEXT_PLANS: &[NamedPlan] = named![
     "lead-change",
 ];
 
-/// The recursive methods of the survey on the same runs.
+/// Plan that applies the recursive methods of the survey to the same runs.
 pub const SURVEY: &NamedPlan = &NamedPlan {
     name: "survey",
     text: include_str!("../plans/survey.toml"),
 };
 
-/// The listed named plans: those of the thesis, and additional ones.
+/// All listed plans: those of the thesis and the built-in ones.
 pub fn named_plans() -> impl Iterator<Item = &'static NamedPlan> {
     TEXT_PLANS.iter().chain(PLANS)
 }
 
-/// The plan with a given name: a listed one, or [`SURVEY`], which is for comparison.
+/// Finds the plan with this name: a listed plan, or [`SURVEY`], which is not listed.
 pub fn find(name: &str) -> Option<&'static NamedPlan> {
     named_plans().chain([SURVEY]).find(|plan| plan.name == name)
 }

@@ -1,6 +1,6 @@
-//! Building blocks of a method, for methods of other crates: `hoid-survey` holds the methods with which the default is
+//! Building blocks for methods in other crates: `hoid-survey` contains the methods with which the default method is
 //! compared. A method is a struct of options (`hoid_ident::settings!`) with [`RecursiveMethod`], which builds a
-//! [`Recursion`]; `Method::from(options)` is then used like any other.
+//! [`Recursion`]; `Method::from(options)` is then used like any other method.
 
 pub use crate::{
     gain::{Gain, ROOM_WITHOUT_FIT, Scaled, error_bars},

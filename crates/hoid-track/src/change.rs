@@ -1,9 +1,9 @@
-//! Change of a person as a method reports it, and the published baseline.
+//! Change of a person as reported by a method, and the published baseline for the detection of changes.
 //!
 //! The baseline uses only the signals of the loop: an adaptation is assumed to be needed while the tracking error or
-//! its rate is larger than k of its standard deviations before the change (R. A. Hess, *Journal of Guidance, Control,
-//! and Dynamics* 32 (2009): three; here either signal raises the alarm, and the rate is the difference of neighbouring
-//! samples).
+//! its rate exceeds k of its standard deviations before the change (R. A. Hess, *Journal of Guidance, Control, and
+//! Dynamics* 32 (2009), with k = 3). Here either signal raises the alarm, and the rate is the difference of
+//! neighbouring samples.
 
 use hoid_model::{SampleTime, uncertainty::Estimate};
 use hoid_numerics::statistics::{mean, sample_variance};
@@ -11,46 +11,49 @@ use hoid_numerics::statistics::{mean, sample_variance};
 /// A change of the person that was declared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Change {
-    /// Time since the change of the person at its declaration, s; accurate to a third of a second.
+    /// Time from the change of the person to its declaration, s; for `adaptive` with a resolution of half a second.
     pub seconds_ago: f64,
-    /// Logarithm of the odds of a change within the last few seconds.
+    /// For `adaptive`, -ln p of the change test; for `multiple-model`, the logarithm of the odds of a change within the
+    /// last four seconds.
     pub odds: f64,
-    /// K_e before and after.
+    /// K_e before and after the change.
     pub k_e: [Estimate; 2],
-    /// K_e_dot before and after, s.
+    /// K_e_dot before and after the change, s.
     pub k_e_dot: [Estimate; 2],
-    /// omega_nm before and after, rad/s.
+    /// omega_nm before and after the change, rad/s.
     pub omega_nm_rad_s: [Estimate; 2],
-    /// zeta_nm before and after.
+    /// zeta_nm before and after the change.
     pub zeta_nm: [Estimate; 2],
-    /// Delay tau_e before and after, s; both equal if it is known.
+    /// Delay tau_e before and after the change, s; both values are equal if the delay is known.
     pub tau_e_s: [Estimate; 2],
-    /// T_L before and after, s.
+    /// T_L before and after the change, s.
     pub t_l_s: [f64; 2],
-    /// Innovation variance before and after.
+    /// Innovation variance before and after the change.
     pub innovation_variance: [f64; 2],
-    /// Changes of K_e, K_e_dot, omega_nm, zeta_nm, the logarithm of the innovation variance and tau_e, each over its
-    /// standard error.
+    /// Changes of K_e, K_e_dot, omega_nm, zeta_nm, the logarithm of the innovation variance and tau_e, each divided by
+    /// its standard error.
     pub z: [f64; 6],
-    /// True if the operator was tested as a whole: the response has then changed, even if no single quantity changed
-    /// by two standard errors.
+    /// True if the operator was tested as a whole: its response has then changed, even if no single quantity changed by
+    /// two standard errors.
     pub of_operator: bool,
 }
 
-/// Change over its standard error from which a quantity counts as changed.
+/// Number of standard errors beyond which a quantity counts as changed.
 const CHANGED: f64 = 2.0;
 /// Names of the quantities of [`Change::z`].
 const QUANTITIES: [&str; 6] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", REMNANT, "tau_e"];
 const REMNANT: &str = "remnant";
 
 impl Change {
-    /// Posterior probability of a change.
+    /// Returns `1/(1 + exp(-odds))`: the posterior probability of a change for `multiple-model`, but only `1/(1 + p)`
+    /// for `adaptive`.
     pub fn probability(&self) -> f64 {
         1.0 / (1.0 + (-self.odds).exp())
     }
 
-    /// Names of the quantities that changed by more than two standard errors: `K_e`, `K_e_dot`, `omega_nm`, `zeta_nm`,
-    /// `remnant`, `tau_e`. If the operator as a whole changed, but no single quantity of it by so much, `response`.
+    /// Returns the names of the quantities that changed by more than two standard errors: `K_e`, `K_e_dot`, `omega_nm`,
+    /// `zeta_nm`, `remnant`, `tau_e`. If the operator was tested as a whole and none of its quantities changed by so
+    /// much, its response is named: `response`.
     pub fn changed(&self) -> Vec<&'static str> {
         let each = || QUANTITIES.into_iter().zip(self.z).filter(|(_, z)| z.abs() > CHANGED);
         let is_named = each().any(|(name, _)| name != REMNANT);
@@ -59,11 +62,10 @@ impl Change {
     }
 }
 
-/// The published baseline: k standard deviations of the tracking error and of its rate before the
-/// change.
+/// The published baseline: thresholds of k standard deviations of the tracking error and of its rate before the change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorThreshold {
-    /// Mean and standard deviation of the error, and of its rate in 1/s.
+    /// Mean and standard deviation of the error and of its rate, the latter per second.
     levels: [[f64; 2]; 2],
     sample_time_s: f64,
     last: Option<f64>,
@@ -86,8 +88,8 @@ impl ErrorThreshold {
         })
     }
 
-    /// Returns the larger distance of error and error rate from their means, in standard deviations: an alarm if it is
-    /// above k. The rate counts from the second sample on.
+    /// Returns the larger of the distances of the error and of its rate from their means, in standard deviations; a
+    /// distance above k is an alarm. The rate is used from the second sample on.
     pub fn step(&mut self, error: f64) -> f64 {
         let distance = |[mean, deviation]: [f64; 2], v: f64| ((v - mean) / deviation).abs();
         let by_error = distance(self.levels[0], error);

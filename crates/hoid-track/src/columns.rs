@@ -1,4 +1,4 @@
-//! A trace as named columns: the form in which it is written and handed to other programs.
+//! A trace as named columns, for files and other programs.
 
 use hoid_model::{
     NotConvertible,
@@ -7,7 +7,7 @@ use hoid_model::{
 
 use crate::{OPERATOR_COLUMNS, OpenLoop, Response, Trace};
 
-/// Named columns of one length.
+/// Named columns of equal length.
 pub type Columns = Vec<(String, Vec<f64>)>;
 
 impl Trace {
@@ -27,9 +27,9 @@ impl Trace {
     }
 
     /// Returns `t`, each coefficient, each parameter of the operator, gain in dB and phase in degrees at the
-    /// frequencies of the options (`gain_db@2.5`, `phase_deg@2.5`), and with a controlled element `crossover_rad_s`
-    /// and `phase_margin_deg`, each followed by its standard error (`_se`). NaN marks a row without an operator or a
-    /// crossover, and a value without a standard error. `operators` are those of [`Trace::operators`].
+    /// frequencies of the options (`gain_db@2.5`, `phase_deg@2.5`), and with a controlled element `crossover_rad_s` and
+    /// `phase_margin_deg`. Each of these columns except `t` is followed by its standard error (`_se`). NaN marks a
+    /// missing operator, crossover or standard error. `operators` is the result of [`Trace::operators`].
     pub fn estimate_columns(&self, operators: &[Result<OperatorEstimate, NotConvertible>]) -> Columns {
         let mut columns: Columns = vec![("t".to_owned(), self.times_s().to_vec())];
         let mut add = |name: &str, estimates: &[Option<Estimate>]| {

@@ -1,24 +1,25 @@
-//! A delay that is tracked in whole samples, for any recursion with a given delay: one recursion for each delay of a
-//! range, and the one that predicts best is reported (D. T. Magill, *Optimal adaptive estimation of sampled stochastic
-//! processes*, 1965; with evidence that is forgotten as in A. H. Jazwinski, *Stochastic Processes and Filtering
-//! Theory*, 1970, section 8.8).
+//! A delay that is tracked in whole samples, for any recursion with a given delay. There is one recursion for each
+//! delay of a range, and the recursion that predicts best is reported (D. T. Magill, *Optimal adaptive estimation of
+//! sampled stochastic processes*, 1965; with evidence that is forgotten as in A. H. Jazwinski, *Stochastic Processes
+//! and Filtering Theory*, 1970, section 8.8).
 //!
-//! With the a-priori innovation eps_k of the recursion with the delay k, and sigma^2 of the reported one, the
-//! logarithm of the evidence is
+//! With the a-priori innovation eps_k of the recursion with the delay k, and the innovation variance sigma^2 of the
+//! reported recursion, the logarithm of the evidence is
 //!
 //! `L_k(t) = gamma L_k(t-1) - eps_k(t)^2/(2 sigma^2)`,  `gamma = 1 - Ts/T`,
 //!
-//! with T = 10 s: evidence from before a change fades with time. Another delay is reported once it leads by 2. Its
-//! recursion has run all the time, so that the estimate need not restart. The weights `p_k` are proportional to
-//! `exp(L_k/3)`, because neighbouring innovations of a wrong model carry the same information more than once (without
-//! the factor 3, bands of 95 % hold 82 % for a constant delay; with it 95 %). tau_e is reported as the weighted mean of
-//! the delays; its variance is that of the weights plus that of a delay uniformly distributed between two samples,
-//! `Ts^2/12`.
+//! with T = 10 s: evidence from before a change fades with time. Another delay is reported once its L_k leads by 2. Its
+//! recursion has been running all the time, so that the estimate need not restart. The weights `p_k` are proportional
+//! to `exp(L_k/3)`, because neighbouring innovations of a wrong model repeat the same information. (For a constant
+//! delay, 95 % bands contain the delay in 82 % of cases without the factor 3, and in 95 % with it.) tau_e is reported
+//! as the weighted mean of the delays; its variance is the weighted variance of the delays plus that of a delay
+//! uniformly distributed between two samples, `Ts^2/12`.
 //!
-//! Before there is evidence the delay is distributed about that of the start, `L_k = -(tau_k - tau_start)^2/(2 s^2)`
-//! with s = 0.03 s; this fades like all evidence. An innovation counts up to [`LARGEST`] standard deviations, so that
-//! one outlier does not decide. While the estimate stays constant nothing is learnt about the delay: all but one of
-//! the recursions then have the coefficients of another delay.
+//! Before there is any evidence, the delay is distributed about the delay of the start,
+//! `L_k = -(tau_k - tau_start)^2/(2 s^2)` with s = 0.03 s; this prior fades like all evidence. Innovations count with
+//! at most [`LARGEST`] standard deviations, so that a single outlier does not decide. While the estimate is kept
+//! constant, the evidence is not updated, because all recursions but one then have coefficients that belong to another
+//! delay.
 
 use hoid_core::state::{State, visit_all};
 use hoid_model::{Orders, SampleTime, uncertainty::Estimate};
@@ -31,28 +32,28 @@ use crate::{
     setup::Setup,
 };
 
-/// Memory of the evidence, s.
+/// Memory length of the evidence, s.
 const MEMORY_S: f64 = 10.0;
-/// Lead of the logarithm of the evidence from which another delay is reported.
+/// Lead in the logarithm of the evidence from which another delay is reported.
 const LEAD: f64 = 2.0;
 /// Divisor of the evidence in the weights of the delays.
-const TEMPER: f64 = 3.0;
-/// Limit of an innovation in the evidence, in standard deviations.
+const EVIDENCE_DIVISOR: f64 = 3.0;
+/// Limit on an innovation in the evidence, in standard deviations.
 const LARGEST: f64 = 5.0;
-/// Standard deviation of the delay about that of the start before there is any evidence, s.
+/// Standard deviation of the delay about the delay of the start, before there is any evidence, s.
 const BEFORE_S: f64 = 0.03;
 /// Largest number of tracked delays.
 const MOST: usize = 128;
 
-/// One recursion for each delay.
+/// A bank with one recursion for each delay.
 pub(crate) struct DelayBank {
     members: Vec<Box<dyn Recursion>>,
     /// nk of the first recursion.
     first_nk: usize,
     sample_time_s: f64,
-    /// gamma.
-    keeps: f64,
-    /// L_k, less the largest.
+    /// Factor gamma by which the evidence decays per sample.
+    decay: f64,
+    /// L_k minus the largest of them.
     evidence: Vec<f64>,
     best: usize,
     /// Innovations of the last sample.
@@ -70,7 +71,7 @@ impl State for DelayBank {
 }
 
 impl DelayBank {
-    /// Builds the bank for the delay range of a setup; `build` makes the recursion of a setup with one delay.
+    /// Builds the bank for the delay range of a setup; `build` makes the recursion for a setup with a single delay.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] for a range of too many samples; the errors of `build`.
@@ -85,7 +86,7 @@ impl DelayBank {
             return Err(bad(
                 "the range of the delay",
                 format!("{low_s} to {high_s} s, {} samples", last_nk - first_nk + 1),
-                &format!("at most {MOST} samples; narrow it, or sample more slowly"),
+                &format!("at most {MOST} samples; narrow the range, or sample more slowly"),
             ));
         }
         let of = |nk: usize| {
@@ -97,14 +98,14 @@ impl DelayBank {
         };
         let members = (first_nk..=last_nk).map(of).collect::<Result<Vec<_>, _>>()?;
         let count = members.len();
-        // The delay of the start fit, if it lies in the range.
+        // The delay of the start fit, limited to the range.
         let best = setup.orders.nk.clamp(first_nk, last_nk) - first_nk;
         let before = |k: usize| -0.5 * ((k as f64 - best as f64) * sample_time.s() / BEFORE_S).powi(2);
         Ok(Self {
             members,
             first_nk,
             sample_time_s: sample_time.s(),
-            keeps: 1.0 - (sample_time.s() / MEMORY_S).min(0.5),
+            decay: 1.0 - (sample_time.s() / MEMORY_S).min(0.5),
             evidence: (0..count).map(before).collect(),
             best,
             innovations: vec![0.0; count],
@@ -124,9 +125,9 @@ impl DelayBank {
         let mut most = f64::NEG_INFINITY;
         for (evidence, innovation) in self.evidence.iter_mut().zip(&self.innovations) {
             let square = (innovation * innovation / variance).min(LARGEST * LARGEST);
-            // An innovation that is NaN counts as the largest.
+            // A NaN innovation counts as the largest possible one.
             let square = if square.is_nan() { LARGEST * LARGEST } else { square };
-            *evidence = self.keeps * *evidence - 0.5 * square;
+            *evidence = self.decay * *evidence - 0.5 * square;
             most = most.max(*evidence);
         }
         self.evidence.iter_mut().for_each(|evidence| *evidence -= most);
@@ -190,7 +191,7 @@ impl Recursion for DelayBank {
     }
 
     fn delay(&self) -> Option<Delay> {
-        let weights: Vec<f64> = self.evidence.iter().map(|evidence| (evidence / TEMPER).exp()).collect();
+        let weights: Vec<f64> = self.evidence.iter().map(|evidence| (evidence / EVIDENCE_DIVISOR).exp()).collect();
         let sum: f64 = weights.iter().sum();
         let moment = |of: &dyn Fn(f64) -> f64| {
             let each = weights.iter().enumerate().map(|(k, weight)| weight * of(k as f64));

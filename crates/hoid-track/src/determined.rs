@@ -1,18 +1,18 @@
 //! The parameters of an operator that the data determine.
 //!
-//! A parameter is determined if it is more than two standard errors from zero and, if the method has a prior for it,
-//! the data have at least halved the prior variance: otherwise the value is that of the prior.
+//! A parameter is determined if it is more than two standard errors from zero and, if the method has a prior for the
+//! parameter, the data have at least halved the prior variance. Otherwise the value is mainly that of the prior.
 
 use hoid_model::uncertainty::OperatorEstimate;
 
 use crate::{Trace, Tracker, methods::Method};
 
-/// Distance from zero, in standard errors.
-const APART: f64 = 2.0;
-/// Largest remaining share of the prior variance.
-const LEFT: f64 = 0.5;
+/// Smallest distance of a determined parameter from zero, in standard errors.
+const SMALLEST_DISTANCE: f64 = 2.0;
+/// Largest remaining share of the prior variance of a determined parameter.
+const LARGEST_REMAINING_SHARE: f64 = 0.5;
 
-/// Name of a parameter, and whether it is determined.
+/// Name of a parameter, and true if the parameter is determined.
 pub type Determined = (&'static str, bool);
 
 fn determined(method: &Method, operator: &OperatorEstimate) -> Vec<Determined> {
@@ -28,27 +28,29 @@ fn determined(method: &Method, operator: &OperatorEstimate) -> Vec<Determined> {
     };
     let of = |(name, _, estimate): (&'static str, _, hoid_model::uncertainty::Estimate)| {
         let error = estimate.standard_error?;
-        let learnt = supposed(name).is_none_or(|before| error * error < LEFT * before * before);
-        Some((name, learnt && estimate.value.abs() > APART * error))
+        let learnt = supposed(name).is_none_or(|before| error * error < LARGEST_REMAINING_SHARE * before * before);
+        Some((name, learnt && estimate.value.abs() > SMALLEST_DISTANCE * error))
     };
     operator.rows().into_iter().filter_map(of).collect()
 }
 
 impl Tracker {
-    /// Returns which parameters of the operator are determined now; those without a standard error are left out.
+    /// Returns for each parameter of the current operator whether it is determined; parameters without a standard error
+    /// are omitted.
     pub fn determined(&self, operator: &OperatorEstimate) -> Vec<Determined> {
         determined(&self.options().method, operator)
     }
 }
 
 impl Trace {
-    /// Returns which parameters of the operator of a row are determined; those without a standard error are left out.
+    /// Returns for each parameter of the operator of a row whether it is determined; parameters without a standard
+    /// error are omitted.
     pub fn determined(&self, operator: &OperatorEstimate) -> Vec<Determined> {
         determined(&self.options().method, operator)
     }
 
-    /// Columns that show for each parameter whether it is determined, 1 or 0, for methods with a prior:
-    /// `K_e_determined` and so on.
+    /// Returns columns that show for each parameter whether it is determined (1) or not (0), such as `K_e_determined`.
+    /// They are empty for methods that need a start fit.
     pub fn determined_columns(
         &self,
         operators: &[Result<OperatorEstimate, hoid_model::NotConvertible>],

@@ -33,7 +33,7 @@ impl TrackOptions {
         }
     }
 
-    /// Lists each memory once, with the parameters that have it.
+    /// Lists each memory length once, with the parameters that have it.
     fn memories_as_text(&self, sample_time: SampleTime) -> String {
         let mut groups: Vec<(Memory, Vec<String>)> = Vec::new();
         for (name, memory) in self

@@ -7,7 +7,7 @@ use hoid_ident::{
     settings::{Bounds, Kind, Setting, Settings, Value},
 };
 
-/// Rate of the gradient if none is given.
+/// Default rate of the normalised gradient.
 const DEFAULT_RATE: f64 = 0.1;
 
 /// Names of the rules.
@@ -23,15 +23,15 @@ const WORDS: [&str; 6] = [
 /// Rule of forgetting of a recursion.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum ForgettingRule {
-    /// A factor for each parameter; for equal memories the scalar factor.
+    /// One factor for each parameter; the scalar factor if all memories are equal.
     #[default]
     Exponential,
-    /// Random walk: the standard deviation of the drift of each parameter in one second, in its unit. Parameters that
-    /// are not named do not drift.
+    /// Random walk: standard deviation of the drift of each parameter in one second, in the unit of the parameter.
+    /// Parameters that are not named do not drift.
     RandomWalk(BTreeMap<String, f64>),
-    /// Sliding rectangular window of the length of the shortest memory.
+    /// Sliding rectangular window, as long as the shortest memory.
     Window,
-    /// Variable factor, with the shortest memory while the innovations are as expected.
+    /// Variable factor, which gives the shortest memory while the innovations are as large as expected.
     Variable,
     /// Directional forgetting with the shortest memory.
     Directional,
@@ -92,8 +92,8 @@ impl ForgettingRule {
     fn belongs(name: &str, rule: &str) -> IdentError {
         IdentError::BadOption {
             option: name.to_owned(),
-            found: "with another way of forgetting".to_owned(),
-            expected: format!("forgetting = {rule}, whose option it is"),
+            found: "the option with another type of forgetting".to_owned(),
+            expected: format!("forgetting = {rule}, to which this option belongs"),
         }
     }
 
@@ -118,7 +118,7 @@ impl ForgettingRule {
     }
 }
 
-/// `forgetting` comes first: the options of one rule are refused by the others.
+/// `forgetting` must be set first, because the options of one rule are refused by the others.
 impl Settings for ForgettingRule {
     fn list(&self) -> Vec<Setting> {
         vec![Self::rule(), Self::drift(), Self::rate()]

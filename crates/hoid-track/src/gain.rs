@@ -1,4 +1,4 @@
-//! The adaptation that the options select.
+//! The gain of a recursion, as selected by the options.
 
 use hoid_core::{
     adaptation::{Adaptation, Forgetting, ParameterStep},
@@ -16,22 +16,23 @@ use hoid_ident::IdentError;
 use crate::{forgetting::ForgettingRule, setup::Setup, shared_options::WindupGuard, start::StartState};
 
 /// Limit of the variance of an unexcited parameter in P, as a multiple of its level with the excitation of the start
-/// fit: the gain after a silence is that of three times the typical standard error.
-const ROOM_TO_GROW: f64 = 10.0;
-/// The same for a start covariance that does not come from a fit, as a multiple of it.
+/// fit: after a silence, the gain corresponds to about three times the typical standard error.
+const LARGEST_VARIANCE_GROWTH: f64 = 10.0;
+/// Limit of the variance of an unexcited parameter in P if the start covariance does not come from a fit, as a multiple
+/// of its start value.
 pub const ROOM_WITHOUT_FIT: f64 = 1e4;
-/// Growing memory of a start without a fit: additional forgetting at the first sample, and its decay from sample to
-/// sample.
+/// Growing memory of a start without a fit: additional forgetting at the first sample, and the factor by which it
+/// decays per sample.
 const EARLY_FORGETTING: f64 = 0.01;
 const EARLY_SHARE: f64 = 0.9993;
 /// Smallest factor of variable forgetting: a memory of ten samples.
 const SMALLEST_FACTOR: f64 = 0.9;
-/// Memory of the innovation variance, in units of the shortest memory of a parameter.
+/// Memory length of the innovation variance, as a multiple of the shortest memory of a parameter.
 const LEVEL_MEMORIES: f64 = 4.0;
 
-/// The adaptations of the kernel as one type, so that each recursion is compiled once.
+/// The gains of the kernel as one type, so that each recursion is compiled once.
 pub enum Gain<const N: usize> {
-    /// P in factors.
+    /// P in factored form.
     Covariance(Covariance<N>),
     /// The sums of a sliding window.
     Window(Window<N, Vec<f64>>),
@@ -47,8 +48,8 @@ impl<const N: usize> State for Gain<N> {
 }
 
 impl<const N: usize> Gain<N> {
-    /// Builds the adaptation with capacity for N parameters. With `growing`, a start without a fit has a growing
-    /// memory: gradients of early estimates, which the data do not yet support, must be forgotten. Least squares has no
+    /// Builds the gain with capacity for N parameters. If `growing` is true, the memory of a start without a fit grows
+    /// from a short length, so that the gradients of early, unreliable estimates are forgotten. Least squares has no
     /// such gradients.
     ///
     /// # Errors
@@ -122,9 +123,8 @@ impl<const N: usize> Gain<N> {
             let room = match (setup.windup_guard, setup.covariance) {
                 (Some(WindupGuard::Off), _) => return f64::INFINITY,
                 (Some(WindupGuard::Bound(multiple)), _) => multiple,
-                // N samples of the start leave 1/N of the information of a sample, a memory 1 -
-                // lambda of it.
-                (None, None) if from.from_fit && i < p => ROOM_TO_GROW * (from.residuals * (1.0 - lambda[i])).max(1.0),
+                // P is proportional to 1/N after a start of N samples, and to 1 - lambda with forgetting.
+                (None, None) if from.from_fit && i < p => LARGEST_VARIANCE_GROWTH * (from.residuals * (1.0 - lambda[i])).max(1.0),
                 _ => ROOM_WITHOUT_FIT,
             };
             room * matrix[i][i]
@@ -138,7 +138,7 @@ impl<const N: usize> Gain<N> {
     }
 }
 
-/// A gain with a covariance that the caller can change.
+/// A gain whose covariance can be scaled.
 pub trait Scaled {
     /// Multiplies P by a factor; false if there is no P.
     fn scale(&mut self, factor: f64) -> bool;

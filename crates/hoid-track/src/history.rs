@@ -1,9 +1,9 @@
-//! The last values of a signal, the newest first.
+//! The latest values of a signal, the newest first.
 
 use hoid_core::state::{State, visit_all};
 
-/// Largest size of a value in a recursion. Its fourth power is still finite, and therefore also the covariances of
-/// filtered signals.
+/// Largest magnitude of a value in a recursion. Its fourth power, and therefore the covariances of filtered signals,
+/// are still finite.
 const LARGEST: f64 = 1e60;
 
 /// Limits a value to 1e60; NaN, which products of large numbers may give, becomes zero.
@@ -11,7 +11,7 @@ pub fn bounded(x: f64) -> f64 {
     if x.is_nan() { 0.0 } else { x.clamp(-LARGEST, LARGEST) }
 }
 
-/// The last n values in one slice. Each is written twice, n elements apart, so that nothing is moved.
+/// The last n values in one slice. Each value is stored twice, n elements apart, so that no values have to be moved.
 #[derive(Debug, Clone)]
 pub struct History {
     values: Vec<f64>,
@@ -36,7 +36,7 @@ impl History {
         }
     }
 
-    /// Takes the next value; the oldest one is dropped.
+    /// Adds the next value and drops the oldest one.
     pub fn push(&mut self, x: f64) {
         if self.n == 0 {
             return;
@@ -47,7 +47,7 @@ impl History {
         self.values[self.at + self.n] = x;
     }
 
-    /// Returns `[x(t), x(t-1), ..., x(t-n+1)]`, with x(t) the last value.
+    /// Returns `[x(t), x(t-1), ..., x(t-n+1)]`, where x(t) is the latest value.
     pub fn newest(&self) -> &[f64] {
         &self.values[self.at..self.at + self.n]
     }

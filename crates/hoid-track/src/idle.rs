@@ -1,21 +1,21 @@
 //! The idle head of a record: the samples recorded before the run started.
 //!
 //! A person who waits for the run to start is not tracking. A fit of such samples gives meaningless delays and poles
-//! with small standard errors. The head is the longest run of first samples in which both e and u stay within [`SHARE`]
-//! of their later size about their first second, or within a step of their resolution; the size is the 90 % quantile of
-//! the distance from the median in the second half of the record. A head shorter than [`LEAST_S`] does not count:
-//! signals start near zero.
+//! with small standard errors. The head is the longest stretch at the start of a record in which both e and u stay
+//! within [`SHARE`] of their later size from their median over the first second, or within one step of their
+//! resolution. The size is the 90 % quantile of the distance from the median in the second half of the record. A head
+//! shorter than [`LEAST_S`] does not count, because signals start near zero.
 
 use hoid_model::Record;
 use hoid_numerics::statistics::{upper_median, upper_quantile};
 
-/// Share of the later size within which a signal is idle.
+/// Share of its later size within which a signal is idle.
 const SHARE: f64 = 0.02;
 /// Shortest head, s.
 const LEAST_S: f64 = 1.0;
 /// Quantile that defines the size of a signal.
 const SIZE: f64 = 0.9;
-/// Number of steps of the resolution that count as constant.
+/// Largest change, in steps of the resolution, that counts as constant.
 const STEPS: f64 = 1.01;
 /// Largest step of a resolution, as a share of the size.
 const COARSE: f64 = 0.2;
@@ -31,7 +31,7 @@ pub fn idle_head(record: &Record) -> usize {
         let size = upper_quantile(&mut off, SIZE).unwrap_or(0.0);
         let steps = || later.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|d| *d > 0.0);
         let step = steps().fold(f64::INFINITY, f64::min);
-        // Noise has no resolution: its differences are not multiples of the smallest.
+        // Noise has no resolution: its differences are not multiples of the smallest difference.
         let multiple = |d: f64| (d / step - (d / step).round()).abs() < 1e-3;
         let coarse = step <= COARSE * size && steps().all(multiple);
         let room = if coarse {

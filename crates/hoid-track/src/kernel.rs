@@ -1,5 +1,5 @@
-//! The recursions of the real-time kernel with a common interface: capacity for the parameters, the delay line, the
-//! covariance in units of the parameters.
+//! The recursions of the real-time kernel behind the common interface, which adds capacity for the parameters, the
+//! delay line, and the covariance in units of the parameters.
 
 use hoid_core::{
     adaptation::Adaptation,
@@ -35,7 +35,7 @@ pub fn too_many(parameters: usize) -> IdentError {
     IdentError::BadOption {
         option: "the orders of a recursion".to_owned(),
         found: format!("{parameters} parameters"),
-        expected: "at most 64, and 16 for the method physical; lower them".to_owned(),
+        expected: "at most 64 parameters (16 for the method physical); lower the orders".to_owned(),
     }
 }
 
@@ -59,8 +59,8 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Builds a recursion of the kernel: with the smallest capacity for its parameters, and with the orders in its
-    /// type if they are those of the operator.
+    /// Builds a recursion of the kernel with the smallest capacity that is sufficient for its parameters. If the orders
+    /// are those of the operator, they are part of its type.
     ///
     /// # Errors
     /// [`IdentError`] for options that contradict each other, or a start that the recursion cannot use.
@@ -98,18 +98,18 @@ impl<'a> Plan<'a> {
         std::array::from_fn(|i| self.from.values.get(i).copied().unwrap_or(0.0))
     }
 
-    /// The adaptation, as [`Gain::new`].
+    /// Returns the gain of the recursion ([`Gain::new`]).
     ///
     /// # Errors
-    /// As that.
+    /// As [`Gain::new`].
     pub fn gain<const N: usize>(&self, growing: bool) -> Result<Gain<N>, IdentError> {
         Gain::new(self.setup, self.from, self.sample_time, growing)
     }
 
-    /// Returns the error bars at the start, as [`gain::error_bars`].
+    /// Returns the error bars at the start ([`gain::error_bars`]).
     ///
     /// # Errors
-    /// As there.
+    /// As [`gain::error_bars`].
     pub fn bars<const N: usize, const K: usize>(&self) -> Result<ErrorBars<N, K>, IdentError> {
         gain::error_bars(self.setup, self.from, self.sample_time)
     }
@@ -165,7 +165,7 @@ fn delay(nk: usize) -> DelayLine<Vec<f64>> {
     DelayLine::new(vec![0.0; nk])
 }
 
-/// Covariance in the units of the parameters.
+/// Writes the covariance in the units of the parameters.
 pub fn scaled<const N: usize>(spread: &[[f64; N]; N], variance: f64, parameters: usize, into: &mut [f64]) {
     for i in 0..parameters {
         for j in 0..parameters {

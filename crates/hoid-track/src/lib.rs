@@ -1,11 +1,11 @@
 //! Recursive estimates: sample by sample, over a record or live.
 //!
-//! A person changes while acting. A recursion corrects the estimate at every sample by the prediction error,
+//! People change while they control. A recursion corrects the estimate at every sample by the prediction error,
 //!
 //! `theta(t) = theta(t-1) + P(t) psi(t) eps(t)`,
 //!
-//! and forgets the past, so that it can follow (L. Ljung, *System Identification*, 1999, chapter
-//! 11). The methods differ in psi, in the parameters theta, and in their prior for the change.
+//! and forgets the past, so that it can follow changes (L. Ljung, *System Identification*, 1999, chapter 11). The
+//! methods differ in psi, in the parameters theta, and in their prior for the change.
 //!
 //! ```
 //! use hoid_model::scenario::{Condition, Scenario};
@@ -25,38 +25,38 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | `methods`, `method` | [`Method`]: the recursive methods, a file or folder each; the self-description of each |
+//! | `methods`, `method` | [`Method`]: the recursive methods, and their self-description |
 //! | [`building`] | components of a method, for methods in other crates |
 //! | `options`, `shared_options`, `memory`, `forgetting` | [`TrackOptions`]: the options of a recursion |
-//! | `person_prior` | [`PersonPrior`]: the prior knowledge of a person before the first sample |
+//! | `person_prior` | [`PersonPrior`]: prior knowledge of a person before the first sample |
 //! | `request`, `plan` | [`TrackRequest`]: the request; [`TrackPlan`]: orders that are still open, searched on the start span |
 //! | `setup`, `start`, `start_noise`, `gain` | components of a recursion: structure, start, forgetting |
 //! | `kernel`, `recursion` | RLS and RPEM of the real-time kernel; the interface of every recursion |
-//! | `predictor`, `history`, `reported` | signals and reports for methods that are not of the kernel |
+//! | `predictor`, `history`, `reported` | signals and reports for methods that do not use the kernel |
 //! | `response` | [`Response`]: gain and phase of an estimate at a frequency |
 //! | `open_loop` | [`OpenLoop`]: crossover and phase margin of an estimate with the controlled element |
-//! | `tracker`, `outcome`, `saved` | [`Tracker`]: one sample at a time; a tracker as numbers, to continue elsewhere |
-//! | `live`, `stage` | [`Live`]: a stream, at a lower rate if its own is high; [`Stage`]: its warm-up, then its tracker |
-//! | `guard` | samples and spans that cannot come from tracking, kept from the recursion |
+//! | `tracker`, `outcome`, `saved` | [`Tracker`]: estimate that takes one sample at a time; its state as numbers, to continue elsewhere |
+//! | `live`, `stage` | [`Live`]: estimate from a stream, which is decimated if its rate is high; [`Stage`]: its warm-up, then its tracker |
+//! | `guard` | exclusion of samples and spans that cannot come from tracking |
 //! | `stationary` | handling of stationary signals in a recursion without a guard |
 //! | `idle` | idle samples recorded before a run started |
-//! | `over_record`, `two_sided` | [`track()`]: a record; the two-sided estimate of a recorded run |
+//! | `over_record`, `two_sided` | [`track()`]: estimate over a record; two-sided estimate of a recorded run |
 //! | `trace`, `columns`, `summary`, `as_text` | [`Trace`]: the estimate at every sample, as columns and as text |
 //! | `diagnostics` | reliability of a trace and of a single estimate: [`Trace::verdict`] |
-//! | `determined` | which parameters the data determine |
-//! | `delay_bank` | a delay in whole samples, followed next to any recursion |
-//! | `validation` | how well a trace explains another run; the choice of the initial covariance by this measure |
-//! | `change` | [`Change`]: when a person changed |
+//! | `determined` | parameters that the data determine |
+//! | `delay_bank` | tracking of a delay in whole samples, with any recursion |
+//! | `validation` | prediction of another run by a trace; choice of the initial covariance by this measure |
+//! | `change` | [`Change`]: a declared change of a person |
 //!
-//! **A recursion starts from the available knowledge.** By default this is the batch fit of the first third of a
-//! record, with the covariance of that fit; until the end of that span only the filters are updated and the estimate
-//! stays constant, so that no sample counts twice and the error bars are valid. With the start of the thesis,
-//! `P_0 = 0.1 I` (eq. 38, 5.41, 5.55), the estimate is updated from the first sample on.
+//! **A recursion starts from the available knowledge.** For methods with a start fit this is by default the batch fit
+//! of the first third of a record, with the covariance of that fit. Until the end of that span only the filters are
+//! updated and the estimate is kept constant, so that no sample counts twice and the error bars are valid. With the
+//! start of the thesis, `P_0 = 0.1 I` (eq. 38, 5.41, 5.55), the estimate is updated from the first sample on.
 //!
 //! **Faulty samples** never reach the filters. A value is faulty if it is not a finite number or is larger than
-//! [`TrackOptions::largest`]. A faulty error e is replaced by the last good one and a faulty output u by the one-step
-//! prediction, and the estimate stays constant at that sample. These samples are counted. With a guard (`guard`; by
-//! default for `adaptive`) the same holds for outliers and for spans that cannot come from tracking.
+//! [`TrackOptions::largest`]. A faulty error e is replaced by the last good value and a faulty output u by the one-step
+//! prediction, and the estimate stays constant at that sample. These samples are counted. With a guard (option `guard`;
+//! on by default for `adaptive`), outliers and spans that cannot come from tracking do not change the estimate either.
 
 pub mod building;
 mod change;
@@ -131,5 +131,5 @@ pub use trace::{OPERATOR_COLUMNS, Trace};
 pub use tracker::Tracker;
 pub use validation::{COVARIANCES, CovarianceChoice, CovarianceUpdates, choose_covariance, track_validated};
 
-/// Regressor and stability of the recursions, options of the kernel.
+/// Regressors of the recursions and choice of the polynomials that are kept stable, both from the kernel.
 pub use hoid_core::{predictor::Regressor, recursion::Stable};

@@ -1,8 +1,8 @@
-//! A live recursion at the rate of its samples: a high rate is filtered and decimated, then the warm-up of a start fit,
-//! then the tracker.
+//! A live recursion. Samples at a high rate are filtered and decimated; the warm-up collects samples for a start fit;
+//! then the tracker runs.
 //!
-//! Rates above 200 Hz are decimated to about 100 Hz ([`Decimation::Auto`]), unless the request counts samples. The
-//! estimate is then [`Live::behind_s`] later than the sample that was taken.
+//! Rates above 200 Hz are decimated to about 100 Hz ([`Decimation::Auto`]), unless orders, delay or memory of the
+//! request are in samples. The estimate then lags the last sample of the stream by [`Live::behind_s`].
 
 use hoid_model::{Decimated, Decimation, Decimator, Orders, Record, SampleTime};
 
@@ -32,11 +32,11 @@ pub struct Live {
 }
 
 impl Live {
-    /// Builds the requested recursion for samples of a rate.
+    /// Builds the requested recursion for a stream with this sample time.
     ///
     /// # Errors
-    /// [`IdentError`] for options that contradict each other, a warm-up that is not a valid time, and a method that
-    /// smooths.
+    /// [`IdentError`] for options that contradict each other, for a warm-up that is not a valid time, and for a
+    /// two-sided method.
     pub fn new(
         asked: &TrackRequest,
         sample_time: SampleTime,
@@ -94,7 +94,8 @@ impl Live {
         })
     }
 
-    /// Starts from a record at the rate of the stream in place of the warm-up; returns the search of open orders.
+    /// Starts from a record at the rate of the stream instead of the warm-up; returns the result of the search for open
+    /// orders.
     ///
     /// # Errors
     /// [`IdentError`] for a record of another rate, and the errors of the start fit.
@@ -102,7 +103,7 @@ impl Live {
         if !record.sample_time().matches(self.sample_time) {
             return Err(IdentError::BadStart {
                 reason: format!(
-                    "the start record has a sample time of {} s, the tracker one of {} s",
+                    "the start record has the sample time {} s, but the tracker has {} s",
                     record.sample_time().s(),
                     self.sample_time.s()
                 ),
@@ -127,7 +128,7 @@ impl Live {
         Ok(choice)
     }
 
-    /// Takes a sample; NaN marks faulty or missing values. If `moves` is false a tracker only updates its filters.
+    /// Takes a sample; NaN marks faulty or missing values. If `moves` is false, the tracker only updates its filters.
     /// `choose` searches open orders at the end of the warm-up.
     pub fn update(&mut self, sample: Sample, moves: bool, choose: ChooseOrders<'_>) -> LiveOutcome {
         let sample = match &mut self.decimator {
@@ -151,7 +152,7 @@ impl Live {
         self.stage.update(sample, moves, &|record| choose(plan, record))
     }
 
-    /// Returns the plan, at the rate that is tracked.
+    /// Returns the plan, which has the sample time of the tracker.
     pub fn plan(&self) -> &TrackPlan {
         &self.plan
     }
@@ -161,7 +162,7 @@ impl Live {
         &self.stage
     }
 
-    /// Returns the tracker, once there is one.
+    /// Returns the tracker; `None` during the warm-up.
     pub fn tracker(&self) -> Option<&Tracker> {
         match &self.stage {
             Stage::Tracking(tracker) => Some(tracker),
@@ -169,7 +170,7 @@ impl Live {
         }
     }
 
-    /// Returns the counts of the recursion; those of the warm-up count its samples.
+    /// Returns the counts of the recursion; during the warm-up, only its samples are counted.
     pub fn counts(&self) -> Counts {
         match &self.stage {
             Stage::Tracking(tracker) => tracker.counts(),
@@ -190,13 +191,13 @@ impl Live {
         self.decimator.as_ref().map(Decimator::done)
     }
 
-    /// Returns the time by which the tracked sample is earlier than the one that was taken, s.
+    /// Returns the time from the last tracked sample to the last sample of the stream, s.
     pub fn behind_s(&self) -> f64 {
         let samples = self.decimator.as_ref().map_or(0, Decimator::lag_samples);
         samples as f64 * self.sample_time.s()
     }
 
-    /// Returns everything that changes as numbers, and the orders once there is a tracker, for [`Live::restore`]. The
+    /// Returns the complete state as numbers, and the orders once there is a tracker, for [`Live::restore`]. The
     /// recursion does not change.
     pub fn saved(&mut self) -> (Option<Orders>, Vec<f64>) {
         let (orders, mut numbers) = self.stage.saved();
@@ -209,15 +210,15 @@ impl Live {
         (orders, numbers)
     }
 
-    /// Restores the state that [`Live::saved`] returned, into a recursion of the same request.
+    /// Restores the state that [`Live::saved`] returned into a recursion built from the same request.
     ///
     /// # Errors
-    /// [`IdentError::BadStart`] for numbers of another recursion, and for numbers that were changed or cut.
+    /// [`IdentError::BadStart`] for numbers of another recursion, and for numbers that were altered or truncated.
     pub fn restore(&mut self, orders: Option<Orders>, numbers: &[f64]) -> Result<(), IdentError> {
         let mut of_stage = numbers;
         if let Some(decimator) = &mut self.decimator {
             let wrong = || IdentError::BadStart {
-                reason: "the saved tracker has another rate, or was changed or truncated since; save it \
+                reason: "the saved tracker has another rate, or was changed or truncated after it was saved; save it \
                          again"
                     .to_owned(),
             };

@@ -1,4 +1,4 @@
-//! How long an observation counts: the time in which its weight falls to 1/e.
+//! Memory length: the time in which the weight of an observation falls to 1/e.
 
 use std::{collections::BTreeMap, str::FromStr};
 
@@ -8,7 +8,7 @@ use hoid_ident::{
 };
 use hoid_model::SampleTime;
 
-/// How long an observation counts.
+/// Memory length: the time in which the weight of an observation falls to 1/e.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Memory {
     /// N samples: `lambda = 1 - 1/N`.
@@ -20,7 +20,7 @@ pub enum Memory {
 }
 
 impl Memory {
-    /// The factor lambda.
+    /// Returns the forgetting factor lambda.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] unless the memory is longer than one sample.
@@ -31,7 +31,7 @@ impl Memory {
         }
     }
 
-    /// Whole samples of a window as long as the memory.
+    /// Returns the length in samples of a window as long as the memory.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] for an infinite memory, or one not longer than one sample.
@@ -58,7 +58,7 @@ impl Memory {
     }
 }
 
-/// `256` samples, `2.56s`, or `inf`.
+/// Parses `256` samples, `2.56s`, or `inf`.
 impl Value for Memory {
     const KIND: Kind = Kind::Memory;
 
@@ -95,7 +95,7 @@ impl FromStr for Memory {
     }
 }
 
-/// The memory of all parameters: given directly, or by its forgetting factor.
+/// The memory of all parameters, given directly or by its forgetting factor.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct CommonMemory(pub Option<Memory>);
 
@@ -110,7 +110,7 @@ impl CommonMemory {
     fn factor() -> Setting {
         Setting::of("lambda", &None::<f64>)
             .bounds(Bounds::UpTo(0.0, 1.0))
-            .help(&["Forgetting factor instead of a memory: lambda = 1 - 1/memory in samples"])
+            .help(&["Forgetting factor instead of a memory: lambda = 1 - 1/N for a memory of N samples"])
     }
 }
 
@@ -147,7 +147,7 @@ impl Settings for CommonMemory {
 settings! {
     /// Memories of a recursion that forgets.
     pub struct MemoryOptions {
-        /// Memory of single parameters, or of all with one letter, such as b0=256,f=inf,K_e=5s
+        /// Memory of individual parameters, or of all parameters with one letter, such as b0=256,f=inf,K_e=5s
         pub memory_of: BTreeMap<String, Memory> = BTreeMap::new(),
     }
     groups {
@@ -157,7 +157,7 @@ settings! {
 }
 
 impl MemoryOptions {
-    /// The same memory for all parameters.
+    /// Returns options with the same memory for all parameters.
     pub fn of_all(memory: Memory) -> Self {
         Self {
             memory: CommonMemory(Some(memory)),
@@ -165,14 +165,15 @@ impl MemoryOptions {
         }
     }
 
-    /// The memory of a parameter where one was given: of its name, of its letter, or of all.
+    /// Returns the given memory of a parameter: by its name, by the letter of its polynomial, or for all parameters.
+    /// `None` if no memory was given.
     pub(crate) fn given(&self, name: &str) -> Option<Memory> {
         let by_letter = self.memory_of.iter().find(|(key, _)| is_named(name, key));
         let by_letter = by_letter.map(|(_, memory)| *memory);
         self.memory_of.get(name).copied().or(by_letter).or(self.memory.0)
     }
 
-    /// The first name of a memory that is neither a parameter nor a letter of one.
+    /// Returns the first name with a memory that is neither a parameter nor the letter of a polynomial.
     pub(crate) fn unknown(&self, names: &[String]) -> Option<&String> {
         let known = |key: &String| names.iter().any(|name| is_named(name, key));
         self.memory_of.keys().find(|key| !known(key))

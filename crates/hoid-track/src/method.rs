@@ -1,8 +1,8 @@
 //! Self-description of a recursive method.
 //!
-//! A method is a file or folder: its options (a struct made by `settings!`), [`RecursiveMethod`] for them, and the
-//! [`Recursion`] that it builds. This makes it a [`Method`](crate::Method), in this or any other crate; a line in the
-//! list of `hoid-survey` adds it to the command line, plans, Python and the book.
+//! A method consists of its options (a struct made by `settings!`), [`RecursiveMethod`] for these options, and the
+//! [`Recursion`] that it builds, all in one file or folder. This makes it a [`Method`](crate::Method), in this or any
+//! other crate; a line in the list of `hoid-survey` adds it to the command line, plans, Python and the book.
 
 use std::{any::Any, collections::BTreeMap, fmt};
 
@@ -27,15 +27,15 @@ use crate::{
 
 /// Name and description of a method.
 pub struct About {
-    /// Name as typed.
+    /// Name as typed by users.
     pub name: &'static str,
     /// Definition, in one line without a full stop.
     pub help: &'static str,
     /// Source.
     pub source: &'static str,
-    /// Supported structures; the first is the default, except that Box-Jenkins is the default if it is among them.
+    /// Supported structures. Box-Jenkins is the default if it is among them, otherwise the first structure.
     pub structures: &'static [Structure],
-    /// Defaults, as text, of options that are shared with other methods.
+    /// Defaults, as text, of options that this method shares with other methods.
     pub defaults: &'static [(&'static str, &'static str)],
 }
 
@@ -43,9 +43,9 @@ pub struct About {
 pub trait Boxed: fmt::Debug + Send + Sync {
     /// Returns a copy.
     fn boxed(&self) -> Box<dyn RecursiveMethod>;
-    /// True if the other is the same method with the same options.
+    /// True if the other method is the same, with the same options.
     fn is_same(&self, other: &dyn RecursiveMethod) -> bool;
-    /// Returns the method as a value of any type.
+    /// Returns the method as [`Any`], for comparison with other methods.
     fn as_any(&self) -> &dyn Any;
 }
 
@@ -65,15 +65,15 @@ impl<M: RecursiveMethod + Clone + PartialEq + 'static> Boxed for M {
 
 /// A recursive method with its options.
 pub trait RecursiveMethod: Settings + Boxed + 'static {
-    /// Returns its name and description.
+    /// Returns name and description of the method.
     fn about(&self) -> About;
 
-    /// Returns its earlier name, if that is still accepted.
+    /// Returns the earlier name of the method, if that name is still accepted.
     fn earlier_name(&self) -> Option<&'static str> {
         None
     }
 
-    /// Memory of a parameter if none is given.
+    /// Default memory length of a parameter.
     fn default_memory(&self, parameter: &str) -> Memory;
 
     /// Builds the recursion.
@@ -90,18 +90,18 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     /// Checks the options against structure and orders.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] with the problem.
+    /// [`IdentError::BadOption`], which describes the problem.
     fn check(&self, setup: &Setup) -> Result<(), IdentError>;
 
-    /// Checks that depend on the sample time.
+    /// Checks the options that depend on the sample time.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] with the problem.
+    /// [`IdentError::BadOption`], which describes the problem.
     fn check_at(&self, _sample_time: SampleTime) -> Result<(), IdentError> {
         Ok(())
     }
 
-    /// Order of the noise model if none is named; `None` for that of the structure.
+    /// Default order of the noise model; `None` for the order that follows from the structure.
     fn default_nd(&self) -> Option<usize> {
         None
     }
@@ -127,12 +127,12 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         None
     }
 
-    /// True if the two-sided estimate of a recorded run was requested.
+    /// True if the two-sided estimate of a recorded run is requested.
     fn smooths(&self) -> bool {
         false
     }
 
-    /// Computes that estimate, a row for each row of a causal trace.
+    /// Computes the two-sided estimate of a recorded run, with a row for each row of a causal trace.
     ///
     /// # Errors
     /// [`IdentError::BadStart`] for a start that cannot be used.
@@ -140,22 +140,22 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         Ok(Vec::new())
     }
 
-    /// True for a method that fits its stored samples again: it needs no start coefficients and no warm-up.
+    /// True for a method that fits its stored samples repeatedly: it needs no start coefficients and no warm-up.
     fn fits_anew(&self) -> bool {
         false
     }
 
-    /// Describes the memory as text, if it is not a memory of parameters.
+    /// Describes the memory as text; `None` for a method with memory lengths of parameters.
     fn memory_as_text(&self) -> Option<String> {
         None
     }
 
-    /// Options of its gain, if it uses that of the kernel.
+    /// Options of the gain, if the method uses the gain of the kernel.
     fn gain(&self) -> Option<&GainOptions> {
         None
     }
 
-    /// Options of its memories, if it has any.
+    /// Memory lengths of the parameters, if the method has any.
     fn memories(&self) -> Option<&MemoryOptions> {
         self.gain().map(|gain| &gain.memories)
     }
@@ -166,27 +166,27 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
             .map_or(ForgettingRule::Exponential, |gain| gain.forgetting.clone())
     }
 
-    /// P at the start as a multiple of the unit matrix; `None` for that of the start fit.
+    /// P at the start as a multiple of the unit matrix; `None` for the covariance of the start fit.
     fn covariance(&self) -> Option<f64> {
         self.gain().and_then(|gain| gain.covariance)
     }
 
-    /// Limit of an innovation in the update, in standard deviations of the innovation.
+    /// Limit on an innovation in the update, in standard deviations of the innovation.
     fn limit(&self) -> f64 {
         f64::INFINITY
     }
 
-    /// Limit of P where nothing excites a parameter; `None` if that follows from the start.
+    /// Limit of P where nothing excites a parameter; `None` if the limit follows from the start.
     fn windup_guard(&self, _structure: Structure) -> Option<WindupGuard> {
         self.gain().and_then(|gain| gain.windup_guard)
     }
 
-    /// Whether a guard was requested or refused; `None` if nothing was specified and the default is to have none.
+    /// The choice of a guard; `None` if nothing was specified and the default is to have none.
     fn guard(&self) -> Option<GuardChoice> {
         None
     }
 
-    /// True with a guard.
+    /// True if the recursion has a guard.
     fn is_guarded(&self) -> bool {
         self.guard() == Some(GuardChoice::Yes)
     }
@@ -226,19 +226,19 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         None
     }
 
-    /// Sets the prior knowledge of the person; false for methods without that option.
+    /// Sets the prior knowledge of the person; returns false for methods without that option.
     fn set_person_prior(&mut self, _prior: PersonPrior) -> bool {
         false
     }
 
-    /// Sets the options that have a default from a record.
+    /// Sets the options whose defaults depend on the record.
     fn prepare(&mut self, _record: &Record) {}
 
     /// Removes the options of parameters that do not exist.
     fn retain(&mut self, _known: &dyn Fn(&str) -> bool) {}
 }
 
-/// Returns the known properties of a method.
+/// Returns name, description and options of a method.
 pub fn spec(method: &dyn RecursiveMethod) -> MethodSpec {
     let about = method.about();
     let own = |setting: Setting| match about.defaults.iter().find(|(name, _)| *name == setting.name) {
@@ -263,7 +263,7 @@ pub fn bad(option: &str, found: String, expected: &str) -> IdentError {
     }
 }
 
-/// Checks that the orders are those of the operator's Box-Jenkins model.
+/// Checks that the orders are those of a Box-Jenkins model of the operator.
 ///
 /// # Errors
 /// [`IdentError::BadOption`].
@@ -273,13 +273,13 @@ pub fn check_operator_orders(name: &str, setup: &Setup) -> Result<(), IdentError
         return Err(bad(
             &format!("the orders of {name}"),
             format!("{} with {o}", setup.structure),
-            "bj with nb = 2 and nf = 2, the operator; nc and nd are free",
+            "the structure of the operator, bj with nb = 2 and nf = 2; nc and nd are free",
         ));
     }
     Ok(())
 }
 
-/// Checks that the delay is long enough for the hold.
+/// Checks that the delay contains at least the one sample of the hold.
 ///
 /// # Errors
 /// [`IdentError::BadOption`].

@@ -1,18 +1,18 @@
 //! Crossover frequency and phase margin of an estimate with the controlled element of the run.
 //!
-//! `L(omega) = Y(omega) Y_c(j omega)`, with Y the sampled response of the estimate. The crossover and its sensitivity
-//! to `dL/L` are computed as for batch fits ([`Crossover`]); `dL/L = dY/Y`, whose covariance is that of the real and
-//! imaginary part of the response at the crossover.
+//! `L(omega) = Y(omega) Y_c(j omega)`, where Y is the sampled response of the estimate. The crossover and its
+//! sensitivity to `dL/L` are computed as for batch fits ([`Crossover`]); `dL/L = dY/Y`, whose covariance follows from
+//! that of the real and imaginary part of the response at the crossover.
 //!
-//! Nothing is reported if |L| does not fall through one, or if the standard error of the crossover is more than half
-//! of it: the first-order error is then meaningless.
+//! Nothing is reported if |L| does not fall through one, or if the standard error of the crossover is more than half of
+//! the crossover: the first-order error is then meaningless.
 
 use hoid_ident::family::Crossover;
 use hoid_model::{Complex64, ContinuousTransferFunction, SampleTime, uncertainty::Estimate};
 
 use crate::response::Response;
 
-/// Largest standard error of the crossover, as a share of it.
+/// Largest standard error of the crossover, relative to the crossover.
 const MOST: f64 = 0.5;
 
 /// Crossover frequency and phase margin.
@@ -40,17 +40,18 @@ impl NoCrossover {
     pub fn words(self) -> &'static str {
         match self {
             Self::NoEstimate => "there is no estimate yet",
-            Self::NeverFalls => "the gain of the open loop does not cross one from above between .05 and 60 rad/s",
-            Self::NotDetermined => "the standard error of the crossover is more than half of it",
+            Self::NeverFalls => "the gain of the open loop does not cross 1 from above between .05 and 60 rad/s",
+            Self::NotDetermined => "the standard error of the crossover frequency exceeds half of its value",
         }
     }
 }
 
 impl OpenLoop {
-    /// Number of values of a packed measure.
+    /// Number of values in a packed crossover and margin.
     pub(crate) const NUMBERS: usize = 4;
 
-    /// Computes the measures of an estimate whose response is `value`, with its covariance `whole`.
+    /// Computes crossover and phase margin of an estimate; `value` gives its response, and `whole` its response with
+    /// the covariance.
     pub(crate) fn of(
         value: impl Fn(f64) -> Option<[f64; 2]>,
         whole: impl Fn(f64) -> Option<Response>,
@@ -68,7 +69,7 @@ impl OpenLoop {
         let found = Crossover::lowest(open_loop, sample_time).ok_or(NoCrossover::NeverFalls)?;
         let there = whole(found.omega_rad_s).ok_or(NoCrossover::NoEstimate)?;
         let [re, im] = there.value;
-        // dY/Y for a change of the real and of the imaginary part.
+        // dY/Y for a unit change of the real part and of the imaginary part.
         let moved =
             [Complex64::new(1.0, 0.0), Complex64::new(0.0, 1.0)].map(|d| found.moved_by(d / Complex64::new(re, im)));
         let estimate = |value: f64, of: usize| {
@@ -86,7 +87,7 @@ impl OpenLoop {
         }
     }
 
-    /// Packs values and variances, for means; NaN if there are none.
+    /// Packs values and variances, for averaging; NaN if there is no crossover.
     pub(crate) fn packed(found: Result<Self, NoCrossover>) -> [f64; Self::NUMBERS] {
         let Ok(found) = found else {
             return [f64::NAN; Self::NUMBERS];

@@ -13,7 +13,7 @@ use crate::{
     start::check_sample_time,
 };
 
-/// Options of a recursive estimate: the method with its own options, and those that all methods share.
+/// Options of a recursive estimate: the method with its own options, and the options that all methods share.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackOptions {
     /// The method, with its options.
@@ -22,12 +22,12 @@ pub struct TrackOptions {
     pub structure: Structure,
     /// The orders.
     pub orders: Orders,
-    /// Start. Default: a batch fit of the first third.
+    /// Start of the recursion. Default: a batch fit of the first third of the record.
     pub start: StartAt,
     /// Time from which the estimate is updated, s; before it, only the filters are updated. Default: the end of the
-    /// start span if P is that of its fit, else the start of the record.
+    /// start span if P comes from the fit of this span, otherwise the start of the record.
     pub update_from_s: Option<f64>,
-    /// Limits of the search of start fits and windows.
+    /// Limits of the search in start fits and in fits of windows.
     pub search: SearchOptions,
     /// Magnitude of e or u beyond which a sample counts as faulty. Default 1e6.
     pub largest: f64,
@@ -56,7 +56,7 @@ impl TrackOptions {
         }
     }
 
-    /// Returns the defaults of a method that starts by itself, without prior knowledge of the person.
+    /// Returns the default options of a method that needs no start fit, without prior knowledge of the person.
     pub fn without_prior(method: Method, sample_time: SampleTime) -> Self {
         Self::default_for(method, sample_time.nk(DEFAULT_DELAY_S))
     }
@@ -98,7 +98,7 @@ impl TrackOptions {
         method.track_delay_s().filter(|_| method.delay_is_parameter())
     }
 
-    /// Returns the names of the estimated parameters: theta, or the physical ones.
+    /// Returns the names of the estimated parameters: coefficients of theta, or physical parameters.
     pub fn parameter_names(&self) -> Vec<String> {
         let with_delay = self.delay_parameter_s().is_some();
         parameter_names(&self.orders, self.method.is_physical(), with_delay)
@@ -154,10 +154,10 @@ impl TrackOptions {
         })
     }
 
-    /// Checks the options as [`TrackOptions::check`] does, and those that depend on the sample time.
+    /// Checks the options as [`TrackOptions::check`] does, and also the options that depend on the sample time.
     ///
     /// # Errors
-    /// [`IdentError`] with the problem.
+    /// [`IdentError`], which describes the problem.
     pub(crate) fn check_at(&self, sample_time: SampleTime) -> Result<(), IdentError> {
         check_sample_time(sample_time)?;
         self.check()?;
@@ -171,7 +171,7 @@ impl TrackOptions {
     /// Checks method, structure, orders and options against each other.
     ///
     /// # Errors
-    /// [`IdentError`] with the problem.
+    /// [`IdentError`], which describes the problem.
     pub fn check(&self) -> Result<(), IdentError> {
         self.orders.check(self.structure)?;
         let (setup, method) = (self.setup()?, &self.method);
@@ -183,7 +183,7 @@ impl TrackOptions {
             return Err(bad(
                 "the range of the delay",
                 format!("{:?} s", (low, high)),
-                "two finite times, the shorter first",
+                "two finite times, the shorter time first",
             ));
         }
         if let Some(p) = setup.covariance
@@ -199,7 +199,7 @@ impl TrackOptions {
         {
             return Err(bad(
                 "windup_guard",
-                "with forgetting by a window or the gradient, which have no P that grows".to_owned(),
+                "a guard with window or gradient forgetting, in which no P grows".to_owned(),
                 "forgetting = exponential, random-walk, variable or directional; or leave it out",
             ));
         }

@@ -14,16 +14,16 @@ use crate::{
     two_sided::Causal,
 };
 
-/// Tracks a record: the estimate after every `every`-th sample.
+/// Tracks a record and returns the estimate after every `every`-th sample.
 ///
 /// # Errors
-/// [`IdentError`] when the options contradict each other or the record, or the start fit fails.
+/// [`IdentError`] if the options contradict each other or the record, or if the start fit fails.
 pub fn track(record: &Record, options: &TrackOptions, every: usize) -> Result<Trace, IdentError> {
     track_from(record, options, every, None)
 }
 
-/// As [`track`], from a fit that is known: that of [`TrackOptions::start_estimator`] to the start
-/// span. Several methods that start from the same fit need it only once.
+/// As [`track`], with a known fit by [`TrackOptions::start_estimator`] to the start span, so that several methods with
+/// the same start need this fit only once.
 ///
 /// # Errors
 /// As [`track`].
@@ -78,7 +78,7 @@ pub(crate) fn track_with(
     let (input, output) = (record.input(), record.output());
     let p = options.polynomial_orders().parameters();
     let mut covariance = vec![0.0; p * p];
-    // Half a sample, so that rounding of the times does not decide.
+    // The limit is half a sample earlier, so that rounding of the times has no effect.
     let first_update = from_s - sample_time.s() / 2.0;
     for k in 0..record.len() {
         let t = record.time_s(k);
@@ -93,7 +93,7 @@ pub(crate) fn track_with(
             trace.changes.push((t, change));
         }
         if let Some(event) = tracker.event() {
-            event.at(t, sample_time).put(&mut trace.faults);
+            event.at(t, sample_time).append_to(&mut trace.faults);
         }
         if (k + 1) % every != 0 && k + 1 != record.len() {
             continue;
@@ -122,7 +122,7 @@ pub(crate) fn track_with(
         trace.held.push(tracker.counts.held);
         trace.change_odds.extend(tracker.change_odds());
     }
-    trace.response_doubt = tracker.response_doubt();
+    trace.response_finding = tracker.response_finding();
     trace.loop_shape = tracker.open_loop_shape();
     trace.response_is_known = tracker.response_is_known();
     trace.counts = tracker.counts;

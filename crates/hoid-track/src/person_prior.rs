@@ -13,7 +13,7 @@ pub enum PersonPrior {
     /// Default values for people.
     #[default]
     Population,
-    /// As little as possible: the default values with wide errors.
+    /// Almost none: the default values with large standard deviations.
     Nothing,
     /// The default values, except for the named parameters.
     Named(OperatorPrior),
@@ -30,7 +30,7 @@ impl PersonPrior {
         }
     }
 
-    /// Checks that the samples have the rate of the fit.
+    /// Checks that the samples have the sample time and the units of the fit.
     ///
     /// # Errors
     /// [`IdentError::BadStart`].
@@ -56,7 +56,7 @@ impl PersonPrior {
         }
     }
 
-    /// Returns the known delay, s.
+    /// Returns the delay that the prior specifies, s; `None` if it specifies none.
     pub(crate) fn delay_s(&self) -> Option<f64> {
         match self.fit() {
             Some(fit) => Some(fit.operator.tau_e_s()),
@@ -75,11 +75,10 @@ impl PersonPrior {
 impl Value for PersonPrior {
     const KIND: Kind = Kind::Prior;
 
-    /// A file of a fit is read by the program and passed to [`Method::start_from`](crate::Method).
+    /// A file with a fit is read by the program and passed to [`Method::start_from`](crate::Method).
     fn read(text: &str) -> Result<Self, String> {
         let expected = "population, none, NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e and T_I separated by commas, \
-                        such as omega_nm=10.5:0.3, or the file of a fit that hoid identify --json has printed, such as \
-                        fit.json";
+                        such as omega_nm=10.5:0.3, or a file with the output of hoid identify --json, such as fit.json";
         Ok(match text {
             "population" => Self::Population,
             "none" => Self::Nothing,

@@ -26,12 +26,12 @@ pub struct TrackPlan {
 }
 
 impl TrackPlan {
-    /// Builds a plan; the orders of the options are replaced by the largest of the ranges. Everything that does not
-    /// depend on data is checked.
+    /// Builds a plan and checks everything that does not depend on data. The orders of the options are replaced by the
+    /// largest orders of the ranges.
     ///
     /// # Errors
-    /// [`IdentError`] for options that contradict each other, for names that do not exist, or for a start that is
-    /// given for one of several models.
+    /// [`IdentError`] for options that contradict each other, for names that do not exist, or for start coefficients if
+    /// the ranges contain more than one model.
     pub fn new(
         options: TrackOptions,
         ranges: OrderRanges,
@@ -47,7 +47,7 @@ impl TrackPlan {
             return Err(of_one_model());
         }
         let options = TrackOptions {
-            // A name that is unknown for the largest orders is unknown for all.
+            // A name that is unknown for the largest orders is unknown for all orders.
             orders: combinations[combinations.len() - 1],
             ..options
         };
@@ -60,12 +60,12 @@ impl TrackPlan {
         })
     }
 
-    /// True if no order is left to be searched.
+    /// True if no order has to be searched.
     pub fn is_settled(&self) -> bool {
         self.ranges.combinations().is_ok_and(|all| all.len() == 1)
     }
 
-    /// Returns the options; until [`TrackPlan::choose`] with the largest orders of the ranges.
+    /// Returns the options; before [`TrackPlan::choose`] these have the largest orders of the ranges.
     pub fn options(&self) -> &TrackOptions {
         &self.options
     }
@@ -75,12 +75,12 @@ impl TrackPlan {
         self.sample_time
     }
 
-    /// Returns the ranges that are searched.
+    /// Returns the ranges of orders that are searched.
     pub fn ranges(&self) -> &OrderRanges {
         &self.ranges
     }
 
-    /// Searches the open orders on a record; does nothing if there are none. `each` is called after every candidate.
+    /// Searches the open orders on a record; does nothing if no order is open. `each` is called after every candidate.
     ///
     /// # Errors
     /// The errors of the search.
@@ -98,8 +98,8 @@ impl TrackPlan {
         Ok((self.with_orders(choice.fit.orders()), Some(choice)))
     }
 
-    /// Returns the options for orders within the ranges; options of coefficients that these orders do not have are
-    /// left out.
+    /// Returns the options for orders within the ranges. Options of coefficients that do not exist with these orders
+    /// are omitted.
     pub fn with_orders(&self, orders: Orders) -> TrackOptions {
         let mut options = TrackOptions {
             orders,
@@ -111,10 +111,11 @@ impl TrackPlan {
     }
 }
 
-/// Error for a given start while orders are searched.
+/// Error for start coefficients that are given while orders are searched.
 pub fn of_one_model() -> IdentError {
     IdentError::BadStart {
-        reason: "it applies to a single model, but a range of orders or delays is searched; give nk and the orders as single numbers"
+        reason: "a start applies to a single model, but a range of orders or delays is searched; give nk and the \
+                 orders as single numbers"
             .to_owned(),
     }
 }
@@ -139,8 +140,8 @@ fn default_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime
 }
 
 /// Returns the search ranges: the defaults of structure and method, replaced by the named orders. If nk is not named,
-/// the delay lies within the range that is tracked; if no other order is named, orders that are still open are those
-/// of the coefficients of a start, named as f1 or b0.
+/// the delay lies within the tracked range. If no order other than nk is named, open orders follow from the names of
+/// the start coefficients, such as f1 or b0.
 ///
 /// # Errors
 /// [`IdentError::BadOption`] for a name that is not an order.
@@ -192,7 +193,7 @@ fn narrowed(
     ranges
 }
 
-/// Checks the start of the recursion, before data are read or orders searched.
+/// Checks the start of the recursion before data are read or orders are searched.
 fn check(options: &TrackOptions, sample_time: SampleTime) -> Result<(), IdentError> {
     options.check_at(sample_time)?;
     for memory in options.memories()? {

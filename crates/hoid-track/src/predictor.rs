@@ -1,8 +1,8 @@
 //! One-step prediction, sample by sample: the predictor of the kernel with a delay line, for methods that need no
 //! gradient.
 //!
-//! The coefficients may change from sample to sample; the histories of w, v and eps keep the values of their time.
-//! After an overflow of a signal the filters are reset.
+//! The coefficients may change from sample to sample; the histories of w, v and eps keep the values that were computed
+//! with earlier coefficients. After an overflow of a signal the filters are reset.
 
 use hoid_core::state::{State, visit_all};
 use hoid_core::{
@@ -14,13 +14,13 @@ use hoid_model::Orders;
 
 use crate::history::bounded;
 
-/// Capacity for coefficients.
-const ROOM: usize = 64;
+/// Maximum number of coefficients.
+const MAX_COEFFICIENTS: usize = 64;
 
 /// The predictor in direct form.
 #[derive(Debug, Clone)]
 pub struct Predictor {
-    kernel: Box<Kernel<AnyShape, ROOM, ROOM>>,
+    kernel: Box<Kernel<AnyShape, MAX_COEFFICIENTS, MAX_COEFFICIENTS>>,
     delay: DelayLine<Vec<f64>>,
     nk: usize,
 }
@@ -67,12 +67,12 @@ impl Predictor {
         prediction
     }
 
-    fn predict(&mut self, theta: &[f64; ROOM], e: f64, u: f64) -> f64 {
+    fn predict(&mut self, theta: &[f64; MAX_COEFFICIENTS], e: f64, u: f64) -> f64 {
         let x = self.delay.step(e);
         bounded(self.kernel.predict(theta, x, u).1)
     }
 
-    fn correct(&mut self, theta: &[f64; ROOM]) {
+    fn correct(&mut self, theta: &[f64; MAX_COEFFICIENTS]) {
         if !self.kernel.correct(theta).is_finite() {
             self.kernel.reset();
         }
@@ -85,8 +85,8 @@ impl Predictor {
     }
 }
 
-fn padded(theta: &[f64]) -> [f64; ROOM] {
-    let mut padded = [0.0; ROOM];
+fn padded(theta: &[f64]) -> [f64; MAX_COEFFICIENTS] {
+    let mut padded = [0.0; MAX_COEFFICIENTS];
     padded[..theta.len()].copy_from_slice(theta);
     padded
 }

@@ -34,7 +34,7 @@ impl From<Step> for StepOutcome {
     }
 }
 
-/// The tracked delay, and that of the polynomials.
+/// The tracked delay, and the delay of the polynomials.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Delay {
     /// Delay of b0 of the polynomials, samples.
@@ -43,7 +43,7 @@ pub struct Delay {
     pub tau_e_s: Estimate,
 }
 
-/// A recursive method. Samples are finite and not too large.
+/// A recursive method. The samples that it receives are finite and not too large.
 pub trait Recursion: State + Send + Sync {
     /// Takes a sample: filters and estimate are updated.
     fn step(&mut self, sample: Sample) -> StepOutcome;
@@ -53,11 +53,11 @@ pub trait Recursion: State + Send + Sync {
     fn bridge(&mut self, sample: Sample);
     /// Returns theta in the order of [`hoid_model::Orders::parameter_names`].
     fn theta(&self) -> &[f64];
-    /// Writes the covariance of theta by rows; false if there is none yet.
+    /// Writes the covariance of theta by rows; returns false while there is none.
     fn covariance(&self, into: &mut [f64]) -> bool;
     /// Returns the tracked innovation variance.
     fn innovation_variance(&self) -> f64;
-    /// Returns the logarithm of the odds of a recent change, for methods that compute it.
+    /// Returns the evidence of a recent change, as [`Change::odds`], for methods that compute it.
     fn change_odds(&self) -> Option<f64> {
         None
     }
@@ -65,19 +65,19 @@ pub trait Recursion: State + Send + Sync {
     fn change(&self) -> Option<Change> {
         None
     }
-    /// Returns the number of failed fits and the reason of the last, for methods that fit.
+    /// Returns the number of failed fits and the reason for the last failure, for methods that fit.
     fn failures(&self) -> Option<(usize, String)> {
         None
     }
-    /// Returns the response at a frequency in rad/s, if it is not that of the polynomials.
+    /// Returns the response at a frequency in rad/s, if it differs from that of the polynomials.
     fn response(&self, _omega_rad_s: f64) -> Option<Response> {
         None
     }
-    /// Returns its real and imaginary part only.
+    /// Returns the real and imaginary part of this response, without its covariance.
     fn response_value(&self, _omega_rad_s: f64) -> Option<[f64; 2]> {
         None
     }
-    /// Multiplies the covariance of the gain by a factor; false if there is none.
+    /// Multiplies the covariance of the gain by a factor; returns false if there is none.
     fn scale_covariance(&mut self, _factor: f64) -> bool {
         false
     }

@@ -15,8 +15,8 @@ use crate::start::StartState;
 /// Number of parameters of the operator with a known delay: K_e, K_e_dot, omega_nm and zeta_nm.
 pub const OPERATOR: usize = 4;
 
-/// `[b0, b1, d.., f1, f2]` with the Jacobian of the operator's part, and the covariance of d, which stays that of the
-/// start fit.
+/// Coefficients `[b0, b1, d.., f1, f2]` with the Jacobian of b and f with respect to the parameters of the operator,
+/// and the covariance of d, which remains that of the start fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reported {
     sample_time_s: f64,
@@ -33,7 +33,7 @@ impl State for Reported {
 }
 
 impl Reported {
-    /// Builds it from a start in physical parameters, `[K_e, K_e_dot, omega_nm, zeta_nm, d..]`.
+    /// Builds the reported estimate from a start in physical parameters, `[K_e, K_e_dot, omega_nm, zeta_nm, d..]`.
     pub fn new(from: &StartState, nk: usize, sample_time: SampleTime) -> Self {
         let p = from.values.len();
         let (nd, ts) = (p - OPERATOR, sample_time.s());
@@ -51,7 +51,7 @@ impl Reported {
         reported
     }
 
-    /// Sets the estimate.
+    /// Sets K_e, K_e_dot, omega_nm and zeta_nm.
     pub fn set(&mut self, eta: [f64; OPERATOR]) {
         let (values, by) = held_operator(eta, self.sample_time_s);
         let p = self.theta.len();
@@ -60,7 +60,7 @@ impl Reported {
         self.by = by;
     }
 
-    /// Sets the first coefficients of a noise model; missing ones are zero.
+    /// Sets the first coefficients of the noise polynomial D; missing coefficients are zero.
     pub fn set_noise(&mut self, d: &[f64]) {
         let p = self.theta.len();
         for (i, place) in self.theta[2..p - 2].iter_mut().enumerate() {
@@ -78,7 +78,7 @@ impl Reported {
         &self.theta
     }
 
-    /// Writes `J C J'` of the operator, and the covariance of d, by rows.
+    /// Writes the covariance of the coefficients by rows: `J C J'` for the operator, and the covariance of d.
     pub fn covariance(&self, of_eta: &[[f64; OPERATOR]; OPERATOR], into: &mut [f64]) {
         let p = self.theta.len();
         let nd = p - OPERATOR;
@@ -100,7 +100,7 @@ impl Reported {
         }
     }
 
-    /// Replaces the covariance of d by that of the coefficients of a tracked noise model.
+    /// Replaces the covariance of d by the covariance of a tracked noise model.
     pub fn set_covariance_of_noise<const D: usize>(&self, of_d: &[[f64; D]; D], into: &mut [f64]) {
         let p = self.theta.len();
         let nd = p - OPERATOR;

@@ -16,21 +16,21 @@ use crate::{
 /// Requested start of the recursion.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum RequestedStart {
-    /// That of the method: from a batch fit, or from the prior knowledge of people.
+    /// The default start of the method: a batch fit, or prior knowledge of people.
     #[default]
     Default,
-    /// From nothing.
+    /// Without knowledge of the operator.
     Nothing,
-    /// From all coefficients, by name.
+    /// All coefficients, by name.
     Coefficients(BTreeMap<String, f64>),
 }
 
 /// A requested recursion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackRequest {
-    /// The recursion, with its options.
+    /// The recursive method, with its options.
     pub method: Method,
-    /// The structure; `None` for that of the method.
+    /// The structure; `None` for the default structure of the method.
     pub structure: Option<Structure>,
     /// Orders by name, each a range.
     pub orders: NamedOrders,
@@ -70,18 +70,18 @@ impl TrackRequest {
         }
     }
 
-    /// Returns the requested structure, or else that of the method.
+    /// Returns the requested structure or, if there is none, the default structure of the method.
     pub fn structure(&self) -> Structure {
         self.structure.unwrap_or_else(|| self.method.default_structure())
     }
 
-    /// True for a recursion of polynomials, or a delay in samples: the sample rate is then kept.
+    /// True for a recursion of polynomials, or if the delay is in samples: the sampling rate is then kept.
     pub fn counts_samples(&self) -> bool {
         let in_samples = matches!(self.delay, Some(DelayRange::Samples(_))) || self.orders.contains_key("nk");
         in_samples || self.method.counts_samples()
     }
 
-    /// Returns the plan for a sample time; everything that does not depend on data is checked.
+    /// Returns the plan for a sample time, after a check of everything that does not depend on data.
     ///
     /// # Errors
     /// [`IdentError`] for options that contradict each other, or for names that do not exist.
@@ -91,7 +91,7 @@ impl TrackRequest {
             if orders.contains_key("nk") {
                 return Err(IdentError::BadOption {
                     option: "nk".to_owned(),
-                    found: "it and the delay in s".to_owned(),
+                    found: "both nk and the delay in s".to_owned(),
                     expected: "one of them: they are the same quantity in samples and in s".to_owned(),
                 });
             }
@@ -113,7 +113,7 @@ impl TrackRequest {
         let structure = self.structure();
         let ranges = ranges_of(&self.method, structure, &orders, &names, sample_time)?;
         let combinations = ranges.combinations()?;
-        // The largest of each order: a name that is unknown for them is unknown for all.
+        // These are the largest values of each order: a name that is unknown for them is unknown for all orders.
         let largest = combinations[combinations.len() - 1];
         let start = match &self.start {
             RequestedStart::Default => StartAt::Span(None),

@@ -1,12 +1,12 @@
-//! The response of an estimate at a frequency: the quantity that seconds of data determine best.
+//! The response of an estimate at a frequency: the quantity that a few seconds of data determine best.
 //!
 //! For the polynomials, `H = B z^-nk/(A F)` at `z = e^{j omega Ts}`, with the derivatives
 //!
 //! `dH/db_j = z^-(nk+j)/(A F)`, `dH/da_j = -H z^-j/A`, `dH/df_j = -H z^-j/F`,
 //!
-//! so that the covariance of theta gives that of the real and the imaginary part. Gain and phase
-//! follow to first order: `d ln H = dH/H`, whose real part is the relative change of the gain and
-//! whose imaginary part is that of the phase.
+//! so that the covariance of theta gives the covariance of the real and the imaginary part. The errors of gain and
+//! phase follow to first order: `d ln H = dH/H`, whose real part is the relative change of the gain and whose imaginary
+//! part is the change of the phase.
 
 use hoid_model::{Orders, SampleTime, uncertainty::Estimate};
 
@@ -18,7 +18,7 @@ const DB: f64 = 8.685_889_638_065_037;
 pub struct Response {
     /// Real and imaginary part.
     pub value: [f64; 2],
-    /// Their covariance; NaN if there is none.
+    /// Covariance of the real and imaginary part; NaN if there is none.
     pub covariance: [[f64; 2]; 2],
 }
 
@@ -55,7 +55,7 @@ impl Response {
         Estimate::with_variance(degrees * im.atan2(re), degrees * degrees * self.along([-im, re]))
     }
 
-    /// Variance in a direction with the length of H, over |H|^4.
+    /// Variance of the response along the direction `[a, b]`, a vector as long as H, divided by |H|^4.
     fn along(&self, [a, b]: [f64; 2]) -> f64 {
         let c = &self.covariance;
         let square = self.value[0] * self.value[0] + self.value[1] * self.value[1];
@@ -66,7 +66,7 @@ impl Response {
     pub(crate) fn relative_covariance(&self) -> Option<[[f64; 2]; 2]> {
         let [re, im] = self.value;
         let (real, imaginary) = (self.along([re, im]), self.along([-im, re]));
-        // Along both directions: their sum contains the covariance twice.
+        // The variance along the sum of both directions contains the covariance twice.
         let both = self.along([re - im, im + re]);
         let cross = 0.5 * (both - real - imaginary);
         [real, imaginary, cross]
@@ -85,7 +85,7 @@ impl Response {
         let o = orders;
         let (sin, cos) = (-omega_rad_s * sample_time.s()).sin_cos();
         let sum = |first: [f64; 2], of: &[f64]| {
-            // Horner's scheme in q^-1, with the constant `first`.
+            // Horner's scheme in q^-1, with the constant term `first`.
             let inner = of.iter().rev().fold([0.0; 2], |sum, c| {
                 let [re, im] = times(sum, [cos, sin]);
                 [re + c, im]
@@ -98,7 +98,7 @@ impl Response {
             sum([1.0, 0.0], &theta[..o.na]),
             sum([1.0, 0.0], &theta[first_f..first_f + o.nf]),
         );
-        // B has no constant of its own: b_0 is at the delay.
+        // B has no constant term of its own: b_0 is at the delay.
         let b = sum([0.0; 2], &theta[first_b..first_b + o.nb]);
         let (sin, cos) = (-omega_rad_s * sample_time.s() * (o.nk as f64 - 1.0)).sin_cos();
         over(times(b, [cos, sin]), times(a, f))

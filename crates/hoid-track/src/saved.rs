@@ -1,8 +1,8 @@
-//! A tracker as numbers, so that it can continue elsewhere: in another process, or after a restart.
+//! The state of a tracker as numbers, so that it can continue elsewhere: in another process, or after a restart.
 //!
-//! The numbers are those of the start, from which gains and bounds are computed, then all numbers that change
-//! ([`hoid_core::state`]), and a seal against damage. A restored tracker continues with the same digits. It no longer
-//! has the start fit.
+//! The numbers are the start, from which gains and bounds are computed, all numbers that change ([`hoid_core::state`]),
+//! and a seal that detects damage. A restored tracker continues with identical results. It does not contain the start
+//! fit.
 
 use hoid_core::state::{State, visit_all};
 use hoid_model::SampleTime;
@@ -71,15 +71,15 @@ impl Tracker {
         sealed(numbers)
     }
 
-    /// Restores the tracker that [`Tracker::saved`] returned, from its options and its numbers.
+    /// Restores the tracker that [`Tracker::saved`] returned, from its options and these numbers.
     ///
     /// # Errors
-    /// [`IdentError::BadStart`] for numbers of another tracker, and for numbers that were changed or cut; the errors
-    /// of [`Tracker::new`].
+    /// [`IdentError::BadStart`] for numbers of another tracker, and for numbers that were altered or truncated; the
+    /// errors of [`Tracker::new`].
     pub fn restored(options: &TrackOptions, sample_time: SampleTime, numbers: &[f64]) -> Result<Self, IdentError> {
         options.check_at(sample_time)?;
         let wrong = || IdentError::BadStart {
-            reason: "the numbers are those of a tracker with other options; save it again".to_owned(),
+            reason: "the saved numbers belong to a tracker with other options; save it again".to_owned(),
         };
         let numbers = opened(numbers).ok_or_else(|| IdentError::BadStart {
             reason: "the saved tracker was changed or truncated after it was saved; save it again".to_owned(),

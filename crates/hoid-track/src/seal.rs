@@ -1,16 +1,16 @@
-//! The seal of saved numbers: a checksum over all of them, appended to them, by which numbers that were changed, cut
-//! or mixed up are refused.
+//! The seal of saved numbers: a checksum that is appended to the numbers. Numbers that were altered, truncated or
+//! reordered are refused.
 //!
-//! A state that is only nearly right is worse than none: an index outside a ring ends the process, and a matrix that
-//! is not a covariance gives small error bars. The sum is FNV-1a (Fowler, Noll, Vo, 1991; offset basis and prime of 64
-//! bits) over the bits of the numbers in their order, its upper 53 bits as a whole number, which every notation of an
-//! f64 keeps. All NaN count as one, since languages do not keep their bits. It protects against damage, not against an
-//! adversary, who can compute it too.
+//! A slightly wrong state is worse than none: an index outside a ring aborts the process, and an invalid covariance
+//! matrix gives error bars that are too small. The checksum is FNV-1a (Fowler, Noll, Vo, 1991; offset basis and prime
+//! of 64 bits) over the bits of the numbers in their order; its upper 53 bits are stored as an integer, which every
+//! notation of an f64 preserves. All NaN values count as equal, since languages do not preserve their bits. The seal
+//! protects against damage, not against an adversary, who can compute it too.
 
 const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
 const PRIME: u64 = 0x0000_0100_0000_01b3;
-/// Bits of a whole number that an f64 represents.
-const KEPT: u32 = 53;
+/// Number of bits of an integer that an f64 represents exactly.
+const EXACT_BITS: u32 = 53;
 
 /// Returns the numbers with their seal.
 pub fn sealed(mut numbers: Vec<f64>) -> Vec<f64> {
@@ -18,7 +18,7 @@ pub fn sealed(mut numbers: Vec<f64>) -> Vec<f64> {
     numbers
 }
 
-/// Returns the numbers without their seal; `None` if it does not match.
+/// Returns the numbers without their seal; `None` if the seal does not match.
 pub fn opened(sealed: &[f64]) -> Option<&[f64]> {
     let (stated, numbers) = sealed.split_last()?;
     (stated.to_bits() == seal(numbers).to_bits()).then_some(numbers)
@@ -34,7 +34,7 @@ fn seal(numbers: &[f64]) -> f64 {
     };
     let bytes = numbers.iter().flat_map(|number| bits(number).to_le_bytes());
     let sum = bytes.fold(BASIS, |sum, byte| (sum ^ u64::from(byte)).wrapping_mul(PRIME));
-    (sum >> (u64::BITS - KEPT)) as f64
+    (sum >> (u64::BITS - EXACT_BITS)) as f64
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use hoid_model::{Orders, Structure};
 
 use crate::{forgetting::ForgettingRule, memory::Memory, shared_options::WindupGuard};
 
-/// Delay of people who track, s: the prior if no delay is given.
+/// Default delay of people who track, s.
 pub(crate) const DEFAULT_DELAY_S: f64 = 0.2;
 
 /// Names of the operator's parameters in a physical recursion.
@@ -17,11 +17,11 @@ pub(crate) const PHYSICAL_NAMES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zet
 /// Start of the recursion.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StartAt {
-    /// From a batch fit of this span of the record, s; `None` is the first third.
+    /// From a batch fit of this span of the record, s; `None` for the first third.
     Span(Option<(f64, f64)>),
     /// From this theta, in the order of [`Orders::parameter_names`].
     Theta(Vec<f64>),
-    /// From nothing: coefficients of zero, or a typical operator for physical parameters.
+    /// Without a fit: coefficients of zero, or a typical operator for physical parameters.
     Nothing,
 }
 
@@ -34,17 +34,17 @@ pub struct Setup {
     pub orders: Orders,
     /// Start.
     pub start: StartAt,
-    /// Limits of the search of start fits and windows.
+    /// Limits of the search in start fits and in fits of windows.
     pub search: SearchOptions,
     /// Names of the estimated parameters, each with its memory.
     pub memories: Vec<(String, Memory)>,
     /// Rule of forgetting.
     pub forgetting: ForgettingRule,
-    /// P at the start as a multiple of the unit matrix; `None` for that of the start fit.
+    /// P at the start as a multiple of the unit matrix; `None` for the covariance of the start fit.
     pub covariance: Option<f64>,
-    /// Limit of P where nothing excites a parameter; `None` if that follows from the start.
+    /// Limit of P where nothing excites a parameter; `None` if the limit follows from the start.
     pub windup_guard: Option<WindupGuard>,
-    /// Limit of an innovation in the update, in standard deviations of the innovation.
+    /// Limit on an innovation in the update, in standard deviations of the innovation.
     pub limit: f64,
     /// Polynomials that are kept stable.
     pub stable: Stable,
@@ -74,13 +74,15 @@ impl Setup {
         }
     }
 
-    /// Returns the orders of the reported polynomials: a delay between two samples needs one more coefficient of B.
+    /// Returns the orders of the reported polynomials: if the delay is a parameter, it may lie between two samples, and
+    /// B has one more coefficient.
     pub fn polynomial_orders(&self) -> Orders {
         polynomial_orders(self.orders, self.delay_parameter_s.is_some())
     }
 }
 
-/// Orders of the polynomials: a delay between two samples needs one more coefficient of B.
+/// Orders of the polynomials: if the delay is a parameter, it may lie between two samples, and B has one more
+/// coefficient.
 pub(crate) fn polynomial_orders(orders: Orders, with_delay: bool) -> Orders {
     match with_delay {
         true => Orders { nb: 3, ..orders },

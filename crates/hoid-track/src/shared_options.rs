@@ -10,16 +10,16 @@ use hoid_ident::{
 
 use crate::{forgetting::ForgettingRule, memory::MemoryOptions};
 
-/// How far the variances of P may grow where nothing excites a parameter.
+/// Limit on the growth of the variances of P where nothing excites a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum WindupGuard {
-    /// Without limit: equations 5.26 and 31 of the thesis unchanged.
+    /// No limit: equations 5.26 and 31 of the thesis unchanged.
     Off,
-    /// Up to this multiple of their initial value.
+    /// Growth up to this multiple of their initial value.
     Bound(f64),
 }
 
-/// `off`, or the bound.
+/// Parses `off`, or the bound.
 impl Value for WindupGuard {
     const KIND: Kind = Kind::NumberOrOff;
 
@@ -28,7 +28,7 @@ impl Value for WindupGuard {
             true => Ok(Self::Off),
             false => f64::read(text)
                 .map(Self::Bound)
-                .map_err(|_| "off, or the multiple of P at the start that is allowed, such as 1e4".to_owned()),
+                .map_err(|_| "off, or the largest allowed multiple of the initial P, such as 1e4".to_owned()),
         }
     }
 
@@ -48,7 +48,7 @@ impl Value for WindupGuard {
 }
 
 settings! {
-    /// The gain of a recursion of the kernel.
+    /// Options of the gain of a recursion in the kernel.
     pub struct GainOptions {
         /// Initial covariance P: X times the unit matrix, in units of the innovation variance (thesis: 0.1)
         #[setting(bounds(Bounds::PositiveFinite), default("that of the start fit, else 1e6"))]
@@ -70,7 +70,7 @@ settings! {
 }
 
 impl GainOptions {
-    /// The limit in use: none for a sliding window, whose sums contain every sample as recorded.
+    /// Returns the limit on innovations; infinite for a sliding window, whose sums contain every sample as recorded.
     pub fn limit_or(&self, default: f64) -> f64 {
         match self.forgetting {
             ForgettingRule::Window => f64::INFINITY,
@@ -78,9 +78,8 @@ impl GainOptions {
         }
     }
 
-    /// The guard against windup in use; `None` if it follows from the start. It is off for the
-    /// recursion of the thesis: P at the start is given, P forgets exponentially, and no innovation
-    /// is too large.
+    /// Returns the guard against windup; `None` if it follows from the start. It is off for the recursion of the
+    /// thesis: P at the start is given, P forgets exponentially, and innovations are not limited.
     pub fn windup_guard(&self, limit: f64) -> Option<WindupGuard> {
         let of_the_text =
             self.covariance.is_some() && self.forgetting == ForgettingRule::Exponential && limit == f64::INFINITY;
@@ -113,7 +112,7 @@ settings! {
 }
 
 settings! {
-    /// A tracked delay.
+    /// Options for tracking a delay.
     pub struct DelayOptions {
         /// Also track the delay tau_e within this range: as a parameter (physical) or in whole samples (rpem,
         /// multiple-model)

@@ -12,13 +12,13 @@ use crate::{
 };
 use hoid_ident::{Choice, IdentError};
 
-/// Computes the options from a record of the warm-up, with the searched values.
+/// Chooses the options for a record of the warm-up; also returns the result of the search.
 pub type Choose<'a> = &'a dyn Fn(&Record) -> Result<(TrackOptions, Option<Choice>), IdentError>;
 
-/// Share of the warm-up that is collected in addition after a failed fit.
-const QUARTER: usize = 4;
-/// Length that is kept of a warm-up that continues, as a multiple of its length.
-const KEPT: usize = 2;
+/// Divisor of the length of the warm-up that gives the number of additional samples after a failed fit.
+const RETRY_DIVISOR: usize = 4;
+/// Maximum number of samples that a continued warm-up keeps, as a multiple of its length.
+const MAX_KEPT_LENGTHS: usize = 2;
 /// Index of the number of kept samples in a saved warm-up.
 const COUNT: usize = 4;
 /// Longest run of faulty samples within a warm-up, s; after a longer one the warm-up restarts.
@@ -38,14 +38,14 @@ pub enum Stage {
 pub struct LiveOutcome {
     /// Outcome of the tracker, once there is one.
     pub outcome: Option<Outcome>,
-    /// Options and search of a start fit that was made at this sample.
+    /// Options and result of the search for a start fit that was made at this sample.
     pub started: Option<(TrackOptions, Option<Choice>)>,
-    /// True if the sample completed no sample of the lower rate: the recursion did not advance.
+    /// True if no sample of the lower rate was completed: the recursion did not advance.
     pub between: bool,
 }
 
 impl Stage {
-    /// Builds a recursion that starts at once if its start is given, else after a warm-up of a given number of
+    /// Builds a recursion. It starts at once if it needs no start fit, otherwise after a warm-up of a given number of
     /// samples.
     ///
     /// # Errors
@@ -57,7 +57,7 @@ impl Stage {
         })
     }
 
-    /// Returns everything that changes as numbers, and the orders once there is a tracker, for [`Stage::restored`]. The
+    /// Returns the complete state as numbers, and the orders once there is a tracker, for [`Stage::restored`]. The
     /// recursion does not change.
     pub fn saved(&mut self) -> (Option<Orders>, Vec<f64>) {
         match self {
@@ -66,11 +66,11 @@ impl Stage {
         }
     }
 
-    /// Restores the recursion that [`Stage::saved`] returned, from its plan.
+    /// Restores the recursion that [`Stage::saved`] returned, with its plan.
     ///
     /// # Errors
-    /// [`IdentError::BadStart`] for numbers of another recursion, and for numbers that were changed or cut; the errors
-    /// of [`Tracker::new`].
+    /// [`IdentError::BadStart`] for numbers of another recursion, and for numbers that were altered or truncated; the
+    /// errors of [`Tracker::new`].
     pub fn restored(
         plan: &TrackPlan,
         orders: Option<Orders>,
@@ -87,8 +87,9 @@ impl Stage {
         Ok(Self::Tracking(Box::new(tracker)))
     }
 
-    /// Takes a sample; NaN marks faulty or missing values. If `moves` is false a tracker only updates its filters. The
-    /// fit of the warm-up is made at its last sample, with the options that `choose` returns for it.
+    /// Takes a sample; NaN marks faulty or missing values. If `moves` is false, the tracker only updates its filters.
+    /// The start fit is made at the last sample of the warm-up, with the options that `choose` returns for the record
+    /// of the warm-up.
     pub fn update(&mut self, sample: Sample, moves: bool, choose: Choose<'_>) -> LiveOutcome {
         let warm_up = match self {
             Self::Tracking(tracker) => {
@@ -116,7 +117,7 @@ impl Stage {
                 }
             }
             Err(error) => {
-                let more = (warm_up.length / QUARTER).max(1);
+                let more = (warm_up.length / RETRY_DIVISOR).max(1);
                 warm_up.needed = warm_up.collected.saturating_add(more);
                 warm_up.trouble = Some(error.to_string());
                 LiveOutcome::default()
@@ -125,7 +126,7 @@ impl Stage {
     }
 }
 
-/// The samples that are collected for the start fit.
+/// Samples that are collected for the start fit.
 #[derive(Debug)]
 pub struct WarmUp {
     length: usize,
@@ -137,7 +138,7 @@ pub struct WarmUp {
     pub needed: usize,
     /// Reason why the last start fit failed or the collection restarted.
     pub trouble: Option<String>,
-    /// Number of faulty samples at the end.
+    /// Number of consecutive faulty samples at the end.
     faulty: usize,
 }
 
@@ -159,7 +160,7 @@ impl State for WarmUp {
             u: 0.0,
             reference: None,
         };
-        self.samples.resize(kept.min(KEPT.saturating_mul(self.length)), nothing);
+        self.samples.resize(kept.min(MAX_KEPT_LENGTHS.saturating_mul(self.length)), nothing);
         for sample in &mut self.samples {
             let mut known = sample.reference.is_some();
             let mut reference = sample.reference.unwrap_or(f64::NAN);
@@ -170,19 +171,19 @@ impl State for WarmUp {
 }
 
 impl WarmUp {
-    /// Returns the warm-up as numbers, for [`WarmUp::restored`]; the reason of the last failure is not among them.
+    /// Returns the warm-up as numbers, for [`WarmUp::restored`], but without the reason for the last failure.
     pub fn saved(&mut self) -> Vec<f64> {
         let mut numbers = Vec::new();
         self.visit(&mut |number| numbers.push(*number));
         sealed(numbers)
     }
 
-    /// Restores the warm-up that [`WarmUp::saved`] returned. `None` for numbers of something else, and for numbers
-    /// that were changed or cut.
+    /// Restores the warm-up that [`WarmUp::saved`] returned. `None` for other numbers, and for numbers that were
+    /// altered or truncated.
     pub fn restored(sample_time: SampleTime, numbers: &[f64]) -> Option<Self> {
         let mut warm_up = Self::new(0, sample_time);
         let numbers = opened(numbers)?;
-        // Room for the samples is made before they are read: there are no more of them than numbers.
+        // Memory for the samples is allocated before they are read; there cannot be more samples than numbers.
         numbers.get(COUNT).filter(|kept| **kept <= numbers.len() as f64)?;
         let mut left = numbers.iter();
         let mut lacking = false;
@@ -205,7 +206,7 @@ impl WarmUp {
         }
     }
 
-    /// Takes a sample. The collection starts with a sound sample, and restarts after a long fault.
+    /// Takes a sample. The collection starts with a sound sample and restarts after a long fault.
     fn collect(&mut self, sample: Sample) {
         let sound = sample.e.is_finite() && sample.u.is_finite();
         self.faulty = if sound { 0 } else { self.faulty.saturating_add(1) };
@@ -219,14 +220,14 @@ impl WarmUp {
             ));
             return;
         }
-        if self.samples.len() >= KEPT.saturating_mul(self.length) {
+        if self.samples.len() >= MAX_KEPT_LENGTHS.saturating_mul(self.length) {
             self.samples.pop_front();
         }
         self.samples.push_back(sample);
         self.collected = self.collected.saturating_add(1);
     }
 
-    /// Excludes the idle head, and collects as many samples to replace it; false if there is none.
+    /// Excludes the idle head and extends the warm-up by as many samples; returns false if there is no idle head.
     fn leave_out_idle(&mut self) -> bool {
         let Ok(record) = self.record() else { return false };
         let idle = idle_head(&record);
@@ -236,7 +237,7 @@ impl WarmUp {
         self.samples.drain(..idle.min(self.samples.len()));
         self.needed = self.collected.saturating_add(idle);
         self.trouble = Some(format!(
-            "neither e nor u moved for {:.1} s: left out, the warm-up continues",
+            "neither e nor u moved for {:.1} s: this span is left out, and the warm-up continues",
             idle as f64 * self.sample_time.s()
         ));
         true
@@ -253,7 +254,7 @@ impl WarmUp {
         Ok((tracker, choice))
     }
 
-    /// Returns the collected samples as a record; a faulty value is replaced by the last good one.
+    /// Returns the collected samples as a record; a faulty value is replaced by the last good value.
     fn record(&self) -> Result<Record, IdentError> {
         let channel = |name: &str, of: fn(&Sample) -> f64| {
             let mut last = self.samples.iter().map(of).find(|v| v.is_finite()).unwrap_or(0.0);

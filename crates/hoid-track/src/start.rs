@@ -1,9 +1,9 @@
 //! Start of a recursion: values, covariance and innovation variance.
 //!
-//! From a batch fit, P is its covariance over sigma^2, which is the inverse of the information
-//! matrix; in physical parameters `P_eta = T^{-1} P_theta T^{-T}` with the Jacobian T of
-//! theta(eta). A multiple of the unit matrix instead (`0.1 I` in the thesis) is the gain that the user chooses; the
-//! error bars then still start with the covariance of the fit.
+//! After a batch fit, P is the covariance of the fit divided by sigma^2, which is the inverse of the information
+//! matrix; in physical parameters `P_eta = T^{-1} P_theta T^{-T}` with the Jacobian T of theta(eta). If the user
+//! selects a multiple of the unit matrix instead (`0.1 I` in the thesis), it determines only the gain; the error bars
+//! still start with the covariance of the fit.
 
 use std::collections::BTreeMap;
 
@@ -17,25 +17,23 @@ use crate::{
     start_noise::StartNoise,
 };
 
-/// Variance of P for a start from nothing, in units of the innovation variance.
+/// Variance in P for a start without knowledge, in units of the innovation variance.
 const UNKNOWN: f64 = 1e6;
-/// Operator of a start from nothing: K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm, tau_e (s), of the order of magnitude
-/// in the thesis.
+/// Operator of a start without knowledge: K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm, tau_e (s), of the same order of
+/// magnitude as in the thesis.
 const TYPICAL_OPERATOR: [f64; 5] = [0.1, 0.05, 10.0, 0.4, 0.25];
-/// First noise pole of a start from nothing.
-const TYPICAL_NOISE_POLE: f64 = -0.8;
-/// Bounds of omega_nm in rad/s (the upper one as a share of the Nyquist frequency) and of zeta_nm.
+/// Coefficient d1 of a start without knowledge: a noise pole at 0.8.
+const TYPICAL_D1: f64 = -0.8;
+/// Bounds of omega_nm, the lower in rad/s and the upper as a share of the Nyquist frequency, and bounds of zeta_nm.
 const SLOWEST_OMEGA: f64 = 0.5;
 const FASTEST_SHARE: f64 = 0.5;
 const DAMPING: [f64; 2] = [0.02, 5.0];
-/// Longest sample time of a tracker, s: beyond it the fastest neuromuscular system that the samples can represent is
-/// slower than the slowest that people have.
+/// Longest sample time of a tracker, s: with a longer one, the upper bound of omega_nm would be below the lower bound.
 const LONGEST_SAMPLE_TIME_S: f64 = FASTEST_SHARE * std::f64::consts::PI / SLOWEST_OMEGA;
 /// Factor by which the roots of an unstable noise model are moved inwards until it is stable.
-const DRAWN_INSIDE: f64 = 0.99;
+const ROOT_SHRINK_FACTOR: f64 = 0.99;
 
-/// Checks that an operator can be tracked at this sample time, regardless of the method: memories, delays and bounds
-/// are in seconds and suit people in all methods.
+/// Checks that the sample time leaves a range between the bounds of omega_nm; the limit is the same for all methods.
 ///
 /// # Errors
 /// [`IdentError::BadOption`] above [`LONGEST_SAMPLE_TIME_S`].
@@ -48,8 +46,8 @@ pub(crate) fn check_sample_time(sample_time: SampleTime) -> Result<(), IdentErro
         option: "the sample time of a tracker".to_owned(),
         found: format!("{ts} s"),
         expected: format!(
-            "less than {LONGEST_SAMPLE_TIME_S:.2} s, since a person cannot be followed with fewer samples; if the time \
-             is in ms, divide it by 1000 (a sample time of {} s) or name its unit",
+            "less than {LONGEST_SAMPLE_TIME_S:.2} s, since slower sampling cannot follow a person; if the time is in \
+             ms, divide it by 1000 (a sample time of {} s) or name its unit",
             ts / 1000.0
         ),
     })
@@ -58,25 +56,25 @@ pub(crate) fn check_sample_time(sample_time: SampleTime) -> Result<(), IdentErro
 /// The start in the coordinates of the recursion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StartState {
-    /// theta, or eta.
+    /// Values of theta, or of the physical parameters eta.
     pub values: Vec<f64>,
-    /// P by rows, over the innovation variance.
+    /// P by rows, divided by the innovation variance.
     pub covariance: Vec<f64>,
-    /// Covariance of the values by rows, over the innovation variance.
+    /// Covariance of the values by rows, divided by the innovation variance.
     pub spread: Vec<f64>,
-    /// Innovation variance; zero when unknown.
+    /// Innovation variance; zero if it is unknown.
     pub variance: f64,
-    /// Number of residuals from which it was estimated.
+    /// Number of residuals from which the innovation variance was estimated.
     pub residuals: f64,
-    /// True for a start from a fit.
+    /// True if the start comes from a fit.
     pub from_fit: bool,
     /// The fit, if it is available.
     pub fit: Option<Fit>,
 }
 
 impl StartState {
-    /// Computes the start that the options select, from a record of the start span if a fit is needed, and from that
-    /// fit if it is known.
+    /// Computes the start that the options select. If a fit is needed, it is `known` or is computed from the record of
+    /// the start span.
     ///
     /// # Errors
     /// The errors of the batch fit; [`IdentError::BadStart`].
@@ -93,7 +91,7 @@ impl StartState {
         }
     }
 
-    /// Start from a given theta.
+    /// Start with a given theta.
     fn given(setup: &Setup, theta: &[f64], sample_time: SampleTime) -> Result<Self, IdentError> {
         let names = setup.orders.parameter_names();
         if theta.len() != names.len() || theta.iter().any(|t| !t.is_finite()) {
@@ -123,7 +121,7 @@ impl StartState {
                 *value = within(*value, limits);
             }
             if o.nd > 0 {
-                values[first + o.nc] = TYPICAL_NOISE_POLE;
+                values[first + o.nc] = TYPICAL_D1;
             }
         }
         Ok(Self::without_fit(setup, values))
@@ -143,7 +141,7 @@ impl StartState {
         }
     }
 
-    /// Start from the batch fit of a record.
+    /// Start with the batch fit of a record.
     fn fitted(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Self, IdentError> {
         let FittedStart {
             values,
@@ -183,7 +181,7 @@ impl StartState {
     }
 }
 
-/// The bounds of a recursion with room for N parameters.
+/// Returns the bounds of the parameters of a recursion with capacity for N parameters.
 ///
 /// # Errors
 /// [`IdentError::UnknownParameter`], [`IdentError::BadOption`].
@@ -193,7 +191,7 @@ pub fn physical_bounds<const N: usize>(setup: &Setup, sample_time: SampleTime) -
     Ok(std::array::from_fn(|i| limits.get(i).copied().unwrap_or(free)))
 }
 
-/// Returns the least and largest value of each physical parameter and of c and d.
+/// Returns the lower and upper bound of each physical parameter and of c and d.
 ///
 /// # Errors
 /// [`IdentError::UnknownParameter`], [`IdentError::BadOption`].
@@ -253,7 +251,7 @@ fn stabilised(setup: &Setup, mut values: Vec<f64>) -> Vec<f64> {
     while d.iter().all(|v| v.is_finite()) && !roots_inside(d, 1.0) {
         let mut factor = 1.0;
         for v in d.iter_mut() {
-            factor *= DRAWN_INSIDE;
+            factor *= ROOT_SHRINK_FACTOR;
             *v *= factor;
         }
     }
@@ -299,8 +297,8 @@ fn polynomial_fit(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result
     }
 }
 
-/// Returns the Box-Jenkins fit if its physical parameters exist and are within the bounds, else the grey box, for
-/// which they always are, with a noise model of the requested order.
+/// Returns the Box-Jenkins fit if its physical parameters exist and are within the bounds, otherwise the grey-box fit,
+/// for which this is always true, with a noise model of the requested order.
 fn fit_physical(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<FittedStart, IdentError> {
     if setup.delay_parameter_s.is_none()
         && let Some(start) = from_box_jenkins(setup, record, known)?
@@ -347,7 +345,7 @@ fn from_box_jenkins(setup: &Setup, record: &Record, known: Option<&Fit>) -> Resu
     }))
 }
 
-/// `T C T'` for sparse rows of T.
+/// Returns `T C T'` for a matrix T with sparse rows.
 fn congruence(rows: &[Vec<(usize, f64)>], c: &[f64], width: usize) -> Vec<f64> {
     let product = |a: &[(usize, f64)], b: &[(usize, f64)]| -> f64 {
         let pairs = a.iter().flat_map(|x| b.iter().map(move |y| (x, y)));
@@ -388,9 +386,9 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<FittedStart, IdentErr
     let value = |name: &str| parameters.iter().position(|(n, _)| n == name);
     let operator = if setup.delay_parameter_s.is_some() { 5 } else { 4 };
     let fit = found.polynomial_fit(0).clone();
-    // The remnant of the grey box has one pole. If D is to have more, it is fitted to the residual of the operator: a
-    // D of too low order leaves the innovations coloured, and a bank of hypotheses takes coloured innovations for
-    // changes.
+    // The remnant of the grey box has one pole. If D must have more poles, it is fitted to the residual of the
+    // operator: a D of too low an order leaves the innovations coloured, and a bank of hypotheses takes coloured
+    // innovations for changes.
     let noise = if o.nd > 1 {
         StartNoise::of(&fit, record, o.nd)
     } else {
@@ -442,8 +440,8 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<FittedStart, IdentErr
             }
         }
         for i in 0..p {
-            // Parameters that the grey box did not have, or kept fixed, are unknown: coefficients are of the order of
-            // 1, gains may change by their own size.
+            // Parameters that the grey box did not have, or kept fixed, are unknown: the standard deviation of a
+            // coefficient is set to about 1, that of a gain to the size of the gain.
             if covariance[i * p + i] == 0.0 {
                 let size = if i < operator { eta[i] * eta[i] } else { 1.0 };
                 covariance[i * p + i] = size.max(variance);

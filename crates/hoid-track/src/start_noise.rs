@@ -1,4 +1,4 @@
-//! The noise model of a start whose operator is known: D of the residual of the operator.
+//! The noise model of a start whose operator is known: the polynomial D, fitted to the residual of the operator.
 //!
 //! `v(t) = u(t) - (B/F) q^-nk e(t)` is an autoregression, `D v = eps`, whose coefficients follow from
 //! least squares (L. Ljung, *System Identification*, 1999, section 10.1).
@@ -9,17 +9,17 @@ use hoid_model::{Channel, Orders, Record, Structure};
 /// D with its covariance.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct StartNoise {
-    /// Coefficients after the 1.
+    /// Coefficients after the leading 1.
     pub d: Vec<f64>,
-    /// Their covariance, by rows.
+    /// Covariance of the coefficients, by rows.
     pub covariance: Vec<f64>,
     /// Variance of the innovations.
     pub variance: f64,
 }
 
 impl StartNoise {
-    /// Fits D of order nd to the residual of the operator of this fit in a record; `None` if the record is too short
-    /// or constant, or the fit has another sample time.
+    /// Fits D of order nd to the residual of the operator of this fit in a record; `None` if the record is too short or
+    /// constant, or if the fit has another sample time.
     pub fn of(fit: &Fit, record: &Record, nd: usize) -> Option<Self> {
         let simulated = fit.simulate(record).ok()?;
         let output = record.output().get(simulated.first..)?;

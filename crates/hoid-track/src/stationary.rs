@@ -1,24 +1,27 @@
-//! A recursion without a guard while the signals are constant.
+//! Treatment of constant signals in a recursion without a guard.
 //!
-//! If e and u stay constant the regressor is zero or constant, the innovations vanish, and their variance, a mean of
+//! If e and u stay constant, the regressor is zero or constant and the innovations vanish. Their variance, a mean of
 //! `eps^2/(1 + h' Sigma h)` with an exponential memory ([`hoid_core::innovation_variance`]), decays to zero as
-//! `lambda^t`, while the covariance over it grows by at most `1/lambda` per sample, in unexcited directions only, and
-//! up to its bound. The error bars, the root of their product, go to zero although nothing is learnt. Such samples
-//! carry no information about parameters or noise, since neither is excited (G. C. Goodwin and K. S. Sin, *Adaptive
-//! Filtering Prediction and Control*, 1984, section 3.4; K. J. Åström and B. Wittenmark, *Adaptive Control*, 2nd ed.
-//! 1995, section 11.5, conditional updating). They therefore enter only the filters:
+//! `lambda^t`, while the covariance divided by this variance grows by at most `1/lambda` per sample, in unexcited
+//! directions only, and up to its bound. The error bars, the square roots of the products of both, go to zero although
+//! nothing is learnt. Such samples carry no information about parameters or noise, since neither is excited (G. C.
+//! Goodwin and K. S. Sin, *Adaptive Filtering Prediction and Control*, 1984, section 3.4; K. J. Åström and B.
+//! Wittenmark, *Adaptive Control*, 2nd ed. 1995, section 11.5, conditional updating). They therefore enter only the
+//! filters:
 //!
-//! - A signal is **stationary** while it stays within [`SHARE`] of its typical size about the value at which the
-//!   stationary span started. The size is the geometric mean over blocks of a second of the largest distance from the
-//!   value at the start of the block; before ten blocks are known, a stationary span has a single value.
-//! - There is **no information** if both e and u are stationary for [`BOTH_S`], or one of them for [`ONE_S`]: a frozen
-//!   channel, or a resting hand, whose response cannot be distinguished from none.
-//! - The recursion is then restored to the first sample of the span, bit for bit (including a jump to its value): to
-//!   the numbers that were stored before it, from which the recursion takes the samples again. Estimate, covariance and
-//!   innovation variance keep their values of that time for the whole span.
-//! - It continues once both signals move and the filters have settled ([`crate::guard`]).
+//! - A signal is **stationary** while it stays within [`SHARE`] of its typical size from its value at the start of the
+//!   stationary span. The typical size is the geometric mean, over blocks of one second, of the largest distance from
+//!   the value at the start of the block. Before ten blocks are known, a span is stationary only if all its values are
+//!   equal.
+//! - There is **no information** if both e and u are stationary for [`BOTH_S`], or one of the two for [`ONE_S`]: a
+//!   frozen channel, or a resting hand, whose response cannot be distinguished from no response.
+//! - The recursion is then restored exactly to its state before the first sample of the span (or before a jump to the
+//!   value of the span): a stored state is restored, and the recursion takes the samples from then on again. Estimate,
+//!   covariance and innovation variance keep their values of that time for the whole span.
+//! - The estimate is updated again once both signals move and the filters have settled ([`crate::guard`]).
 //!
-//! Without stationary spans the digits are the same as without this watch. Sample times below 40 us are not watched.
+//! Without stationary spans, the results are identical to those without this watch. At sample times below 40 us,
+//! signals are not watched.
 
 use hoid_core::state::{State, visit_all};
 use hoid_model::SampleTime;
@@ -28,35 +31,36 @@ use crate::{
     recursion::{Recursion, Sample, StepOutcome},
 };
 
-/// Share of the typical size within which a signal is stationary.
+/// Share of its typical size within which a signal is stationary.
 const SHARE: f64 = 0.02;
-/// Shortest stationary spans of both signals, and of one, without information, s, and their least number of samples.
+/// Shortest stationary span of both signals, and of one signal, that carries no information, s, and its smallest number
+/// of samples.
 pub(crate) const BOTH_S: f64 = 1.0;
 const ONE_S: f64 = 5.0;
 const LEAST: u64 = 20;
-/// Number of blocks after which the size of a signal is known, and number over which it is averaged.
-const LEARNT: u32 = 10;
+/// Number of blocks after which the size of a signal is known, and largest number of blocks over which it is averaged.
+const KNOWN_AFTER: u32 = 10;
 const AVERAGED: u32 = 60;
 /// Largest number of samples between two snapshots.
 const MOST: u64 = 1 << 17;
 /// e and u.
 const CHANNELS: usize = 2;
 
-/// Way in which a recursion takes a sample.
+/// Way in which a recursion uses a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Act {
-    /// Filters and estimate.
+    /// Filters and estimate are updated.
     Step,
-    /// Only the filters.
+    /// Only the filters are updated.
     Follow,
-    /// Only the filters, with the prediction of u.
+    /// Only the filters are updated, with the prediction of u.
     Bridge,
 }
 
 impl Act {
     const ALL: [Self; 3] = [Self::Step, Self::Follow, Self::Bridge];
 
-    /// Takes the sample; no innovation if u is missing.
+    /// Passes the sample to the recursion; returns `None` if u is missing.
     #[inline]
     pub fn on(self, recursion: &mut dyn Recursion, sample: Sample) -> Option<StepOutcome> {
         match self {
@@ -74,7 +78,7 @@ impl Act {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct BufferedSample {
     values: [f64; CHANNELS],
-    /// NaN for none.
+    /// External signal; NaN if there is none.
     reference: f64,
     act: usize,
 }
@@ -94,31 +98,31 @@ impl BufferedSample {
 /// Duration of the stationary span of a signal, and its typical size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Channel {
-    /// Value at which the span started, number of samples since then, and number of last samples with the same value.
+    /// Value at which the span started, number of samples since then, and number of latest samples with the same value.
     value: f64,
-    stands: u64,
+    stationary_samples: u64,
     same: u64,
     last: f64,
-    /// Largest step within the previous block and within this one, and whether the signal reached the span and the
-    /// value by a larger step.
+    /// Largest step in the previous block and in this one, and whether the signal jumped by more than these at the
+    /// start of the span and at the start of the repeated value.
     steps: [f64; 2],
     jumped: [bool; 2],
     tolerance: f64,
-    /// Value at the start of the block, and the largest distance from it.
+    /// Value at the start of the block, and the largest distance from it so far.
     first: f64,
     largest: f64,
-    /// Mean logarithm of these distances, and number of blocks in it.
+    /// Mean logarithm of the largest distances, and number of blocks in this mean.
     size: f64,
     blocks: u32,
 }
 
-hoid_core::state!([] Channel { value, stands, same, last, steps, jumped, tolerance, first, largest, size, blocks });
+hoid_core::state!([] Channel { value, stationary_samples, same, last, steps, jumped, tolerance, first, largest, size, blocks });
 
 impl Channel {
     /// A channel before the first sample.
     const NEW: Self = Self {
         value: f64::NAN,
-        stands: 0,
+        stationary_samples: 0,
         same: 0,
         last: f64::NAN,
         steps: [0.0; 2],
@@ -140,22 +144,23 @@ impl Channel {
             (self.same, self.jumped[1]) = (0, jumped);
         }
         if !missing && (x - self.value).abs() <= self.tolerance {
-            self.stands += 1;
+            self.stationary_samples += 1;
         } else {
-            (self.value, self.stands, self.jumped[0]) = (x, 0, jumped);
+            (self.value, self.stationary_samples, self.jumped[0]) = (x, 0, jumped);
         }
         self.last = x;
         self.steps[1] = self.steps[1].max(step);
         self.largest = self.largest.max((x - self.first).abs());
     }
 
-    /// Number of samples of a stationary span that must be undone, for a span of at least `least` samples: those that
-    /// repeat one value, if nearly all do, and the one before them if the signal jumped to that value.
-    fn stood(&self, least: u64) -> (u64, bool) {
+    /// Returns the number of samples of a stationary span that must be undone, for a span of at least `least` samples,
+    /// and true if the signal jumped at its start, so that the sample before it must also be undone. If nearly all
+    /// samples have the same value, only these are counted.
+    fn samples_to_undo(&self, least: u64) -> (u64, bool) {
         if 4 * self.same >= 3 * least {
             (self.same, self.jumped[1])
         } else {
-            (self.stands, self.jumped[0])
+            (self.stationary_samples, self.jumped[0])
         }
     }
 
@@ -163,13 +168,13 @@ impl Channel {
         self.steps = [self.steps[1], 0.0];
         let distance = std::mem::take(&mut self.largest);
         self.first = x;
-        // The size is not learnt within a stationary span.
+        // The size of a signal is not learnt from blocks within a stationary span.
         if distance <= self.tolerance || !distance.is_finite() {
             return;
         }
         self.blocks = self.blocks.saturating_add(1);
         self.size += (distance.ln() - self.size) / f64::from(self.blocks.min(AVERAGED));
-        if self.blocks >= LEARNT {
+        if self.blocks >= KNOWN_AFTER {
             self.tolerance = SHARE * self.size.exp();
         }
     }
@@ -178,20 +183,20 @@ impl Channel {
 /// The stationarity watch of a recursion.
 #[derive(Debug, Clone)]
 pub(crate) struct StationaryWatch {
-    /// Numbers of samples: of a stationary span of both signals and of one without information, of a block, and until
-    /// the filters have settled.
+    /// Numbers of samples: in a stationary span of both signals and of one signal without information, in a block, and
+    /// until the filters have settled.
     both: u64,
     one: u64,
     block: u64,
     settle: u64,
     samples: u64,
     channels: [Channel; CHANNELS],
-    /// The recursion before the stored samples, and before the last `since` of them.
+    /// State of the recursion before the first stored sample, and before the stored sample with index `since`.
     kept: [Snapshot; 2],
     since: usize,
     ring: Vec<BufferedSample>,
-    /// Number of samples of the pause so far, and of consecutive samples in which both signals move; zero outside a
-    /// pause.
+    /// Number of samples of the pause so far, and number of consecutive samples in which both signals move; zero
+    /// outside a pause.
     paused: u64,
     moving: u64,
     channel: usize,
@@ -285,11 +290,11 @@ impl StationaryWatch {
         }
     }
 
-    /// Returns the channel that has been constant for too long, and the number of samples to undo.
+    /// Returns the channel that has been constant for too long, and the number of samples that must be undone.
     #[inline]
     fn stationary_channel(&self) -> Option<(GuardChannel, u64)> {
-        let [e, u] = self.channels.map(|channel| channel.stands);
-        let stood = |c: usize, least: u64| self.channels[c].stood(least);
+        let [e, u] = self.channels.map(|channel| channel.stationary_samples);
+        let stood = |c: usize, least: u64| self.channels[c].samples_to_undo(least);
         let all = |(repeats, jumped): (u64, bool)| repeats + u64::from(jumped);
         if e.min(u) >= self.both {
             let (e, u) = (stood(0, self.both), stood(1, self.both));
@@ -304,7 +309,8 @@ impl StationaryWatch {
         }
     }
 
-    /// Stores the numbers of the recursion before the next sample, and drops those of two snapshots ago.
+    /// Stores the state of the recursion before the next sample, and drops the older of two stored states with its
+    /// samples.
     fn keep(&mut self, recursion: &mut dyn Recursion) {
         self.ring.drain(..self.since);
         self.since = self.ring.len();
@@ -315,7 +321,7 @@ impl StationaryWatch {
         }
     }
 
-    /// Restores the recursion to before the last `stood` samples, all of which then enter the filters.
+    /// Restores the recursion to its state before the last `stood` samples, after which these only update the filters.
     #[cold]
     fn begin_pause(
         &mut self,
@@ -326,7 +332,8 @@ impl StationaryWatch {
     ) -> Guarded {
         let last = self.ring.len() - 1;
         let begin = last.checked_sub(stood.saturating_sub(1) as usize);
-        // Samples from before the ring, which did not move the estimate, are left as they are.
+        // If the span starts before the stored samples, nothing is undone, because the earlier samples did not change
+        // the estimate.
         if let Some(begin) = begin {
             let newer = usize::from(begin >= self.since);
             self.kept[newer].restore(recursion);
@@ -362,9 +369,9 @@ impl StationaryWatch {
         Guarded { outcome, held: true }
     }
 
-    /// True while a stationary span may still be that of the pause, or has half the length of a new one.
+    /// True while a stationary span may still belong to the pause, or has half the length of a new span.
     fn stationary_soon(&self) -> bool {
-        let [e, u] = self.channels.map(|channel| channel.stands);
+        let [e, u] = self.channels.map(|channel| channel.stationary_samples);
         2 * e.min(u) >= self.both || 2 * e >= self.one || 2 * u >= self.one
     }
 
@@ -383,7 +390,7 @@ impl StationaryWatch {
         });
     }
 
-    /// Returns the event at the last sample.
+    /// Returns the event reported at the last sample.
     pub fn event(&self) -> Option<GuardEvent> {
         self.event
     }

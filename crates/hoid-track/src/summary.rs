@@ -1,4 +1,4 @@
-//! A trace in a few lines.
+//! A summary of a trace in a few lines.
 
 use std::fmt;
 
@@ -23,7 +23,7 @@ impl fmt::Display for Trace {
         let counts = self.counts();
         writeln!(
             f,
-            "samples {}, of which {} were faults, and {} steps were shortened",
+            "samples {}, of which {} were faulty, and {} steps were shortened",
             counts.samples, counts.skipped, counts.shortened
         )?;
         let Some(last) = self.len().checked_sub(1) else {

@@ -15,7 +15,7 @@ use crate::{
 };
 use hoid_ident::{Fit, IdentError, family::LoopShape};
 
-/// The estimate at every sample that was kept, with its uncertainty.
+/// The estimate at each sample that was kept, with its uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trace {
     pub(crate) options: TrackOptions,
@@ -26,39 +26,39 @@ pub struct Trace {
     pub(crate) theta: Vec<f64>,
     /// Covariance of theta, the upper triangle of each row; NaN if there is none.
     pub(crate) covariance: Vec<f64>,
-    /// The operator itself, for a recursion in physical parameters.
+    /// Operator of each row, for a recursion in physical parameters.
     pub(crate) operator: Vec<OperatorEstimate>,
-    /// The delay of each row, if it is tracked.
+    /// Delay of each row, if it is tracked.
     pub(crate) delays: Vec<Delay>,
-    /// The responses that are not those of the polynomials, at each frequency of the options.
+    /// Responses at each frequency of the options, for methods whose response is not that of the polynomials.
     pub(crate) responses: Vec<f64>,
-    /// Crossover and margin of such a recursion, or the reason why there are none.
+    /// Crossover and margin for such methods, or the reason why there are none.
     pub(crate) open_loops: Vec<f64>,
     pub(crate) no_crossover: Vec<Option<NoCrossover>>,
     pub(crate) innovation: Vec<f64>,
     pub(crate) innovation_variance: Vec<f64>,
     pub(crate) shortened: Vec<u64>,
-    /// Logarithm of the odds of a recent change, for methods that compute it.
+    /// Evidence of a recent change in each row, as [`Change::odds`], for methods that compute it.
     pub(crate) change_odds: Vec<f64>,
-    /// Times at which changes were declared, s, with the changes.
+    /// Times of declaration in s, with the declared changes.
     pub(crate) changes: Vec<(f64, Change)>,
     pub(crate) counts: Counts,
     /// Events found by the guard.
     pub(crate) faults: Vec<TrackFault>,
     /// Number of held-back samples up to each row.
     pub(crate) held: Vec<u64>,
-    /// True with a guard.
+    /// True if the recursion had a guard.
     pub(crate) guarded: bool,
     /// Length of the idle head of the record, s.
     pub(crate) idle_s: f64,
-    /// The batch fit of the start.
+    /// The batch fit of the start span.
     pub(crate) start: Option<Fit>,
     pub(crate) failures: Option<(usize, String)>,
-    /// Finding from the response at the end against the assumed operator.
-    pub(crate) response_doubt: Option<Finding>,
-    /// Every crossing of the loop at the end with its controlled element.
+    /// Finding that the response at the end is implausible for a person.
+    pub(crate) response_finding: Option<Finding>,
+    /// Every crossing of the open loop of the last row with the controlled element of the options.
     pub(crate) loop_shape: Option<LoopShape>,
-    /// True if the response at the end is determined at some frequency, regardless of gain and lead.
+    /// True if the response at the end is determined at some frequency, whether or not gain and lead are.
     pub(crate) response_is_known: bool,
     /// Number of samples between two rows.
     pub(crate) every: usize,
@@ -72,7 +72,7 @@ pub struct Trace {
 pub const OPERATOR_COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
 
 impl Trace {
-    /// An empty trace, with capacity for some rows.
+    /// An empty trace, with capacity for `rows` rows.
     pub(crate) fn empty(options: TrackOptions, sample_time: SampleTime, rows: usize, every: usize) -> Self {
         let p = options.polynomial_orders().parameters();
         Self {
@@ -98,7 +98,7 @@ impl Trace {
             idle_s: 0.0,
             start: None,
             failures: None,
-            response_doubt: None,
+            response_finding: None,
             loop_shape: None,
             response_is_known: false,
             every,
@@ -148,8 +148,8 @@ impl Trace {
         &self.times_s
     }
 
-    /// Returns the names of the coefficients. With the delay as a parameter B has three, from the smallest tracked
-    /// delay on.
+    /// Returns the names of the coefficients. If the delay is a parameter, B has three coefficients, the first at the
+    /// smallest tracked delay.
     pub fn parameter_names(&self) -> Vec<String> {
         self.options.polynomial_orders().parameter_names()
     }
@@ -161,7 +161,7 @@ impl Trace {
     /// Returns theta of a row.
     ///
     /// # Panics
-    /// Beyond the last row, here and below.
+    /// This method and the following methods of a row panic beyond the last row.
     pub fn theta(&self, row: usize) -> &[f64] {
         let p = self.width();
         &self.theta[row * p..(row + 1) * p]
@@ -268,8 +268,8 @@ impl Trace {
         Response::unpacked(&self.responses[from..from + Response::NUMBERS])
     }
 
-    /// Returns every crossing of the loop of the last row with the controlled element of the options, and whether the
-    /// loop is stable; `None` without a controlled element.
+    /// Returns every crossing of the open loop of the last row with the controlled element of the options, and the
+    /// stability of the closed loop; `None` without a controlled element.
     pub fn loop_shape(&self) -> Option<&LoopShape> {
         self.loop_shape.as_ref()
     }
@@ -308,8 +308,8 @@ impl Trace {
         &self.shortened
     }
 
-    /// Returns the logarithm of the odds that the person changed within the last four seconds, in each row; empty for
-    /// methods without hypotheses.
+    /// Returns the evidence of a recent change in each row: -ln p of the change test for `adaptive`, the logarithm of
+    /// the odds of a change within the last four seconds for `multiple-model`; empty for other methods.
     pub fn change_odds(&self) -> &[f64] {
         &self.change_odds
     }
@@ -346,12 +346,12 @@ impl Trace {
         self.idle_s
     }
 
-    /// Returns the batch fit of the start.
+    /// Returns the batch fit of the start span.
     pub fn start(&self) -> Option<&Fit> {
         self.start.as_ref()
     }
 
-    /// Returns the number of failed fits and the reason of the last, for the method window.
+    /// Returns the number of failed fits and the reason for the last failure, for the method `window`.
     pub fn failures(&self) -> Option<&(usize, String)> {
         self.failures.as_ref()
     }
@@ -376,11 +376,11 @@ impl Trace {
         (self.averaged - 1) as f64 / 2.0 * self.every as f64 * self.sample_time.s()
     }
 
-    /// Replaces each row by the mean of the last `rows` rows: theta, the operator of a physical recursion, and their
-    /// covariance.
+    /// Replaces each row by the mean of the last `rows` rows: theta, operator, delay, responses, crossover and margin,
+    /// with their variances and covariances.
     ///
-    /// The mean lags by `(rows - 1)/2`. Estimates of neighbouring samples have nearly the same error, so that the mean
-    /// of the covariances is close to, and never below, the covariance of the mean.
+    /// The mean lags by `(rows - 1)/2` rows. Estimates of neighbouring samples have nearly the same error, so that the
+    /// mean of the covariances is close to, and never below, the covariance of the mean.
     #[must_use]
     pub fn moving_average(mut self, rows: usize) -> Self {
         let p = self.width();
@@ -483,7 +483,8 @@ fn unpack(packed: &[f64], p: usize) -> Vec<f64> {
     whole
 }
 
-/// Mean of each column over the last `rows` rows, fewer at the start. NaN affects only the means that contain it.
+/// Mean of each column over the last `rows` rows, or over fewer rows at the start. NaN affects only the means that
+/// contain it.
 fn causal_mean(values: &[f64], width: usize, rows: usize) -> Vec<f64> {
     if width == 0 {
         return Vec::new();

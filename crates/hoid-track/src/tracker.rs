@@ -26,13 +26,14 @@ use crate::{
 
 /// Frequency at which the sign of a response is examined, rad/s.
 const LOW_RAD_S: f64 = 0.5;
-/// Frequencies at which a response may be known, rad/s, and its largest error there, dB.
+/// Frequencies at which the error of the response is examined, rad/s, and the largest standard error of a known
+/// response, dB.
 const KNOWN_AT_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
 const KNOWN_DB: f64 = 2.0;
-/// Phases of people at that frequency, deg: a lag and a delay reach -110, two leads 70.
+/// Range of the phase of people at [`LOW_RAD_S`], deg: a lag and a delay give -110, two leads 70.
 const PHASES_DEG: (f64, f64) = (-120.0, 75.0);
-/// Least distance of a phase from this range, in standard errors.
-const APART: f64 = 2.0;
+/// Smallest distance of an implausible phase from this range, in standard errors.
+const IMPLAUSIBLE_DISTANCE: f64 = 2.0;
 /// Quantile of the normal distribution for 95 %.
 const NORMAL: f64 = 1.96;
 
@@ -43,7 +44,7 @@ pub struct Tracker {
     pub(crate) recursion: Box<dyn Recursion>,
     pub(crate) guard: Option<Box<Guard>>,
     pub(crate) stationary: Option<Box<StationaryWatch>>,
-    /// True if the last sample moved the estimate.
+    /// True if the last sample updated the estimate.
     pub(crate) moved: bool,
     pub(crate) last_e: f64,
     pub(crate) counts: Counts,
@@ -61,8 +62,8 @@ impl std::fmt::Debug for Tracker {
 }
 
 impl Tracker {
-    /// Builds a tracker with filters at rest. `span` is the record of the start fit; without it the tracker starts
-    /// from theta or from nothing, as the options require.
+    /// Builds a tracker with filters at rest. `span` is the record of the start fit. Without it, the tracker starts
+    /// from given coefficients or without knowledge, as the options require.
     ///
     /// # Errors
     /// [`IdentError`] if options contradict each other, or the start fit fails.
@@ -70,7 +71,7 @@ impl Tracker {
         Self::from_fit(options, span, None, sample_time)
     }
 
-    /// As [`Tracker::new`], with the fit of the span if it is known.
+    /// As [`Tracker::new`], with the fit of the start span if it is known.
     pub(crate) fn from_fit(
         options: &TrackOptions,
         span: Option<&Record>,
@@ -94,14 +95,14 @@ impl Tracker {
         })
     }
 
-    /// Takes a sample: a bounded number of operations, whatever its values and the length of the run. On a PC with 100
-    /// samples a second `adaptive` takes 33 us in the median and 86 us at 99 of 100 samples, without replays (`replay`
-    /// of 0) 0.5 and 22 us, `rpem` 0.1 and 0.2 us.
+    /// Takes a sample. The number of operations is bounded, regardless of the values and of the length of the run. On a
+    /// PC at 100 samples per second, `adaptive` takes 33 us in the median and 86 us at the 99 % quantile, without
+    /// replays (`replay` of 0) 0.5 and 22 us, and `rpem` 0.1 and 0.2 us.
     pub fn step(&mut self, e: f64, u: f64) -> Outcome {
         self.update(Sample { e, u, reference: None }, true)
     }
 
-    /// Takes a sample, with the external signal if it is known. If `moves` is false only the filters are updated.
+    /// Takes a sample, with the external signal if it is known. If `moves` is false, only the filters are updated.
     pub fn update(&mut self, sample: Sample, moves: bool) -> Outcome {
         self.counts.samples += 1;
         let sound = |v: f64| v.abs() <= self.options.largest;
@@ -150,7 +151,7 @@ impl Tracker {
         }
     }
 
-    /// Outcome of a sample that passed a guard.
+    /// Returns the outcome of a sample that a guard has examined.
     #[inline]
     fn guarded(&mut self, guarded: Guarded, skipped: bool) -> Outcome {
         let taken = guarded.outcome.filter(|_| !guarded.held);
@@ -254,7 +255,8 @@ impl Tracker {
         Some(Response::of_polynomials(&orders, theta, whole, omega_rad_s, ts))
     }
 
-    /// Returns crossover and phase margin with the controlled element of the options; `None` without one.
+    /// Returns crossover and phase margin with the controlled element of the options; `None` without a controlled
+    /// element.
     pub fn open_loop(&self) -> Option<Result<OpenLoop, NoCrossover>> {
         let element = self.options.controlled_element.as_ref()?;
         let whole = |omega: f64| self.response(omega);
@@ -270,8 +272,8 @@ impl Tracker {
         Some(OpenLoop::of(value, whole, element, self.sample_time))
     }
 
-    /// True if a method whose basis contains more forms than gain and lead determines the current response at some
-    /// frequency to a quarter: gain and lead may then be undetermined.
+    /// True if the method has a basis with more forms than gain and lead, and determines the current response within 2
+    /// dB at one of the frequencies [`KNOWN_AT_RAD_S`]: gain and lead may then be undetermined.
     pub(crate) fn response_is_known(&self) -> bool {
         let known = |omega: &f64| {
             let gain = self
@@ -282,8 +284,8 @@ impl Tracker {
         self.options.method.lag_of_basis_s().is_some() && KNOWN_AT_RAD_S.iter().any(known)
     }
 
-    /// Returns every crossing of the current loop with its controlled element; `None` without one, or without an
-    /// estimate.
+    /// Returns every crossing of the current open loop with the controlled element of the options; `None` without a
+    /// controlled element or without an estimate.
     pub(crate) fn open_loop_shape(&self) -> Option<LoopShape> {
         let element = self.options.controlled_element.as_ref()?;
         self.response(1.0)?;
@@ -304,9 +306,10 @@ impl Tracker {
         LoopShape::of(known, element, self.sample_time)
     }
 
-    /// Returns the finding from the current response against the assumed operator: with a controlled element, the loop
-    /// that it would form ([`LoopShape::doubt`]), without one the sign of the response at low frequencies.
-    pub(crate) fn response_doubt(&self) -> Option<Finding> {
+    /// Returns the finding that the current response is implausible for a person. With a controlled element, the loop
+    /// that both would form is examined ([`LoopShape::doubt`]); without a controlled element, the sign of the response
+    /// at low frequencies.
+    pub(crate) fn response_finding(&self) -> Option<Finding> {
         if let Some(element) = &self.options.controlled_element {
             let reach = match self.open_loop()? {
                 Ok(found) => NORMAL * found.phase_margin_deg.standard_error.unwrap_or(0.0),
@@ -316,7 +319,7 @@ impl Tracker {
             return self.loop_shape(element).doubt(reach);
         }
         let phase = self.response(LOW_RAD_S)?.phase_deg();
-        let reach = APART * phase.standard_error?;
+        let reach = IMPLAUSIBLE_DISTANCE * phase.standard_error?;
         let (farthest, most) = PHASES_DEG;
         let ahead = if phase.value < farthest {
             phase.value + 360.0
@@ -337,7 +340,7 @@ impl Tracker {
         })
     }
 
-    /// Returns the logarithm of the odds that the person changed within the last four seconds, from the bank of
+    /// Returns the evidence of a recent change, as [`Change::odds`]; `None` for methods other than `adaptive` and
     /// `multiple-model`.
     pub fn change_odds(&self) -> Option<f64> {
         self.recursion.change_odds()
@@ -361,12 +364,12 @@ impl Tracker {
         self.counts
     }
 
-    /// Returns the number of failed fits and the reason of the last, for the method window.
+    /// Returns the number of failed fits and the reason for the last failure, for the method `window`.
     pub fn failures(&self) -> Option<(usize, String)> {
         self.recursion.failures()
     }
 
-    /// Returns the batch fit of the start.
+    /// Returns the batch fit of the start span.
     pub fn start(&self) -> Option<&Fit> {
         self.start.fit.as_ref()
     }
@@ -383,7 +386,7 @@ fn largest_nk(options: &TrackOptions, sample_time: SampleTime) -> usize {
     options.orders.nk.max((latest.ceil() as usize).saturating_add(1))
 }
 
-/// Builds the watch of a recursion without a guard, unless a recursion without it was requested.
+/// Builds the watch for constant signals; `None` if the option `guard` is given, with either value.
 pub(crate) fn stationary_watch(options: &TrackOptions, sample_time: SampleTime) -> Option<Box<StationaryWatch>> {
     if options.method.guard().is_some() {
         return None;

@@ -4,16 +4,16 @@ use hoid_model::uncertainty::OperatorEstimate;
 
 use crate::setup::Setup;
 
-/// The causal run, and the samples at which estimates are needed.
+/// The causal run, and the samples at which two-sided estimates are needed.
 #[derive(Debug, Clone)]
 pub struct Causal {
     /// Components of the recursion.
     pub setup: Setup,
     /// Magnitude beyond which a sample counts as faulty.
     pub largest: f64,
-    /// The samples at which a trace has rows, ascending.
+    /// The samples at which a trace has rows, in ascending order.
     pub rows: Vec<usize>,
-    /// The operator at the end.
+    /// The operator at the end of the causal run.
     pub last: Option<OperatorEstimate>,
 }
 
@@ -22,7 +22,7 @@ pub struct Causal {
 pub struct TwoSided {
     /// The coefficients.
     pub theta: Vec<f64>,
-    /// Their covariance, by rows.
+    /// Covariance of the coefficients, by rows.
     pub covariance: Vec<f64>,
     /// The operator.
     pub operator: OperatorEstimate,

@@ -1,30 +1,31 @@
-//! Prediction of another run by a trace, and the choice of the initial covariance by it.
+//! Prediction of another run by a trace, and choice of the initial covariance by this prediction.
 //!
 //! The thesis measures models by the variance accounted for (eq. 39) and proposes that "the covariance matrix could be
-//! updated based on VAF from a validation data set, in order to reduce the strong oscillations" (section VII), but not
-//! how. Here a second run of the same person in the same task, with its own remnant, is simulated with the
-//! time-varying estimates of the first,
+//! updated based on VAF from a validation data set, in order to reduce the strong oscillations" (section VII), but does
+//! not specify how. Here a second run of the same person in the same task, with its own remnant, is simulated with the
+//! time-varying estimates of the first run,
 //!
 //! `w(t) = sum_j b_j(t) e(t - nk - j) - sum_i g_i(t) w(t - i)`,  `G = A F`,
 //!
 //! `VAF = max(0, 1 - sum (u - w)^2/sum u^2) 100 %`,
 //!
-//! and from a grid of `P_0 = p I` the p is chosen whose trace explains most of that run. An estimate that follows the
-//! remnant of the first run explains less of the second, which has another remnant; one that is too stiff explains less
-//! after a change of the person. The runs are aligned at their first samples, so that changes of the task have to occur
-//! at the same time in both.
+//! and from a grid of `P_0 = p I` the p is chosen whose trace explains most of the second run. An estimate that follows
+//! the remnant of the first run explains less of the second run, which has another remnant; an estimate that is too
+//! stiff explains less after a change of the person. The runs are aligned at their first samples, so that changes of
+//! the task must occur at the same time in both runs.
 //!
 //! [`track_validated`] follows the proposal literally: P is updated during the run. At regular times the current model
-//! and that of one interval before are both simulated over the last few seconds of the second run; if the current one
-//! explains less,
+//! and the model of one interval earlier are both simulated over the last few seconds of the second run; if the current
+//! model explains less,
 //!
 //! `P <- P max(least, ((1 - VAF_before)/(1 - VAF_now))^power)`,
 //!
-//! the estimate moves less until it has forgotten; if it explains more, P stays constant. The share that the remnant
-//! leaves unexplained is in both, so that noise does not penalise a correct model.
+//! so that the estimate changes less until the reduction has been forgotten; if the current model explains more, P is
+//! left unchanged. The share that the remnant leaves unexplained is the same for both models, so that noise does not
+//! penalise a correct model.
 //!
-//! No mean is removed for the VAF. The first seconds are excluded, since the simulation starts at rest and the person
-//! does not.
+//! No mean is removed for the VAF. The first 2 s are excluded, since the simulation starts at rest and the person does
+//! not.
 
 use hoid_ident::{IdentError, validation::vaf};
 use hoid_model::{Orders, Record, SampleTime};
@@ -37,7 +38,7 @@ use crate::{
     trace::Trace,
 };
 
-/// Values of p that are tried, in units of the innovation variance; the thesis has 0.1.
+/// Values of p that are tried, in units of the innovation variance; the thesis uses 0.1.
 pub const COVARIANCES: [f64; 9] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0];
 /// Time after which the initial state of the simulation has decayed, s.
 const SETTLING_S: f64 = 2.0;
@@ -49,13 +50,13 @@ const COVARIANCE: &str = "covariance";
 /// An initial covariance chosen by a second run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CovarianceChoice {
-    /// Each p that was tried, ascending, with the VAF of the second run for its trace, %.
+    /// Each p that was tried, in ascending order, with the VAF of the second run for its trace, %.
     pub candidates: Vec<(f64, f64)>,
     /// The chosen p.
     pub covariance: f64,
     /// Label of the second run.
     pub label: String,
-    /// Span of the second run that was compared, s from its first sample.
+    /// Span of the second run that was compared, in s from its first sample.
     pub span_s: (f64, f64),
 }
 
@@ -68,8 +69,9 @@ impl CovarianceChoice {
 }
 
 impl Trace {
-    /// Returns the VAF (eq. 39, no mean removed) of another run that is simulated with the estimates of this trace,
-    /// each at its time from the first sample on, in %, and the span that was compared, in s from the first sample.
+    /// Returns the VAF (eq. 39, no mean removed) of another run in %, and the span of that run that was compared, in s
+    /// from its first sample. The run is simulated with the estimates of this trace at the same times from the first
+    /// sample on.
     ///
     /// # Errors
     /// [`IdentError`] for a run with another sample time, without an input, or with too few samples in common, and for
@@ -124,7 +126,7 @@ fn check(other: &Record, options: &TrackOptions, ts: SampleTime) -> Result<(), I
     Ok(())
 }
 
-/// Simulates the response to an input from a sample on, at rest before it, with the coefficients of each sample.
+/// Simulates the response to an input from sample `first` on, at rest before it, with the coefficients of each sample.
 fn simulated<'t>(o: &Orders, e: &[f64], first: usize, theta_at: impl Fn(usize) -> &'t [f64]) -> Vec<f64> {
     let mut w = vec![0.0; e.len()];
     for k in first..e.len() {
@@ -162,17 +164,17 @@ fn check_method(options: &TrackOptions) -> Result<(), IdentError> {
         return Err(bad(
             "the run for validation",
             format!("{method}, whose gain has no start covariance to choose"),
-            "a method with the option covariance, such as rls or rpem, and a way of forgetting that has P",
+            "a method with the option covariance, such as rls or rpem, and a type of forgetting that has P",
         ));
     }
     Ok(())
 }
 
 /// Returns the options with the initial covariance whose trace of the record explains most of a second run; if two
-/// explain the same, the smaller.
+/// covariances explain the same, the smaller one is chosen.
 ///
 /// # Errors
-/// [`IdentError`] for a method without such a covariance, or with a given one, and as [`track_from`] and
+/// [`IdentError`] for a method without such a covariance, or if a covariance is given; also as [`track_from`] and
 /// [`Trace::vaf_of`].
 pub fn choose_covariance(
     record: &Record,
@@ -184,8 +186,8 @@ pub fn choose_covariance(
     if let Some(given) = method.covariance() {
         return Err(bad(
             COVARIANCE,
-            format!("{given}, and a run for validation, which chooses it"),
-            "one of the two",
+            format!("{given}, and a run for validation, which chooses the covariance"),
+            "only one of the two",
         ));
     }
     let mut candidates = Vec::new();
@@ -219,12 +221,12 @@ pub fn choose_covariance(
     Ok((options, choice))
 }
 
-/// Update of P by the VAF of a second run.
+/// Settings for the reduction of P by the VAF of a second run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CovarianceUpdates {
     /// Time between two comparisons with the second run, s.
     pub interval_s: f64,
-    /// Length of the second run that is examined, s.
+    /// Length of the span of the second run that is simulated, s.
     pub window_s: f64,
     /// Smallest factor of P.
     pub least: f64,
@@ -232,7 +234,7 @@ pub struct CovarianceUpdates {
     pub power: f64,
 }
 
-/// Chosen on separate runs (`research/notes/survey-methods.md`).
+/// The defaults were chosen with separate runs (`research/notes/survey-methods.md`).
 impl Default for CovarianceUpdates {
     fn default() -> Self {
         Self {
@@ -274,7 +276,7 @@ pub fn track_validated(
     let unexplained = |theta: &[f64], end: usize| -> f64 {
         let first = end.saturating_sub(window);
         let from = first.saturating_sub(settling);
-        // The input of the nk samples before belongs to the run.
+        // The input before this span that still acts within it is needed too.
         let begin = from.saturating_sub(o.nk + o.nb);
         let w = simulated(&o, &e[begin..end], from - begin, |_| theta);
         let error: f64 = (first..end).map(|k| (u[k] - w[k - begin]).powi(2)).sum();

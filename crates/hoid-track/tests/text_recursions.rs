@@ -218,7 +218,7 @@ fn a_guard_that_is_none_is_refused_with_what_to_do() {
     let refused = |method: Method, name: &str, text: &str| method.with(name, text).unwrap_err().to_string();
     for (text, says) in [
         ("0.5", "1 or more"),
-        ("no", "off, or the multiple"),
+        ("no", "off, or the largest allowed multiple"),
         ("NaN", "off, or the"),
         ("inf", "1 or more"),
     ] {

@@ -1,17 +1,17 @@
-//! Human-operator identification: a model of how a person controls a machine, from the tracking error e and the
-//! control output u.
+//! Human-operator identification: estimates a model of how a person controls a machine from the tracking error e and
+//! the control output u.
 //!
-//! A pilot, driver or surgeon closes a control loop. Near the task they behave like a linear
-//! operator with a remnant,
+//! A pilot, driver or surgeon closes a control loop. In a given task they behave approximately like a linear operator
+//! with a remnant,
 //!
 //! `u = K_e (T_L s + 1) e^(-tau_e s) omega_nm^2/(s^2 + 2 zeta_nm omega_nm s + omega_nm^2) e + n`,
 //!
-//! and hoid estimates these parameters with standard errors: in batch by the prediction error
-//! method on a Box-Jenkins model `u = (B/F) q^-nk e + (1/D) eps`, sample by sample by recursions,
-//! on recorded and on simulated runs.
+//! and hoid estimates its parameters with standard errors: in batch, by the prediction error method on a Box-Jenkins
+//! model `u = (B/F) q^-nk e + (1/D) eps`, and recursively, sample by sample. Both work on recorded and on simulated
+//! runs.
 //!
-//! This crate re-exports the others. The prelude contains the items for most programs, from the file to the report
-//! (feature `report`):
+//! This crate re-exports the other crates. The prelude contains the items that most programs need. From a file to a
+//! report (feature `report`):
 //!
 //! ```no_run
 //! use hoid::prelude::*;
@@ -33,7 +33,7 @@
 //! # }
 //! ```
 //!
-//! The same for a simulated run with known true values:
+//! A simulated run with known true values:
 //!
 //! ```
 //! use hoid::prelude::*;
@@ -59,16 +59,16 @@
 //! # }
 //! ```
 //!
-//! | feature | brings | default |
+//! | feature | contents | default |
 //! |---|---|---|
-//! | none | [`model`], [`ident`], [`track`], [`sim`]: what estimates | |
-//! | `io` | [`io`]: files; [`analysis`]: from recordings to a result and its verdict | yes |
+//! | none | [`model`], [`ident`], [`track`], [`sim`]: models, estimators and simulation | |
+//! | `io` | [`io`]: files; [`analysis`]: analysis of recordings, with a verdict | yes |
 //! | `study` | [`study`]: Monte Carlo studies and groups of runs | |
-//! | `report` | [`report`]: figures and HTML pages; with `study` | |
-//! | `thesis` | [`thesis`]: the thesis, reproduced; with `report` | |
-//! | `pdf-png` | figures as PDF and PNG; with `report` | |
+//! | `report` | [`report`]: figures and HTML pages; includes `study` | |
+//! | `thesis` | [`thesis`]: reproduction of the thesis; includes `report` | |
+//! | `pdf-png` | figures as PDF and PNG; includes `report` | |
 //!
-//! With `default-features = false` the code that reads files is not built.
+//! With `default-features = false` the code for reading files is not compiled.
 
 #[cfg(feature = "io")]
 pub use hoid_analysis as analysis;
@@ -92,7 +92,7 @@ pub use hoid_survey as survey;
 pub use hoid_thesis as thesis;
 pub use hoid_track as track;
 
-/// Items for most programs: read, identify, validate, track, report, simulate.
+/// Items that most programs need, for reading, identification, validation, tracking, reports and simulation.
 pub mod prelude {
     #[cfg(feature = "io")]
     pub use hoid_analysis::{Identification, Identified, Recordings, identify};
@@ -116,7 +116,7 @@ pub mod prelude {
     pub use hoid_track::{Memory, Method, Sample, StartAt, Trace, TrackOptions, Tracker, track};
 }
 
-/// The Rust examples of the book; its other blocks are run by `python/tests/test_book.py`.
+/// The Rust examples of the book; `python/tests/test_book.py` runs its other code blocks.
 #[cfg(doctest)]
 mod book {
     #[doc = include_str!("../../../docs/src/methods/grey-box.md")]

@@ -167,7 +167,7 @@ fn a_delay_that_changes_is_followed_and_named() {
     assert!(says.contains("nk = 29") && says.contains("31 to 41"), "{says}");
     for range in [(0.4, 0.2), (f64::NAN, 0.4), (-0.1, 0.4), (0.2, f64::INFINITY)] {
         let says = refused(with(range));
-        assert!(says.contains("shorter first"), "{says}");
+        assert!(says.contains("shorter time first"), "{says}");
     }
     let says = refused(tracked.with(&[("smooth", "true")]).unwrap());
     assert!(says.contains("one delay"), "{says}");

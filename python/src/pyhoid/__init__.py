@@ -1,5 +1,5 @@
-"""Human-operator identification: how a person controls a machine, from the tracking error e and
-the control output u.
+"""Human-operator identification: estimates how a person controls a machine from the tracking error
+e and the control output u.
 
 >>> import pyhoid
 >>> record = pyhoid.simulate("C1", seed=1)  # or pyhoid.read("run1.csv"), or pyhoid.Record(...)
@@ -7,8 +7,8 @@ the control output u.
 >>> trace = pyhoid.track(record)            # the operator from sample to sample
 >>> pyhoid.plots.bode(fit)                  # matplotlib is imported here, not before
 
-Everything that the command line does is here under the same names and with the same defaults, and
-gives the same digits.
+Everything that the command line offers is available here under the same names, with the same defaults
+and the same numerical results.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ __all__ = [
     "write",
 ]
 
-#: Modules that are imported at their first use, because of what they import themselves.
+#: Modules that are imported only at their first use, because they import large packages.
 _LAZY = ("dask", "lsl", "plots")
 
 

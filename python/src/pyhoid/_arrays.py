@@ -1,6 +1,6 @@
-"""Signals as people pass them, made contiguous arrays of float64.
+"""Conversion of signals to contiguous arrays of float64.
 
-An array that is one already is not copied.
+An array that already has this form is not copied.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ __all__ = ["FloatArray", "signal"]
 
 
 def signal(values: Any, name: str) -> FloatArray:
-    """Make `values` a one-dimensional, contiguous array of float64 in native byte order.
+    """Convert `values` to a one-dimensional, contiguous array of float64 in native byte order.
 
-    An array that is one already is used without a copy. So are the values of a pandas Series; its
-    index is ignored, because hoid counts samples: give `sample_time`. Lists, integers, other byte
-    orders and strided arrays are converted.
+    An array that already has this form is used without a copy, as are the values of a pandas Series. The
+    index of a Series is ignored, because hoid counts samples: give `sample_time`. Lists, integers, other
+    byte orders and strided arrays are converted.
 
     Raises
     ------

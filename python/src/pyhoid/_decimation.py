@@ -1,4 +1,4 @@
-"""Records at the rate at which they are used."""
+"""Records at the sampling frequency at which they are used."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["said"]
 
 
 def said(records: Sequence[Record]) -> str:
-    """What was done to the rate of the records, as a line; empty if nothing was."""
+    """Describe in one line how the rate of the records was reduced; empty if it was kept."""
     steps = [
         step.partition(":")[0] for one in records for step in one.steps if "decimated by" in step
     ]

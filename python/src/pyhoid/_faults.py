@@ -1,4 +1,4 @@
-"""Findings in the records of a fit, and the records as they were fitted."""
+"""Faults found in the records of a fit, and the records as they were fitted."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ def used(
     native: _pyhoid.Fit | _pyhoid.OperatorFit | _pyhoid.TimeVaryingFit | _pyhoid.Trace,
     given: Sequence[Record],
 ) -> tuple[Record, ...]:
-    """The records as they were fitted, from those that were given and the processing of them."""
+    """Return the records as they were fitted, from the given records and the steps applied to them."""
     several = []
     for origin, parts, steps in native.records():
         of = given[origin]
         record = Record._of({**parts, "input_lead": of.input_lead + parts["input_lead"]})
         record.steps = [*of.steps, *steps]
-        # A record that is as it was stays the object that was given.
+        # For an unchanged record, the given object itself is returned.
         several.append(of if not steps and _same(of, record) else record)
     return tuple(several)
 
@@ -37,5 +37,5 @@ def _same(one: Record, other: Record) -> bool:
 def faults_of(
     native: _pyhoid.Fit | _pyhoid.OperatorFit | _pyhoid.TimeVaryingFit | _pyhoid.Description,
 ) -> list[dict[str, Any]]:
-    """Faults of the records that were searched for, each with the place of its record."""
+    """Return the faults that were found in the records, each with the index of its record."""
     return [{"record": place, **fault} for place, fault in native.faults]

@@ -1,4 +1,4 @@
-"""Choices that people type, as types: mypy and pyright find a wrong one before it runs.
+"""Choices as literal types, so that mypy and pyright find an invalid choice before the program runs.
 
 The entries of single options are in `_settings`.
 """
@@ -18,20 +18,20 @@ __all__ = [
     "Sparse",
 ]
 
-#: What `identify` fits, except for time-varying.
+#: Structures that `identify` fits, except for time-varying.
 ModelStructure = Structure | Literal["operator", "family", "grey-box", "grey_box"]
 
-#: How it is fitted.
+#: Methods by which `identify` fits.
 BatchMethod = Literal["pem", "iv4", "sriv", "rivbj"]
 
-#: What chooses between candidates.
+#: Criteria that select among candidates.
 Criterion = Literal["loss", "aic", "aicc", "bic", "fpe", "mdl", "yic"]
 
 #: Treatment of faults of records.
 Faults = Literal["bridge", "cut", "report", "keep"]
 
-#: Trend taken out of input and output.
+#: Trend removed from input and output.
 Detrending = Literal["none", "mean", "linear"]
 
-#: Treatment of a column that lacks a value in some rows.
+#: Treatment of a column without values in some rows.
 Sparse = Literal["hold", "linear", "drop"]

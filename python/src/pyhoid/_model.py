@@ -1,4 +1,4 @@
-"""What every fitted model does: predict, simulate, validate, respond, become a transfer function."""
+"""Methods of every fitted model: prediction, simulation, validation, frequency response, conversion."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["QUALITY", "Correlation", "FrequencyResponse", "Model", "Series", "Validation"]
 
-#: Figures of the quality of a fit.
+#: Measures of the quality of a fit.
 QUALITY = ("vaf_simulation", "vaf_prediction", "nrmse_simulation", "nrmse_prediction")
 
 
@@ -63,7 +63,7 @@ class FrequencyResponse(NamedTuple):
 
 
 class Correlation(NamedTuple):
-    """Correlation by lag, with the bound that 99 % of white residuals stay within."""
+    """Correlation by lag, with the bound within which 99 % of the values for white residuals lie."""
 
     lags: npt.NDArray[np.int64]
     values: FloatArray
@@ -91,18 +91,18 @@ class Validation(NamedTuple):
 
 
 class Model:
-    """A model from e to u with its noise."""
+    """A model from e to u with its noise model."""
 
     @property
     def _model(self) -> _pyhoid.Fit:
-        """The polynomials that predict."""
+        """The polynomial model used for prediction."""
         raise NotImplementedError
 
     def _response(self, omega: FloatArray) -> Sequence[FloatArray]:
         return self._model.frequency_response(omega)
 
     def predict(self, record: Record, horizon: int = 1) -> Series:
-        """Prediction of u, `horizon` samples ahead.
+        """Predict u, `horizon` samples ahead.
 
         Raises
         ------
@@ -114,21 +114,21 @@ class Model:
         return Series(*self._model.predict(record, horizon))
 
     def simulate(self, record: Record) -> Series:
-        """Response to e alone, from the initial states that fit the record best.
+        """Simulate the response to e alone, from the initial states that fit the record best.
 
         >>> fit.simulate(record)
         """
         return Series(*self._model.simulate(record))
 
     def residuals(self, record: Record) -> Series:
-        """One-step prediction errors.
+        """Return the one-step prediction errors.
 
         >>> fit.residuals(record).values.std()
         """
         return Series(*self._model.residuals(record))
 
     def validate(self, record: Record) -> Validation:
-        """Simulation, prediction and residual tests on a record.
+        """Simulate and predict a record, and test the residuals.
 
         >>> fit.validate(record).ljung_box["p_value"]
         """
@@ -138,19 +138,19 @@ class Model:
         return Validation(**found)
 
     def quality_on(self, records: Record | Sequence[Record]) -> dict[str, float]:
-        """`quality` on other records.
+        """Return the `quality` on other records.
 
         >>> fit.quality_on(record)["vaf_simulation"]
         """
         return self._model.quality(_options.as_records(records))
 
     def frequency_response(self, omega: Any = None) -> FrequencyResponse:
-        """Frequency response from e to u.
+        """Return the frequency response from e to u.
 
         Parameters
         ----------
         omega : array_like, shape (n,), optional
-            Frequencies in rad/s; default 200 of them, from 0.1 rad/s to the Nyquist frequency.
+            Frequencies in rad/s; by default 200 frequencies from 0.1 rad/s to the Nyquist frequency.
 
         >>> fit.frequency_response([1.0, 2.0]).response
         """
@@ -160,7 +160,7 @@ class Model:
         return FrequencyResponse(frequencies, *self._response(frequencies))
 
     def to_control(self) -> control.TransferFunction:
-        """The model from e to u as a transfer function of python-control, in z.
+        """Return the model from e to u as a transfer function of python-control, in z.
 
         Raises
         ------
@@ -180,7 +180,7 @@ class Model:
         den = np.convolve(parts["A"], parts["F"])
         length = max(len(num), len(den))
         num, den = (np.pad(p, (0, length - len(p))) for p in (num, den))
-        # Zeros at the front of the numerator are the delay; those at the end of both cancel.
+        # The leading zeros of the numerator are the delay; trailing zeros of both cancel.
         while length > 1 and num[-1] == 0 and den[-1] == 0:
             num, den, length = num[:-1], den[:-1], length - 1
         return control.TransferFunction(num, den, self._model.sample_time)

@@ -1,4 +1,4 @@
-"""Options as people write them, in the plain form that the native module takes."""
+"""Conversion of options as users write them to the plain types that the native module takes."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ Progress = bool | Callable[[int, int], object]
 
 
 def order(name: str, value: Any) -> tuple[int, int]:
-    """An order, or the ends of a range of orders, both included."""
+    """Return an order as the two ends of a range of orders, both included."""
     if isinstance(value, range):
         if value.step != 1 or not len(value):
-            raise OptionError(f"{name} is {value}, expected a range with step 1 that is not empty")
+            raise OptionError(f"{name} is {value}, expected a nonempty range with step 1")
         return value[0], value[-1]
     ends = value if isinstance(value, (tuple, list)) else (value, value)
     if len(ends) != 2:
@@ -46,7 +46,7 @@ def order(name: str, value: Any) -> tuple[int, int]:
         raise OptionError(f"{name} is {value!r}, expected whole numbers") from None
     if low < 0 or high < low:
         raise OptionError(
-            f"{name} is {value!r}, expected numbers of zero or more, the smaller first"
+            f"{name} is {value!r}, expected nonnegative numbers, the smaller first"
         )
     return low, high
 
@@ -55,10 +55,10 @@ def controlled_element(
     element: str | Sequence[float] | tuple[Sequence[float], Sequence[float]],
     den: Sequence[float] | None = None,
 ) -> str | tuple[list[float], list[float]]:
-    """A controlled element as text, or its numerator and denominator, in one or two values."""
+    """Return a controlled element as text, or as numerator and denominator."""
     if isinstance(element, str):
         if den is not None:
-            raise OptionError(f"the controlled element {element!r} is whole, expected no den next to it")
+            raise OptionError(f"the controlled element {element!r} is complete, expected no den")
         return element
     try:
         parts: tuple[Any, ...] = tuple(element) if den is None else (element, den)
@@ -68,12 +68,12 @@ def controlled_element(
     except (TypeError, ValueError):
         raise OptionError(
             f"the controlled element is {element!r}, expected text such as '90/(s(s+6))', "
-            "or numerator and denominator by descending powers of s"
+            "or numerator and denominator in descending powers of s"
         ) from None
 
 
 def numbers(name: str, values: Mapping[str, Any]) -> dict[str, float]:
-    """Numbers by name."""
+    """Return numbers by name."""
     try:
         return {str(key): float(value) for key, value in values.items()}
     except (TypeError, ValueError, AttributeError):
@@ -83,7 +83,7 @@ def numbers(name: str, values: Mapping[str, Any]) -> dict[str, float]:
 
 
 def guesses(name: str, values: Any) -> str | None:
-    """Pairs of numbers by name, as NAME=VALUE:WEIGHT; None if there are none.
+    """Return pairs of numbers by name as NAME=VALUE:WEIGHT; None if there are none.
 
     >>> guesses("coefficient_prior", {"f1": (-1.9, 0.5)})
     'f1=-1.9:0.5'
@@ -100,7 +100,7 @@ def guesses(name: str, values: Any) -> str | None:
 
 
 def span(name: str, value: Any) -> tuple[float, float] | None:
-    """Two finite numbers, the smaller first."""
+    """Return two finite numbers, the smaller first."""
     if value is None:
         return None
     try:
@@ -113,7 +113,7 @@ def span(name: str, value: Any) -> tuple[float, float] | None:
 
 
 def delay(value: Any) -> tuple[float, float] | None:
-    """A delay in s, or the shortest and the longest.
+    """Return a delay in s as the shortest and the longest delay.
 
     >>> delay(0.28), delay((0.1, 0.4))
     ((0.28, 0.28), (0.1, 0.4))
@@ -122,7 +122,7 @@ def delay(value: Any) -> tuple[float, float] | None:
 
 
 def text(name: str, value: Any) -> str | None:
-    """A value as the command line writes it; None if it carries no information.
+    """Return a value in the form of the command line; None if it carries no information.
 
     >>> text("memory_of", {"b": 256, "f": "inf"})
     'b=256,f=inf'
@@ -153,11 +153,11 @@ def text(name: str, value: Any) -> str | None:
 
 
 def as_records(records: Record | Sequence[Record]) -> list[Record]:
-    """One record or several, as a list."""
+    """Return one record or several as a list."""
     several = [records] if isinstance(records, Record) else records
     if not isinstance(several, Iterable) or isinstance(several, (str, bytes)):
         raise DataError(
-            f"expected a pyhoid.Record or a sequence of them, found {type(records).__name__};"
+            f"expected a pyhoid.Record or a sequence of records, found {type(records).__name__};"
             " make one with pyhoid.Record(e=, u=, sample_time=)"
         )
     several = list(several)
@@ -173,7 +173,7 @@ def as_records(records: Record | Sequence[Record]) -> list[Record]:
 
 
 def settings(given: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Settings as a page lists them, by name: those that were given or have a default."""
+    """Return settings by name, as a report page lists them: those that were given or have a default."""
     return [
         (name, str(value))
         for name, value in given.items()
@@ -182,7 +182,7 @@ def settings(given: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def reporter(progress: Any, what: str) -> Callable[[int, int], object] | None:
-    """The function that is called with the work done and the whole work."""
+    """Return the function that is called with the completed and the total amount of work."""
     if progress is None or progress is False:
         return None
     if progress is not True:
@@ -193,7 +193,7 @@ def reporter(progress: Any, what: str) -> Callable[[int, int], object] | None:
         return progress  # type: ignore[no-any-return]
 
     def show(done: int, total: int) -> None:
-        # On a terminal one line that is overwritten; elsewhere only the last one.
+        # On a terminal, one line is overwritten repeatedly; elsewhere only the last line is written.
         end = "\n" if done >= total else "\r"
         if sys.stderr.isatty() or end == "\n":
             sys.stderr.write(f"{done} of {total} {what}{end}")

@@ -1,8 +1,8 @@
-"""Files that Python reads and hoid does not: packed text, Arrow and Feather, Excel.
+"""Files that Python reads but hoid does not: compressed text, Arrow and Feather, Excel.
 
-They are read by the packages that people have for them, and handed over as a file of the same name
-that hoid reads, so that every option of `read` and every check of the data is the same. A message
-names the file that was given.
+Common Python packages read these files. Their content is passed on as a file that hoid reads, so
+that every option of `read` and every check of the data is the same. A message names the file that the
+user gave.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .errors import Error, FileError, FileMissingError, FormatError
 
 __all__ = ["readable"]
 
-#: Largest file that a packed one may become: a gigabyte of text is 10 million samples.
+#: Largest size of a decompressed file: a gigabyte of text is 10 million samples.
 _MOST_BYTES = 1 << 30
 
 
@@ -38,7 +38,7 @@ def _unpacked(path: Path, place: Path) -> Path:
                     )
                 text.write(block)
     except (EOFError, gzip.BadGzipFile) as error:
-        raise FormatError(f"{path} is cut or damaged: {error}; pack it again") from error
+        raise FormatError(f"{path} is truncated or damaged: {error}; pack it again") from error
     return made
 
 
@@ -80,7 +80,7 @@ def _excel(path: Path, place: Path) -> Path:
     return made
 
 
-#: Who reads what, by the last ending.
+#: Reading function for each file extension.
 _READERS: dict[str, Callable[[Path, Path], Path]] = {
     "gz": _unpacked,
     "arrow": _arrow,
@@ -94,7 +94,7 @@ _READERS: dict[str, Callable[[Path, Path], Path]] = {
 
 @contextmanager
 def readable(path: str | PathLike[str]) -> Iterator[str | PathLike[str]]:
-    """The file, or one with the same content that hoid reads, for as long as it is needed."""
+    """Provide a file with the same content that hoid reads, until the context ends."""
     ending = Path(fspath(path)).suffix.lower().lstrip(".")
     reader = _READERS.get(ending)
     if reader is None:
@@ -114,7 +114,7 @@ def readable(path: str | PathLike[str]) -> Iterator[str | PathLike[str]]:
         try:
             yield made
         except Error as error:
-            # The message names what was given.
+            # The message names the file that the user gave.
             raise type(error)(str(error).replace(str(made), str(path))) from None
     finally:
         shutil.rmtree(place, ignore_errors=True)

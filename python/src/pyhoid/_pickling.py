@@ -1,9 +1,9 @@
 """Pickles of results, for joblib, multiprocessing and dask.
 
-A result has a native side that is computed and cannot be stored. Its pickle holds what the native
-side reports about itself, and the call that made it. So a result comes back at once and with the same
-digits; what is asked of it that was not reported before (a prediction on another record, a page) makes
-the native side again, once, by the same call on the same data, and compares.
+A result has a native object that is computed and cannot be stored. Its pickle holds everything that the
+native object reports about itself, and the call that created it. A result is therefore restored at once
+and with the same digits. If it is used for anything else (a prediction on another record, a report
+page), the native object is recreated once, by the same call on the same data, and compared.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ __all__ = ["Call", "Recalled", "recalled", "same", "state_of"]
 
 
 class Call(NamedTuple):
-    """What made a native result: a function of this package by name, what it was given, and the way
-    from its result to the native side that is meant."""
+    """The call that created a native result: the name of a function of this package, its arguments, and
+    the attributes that lead from the function's result to the native object."""
 
     function: str
     records: tuple[Any, ...]
@@ -32,7 +32,7 @@ class Call(NamedTuple):
     path: tuple[str | int, ...] = ()
 
     def native(self) -> Any:
-        """Make it again."""
+        """Repeat the call and return the native object."""
         import pyhoid
 
         function: Callable[..., Any] = getattr(pyhoid, self.function)
@@ -46,12 +46,12 @@ class Call(NamedTuple):
         return found
 
     def to(self, *path: str | int) -> Call:
-        """The same call, and what is reached from its result."""
+        """Return the call that leads from the same result to one of its parts."""
         return self._replace(path=(*self.path, *path))
 
 
 class Recalled:
-    """A native result out of a pickle."""
+    """A native result restored from a pickle."""
 
     def __init__(self, answers: Mapping[str, Any], call: Call | None) -> None:
         self._answers = dict(answers)
@@ -62,16 +62,16 @@ class Recalled:
         if self._made is None:
             if self._call is None:
                 raise DataError(
-                    "a start fit of a tracker that results of a pickle has its numbers alone:"
-                    " fit the record again by identify"
+                    "the start fit of a tracker from a pickle has only its numbers:"
+                    " fit the record again with identify"
                 )
             made = self._call.native()
             for name, value in self._answers.items():
                 if name != "len" and not same(_answer(made, name), value):
                     raise DataError(
-                        f"the result out of the pickle cannot be made again: {name} differs."
-                        f" It was made by another version than {_pyhoid.__version__},"
-                        " or its data have changed: make it again from the data"
+                        f"the result in the pickle cannot be reproduced: {name} differs."
+                        f" It was made by a version other than {_pyhoid.__version__},"
+                        " or its data have changed: make the result again from the data"
                     )
             self._made = made
         return self._made
@@ -81,7 +81,7 @@ class Recalled:
             raise AttributeError(name)
         answers = self.__dict__.get("_answers", {})
         if name in answers:
-            # Those who change what they got change their own.
+            # The caller gets a copy, so that changes to it have no effect here.
             return copy.deepcopy(answers[name])
         return getattr(self._native(), name)
 
@@ -94,7 +94,7 @@ def _answer(native: Any, name: str) -> Any:
 
 
 def _seal(answers: Mapping[str, Any]) -> str:
-    """A digest of the answers: a pickle that was cut or changed is known."""
+    """Return a digest of the answers, by which a truncated or changed pickle is detected."""
 
     def told(value: Any) -> Any:
         if isinstance(value, np.ndarray):
@@ -109,7 +109,7 @@ def _seal(answers: Mapping[str, Any]) -> str:
 
 
 def same(one: Any, other: Any) -> bool:
-    """Whether two answers agree to the last digit; what is not a number agrees with itself."""
+    """Return whether two answers are identical; NaN counts as equal to itself."""
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
         one, other = np.asarray(one), np.asarray(other)
         if one.dtype.kind in "fc" and other.dtype.kind in "fc":
@@ -125,7 +125,7 @@ def same(one: Any, other: Any) -> bool:
 
 
 def state_of(result: Any, names: Sequence[str]) -> dict[str, Any]:
-    """The state of a result for its pickle: its own attributes, and what its native side reports."""
+    """Return the state for a pickle: the attributes of the result, and what its native object reports."""
     own = dict(result.__dict__)
     native, call = own.pop("_native"), own.pop("_call", None)
     answers = {name: _answer(native, name) for name in names}
@@ -139,12 +139,12 @@ def state_of(result: Any, names: Sequence[str]) -> dict[str, Any]:
 
 
 def recalled(result: Any, state: Any, names: Sequence[str]) -> None:
-    """Fill a result from the state in its pickle.
+    """Restore a result from the state in its pickle.
 
     Raises
     ------
     DataError
-        When something is missing from the state, or the answers are not those that were sealed.
+        If something is missing from the state, or the answers do not match their digest.
     """
     expected = {"version", "own", "call", "answers", "seal"}
     if not isinstance(state, dict) or set(state) != expected:

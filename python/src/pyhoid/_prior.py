@@ -1,4 +1,4 @@
-"""What is known of a person before the data, in the form of a text."""
+"""Prior knowledge of a person, in the form of text."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["prior_text"]
 
 
 def prior_text(prior: Any) -> str:
-    """A prior as text: words, a path, or the JSON of another fit.
+    """Return a prior as text: words, a path, or the JSON of another fit.
 
     >>> prior_text({"omega_nm": (9, 0.2)})
     'omega_nm=9.0:0.2'

@@ -1,7 +1,7 @@
-"""The keywords of a recursion, which `track` and `Tracker` share.
+"""The keywords of a recursion, common to `track` and `Tracker`.
 
-The options of the methods are not listed here: they are those of the registry of the library
-(`_settings.py` is made from it), and their values are read there.
+The options of the methods are not listed here: they come from the registry of the library, from which
+`_settings.py` is generated, and the library parses their values.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _OF_METHODS = {name for *_, keywords in _pyhoid.recursive_methods() for name in 
 
 
 def name_of_now(method: RecursiveMethod) -> RecursiveMethod:
-    """The name of a method; of an earlier name the current one, with a warning to who called."""
+    """Return the current name of a method; for an earlier name, warn the caller."""
     renamed = _pyhoid.renamed_method(method) if isinstance(method, str) else None
     if renamed is None:
         return method
@@ -50,7 +50,7 @@ def name_of_now(method: RecursiveMethod) -> RecursiveMethod:
 
 
 def plain(arguments: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
-    """The keywords of a call in plain form: those that all methods share, and those of the method."""
+    """Return the keywords of a call in plain form: those common to all methods, and those of the method."""
     given = {name: arguments[name] for name in KEYWORDS}
     for name in settings:
         if name not in _OF_METHODS:
@@ -85,7 +85,7 @@ def plain(arguments: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str
         else _options.controlled_element(given["controlled_element"]),
         "fit": fit,
         "settings": {
-            # Python keeps the word lambda for itself.
+            # `lambda` is a reserved word in Python.
             "lambda" if name == "forgetting_factor" else name: text
             for name, text in texts.items()
             if text is not None
@@ -94,7 +94,7 @@ def plain(arguments: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str
 
 
 def _person(prior: Any) -> tuple[str | None, tuple[str, str] | None]:
-    """What is known of a person: as text, or the text of a fit with the name of its file.
+    """Return prior knowledge of a person: a text, or the text of a fit with the name of its file.
 
     >>> _person({"omega_nm": (9, 0.2)})
     ('omega_nm=9.0:0.2', None)
@@ -110,4 +110,4 @@ def _person(prior: Any) -> tuple[str | None, tuple[str, str] | None]:
     except OSError as error:
         raise OptionError(f"prior {path}: {error.strerror or error}") from None
     except UnicodeDecodeError:
-        raise FormatError(f"prior {path}: it is not a text in UTF-8") from None
+        raise FormatError(f"prior {path}: it is not UTF-8 text") from None

@@ -1,7 +1,7 @@
-"""Figures of the reproduction of the thesis, from the tables next to its own figures.
+"""Figures of the reproduction of the thesis, drawn from the tables stored next to them.
 
-The columns of a table show what kind of figure it is: box plots over nk and the noise level, maps
-over nk and m, Bode plots, estimates over time, or curves.
+The columns of a table determine the kind of figure: box plots over nk and the noise level, maps over
+nk and m, Bode plots, estimates over time, or curves.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Columns = Mapping[str, Any]
 
-#: Columns that show which curve a row belongs to.
+#: Columns that determine the curve to which a row belongs.
 KEYS = (
     "model",
     "estimator",
@@ -40,7 +40,7 @@ KEYS = (
 
 
 def draw(name: str, directory: Path) -> Figure:
-    """The figure of this name."""
+    """Draw the figure with this name."""
     files = {file.stem.lower(): file for file in sorted((directory / "figures").glob("*.csv"))}
     file = files.get(name.lower())
     if file is None:
@@ -85,7 +85,7 @@ def _columns(file: Path) -> dict[str, Any]:
 
 
 def _each(columns: Columns, name: str) -> list[Any]:
-    """The values of a column in their order, each once, without missing ones."""
+    """Return the distinct values of a column in order, without missing values."""
     found = columns[name].tolist() if name in columns else []
     return [value for value in dict.fromkeys(found) if value == value] or [None]
 
@@ -93,14 +93,14 @@ def _each(columns: Columns, name: str) -> list[Any]:
 def _rows(columns: Columns, **wanted: Any) -> Any:
     mask = np.ones(len(next(iter(columns.values()))), dtype=bool)
     for name, value in wanted.items():
-        # A row without the key, such as that of the truth, belongs to all of its values.
+        # A row without the key, such as that of the true values, belongs to every value of the key.
         if value is not None:
             mask &= (columns[name] == value) | (columns[name] != columns[name])
     return mask
 
 
 def _shades(hue: str, levels: int) -> list[Any]:
-    """A hue from light to dark."""
+    """Return shades of a hue from light to dark."""
     rgb = np.array(to_rgb(hue))
     shares = np.linspace(-1, 1, levels) if levels > 1 else [0.0]
     return [tuple(rgb + (1 - rgb) * -0.55 * s if s < 0 else rgb * (1 - 0.6 * s)) for s in shares]
@@ -128,7 +128,7 @@ def _order_titles(grid: Any, orders: list[Any]) -> None:
             ax.set_title(f"m0 = {order:g}")
 
 
-#: Estimators by the start of their name: hue and dashes. Batch fits use those of their method.
+#: Hue and dashes of estimators, by the start of their names. Batch fits use those of their method.
 LINES: Mapping[str, tuple[str, str]] = {
     "RLS": (plots.COLOURS[0], "-"),
     "OLS": (plots.COLOURS[0], "--"),

@@ -1,7 +1,7 @@
-"""What the results of `identify` share: records, settings, JSON both ways, equality, pickles.
+"""Common parts of the results of `identify`: records, settings, JSON, equality, pickles.
 
-A result is written as the JSON of ``hoid identify --json``, with a state from which the model comes back as
-it was, every bit of it. Equality and pickles use that text.
+A result is written as the JSON of ``hoid identify --json``, together with a state from which the model is
+restored exactly. Equality and pickles use this text.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ class Result:
     """A result of `identify`."""
 
     _native: Any
-    #: The records as they were fitted; none of a result that was read from JSON.
+    #: The records as they were fitted; empty for a result that was read from JSON.
     records: tuple[Record, ...]
     #: The settings that were used, by name.
     settings: dict[str, Any]
-    #: Names of those that are not the default.
+    #: Names of the settings that differ from the default.
     given: frozenset[str]
     #: Units of e and u; empty if none is declared.
     units: tuple[str, str]
-    #: Faults of the records that were searched for: record, kind, channel, from, to, samples, size,
+    #: Faults found in the records: record, kind, channel, from, to, samples, size,
     #: deviations, action, words.
     faults: list[dict[str, Any]]
 
@@ -44,7 +44,7 @@ class Result:
         units: tuple[str, str] | None = None,
     ) -> None:
         self._native = native
-        # Those of a part of another result, or out of a pickle, are the records that it is of.
+        # A part of another result, or a result from a pickle, gets its records from that result.
         self.records = used(native, records) or tuple(records)
         self.units = units or channel_units(self.records)
         own = native.settings
@@ -53,16 +53,16 @@ class Result:
         self.faults = faults_of(native)
 
     def to_json(self) -> str:
-        """The result as text: the object of ``hoid identify --json``, and the state of its model.
+        """Return the result as text: the object of ``hoid identify --json``, and the state of its model.
 
-        `from_json` reads it again, and ``pyhoid.track(record, prior=...)``, ``hoid track --prior``,
-        ``hoid stream --prior`` and ``hoid identify --prior`` take an operator's as a prior. The samples
-        of the records are not in it.
+        `from_json` restores the result. ``pyhoid.track(record, prior=...)``, ``hoid track --prior``,
+        ``hoid stream --prior`` and ``hoid identify --prior`` accept the text for an operator as a prior. The
+        text does not contain the samples of the records.
 
         Raises
         ------
         DataError
-            For a part of another result, such as ``operator.fit``: write that one.
+            For a part of another result, such as ``operator.fit``: write the whole result instead.
 
         Examples
         --------
@@ -77,7 +77,7 @@ class Result:
         return self.to_json() if state is None else state
 
     def __eq__(self, other: object) -> bool:
-        """Equal where all that is written of both is."""
+        """Return whether the two results have the same JSON and the same state."""
         if not isinstance(other, Result):
             return NotImplemented
         return type(self) is type(other) and self._text() == other._text()

@@ -1,4 +1,4 @@
-"""Readable tables, as text and as HTML, and numbers with no more digits than are certain."""
+"""Tables as text and as HTML, and numbers with no more digits than their errors justify."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ DASH = "–"
 
 
 def number(value: float | None, digits: int = 5) -> str:
-    """A number for people to read."""
+    """Format a number."""
     if value is None or math.isnan(value):
         return DASH
     if value == 0 or 1e-4 <= abs(value) < 1e6:
@@ -21,7 +21,7 @@ def number(value: float | None, digits: int = 5) -> str:
 
 
 def with_uncertainty(value: float, error: float | None) -> tuple[str, str]:
-    """Value and standard error: the error has two digits, the value the same decimals."""
+    """Format a value and its standard error: two digits of the error, the same decimals for the value."""
     if error is None or not math.isfinite(error) or error <= 0 or not math.isfinite(value):
         return number(value), DASH
     decimals = 1 - math.floor(math.log10(error))
@@ -32,7 +32,7 @@ def with_uncertainty(value: float, error: float | None) -> tuple[str, str]:
 
 
 def plain_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table as text: the first column is aligned left, the others right."""
+    """Format a table as text: the first column is left-aligned, the others are right-aligned."""
     table = [list(header), *[list(row) for row in rows]]
     widths = [max(len(row[i]) for row in table) for i in range(len(header))]
 
@@ -48,7 +48,7 @@ def plain_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def html_table(caption: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """The same table as HTML, for notebooks."""
+    """Format the same table as HTML, for notebooks."""
     head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
 
     def line(row: Sequence[str]) -> str:

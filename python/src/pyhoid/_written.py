@@ -1,4 +1,4 @@
-"""What results share that are read from their JSON alone: verdict, settings, equality."""
+"""Common parts of results that consist of their JSON alone: verdict, settings, equality."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ __all__ = ["Written"]
 
 
 class Written:
-    """A result of which the JSON is all there is."""
+    """A result that consists of its JSON alone."""
 
-    #: Level, reasons and notes.
+    #: Verdict on the result: level, reasons and notes.
     verdict: Verdict
     #: The settings that were used.
     settings: dict[str, str]

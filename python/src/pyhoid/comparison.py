@@ -1,4 +1,4 @@
-"""Whether conditions differ, and people: from recordings with their manifest, or the results of a group."""
+"""Comparison of conditions and of people, from recordings with their manifest or the results of a group."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 __all__ = ["Comparison", "compare"]
 
-#: A factor: its name, ``"name:level=a,b;level=c"``, or levels with their members by name.
+#: A factor: its name, ``"name:level=a,b;level=c"``, or levels and their members by name.
 Factor = str | Mapping[str, Mapping[str, Sequence[str]]]
 
 
 class Comparison(Written):
-    """Differences between conditions and people. `compare` makes it.
+    """Differences between conditions and between people. `compare` creates it.
 
     Examples
     --------
@@ -37,13 +37,13 @@ class Comparison(Written):
         super()._read(found)
         #: Each difference: quantity, unit, factor, from, to, value, standard_error, interval, t, p, p_adjusted ...
         self.differences: list[dict[str, Any]] = found["differences"]
-        #: The mean over people of each quantity in each condition.
+        #: The mean over people for each quantity and condition.
         self.means: list[dict[str, Any]] = found["means"]
-        #: The estimates of people that all of it is made of.
+        #: The estimates for people from which means and differences are computed.
         self.estimates: list[dict[str, Any]] = found["estimates"]
         #: Changes from run to run, with ``covariate="run"``.
         self.learning: list[dict[str, Any]] = found["learning"]
-        #: Who is missing where, and why.
+        #: Missing estimates, with the reasons.
         self.left_out: list[dict[str, Any]] = found["left_out"]
 
     @property
@@ -54,7 +54,7 @@ class Comparison(Written):
     def to_dataframe(
         self, table: Literal["differences", "means", "estimates", "learning", "left_out"] = "differences"
     ) -> pd.DataFrame:
-        """A table of the result, a row for each entry; ends of intervals are ``low`` and ``high``.
+        """Return a table of the result with a row for each entry; ends of intervals are ``low`` and ``high``.
 
         >>> found.to_dataframe("estimates")
         """
@@ -63,18 +63,20 @@ class Comparison(Written):
         return pd.DataFrame([_flat(row) for row in getattr(self, table)])
 
     def mixed_model(self, quantity: str, fixed: str = "C(condition)", data: pd.DataFrame | None = None) -> Any:
-        """A linear mixed model of the estimates, with an intercept of each person (statsmodels, restricted likelihood).
+        """Fit a linear mixed model to the estimates, with an intercept for each person (statsmodels, restricted
+        likelihood).
 
-        Each estimate counts the same, whatever its standard error: for designs that `compare` does not have.
+        All estimates have the same weight, regardless of their standard errors. The model allows designs that
+        `compare` does not support.
 
         Parameters
         ----------
         quantity : str
-            One that was compared.
+            A quantity that was compared.
         fixed : str
             The fixed effects, as a formula over the columns of ``to_dataframe("estimates")``.
         data : pandas.DataFrame, optional
-            That table with columns of your own.
+            The table ``to_dataframe("estimates")``, with additional columns.
 
         Returns
         -------
@@ -102,7 +104,7 @@ class Comparison(Written):
         return mixedlm(f"value ~ {fixed}", rows, groups=rows["subject"]).fit(reml=True)
 
     def to_svg(self) -> str:
-        """People by condition with the mean and its interval, as the text of an SVG file.
+        """Draw people by condition with the mean and its interval, as the text of an SVG file.
 
         >>> from pathlib import Path
         >>> Path("people.svg").write_text(found.to_svg())
@@ -110,7 +112,7 @@ class Comparison(Written):
         return _pyhoid.comparison_figure_of(self._text)
 
     def to_json(self) -> str:
-        """The object of ``hoid compare --json``; `from_json` reads it again.
+        """Return the object of ``hoid compare --json``, which `from_json` reads.
 
         >>> text = found.to_json()
         """
@@ -118,12 +120,12 @@ class Comparison(Written):
 
     @classmethod
     def from_json(cls, text: str) -> Comparison:
-        """A comparison that `to_json` wrote, or ``hoid compare --json`` printed.
+        """Read a comparison that `to_json` wrote or ``hoid compare --json`` printed.
 
         Raises
         ------
         DataError
-            For a text that is not a result, was changed, or is of another version.
+            For a text that is not a result, was changed, or comes from another version.
 
         Examples
         --------
@@ -161,34 +163,35 @@ def compare(
     jobs: int | None = None,
     progress: Progress = False,
 ) -> Comparison:
-    """Whether conditions differ, and people.
+    """Test whether conditions or people differ.
 
     Parameters
     ----------
     results : path
-        Recordings with their manifest (the file ``group.toml`` or its directory), which are analysed
-        first; or the directory that `group` wrote, or a file with what ``hoid group --json`` printed.
+        Recordings with their manifest (the file ``group.toml`` or its directory), which are first
+        analysed; or the directory that `group` wrote, or a file with the output of ``hoid group --json``.
     factor : str, mapping, or sequence of str
-        What conditions or people differ in: ``"axis:roll=C1r,C2r;pitch=C1p,C2p"``, or
-        ``{"axis": {"roll": ["C1r", "C2r"], "pitch": ["C1p", "C2p"]}}``; several for their interactions.
-        Without it each condition is a level.
+        The variable in which conditions or people differ: ``"axis:roll=C1r,C2r;pitch=C1p,C2p"``, or
+        ``{"axis": {"roll": ["C1r", "C2r"], "pitch": ["C1p", "C2p"]}}``. Several factors include their
+        interactions. Without a factor each condition is a level.
     variation : {"within", "between"}
-        Whether each person is in all levels or in one; found from the results.
+        Whether each person is in all levels or in one; by default determined from the results.
     of : str or sequence of str
-        ``"crossover"``, ``"phase_margin"``, ``"tau_e"`` (these three by default), ``"gain_db@2.5"``,
-        ``"phase_deg@2.5"``, ``"rms_e"``, ``"rms_u"``, or parameters such as ``"K"``, ``"T_L"``: for
-        them recordings are analysed in one form, chosen by the evidence of all people.
+        ``"crossover"``, ``"phase_margin"``, ``"tau_e"`` (the default is these three), ``"gain_db@2.5"``,
+        ``"phase_deg@2.5"``, ``"rms_e"``, ``"rms_u"``, or parameters such as ``"K"``, ``"T_L"``. To compare
+        parameters, recordings are analysed in one form, chosen by the evidence from all people.
     covariate : {"run"}
-        Takes learning over the runs out, and reports it.
+        Removes the effect of learning over the runs, and reports it.
     adjust : {"holm", "none"}
-        What is done about many tests.
+        Adjustment of the p-values for multiple tests.
     weights : {"penalised", "reml"}
-        The variance between people in their weights: kept away from zero, or that of the restricted
-        likelihood, whose intervals are too short for few people.
+        Estimate of the variance between people in their weights: kept away from zero, or from the
+        restricted likelihood, whose intervals are too short for few people.
     directory : path, optional
-        Where the results of recordings are kept for the next comparison; they are removed without it.
+        Directory in which the results of recordings are kept for the next comparison; without it they are
+        removed.
     jobs, progress
-        For recordings, as in `study`.
+        Used if recordings are analysed, as in `study`.
 
     Returns
     -------

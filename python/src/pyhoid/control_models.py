@@ -1,4 +1,4 @@
-"""Models of python-control as operators."""
+"""Conversion of models of python-control to operators."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ __all__ = ["from_control"]
 
 
 def from_control(system: control.TransferFunction | Any) -> Conversion:
-    """The operator of a discrete transfer function of python-control.
+    """Convert a discrete transfer function of python-control to an operator.
 
     The transfer function has the form ``(b0 + b1 q^-1) q^-nk / (1 + f1 q^-1 + f2 q^-2)``.
 
     Parameters
     ----------
     system : control.TransferFunction
-        With one input, one output, and a sample time, as `Fit.to_control` gives it.
+        A transfer function with one input, one output and a sample time, as from `Fit.to_control`.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def from_control(system: control.TransferFunction | Any) -> Conversion:
         )
     num = np.asarray(system.num[0][0], dtype=float)
     den = np.asarray(system.den[0][0], dtype=float)
-    # Powers of z, the highest first: those that the denominator has more are the delay.
+    # Powers of z in descending order; the excess powers of the denominator are the delay.
     relative = len(den) - len(num)
     den, num = den / den[0], num / den[0]
     coefficients = np.trim_zeros(num, "b")

@@ -1,4 +1,4 @@
-"""Conversions: discrete coefficients and operator parameters, and continuous to discrete time."""
+"""Conversion of discrete coefficients to operator parameters and back, and to discrete time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Conversion", "DiscreteTransferFunction", "convert", "discretise"]
 
 
 class Conversion(NamedTuple):
-    """An operator in both forms.
+    """An operator in discrete and continuous form.
 
     The discrete form is ``B q^-nk / F`` with ``B = b0 + b1 q^-1``, ``F = 1 + f1 q^-1 + f2 q^-2``.
 
@@ -31,7 +31,7 @@ class Conversion(NamedTuple):
 
 
 class DiscreteTransferFunction(NamedTuple):
-    """Numerator and denominator by ascending powers of q^-1.
+    """Numerator and denominator in ascending powers of q^-1.
 
     Examples
     --------
@@ -60,7 +60,7 @@ def convert(
     operator: Mapping[str, Any] | None = None,
     sample_time: float = 0.01,
 ) -> Conversion:
-    """Convert discrete coefficients to operator parameters, or the other way round.
+    """Convert discrete coefficients to operator parameters, or vice versa.
 
     Parameters
     ----------
@@ -69,8 +69,8 @@ def convert(
     nk : int
         Delay of b0 in samples.
     operator : mapping
-        ``K_e``, ``T_L`` (or ``K_e_dot``), ``omega_nm``, ``zeta_nm`` and ``tau_e`` (0 where it is
-        left out), as numbers or estimates; also an `Operator`.
+        ``K_e``, ``T_L`` (or ``K_e_dot``), ``omega_nm``, ``zeta_nm`` and ``tau_e`` (0 if omitted), as
+        numbers or estimates; also an `Operator`.
     sample_time : float
         Ts in s.
 
@@ -81,7 +81,7 @@ def convert(
     Raises
     ------
     OptionError
-        When both or neither are given, or a parameter is missing.
+        If both or neither are given, or if a parameter is missing.
 
     Examples
     --------
@@ -123,7 +123,7 @@ def discretise(
     Parameters
     ----------
     num, den : sequence of float
-        Coefficients by descending powers of s.
+        Coefficients in descending powers of s.
     sample_time : float
         Ts in s.
     method : {"zoh", "foh", "tustin", "prewarped", "forward-euler", "backward-euler", "matched"}
@@ -133,7 +133,7 @@ def discretise(
     Returns
     -------
     DiscreteTransferFunction
-        Numerator and denominator by ascending powers of q^-1.
+        Numerator and denominator in ascending powers of q^-1.
 
     Examples
     --------

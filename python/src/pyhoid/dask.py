@@ -1,9 +1,9 @@
-"""Studies spread over a Dask cluster, shard by shard.
+"""Studies distributed over a Dask cluster, shard by shard.
 
-A plan is cut into shards. Each shard runs as one task in a folder of its worker, and its files come
-back as soon as it is done. The shards are kept next to the result until they are merged: a lost
-worker costs only the shard that it was running, and an interrupted study continues with the shards
-that it has. The merged tables have the same bytes as those of a run on one machine.
+A plan is divided into shards. Each shard runs as one task in a directory of its worker, and its files are
+returned as soon as it is finished. The shards are kept next to the result until they are merged. If a
+worker is lost, only the shard that it was running has to be repeated, and an interrupted study continues
+with the shards that are finished. The merged tables have the same bytes as those of a run on one machine.
 
 >>> from dask.distributed import Client
 >>> client = Client("tcp://scheduler:8786")  # or Client(LocalCluster()), or one of dask-jobqueue
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = ["study"]
 
-#: Folder of the shards next to the result.
+#: Subdirectory of the result in which shards are kept.
 SHARDS = "shards"
 
 
@@ -45,7 +45,7 @@ def _run_shard(text: str, replications: int, index: int, count: int, jobs: int) 
 
 
 def _keep(files: dict[str, bytes], target: Path) -> None:
-    """Write a shard next to its place and rename it: it is there as a whole or not at all."""
+    """Write a shard under a temporary name and rename it, so that it is never incomplete."""
     beside = target.with_name(f".{target.name}.{os.getpid()}")
     shutil.rmtree(beside, ignore_errors=True)
     for name, content in files.items():
@@ -72,26 +72,26 @@ def study(
     Parameters
     ----------
     source : path, str or Plan
-        As in `pyhoid.plan`. Workers get its text, and need nothing but pyhoid.
+        As in `pyhoid.plan`. Workers receive its text and need only pyhoid.
     directory : path
-        Where the tables are written, on the machine of the client. A study that was stopped there
+        Directory for the tables, on the machine of the client. A stopped study in this directory
         continues.
     client : distributed.Client
-        A client of any scheduler.
+        Client of any Dask scheduler.
     shards : int, optional
-        Default four for each worker. With more there is less to repeat when a worker is lost; a
-        shard cannot be smaller than a block of the plan.
+        Number of shards; by default four per worker. With more shards, less has to be repeated if a
+        worker is lost; a shard cannot be smaller than a block of the plan.
     jobs : int, optional
-        Threads for a shard; default those of a worker.
+        Number of threads per shard; by default the number of threads of a worker.
     replications : int, optional
-        Replaces the number in the plan.
+        Replaces the number of replications in the plan.
     retries : int
-        How often a failed shard is tried again.
+        Number of times a failed shard is repeated.
     csv : bool
-        Write the tables as CSV instead of Parquet.
+        Whether the tables are written as CSV instead of Parquet.
     progress : bool or callable
-        True shows on standard error how many shards are done; a callable gets their number and
-        the number of all shards.
+        True shows the number of finished shards on standard error; a callable receives the number of
+        finished shards and the number of all shards.
 
     Returns
     -------
@@ -100,9 +100,9 @@ def study(
     Raises
     ------
     OptionError
-        For a plan that is not valid, or a cluster without workers.
+        For an invalid plan, or a cluster without workers.
     StudyStateError
-        When the directory holds another study.
+        If the directory holds another study.
     """
     from distributed import as_completed
 
@@ -117,13 +117,13 @@ def study(
     threads = jobs or max(int(worker["nthreads"]) for worker in workers.values())
     report = _options.reporter(progress, "shards")
     target = Path(directory)
-    # Another plan, or another number of shards, has other shards.
+    # A different plan or number of shards uses a different directory.
     kept = target / SHARDS / f"{plan.sha256[:16]}-{plan.replications}-{count}"
     kept.mkdir(parents=True, exist_ok=True)
     folders = {index: kept / f"{index}" for index in range(1, count + 1)}
     lacking = [index for index, folder in folders.items() if not folder.exists()]
     done = count - len(lacking)
-    # A shard fills its worker: the tasks of one worker run one after the other.
+    # A shard uses all threads of its worker, so the tasks of one worker run one after the other.
     futures = {
         client.submit(
             _run_shard,

@@ -1,4 +1,4 @@
-"""Describing functions: how a person responds at the lines of the excitation."""
+"""Describing functions: the response of a person at the lines of the excitation."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ if TYPE_CHECKING:
 __all__ = ["DescribingFunction", "Description", "describe", "describing_function"]
 
 
-#: What a pickle keeps of the native side.
+#: Attributes of the native object that a pickle contains.
 _ANSWERS = ("per_run", "remnant_spectrum", "figures")
 
 
 class DescribingFunction:
-    """The response of a person at the lines of the excitation. `describing_function` makes it.
+    """The response of a person at the lines of the excitation. `describing_function` creates it.
 
-    Columns are read by name, and have one value for each line: ``omega`` (rad/s), ``harmonic``,
-    ``response`` (complex), ``response_se``, ``coherence``, ``magnitude_db``, ``phase_deg``, with
-    ``_se`` for standard errors (NaN if there is only one run).
+    Columns are accessed by name and have one value for each line: ``omega`` (rad/s), ``harmonic``,
+    ``response`` (complex), ``response_se``, ``coherence``, ``magnitude_db``, ``phase_deg``. Standard errors
+    have the suffix ``_se``; they are NaN if there is only one run.
 
     Examples
     --------
@@ -75,13 +75,13 @@ class DescribingFunction:
 
     @property
     def remnant_spectrum(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Frequency (rad/s), density of the remnant, and its standard error."""
+        """Frequencies (rad/s), power density of the remnant, and its standard error."""
         omega, density, error = self._native.remnant_spectrum
         return omega, density, error
 
     @property
     def figures(self) -> dict[str, Any]:
-        """The number of runs, and estimates of off_line_share, noise_ratio, rms_e and rms_u."""
+        """Number of runs, and estimates of off_line_share, noise_ratio, rms_e and rms_u."""
         found = dict(self._native.figures)
         runs = found.pop("runs")
         return {"runs": runs, **estimates(found)}
@@ -93,14 +93,14 @@ class DescribingFunction:
         weights: str = "coherence",
         delay: tuple[float, float] = (0.0, 1.0),
     ) -> dict[str, Any]:
-        """Fit ``K (1 + T_L s) exp(-tau s)`` through the lines.
+        """Fit ``K (1 + T_L s) exp(-tau s)`` to the response at the lines.
 
         Returns gain, lead (s), delay (s) and the misfit.
 
         Parameters
         ----------
         lead : bool
-            False holds T_L at 0.
+            False fixes T_L at 0.
         weights : {"coherence", "variance", "uniform"}
         delay : (float, float)
             Smallest and largest tau in s.
@@ -118,15 +118,15 @@ class DescribingFunction:
     ) -> dict[str, Estimate | None]:
         """Crossover frequency and phase margin with a controlled element.
 
-        `num` is the element as text, such as ``"90/(s(s+6))"``; or `num` and `den` are its
-        coefficients by descending powers of s.
+        `num` is the element as text, such as ``"90/(s(s+6))"``; or `num` and `den` are its coefficients
+        in descending powers of s.
 
         >>> described.margins("90/(s(s+6))")
         """
         return estimates(self._native.margins(_options.controlled_element(num, den)))
 
     def to_pandas(self) -> pd.DataFrame:
-        """The lines as a table.
+        """Return the lines as a table.
 
         >>> described.to_pandas()
         """
@@ -173,27 +173,27 @@ def describing_function(
     detrend: str = "none",
     smoothing_bins: int = 8,
 ) -> DescribingFunction:
-    """The describing function from e to u by Fourier coefficients at the lines of the excitation.
+    """Compute the describing function from e to u from Fourier coefficients at the lines.
 
     Parameters
     ----------
     records : Record or sequence of Record
         Runs with the same excitation.
     channel : str, optional
-        Channel in whose spectrum the lines are found; not used when they are given.
+        Channel in whose spectrum the lines are searched; not used if the lines are given.
     harmonics, omega : sequence, optional
         The lines, as multiples of the fundamental or in rad/s; both need `period`.
     period : float, optional
         Period of the excitation in s.
     least_amplitude : float
-        Least amplitude of a line, as a share of the largest.
+        Smallest amplitude of a line, relative to the largest.
     averaging : {"ratios", "reference", "same-excitation"}
-        Mean of U/E over runs; cross spectra with the channel `reference`; cross spectra of runs
-        with the same phases.
+        Mean of U/E over the runs; cross spectra with the channel `reference`; or cross spectra of runs
+        whose excitation has the same phases.
     reference : str, optional
         The channel for ``averaging="reference"``.
     realisation : {"record", "period"}
-        What counts as one run.
+        Whether a whole record or a period counts as one run.
     start, stop : float, optional
         Span in s.
     offset_samples : float
@@ -209,7 +209,7 @@ def describing_function(
     Raises
     ------
     DataError
-        When the span does not hold whole periods, or a line has no power.
+        If the span does not contain whole periods, or a line has no power.
 
     Examples
     --------
@@ -248,7 +248,7 @@ def describing_function(
 
 
 class Description:
-    """A describing function, its loop, and its reliability. `describe` makes it.
+    """A describing function with its loop and its reliability. `describe` creates it.
 
     Attributes
     ----------
@@ -260,13 +260,14 @@ class Description:
         Crossover frequency (rad/s), phase margin (deg), gain margin (dB) and its frequency, each an
         Estimate or None; None without a controlled element.
     remnant_share, noise_ratio : Estimate
-        Share of the power of u at non-excited frequencies, and with its part at the lines (P_n).
+        Share of the power of u at non-excited frequencies, and this share including the noise at the
+        lines (P_n).
     verdict : {"trustworthy", "doubtful", "not determined"}
-        What the result is worth.
+        Reliability of the result.
     reasons, notes : list of str
-        What speaks against it, and additional notes.
+        Reasons against trusting the result, and additional notes.
     excitation : str or None
-        The channel that the average refers to.
+        The channel of the excitation.
     period : float
         Period of the excitation, s.
 
@@ -280,7 +281,7 @@ class Description:
         self._json: str = native.to_json()
         #: The settings that were used, by name.
         self.settings: dict[str, str] = {name: value for name, value, _ in native.settings}
-        #: Faults of the records that were searched for: kind, channel, from, to, size, action.
+        #: Faults found in the records: kind, channel, from, to, size, action.
         self.faults: list[dict[str, Any]] = faults_of(native)
         self.phase_deg: FloatArray = native.phase_deg
         found = native.open_loop
@@ -294,7 +295,7 @@ class Description:
         self.excitation, self.period = native.excitation
 
     def to_json(self) -> str:
-        """The object of ``hoid describe --json`` as text.
+        """Return the object of ``hoid describe --json`` as text.
 
         >>> pyhoid.describe(record).to_json()
         """
@@ -324,32 +325,32 @@ def describe(
 ) -> Description:
     """Describe how a person responds at the lines of a periodic excitation, without a model.
 
-    It is ``hoid describe``: records are the runs where there are three or more, else their periods
-    are.
+    This is ``hoid describe``. If there are three or more records, each is a run; otherwise each period
+    of a record is a run.
 
     Parameters
     ----------
     records : Record or sequence of Record
         Runs of one person in one task, each over whole periods of the excitation.
     excitation : str, optional
-        Channel of the recorded disturbance or target; by default the first of the common names that
-        there is with lines.
+        Channel of the recorded disturbance or target; by default the first channel with a common name
+        that has lines.
     lines : sequence of float, optional
-        Its lines in rad/s, which need `period`; by default those found.
+        Lines of the excitation in rad/s, which require `period`; by default the lines found.
     period : float, optional
-        Its period in s.
+        Period of the excitation in s.
     controlled_element : str or (array_like, array_like), optional
-        As text, such as ``"90/(s(s+6))"``, or numerator and denominator by descending powers of s:
-        adds crossover and margins.
+        Text such as ``"90/(s(s+6))"``, or numerator and denominator in descending powers of s; adds
+        crossover and margins.
     start, stop : float, optional
         Span in s.
     offset_samples : float
         ``e[k]`` belongs to ``u[k + offset_samples]``.
     detrend : {"none", "mean", "linear"}
     faults : {"bridge", "cut", "report", "keep"}
-        What is done about faults of the records, as in `identify`.
+        Treatment of faults in the records, as in `identify`.
     decimate : "auto", "off" or int
-        As in `identify`. The response at the lines is the same at both rates.
+        As in `identify`. The response at the lines is the same at the original and the reduced rate.
 
     Returns
     -------
@@ -358,9 +359,9 @@ def describe(
     Raises
     ------
     OptionError
-        When no channel holds an excitation, or the lines are none of the period.
+        If no channel contains an excitation, or the lines are not harmonics of the period.
     DataError
-        When the span does not hold whole periods, or a line has no power.
+        If the span does not contain whole periods, or a line has no power.
 
     Examples
     --------
@@ -381,7 +382,7 @@ def describe(
             controlled_element=element,
             start=start,
             stop=stop,
-            # A ratio of samples knows no hold: what the input was moved for it is taken back.
+            # A ratio of Fourier coefficients does not include the hold, so the shift of the input is reversed.
             offset_samples=offset_samples + several[0].input_lead / several[0].sample_time,
             detrend=detrend,
             faults=faults,

@@ -1,7 +1,7 @@
 """Exceptions of pyhoid, by kind.
 
-Each is a `pyhoid.Error`, and also a `ValueError` for a wrong value or an `OSError` for a file. The
-messages name the quantity, what was found, the expected value, and the remedy.
+Each is a `pyhoid.Error`, and also a `ValueError` for an invalid value or an `OSError` for a file. The
+messages name the quantity, the value found, the expected value, and the remedy.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ class Error(Exception):
 
 
 class OptionError(Error, ValueError):
-    """An option that is out of range, unknown, or does not fit the other options."""
+    """An option that is out of range, unknown, or inconsistent with other options."""
 
 
 class DataError(Error, ValueError):
-    """Data that cannot give a result: not finite, unequal lengths, too short, no excitation."""
+    """Data that cannot give a result: not finite, of unequal lengths, too short, or without excitation."""
 
 
 class EstimationError(Error, ArithmeticError):
-    """An estimation without a result: singular regressors, no finite loss."""
+    """An estimation without a result: singular regressors, or no finite loss."""
 
 
 class NotConvertibleError(Error, ValueError):
@@ -48,11 +48,11 @@ class FileMissingError(FileError, FileNotFoundError):
 
 
 class FormatError(Error, ValueError):
-    """A file with unexpected content; the message names the place in it."""
+    """A file with unexpected content; the message names the position in the file."""
 
 
 class StudyStateError(Error, RuntimeError):
-    """A study directory in which the request is not possible.
+    """A study directory for which the request is not possible.
 
-    It is occupied, belongs to another plan, or lacks shards.
+    The directory is occupied, belongs to another plan, or lacks shards.
     """

@@ -1,4 +1,4 @@
-"""Estimates with their standard errors, and the operator and remnant made of them."""
+"""Estimates with their standard errors, and operators and remnants that consist of them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["Estimate", "Operator", "Remnant"]
 
 _T = TypeVar("_T")
 
-#: Units of parameters, those of gains next to the units of u and e.
+#: Units of parameters; for gains, the factor in addition to the units of u and e.
 UNITS: Mapping[str, str] = {
     "K_e": "",
     "T_L": "s",
@@ -37,9 +37,9 @@ _GAINS = ("K", "K_e", "K_e_dot", "K_over_T_I", "K_I")
 
 
 def unit_of(name: str, units: tuple[str, str] = ("", ""), own: str | None = None) -> str:
-    """The unit of a parameter; of a gain only where those of e and u are declared.
+    """Return the unit of a parameter; for a gain only if the units of e and u are declared.
 
-    `own` is the unit that it has next to that of u/e; by default that of its name.
+    `own` is the factor in addition to u/e; by default it follows from the name of the parameter.
 
     >>> unit_of("T_L"), unit_of("K_e")
     ('s', '')
@@ -58,7 +58,7 @@ def unit_of(name: str, units: tuple[str, str] = ("", ""), own: str | None = None
 
 
 def channel_units(records: Sequence[Record]) -> tuple[str, str]:
-    """The units of input and output, whatever their columns are called; empty if none is given."""
+    """Return the units of input and output, regardless of the column names; empty if none is given."""
     if not records:
         return ("", "")
     record, units = records[0], records[0].units
@@ -71,7 +71,7 @@ def channel_units(records: Sequence[Record]) -> tuple[str, str]:
 class Estimate(NamedTuple):
     """A value and its standard error.
 
-    The standard error is None if there is none: for a delay of whole samples, or an exact fit.
+    The standard error is None if it does not exist: for a delay in whole samples, or an exact fit.
 
     Examples
     --------
@@ -90,14 +90,14 @@ class Estimate(NamedTuple):
 
 
 def estimates(found: Mapping[str, Any]) -> dict[str, Estimate | None]:
-    """Estimates from the pairs of the native module."""
+    """Create estimates from the pairs that the native module returns."""
     return {name: None if pair is None else Estimate(*pair) for name, pair in found.items()}
 
 
 class Named(Mapping[str, _T]):
-    """Values by name, which are also attributes."""
+    """Values by name, which are also accessible as attributes."""
 
-    #: What has them, in messages.
+    #: Name of the object in messages.
     _owner = "it"
     _all: dict[str, _T]
 
@@ -125,7 +125,7 @@ class _Converted(Named[Estimate]):
     """Estimates by name, or the reason why there are none."""
 
     _what = "the model"
-    #: Units of e and u, for those of gains.
+    #: Units of e and u, from which the units of gains follow.
     _units: tuple[str, str] = ("", "")
 
     def __init__(
@@ -179,12 +179,12 @@ class _Converted(Named[Estimate]):
 class Operator(_Converted):
     """The human operator of a model.
 
-    The parameters are K_e (unit of u by that of e), T_L (s), K_e_dot (that of K_e times s),
+    The parameters are K_e (unit of u divided by that of e), T_L (s), K_e_dot (unit of K_e times s),
     omega_nm (rad/s), zeta_nm, tau_e (s).
 
-    A mapping from names to `Estimate`; the entries are also attributes (``operator.K_e.value``).
-    Where the coefficients do not represent a continuous operator, `convertible` is False, `reason`
-    gives the reason, and reading a parameter raises `NotConvertibleError`.
+    The operator is a mapping from names to `Estimate`; the entries are also attributes
+    (``operator.K_e.value``). If the coefficients do not represent a continuous operator, `convertible` is
+    False, `reason` gives the reason, and access to a parameter raises `NotConvertibleError`.
 
     Attributes
     ----------
@@ -209,7 +209,7 @@ class Operator(_Converted):
 
 
 class Remnant(_Converted):
-    """The remnant of a noise model: T_n (s) and K_n, and the order m of its filter.
+    """The remnant of a noise model: T_n (s), K_n, and the order m of its filter.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""How many runs, how long, which forcing function: an experiment before it is done."""
+"""Design of an experiment: number and length of the runs, and forcing function."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["ExperimentDesign", "design"]
 
 
 class ExperimentDesign(Written):
-    """A forcing function and the errors to be expected. `design` makes it.
+    """A forcing function and the expected errors. `design` creates it.
 
     Examples
     --------
@@ -31,26 +31,26 @@ class ExperimentDesign(Written):
         super()._read(found)
         #: Form of the typical person's operator.
         self.form: str = found["form"]
-        #: Number of runs, and length of one in s.
+        #: Number of runs, and length of a run in s.
         self.runs: int = found["runs"]
         self.length: float = found["length_s"]
-        #: Runs until every wanted quantity has its accepted error.
+        #: Number of runs needed for the accepted errors of all requested quantities.
         self.runs_needed: int = found["runs_needed"]
-        #: Peak of the forcing function divided by its rms.
+        #: Ratio of peak to rms of the forcing function.
         self.crest_factor: float = found["crest_factor"]
         #: Each line: omega_rad_s, amplitude, phase_rad, and the response of the person with its errors.
         self.lines: list[dict[str, Any]] = found["lines"]
-        #: The operator between the lines, with its errors.
+        #: Response of the operator between the lines, with its errors.
         self.response: list[dict[str, Any]] = found["response"]
-        #: The response to a target that is shown, likewise; empty without it.
+        #: Response to a displayed target between the lines, with its errors; empty without such a target.
         self.response_to_target: list[dict[str, Any]] = found["response_to_target"]
-        #: The person with the greatest errors, if there are several people.
+        #: The person with the largest errors, if there are several people.
         self.worst: dict[str, Any] | None = found["worst"]
-        #: The other people.
+        #: Expected errors for the other people.
         self.people: list[dict[str, Any]] = found["people"]
-        #: Another forcing function, with ``against``.
+        #: Expected errors with another forcing function, if ``against`` is given.
         self.against: dict[str, Any] | None = found["against"]
-        #: People and runs to find a difference, with ``difference``.
+        #: Number of people and runs needed to find a difference, if ``difference`` is given.
         self.difference: dict[str, Any] | None = found["difference"]
         self._parameters: list[dict[str, Any]] = _rows(found)
 
@@ -68,8 +68,8 @@ class ExperimentDesign(Written):
             "errors", "lines", "response", "response_to_target", "people", "power"
         ] = "errors",
     ) -> pd.DataFrame:
-        """A table of the result: errors of the typical person, lines, response to the error and to a
-        target that is shown, errors of each of several people, or the power over runs and people.
+        """Return a table of the result: errors of the typical person, lines, response to the error and to
+        a displayed target, errors of each person, or power over runs and people.
 
         >>> designed.to_dataframe("lines")
         """
@@ -91,7 +91,7 @@ class ExperimentDesign(Written):
         return pd.DataFrame(getattr(self, table))
 
     def to_svg(self, figure: Literal["response", "runs"] = "response") -> str:
-        """A figure as the text of an SVG file: the lines with the response of the person, or the
+        """Draw a figure as the text of an SVG file: the lines with the response of the person, or the
         errors over the number of runs.
 
         >>> from pathlib import Path
@@ -101,7 +101,7 @@ class ExperimentDesign(Written):
         return {"response": response, "runs": runs}[figure]
 
     def write(self, directory: str | PathLike[str]) -> None:
-        """Writes scenario.toml, lab.toml (for ``hoid lab --config``), forcing.csv and design.json.
+        """Write scenario.toml, lab.toml (for ``hoid lab --config``), forcing.csv and design.json.
 
         >>> designed.write("design")
         """
@@ -119,7 +119,7 @@ class ExperimentDesign(Written):
                 (place / name).write_text(text)
 
     def to_json(self) -> str:
-        """The object of ``hoid design --json``; `from_json` reads it again.
+        """Return the object of ``hoid design --json``, which `from_json` reads.
 
         >>> text = designed.to_json()
         """
@@ -127,12 +127,12 @@ class ExperimentDesign(Written):
 
     @classmethod
     def from_json(cls, text: str) -> ExperimentDesign:
-        """A design that `to_json` wrote, or ``hoid design --json`` printed.
+        """Read a design that `to_json` wrote or ``hoid design --json`` printed.
 
         Raises
         ------
         DataError
-            For a text that is not a result, was changed, or is of another version.
+            For a text that is not a result, was changed, or comes from another version.
 
         Examples
         --------
@@ -169,7 +169,7 @@ def _rows(found: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _number(value: float | None) -> float:
-    # JSON has no infinite number, as the T_I of an integration.
+    # JSON cannot represent infinity, such as the T_I of a pure integration.
     return float("nan") if value is None else value
 
 
@@ -200,51 +200,53 @@ def design(
     against: str | PathLike[str] | None = None,
     seed: int = 0,
 ) -> ExperimentDesign:
-    """How many runs, how long, which forcing function.
+    """Design an experiment: number and length of the runs, and forcing function.
 
     Parameters
     ----------
     people : str or path
-        ``"population"`` (as people are known to adapt to the controlled element), a scenario
-        (``.toml``), a fit (``.json``), the directory that `group` wrote, or its ``population.json``.
+        ``"population"`` (typical people, adapted to the controlled element), a scenario (``.toml``), a fit
+        (``.json``), the directory that `group` wrote, or its ``population.json``.
     controlled_element : str or (array_like, array_like)
-        As ``"90/(s(s+6))"``, or numerator and denominator; that of the scenario or group if not given.
+        Text such as ``"90/(s(s+6))"``, or numerator and denominator; by default from the scenario or group.
     wanted : mapping, str, or sequence of str
-        Accepted standard errors: ``{"tau_e": 0.05, "phase_margin": 2}``, or ``"tau_e=5%"``; the margin
-        in deg, all else relative. Without it all parameters.
+        Accepted standard errors: ``{"tau_e": 0.05, "phase_margin": 2}``, or ``"tau_e=5%"``; in deg for the
+        margin, otherwise relative. Without it, all parameters are requested.
     difference : mapping or str
-        A difference between two conditions to be found: ``{"crossover": 0.5}`` in its unit, or
-        ``"crossover=10%"`` of its value.
+        A difference between two conditions that the experiment should find: ``{"crossover": 0.5}`` in the
+        unit of the quantity, or ``"crossover=10%"`` of its value.
     power, alpha : float
-        Probability to find it, and level of the test.
+        Probability of finding the difference, and significance level of the test.
     between_people, run_to_run : float
-        Standard deviation of the difference between people, and of a person from run to run, relative.
-        The first may be a file that has it: a comparison as JSON, the result of a group with several
-        conditions, a ``population.json``. Without it that of ``people`` if they have one, else 0.1.
+        Relative standard deviations of the difference between people, and of a person from run to run.
+        The first may be a file that contains it: a comparison as JSON, the result of a group with several
+        conditions, or a ``population.json``. By default it comes from ``people`` if they provide it;
+        otherwise it is 0.1.
     condition : str
-        The condition of a group that has several.
+        Name of the condition, for a group with several conditions.
     form : str
-        Form of the population's operator; the one that people use with the element if not given.
+        Form of the population's operator; by default the form that people typically adopt with the element.
     disturbance : bool
-        The forcing function enters at the input of the controlled element; else it is the target.
+        True if the forcing function enters at the input of the controlled element; otherwise it is the target.
     display : {"compensatory", "pursuit", "preview"}
-        Display of the task. On the last two a target and a disturbance are designed, on lines of their
-        own, and the errors of the response to the target (``K_f``, ``tau_f``) are predicted too.
+        Display of the task. For ``"pursuit"`` and ``"preview"``, a target and a disturbance with separate
+        lines are designed, and the errors of the response to the target (``K_f``, ``tau_f``) are also
+        predicted.
     length : float
         Length of a run in s, the period of the forcing function.
     runs : int
-        Number of runs; by default that which the wanted errors take.
+        Number of runs; by default the number needed for the accepted errors.
     lines, spacing, band, shelf
-        Number of lines, their least distance in multiples of 1/length, their lowest and highest
-        frequency in rad/s, and the largest amplitude beyond the crossover as a part of the mean below.
+        Number of lines, their smallest distance in multiples of 1/length, their lowest and highest frequency
+        in rad/s, and the largest amplitude above the crossover relative to the mean amplitude below it.
     max_rms_e, max_u : float
-        Largest rms of error and control.
+        Largest rms of e and largest rms of u.
     remnant_share, remnant_time_constant : float
-        Share of the remnant in the variance of u, and its time constant in s.
+        Share of the variance of u due to the remnant, and time constant of the remnant in s.
     against : str or path
         Another forcing function: ``"reference"``, a scenario, or a table of lines.
     seed : int
-        Start of the search for phases.
+        Seed of the search for phases.
 
     Returns
     -------

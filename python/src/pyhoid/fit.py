@@ -1,4 +1,4 @@
-"""A fitted model: coefficients, operator, remnant, quality, predictions, its page."""
+"""A fitted model: coefficients, operator, remnant, quality, predictions, report page."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ __all__ = ["Correlation", "Fit", "FrequencyResponse", "Series", "Validation"]
 
 
 class Fit(Model, Result):
-    """A fitted model. `identify` makes it.
+    """A fitted model. `identify` creates it.
 
     Attributes
     ----------
     records : tuple of Record
-        The records that the model was fitted to.
+        The records to which the model was fitted.
     settings : dict
-        The keywords of the call, defaults included.
+        The keywords of the call, including defaults.
 
     Examples
     --------
@@ -62,12 +62,12 @@ class Fit(Model, Result):
 
     @property
     def structure(self) -> str:
-        """Name of the structure, such as ``"bj"``; ``"operator"`` with its remnant of order m."""
+        """Name of the structure, such as ``"bj"``; ``"operator"`` for an operator with a remnant of order m."""
         return self._native.structure
 
     @property
     def orders(self) -> dict[str, int]:
-        """na, nb, nc, nd, nf and nk; nb counts b0, b1, ..."""
+        """Orders na, nb, nc, nd, nf and nk; nb counts b0, b1, ..."""
         return self._native.orders
 
     @property
@@ -77,7 +77,7 @@ class Fit(Model, Result):
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Coefficients (or physical parameters of a grey box) by name."""
+        """Coefficients (or physical parameters of a grey-box model) by name."""
         return {name: value for name, (value, _) in self._native.parameters}
 
     @property
@@ -103,9 +103,9 @@ class Fit(Model, Result):
 
     @property
     def polynomials(self) -> dict[str, FloatArray]:
-        """A, B, C, D and F by ascending powers of q^-1.
+        """A, B, C, D and F in ascending powers of q^-1.
 
-        B starts with the zeros of its delay, the others with 1.
+        B starts with nk zeros for the delay, the others with 1.
         """
         return self._native.polynomials
 
@@ -121,7 +121,7 @@ class Fit(Model, Result):
 
     @property
     def criteria(self) -> dict[str, float | None]:
-        """aic, aicc, bic, fpe, mdl and yic."""
+        """Values of the criteria aic, aicc, bic, fpe, mdl and yic."""
         return {
             name: self._native.figures[name] for name in ("aic", "aicc", "bic", "fpe", "mdl", "yic")
         }
@@ -149,7 +149,7 @@ class Fit(Model, Result):
 
     @property
     def operators(self) -> list[Operator | None]:
-        """The operator of each record, for a grey box with individual parameters.
+        """The operator of each record, for a grey-box model with individual parameters.
 
         Empty for other fits.
         """
@@ -157,23 +157,23 @@ class Fit(Model, Result):
 
     @property
     def levels(self) -> list[Estimate | None]:
-        """The level of u of each record: the constant that is not a response to e, in the unit of u.
+        """The constant of u in each record that is not a response to e, in the unit of u.
 
-        Estimated of recorded data; empty for simulated runs and with ``faults="keep"``. None if
+        It is estimated for recorded data; empty for simulated runs and with ``faults="keep"``. None if
         the model has no static gain.
         """
         return [None if pair is None else Estimate(*pair) for pair in self._native.levels]
 
     @property
     def remnant(self) -> Remnant | None:
-        """T_n and K_n by the inverse of the zero-order hold; see `remnant_by`.
+        """T_n and K_n, from the inverse of the zero-order hold; see `remnant_by`.
 
         None without a noise model D.
         """
         return self.remnant_by("zoh")
 
     def remnant_by(self, discretisation: str) -> Remnant | None:
-        """T_n and K_n by the inverse of ``"zoh"`` or ``"backward-euler"``.
+        """Return T_n and K_n from the inverse of ``"zoh"`` or ``"backward-euler"``.
 
         >>> fit.remnant_by("backward-euler")
         """
@@ -184,11 +184,11 @@ class Fit(Model, Result):
     def quality(self) -> dict[str, float]:
         """VAF and NRMSE fit (both in %) of simulation and one-step prediction.
 
-        They are taken over the records of the fit.
+        Both are computed over the records of the fit.
         """
         known = self._quality
         if known is None:
-            # Without records as it was written.
+            # Without records, the stored values are returned.
             written = None if self.records else json.loads(self.to_json())["fit"]
             known = (
                 self._native.quality(list(self.records))
@@ -200,7 +200,7 @@ class Fit(Model, Result):
 
     @property
     def verdict(self) -> Verdict:
-        """What the fit is worth on its records: `level`, `reasons` and `notes`.
+        """Reliability of the fit on its records: `level`, `reasons` and `notes`.
 
         Raises
         ------
@@ -208,14 +208,14 @@ class Fit(Model, Result):
             For a fit without records, such as the start of a `Tracker`.
         """
         if not self.records and self._native.state() is not None:
-            raise DataError("the fit has no records to be judged on; a fit by identify has them")
+            raise DataError("the fit has no records to be judged on; a fit from identify has records")
         if self._verdict is None:
             self._verdict = Verdict(*self._native.verdict(list(self.records)))
         return self._verdict
 
     @property
     def candidates(self) -> list[dict[str, Any]]:
-        """The table that the model was chosen from; empty without a search."""
+        """The candidates from which the model was selected; empty without a search."""
         return self._native.candidates
 
     @property
@@ -225,23 +225,23 @@ class Fit(Model, Result):
 
     @property
     def roots(self) -> list[dict[str, Any]]:
-        """Poles and zeros with standard errors, natural frequency (rad/s) and damping."""
+        """Return poles and zeros with standard errors, natural frequency (rad/s) and damping."""
         return self._native.roots
 
     def margins(
         self, num: str | Sequence[float], den: Sequence[float] | None = None
     ) -> dict[str, Estimate | None]:
-        """Crossover frequency and margins with a controlled element.
+        """Return crossover frequency and margins with a controlled element.
 
-        `num` is the element as text, such as ``"90/(s(s+6))"``; or `num` and `den` are its
-        coefficients by descending powers of s.
+        `num` is the element as text, such as ``"90/(s(s+6))"``; or `num` and `den` are its coefficients
+        in descending powers of s.
 
         >>> fit.margins("90/(s(s+6))")
         """
         return estimates(self._native.margins(_options.controlled_element(num, den)))
 
     def to_pandas(self) -> pd.DataFrame:
-        """Parameters, operator and remnant as a table: value, standard_error, unit.
+        """Return parameters, operator and remnant as a table: value, standard_error, unit.
 
         >>> fit.to_pandas()
         """
@@ -260,7 +260,7 @@ class Fit(Model, Result):
         )
 
     def to_xarray(self) -> xr.Dataset:
-        """Parameters and covariance over the coordinate ``parameter``.
+        """Return parameters and covariance over the coordinate ``parameter``.
 
         >>> fit.to_xarray()
         """
@@ -281,7 +281,7 @@ class Fit(Model, Result):
         )
 
     def plot(self, record: Record | None = None, ax: Axes | None = None) -> Axes:
-        """Plot the time response on a record, by default the first; see `pyhoid.plots`.
+        """Plot the time response on a record, by default the first record; see `pyhoid.plots`.
 
         >>> axes = fit.plot(record.span(20, 40))
         """
@@ -296,9 +296,9 @@ class Fit(Model, Result):
         title: str | None = None,
         controlled_element: str | tuple[Sequence[float], Sequence[float]] | None = None,
     ) -> Path:
-        """Write the page about the model, ``report.html``, into a directory.
+        """Write the report page of the model, ``report.html``, to a directory.
 
-        It is the page that ``hoid identify --report`` writes.
+        It is the same page as ``hoid identify --report`` writes.
 
         Parameters
         ----------
@@ -307,24 +307,24 @@ class Fit(Model, Result):
         title : str, optional
             Heading of the page.
         controlled_element : str or (array_like, array_like), optional
-            As text, such as ``"90/(s(s+6))"``, or numerator and denominator by descending powers
-            of s. The page then has the margins of the loop.
+            Text such as ``"90/(s(s+6))"``, or numerator and denominator in descending powers of s. With it,
+            the page contains the margins of the loop.
 
         Returns
         -------
         Path
-            The page.
+            Path of the page.
 
         Raises
         ------
         FileError
-            When the page cannot be written.
+            If the page cannot be written.
 
         >>> page = fit.report("out")
         """
         if not self.records:
             raise DataError(
-                "the fit has no records for the page to show; a fit by identify has them"
+                "the fit has no records for the page to show; a fit from identify has records"
             )
         labels = [record.label or "(unnamed)" for record in self.records]
         what = labels[0] if len(labels) == 1 else f"{len(labels)} records"
@@ -357,7 +357,7 @@ class Fit(Model, Result):
         return rows
 
     def summary(self) -> str:
-        """The fit as tables in plain text.
+        """Return the fit as tables in plain text.
 
         >>> print(fit.summary())
         """

@@ -1,4 +1,4 @@
-"""Groups of recorded runs by subject and condition, and virtual experiments to try them on."""
+"""Groups of recorded runs by subject and condition, and virtual experiments for trying them out."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def group(
     Parameters
     ----------
     manifest : path
-        The file ``group.toml``, or its directory; `group_manifest` makes the text of one.
+        The file ``group.toml`` or its directory; `group_manifest` creates its text.
     directory : path
-        Where the tables and pages are written.
+        Directory to which the tables and pages are written.
     jobs, resume, csv, progress
         As in `study`.
 
@@ -38,7 +38,7 @@ def group(
     -------
     Results
         ``people``, ``estimates``, ``averages``, ``delays``, ``trace-averages``, ...;
-        `Results.pages` has the page of the group, ``report.html``, and one for each subject.
+        `Results.pages` contains the page of the group, ``report.html``, and one for each subject.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def group(
 def group_manifest(
     directory: str | PathLike[str], pattern: str = "{subject}_{condition}_{run}.csv"
 ) -> tuple[str, list[str]]:
-    """The manifest of a directory, as TOML text, and the files that are not in it.
+    """Return the manifest of a directory as TOML text, and the files that it does not list.
 
     The manifest lists the files whose names match the pattern.
 
@@ -95,24 +95,24 @@ def simulate_group(
 ) -> int:
     """Simulate a virtual experiment.
 
-    Writes a file for each run, the true parameters in ``truth.csv``, and a manifest for `group`.
+    Writes a file for each run, the true parameters to ``truth.csv``, and a manifest for `group`.
 
     Parameters
     ----------
     directory : path
         Created if it does not exist.
     subjects, runs : int
-        Number of subjects, and of runs for each subject and condition.
+        Number of subjects, and number of runs for each subject and condition.
     conditions : sequence of str
     between_subjects, between_runs : float
-        Spread of the parameters between subjects and between the runs of one; 0.1 is 10 %.
+        Spread of the parameters between subjects and between the runs of a subject; 0.1 is 10 %.
     remnant_order : int
     noise_level : float
         P_n = var(u_n) / var(u).
     seed : int
     trouble : sequence of str
-        What is wrong with the sampling: any of ``"jitter"``, ``"missing"``, ``"repeated"``,
-        ``"slow-clock"``, ``"saturated"``, ``"quantised"`` and ``"stalled"``.
+        Sampling defects: any of ``"jitter"``, ``"missing"``, ``"repeated"``, ``"slow-clock"``,
+        ``"saturated"``, ``"quantised"`` and ``"stalled"``.
 
     Returns
     -------
@@ -122,9 +122,9 @@ def simulate_group(
     Raises
     ------
     OptionError
-        For an experiment that is not valid.
+        For an invalid experiment.
     StudyStateError
-        When the directory already holds an experiment.
+        If the directory already holds an experiment.
 
     Examples
     --------
@@ -158,29 +158,28 @@ def simulate_people(
     seed: int = 1,
     trouble: Sequence[str] = (),
 ) -> int:
-    """Simulate people who are like people.
+    """Simulate people with realistic operators and remnants.
 
-    Persons are drawn over the family of operators, from published ranges. Writes a file with the
-    columns t, e, u, d, y for each run, the true parameters in ``truth.csv``, and a manifest for
-    `group`.
+    People are drawn from the family of operators, from published ranges. Writes a file with the columns
+    t, e, u, d, y for each run, the true parameters to ``truth.csv``, and a manifest for `group`.
 
     Parameters
     ----------
     directory : path
         Created if it does not exist.
     subjects, runs : int
-        Number of subjects, and of runs for each subject and controlled element.
+        Number of subjects, and number of runs for each subject and controlled element.
     plants : sequence of str
         Controlled elements: ``"integrator"`` 1/s, ``"lagged-integrator"`` 1/(s(s+1)),
         ``"double-integrator"`` 1/s^2.
     form : str, optional
-        Form of all operators; default those that people have on each element.
+        Form of all operators; by default the forms that people typically adopt with each element.
     remnants : sequence of str
-        Kinds of remnant, subject after subject.
+        Kinds of remnant, which alternate over the subjects.
     remnant_share : tuple of float
-        Least and greatest share of the remnant in the variance of u.
+        Smallest and largest share of the variance of u due to the remnant.
     sample_time : float
-        In s.
+        Sample time in s.
     between_runs : float
         Spread of the parameters between the runs of a subject; 0.1 is 10 %.
     seed : int
@@ -195,9 +194,9 @@ def simulate_people(
     Raises
     ------
     OptionError
-        For an experiment that is not valid.
+        For an invalid experiment.
     StudyStateError
-        When the directory already holds an experiment.
+        If the directory already holds an experiment.
 
     Examples
     --------

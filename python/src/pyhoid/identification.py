@@ -1,7 +1,7 @@
-"""Batch fits: from records to the operator of a person, or to a model of polynomials.
+"""Batch fits: from records to the operator of a person, or to a polynomial model.
 
-The options of the estimators are not listed here: they are those of the registry of the library
-(`_settings.py` is made from it), and their values are read there.
+The options of the estimators are not listed here: they come from the registry of the library, from which
+`_settings.py` is generated, and the library parses their values.
 """
 
 from __future__ import annotations
@@ -91,12 +91,12 @@ def identify(
     roles: Mapping[str, str] | None = None,
     **settings: Unpack[BatchSettings],
 ) -> OperatorFit | Fit | TimeVaryingFit:
-    """Identify the operator of a person, or a model of polynomials, from one or several records.
+    """Identify the operator of a person, or a polynomial model, from one or several records.
 
-    It is ``hoid identify`` with the same options, defaults and digits. Without a structure it is the
-    operator of a person: a family of operators with a rich noise model, its form by evidence, fitted
-    by prediction error and, where the excitation is periodic and recorded, at its lines too; with a
-    verdict. The mean of e and u is taken out of each record.
+    This is ``hoid identify`` with the same options, defaults and digits. Without a structure it identifies
+    the operator of a person: a family of operators with a flexible noise model is fitted by the prediction
+    error method and, if the excitation is periodic and recorded, also at its lines. The form is selected by
+    evidence, and the result has a verdict. The mean of e and u is removed from each record.
 
     Parameters
     ----------
@@ -104,54 +104,55 @@ def identify(
         Several records share one model, each with its own initial states.
     structure : str, optional
         ``"operator"`` (the default), or polynomials: ``"arx"``, ``"armax"``, ``"oe"``, ``"bj"``, ``"fir"``,
-        ``"ar"``, ``"ma"``, ``"arma"``, ``"ararx"``, ``"ararmax"``, ``"general"``. Default that of
-        `method`, and ``"bj"`` with options that polynomials alone have, as nk. ``"grey-box"`` and
-        ``"family"`` are other names of ``"operator"``, ``"time-varying"`` of ``"operator"`` with
+        ``"ar"``, ``"ma"``, ``"arma"``, ``"ararx"``, ``"ararmax"``, ``"general"``. The default is that of
+        `method`, or ``"bj"`` with options that only polynomials have, such as nk. ``"grey-box"`` and
+        ``"family"`` are other names for ``"operator"``; ``"time-varying"`` is ``"operator"`` with
         ``change="sigmoid"``.
     na, nb, nc, nd, nf : int or (int, int) or range, optional
-        Orders. A pair is searched from the first to the second, both included. nb counts b0, b1, ...
-        Those that are left out of ``"bj"`` are searched: nk from 0.05 to 0.6 s, nd from 1 to 4. For
-        ``"operator"`` nc and nd are those of the noise model, which Akaike's criterion chooses; nd by
-        default from 0 to 24, or to 8 where nc is not 0.
+        Orders. A pair is a range to be searched, both ends included. nb counts b0, b1, ...
+        Orders of ``"bj"`` that are omitted are searched: nk from 0.05 to 0.6 s, nd from 1 to 4. For
+        ``"operator"``, nc and nd are the orders of the noise model, selected by Akaike's criterion; the
+        default range of nd is 0 to 24, or 0 to 8 if nc is not 0.
     method : {{"pem", "iv4", "sriv", "rivbj"}}
         Prediction error method (Ljung 1999), or instrumental variables: iv4 for arx, sriv for oe,
         rivbj for bj (Young 2011).
     faults : {{"bridge", "cut", "report", "keep"}}
-        What is done about faults of the records (spikes, dropouts, frozen and idle stretches):
-        bridge faults of up to 0.1 s and cut at longer ones, cut all, report only, or look for
-        none. What was found is ``fit.faults``. For recorded data a level of u is estimated too
-        (``fit.levels``), and ``fit.records`` are without their means; keep leaves data as they are.
+        Treatment of faults in the records (spikes, dropouts, frozen and idle stretches): ``"bridge"``
+        bridges faults of up to 0.1 s and cuts the record at longer ones; ``"cut"`` cuts it at all faults;
+        ``"report"`` only reports them; ``"keep"`` does not search for faults. The faults found are in
+        ``fit.faults``. For recorded data, the constant of u is also estimated (``fit.levels``), and
+        ``fit.records`` have their means removed; with ``"keep"`` the data are unchanged.
     decimate : "auto", "off" or int
-        Keep every n-th sample after a linear-phase low-pass filter. ``"auto"``: above 200 Hz by the
-        number that comes nearest to 100 Hz for operators; polynomial structures, whose orders and
-        delay count samples, take all samples unless a number is given.
+        Keep every n-th sample after a linear-phase low-pass filter. For operators, ``"auto"`` reduces
+        rates above 200 Hz by the factor whose new rate is nearest to 100 Hz. Polynomial structures,
+        whose orders and delay count samples, use all samples unless a number is given.
         ``fit.records`` are the decimated records.
     progress : bool or callable
-        True shows on standard error how far a search is; a callable gets the number of
-        candidates done and the number of all.
+        True shows the progress of a search on standard error; a callable receives the number of
+        completed candidates and the number of all candidates.
     inputs : sequence of str, optional
-        What the person sees, of ``"operator"``: the error first, then channels of the records, as
-        ``["e", "r"]``. The responses to all of them are fitted together: ``fit.channels``.
+        Signals that the person perceives, for ``"operator"``: the error first, then channels of the
+        records, such as ``["e", "r"]``. All responses are fitted jointly: ``fit.channels``.
     roles : dict of str to str, optional
-        What each further input is: ``"feedforward"`` (the default; ``"feedforward:0.5"`` with 0.5 s
-        of its future shown), ``"motion"`` or ``"output"``; ``"feedforward/derivative"`` fits one form.
+        Role of each further input: ``"feedforward"`` (the default; ``"feedforward:0.5"`` if 0.5 s of its
+        future are displayed), ``"motion"`` or ``"output"``; ``"feedforward/derivative"`` fits only one form.
     **settings
         {settings}
 
     Returns
     -------
     OperatorFit, Fit or TimeVaryingFit
-        The operator of a person, polynomials, gains that change. A result that is doubtful is no
-        error: see its `verdict`.
+        The operator of a person, polynomials, or an operator with changing gains. A doubtful result is
+        not an error: see its `verdict`.
 
     Raises
     ------
     OptionError
-        For options that are out of range or do not fit each other (a `ValueError`).
+        For options that are out of range or inconsistent with each other (a `ValueError`).
     DataError
         For records that cannot give a result (a `ValueError`).
     EstimationError
-        When there is no result, for example with singular regressors.
+        If there is no result, for example because of singular regressors.
 
     Examples
     --------
@@ -190,20 +191,20 @@ identify.__doc__ = (identify.__doc__ or "").format(settings=BATCH_SETTINGS)
 
 
 def from_json(text: str) -> OperatorFit | Fit | TimeVaryingFit:
-    """A result that its `to_json` wrote, or ``hoid identify --json`` printed.
+    """Restore a result that its `to_json` wrote or ``hoid identify --json`` printed.
 
-    It is equal to the one that was written, and predicts, simulates and validates as that did; the
-    samples of its records are not in it.
+    It is equal to the result that was written, and gives the same predictions, simulations and validations.
+    It does not contain the samples of its records.
 
     Parameters
     ----------
     text : str
-        The JSON.
+        JSON text of the result.
 
     Raises
     ------
     DataError
-        For a text that is not a result, was changed, or is of another version.
+        For a text that is not a result, was changed, or comes from another version.
 
     Examples
     --------
@@ -236,7 +237,7 @@ def _result(
 def identify_operator(
     records: Record | Sequence[Record], **options: Unpack[IdentifyOptions]
 ) -> OperatorFit:
-    """The same as `identify` without a structure: the operator of a person.
+    """Identify the operator of a person, as `identify` does without a structure.
 
     >>> pyhoid.identify_operator(runs, controlled_element="1/s")
     """
@@ -245,7 +246,7 @@ def identify_operator(
 
 
 def _roles(record: Record, inputs: Sequence[str] | None, roles: Mapping[str, str] | None) -> list[str]:
-    """The inputs in addition to the error, each with its role, as the library reads them.
+    """Return the inputs other than the error with their roles, in the form that the library reads.
 
     >>> _roles(record, ["e", "r"], {"r": "feedforward:0.5"})
     ['r=feedforward:0.5']
@@ -267,7 +268,7 @@ def _roles(record: Record, inputs: Sequence[str] | None, roles: Mapping[str, str
 
 
 def _texts(settings: Mapping[str, Any]) -> dict[str, str]:
-    """Options as texts, as the library reads them; those that carry no information are left out.
+    """Return options as texts in the form that the library reads, without those that carry no information.
 
     >>> _texts({"nk": (20, 40), "individual": ("K", "T_L"), "stable": False, "neuromuscular": False})
     {'nk': '20..40', 'individual': 'K,T_L', 'neuromuscular': 'no'}

@@ -1,9 +1,10 @@
 """LabStreamingLayer: samples of a person in, estimates out.
 
-The stream of a person has a channel for e and one for u, by their labels, or the first two. Each
-sample is taken by a `Tracker`, and each estimate pushed with the time stamp of its sample: it lies
-next to it in a recording. Clocks are brought to that of this computer by LabStreamingLayer itself.
-By the time stamps samples are found that are lost: the tracker bridges them, and they are counted.
+The stream of a person has one channel for e and one for u, identified by their labels; without labels
+they are the first two channels. A `Tracker` processes each sample, and each estimate is sent with the
+time stamp of its sample, so that both are aligned in a recording. LabStreamingLayer itself converts time
+stamps to the clock of this computer. Lost samples are detected by the time stamps, bridged by the
+tracker, and counted.
 
 >>> tracker = pyhoid.Tracker(sample_time=0.01, controlled_element="90/(s(s+6))")
 >>> counts = pyhoid.lsl.stream("person", "estimate", tracker)  # until the person's stream ends
@@ -25,7 +26,7 @@ __all__ = ["CHANNELS", "stream"]
 
 _OPERATOR = ("K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e")
 
-#: Labels of the channels of the estimate; a standard error ends in ``_se``, NaN is not known.
+#: Labels of the channels of the estimate; standard errors end in ``_se``; unknown values are NaN.
 CHANNELS = (
     *(f"{name}{end}" for name in _OPERATOR for end in ("", "_se")),
     *("crossover_rad_s", "crossover_rad_s_se", "phase_margin_deg", "phase_margin_deg_se"),
@@ -45,35 +46,36 @@ def stream(
     u: str = "u",
     patience: float = 10.0,
 ) -> dict[str, int]:
-    """Track the person of a stream, and push the estimates as another, until the stream ends.
+    """Track the person of a stream and send the estimates as another stream, until the stream ends.
 
     Parameters
     ----------
     lsl_in, lsl_out : str
         Names of the streams.
     tracker : Tracker
-        What takes the samples; its sample time is that of the stream.
+        Tracker that processes the samples; its sample time must be that of the stream.
     e, u : str
-        Labels of the channels; without labels they are the first and the second.
+        Labels of the channels; without labels, e is the first channel and u the second.
     patience : float
-        Seconds without a stream or a sample after which it has ended.
+        Seconds without a stream or a sample after which the stream is considered ended.
 
     Returns
     -------
     dict of str to int
-        ``samples`` that came, ``lost`` ones among them, ``late`` ones that were left out.
+        Number of ``samples``, number of ``lost`` samples among them, and number of ``late`` samples,
+        which were left out.
 
     Raises
     ------
     DataError
-        No stream of that name, or one without these channels.
+        If there is no stream of that name, or the stream lacks these channels.
     OptionError
-        A tracker of another sample time.
+        If the tracker has another sample time.
     """
     pylsl = _pylsl()
     found = pylsl.resolve_byprop("name", lsl_in, timeout=patience)
     if not found:
-        raise DataError(f"no stream {lsl_in!r} came within {patience} s; is it on this network?")
+        raise DataError(f"no stream {lsl_in!r} appeared within {patience} s; is it on this network?")
     inlet = pylsl.StreamInlet(found[0], processing_flags=pylsl.proc_clocksync)
     try:
         info = inlet.info(timeout=patience)
@@ -82,7 +84,7 @@ def stream(
         if rate > 0 and abs(rate * tracker.sample_time - 1) > 0.05:
             raise OptionError(
                 f"the stream goes at {rate} Hz, the tracker at {1 / tracker.sample_time} Hz; "
-                "make it with the sample time of the stream"
+                "make the tracker with the sample time of the stream"
             )
         outlet = _outlet(pylsl, lsl_out, 1 / tracker.sample_time)
         return _run(inlet, outlet, tracker, places, patience)
@@ -99,7 +101,7 @@ def _pylsl() -> Any:
 
 
 def _places(labels: Sequence[str | None], count: int, names: tuple[str, str]) -> tuple[int, int]:
-    """Where e and u are.
+    """Return the positions of e and u among the channels.
 
     >>> _places(["u", "e"], 2, ("e", "u")), _places([], 3, ("e", "u"))
     ((1, 0), (0, 1))
@@ -111,7 +113,7 @@ def _places(labels: Sequence[str | None], count: int, names: tuple[str, str]) ->
         if name not in known:
             raise DataError(
                 f"the stream has the channels {', '.join(known) or count}, expected {name}; "
-                "choose by e= and u="
+                "choose with e= and u="
             )
     first, second = (list(labels).index(name) for name in names)
     return first, second

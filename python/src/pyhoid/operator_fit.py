@@ -1,4 +1,4 @@
-"""The operator of a person: which form, its parameters with honest errors, and its reliability."""
+"""The operator of a person: its form, parameters with realistic errors, and reliability."""
 
 from __future__ import annotations
 
@@ -28,87 +28,88 @@ if TYPE_CHECKING:
 __all__ = ["OperatorFit"]
 
 class OperatorFit(Model, Result):
-    """The operator of a person. `identify` makes it.
+    """The operator of a person. `identify` creates it.
 
     Attributes
     ----------
     form : str
-        The form that was chosen or given.
+        The form that was selected or given.
     neuromuscular : bool
-        Whether it has neuromuscular dynamics.
+        Whether the operator has neuromuscular dynamics.
     parameters : OperatorParameters
         `OperatorParameter` by name: value, standard error, interval, share of the prior, whether
         the data determine it, unit.
     operators : tuple of OperatorParameters
-        One for all records; one for each where some parameters are individual. `parameters` is the
-        first.
+        One operator for all records, or one for each record if some parameters are individual.
+        `parameters` belongs to the first.
     verdict : Verdict
-        What the result is worth: `level`, `reasons`, `notes`.
+        Reliability of the result: `level`, `reasons`, `notes`.
     forms : list of dict
-        The forms that were compared, simplest first: form, weight (by which estimates are averaged), loss,
-        criterion (Akaike's), held_out, chi2, degrees_of_freedom, converged.
+        The forms that were compared, simplest first: form, weight (with which estimates are averaged),
+        loss, criterion (Akaike's), held_out, chi2, degrees_of_freedom, converged.
     lines : dict or None
         The fit at the lines of the excitation: parameters (an Estimate each), chi2,
-        degrees_of_freedom, held_out, converged; with a controlled element open_loop and
+        degrees_of_freedom, held_out, converged; with a controlled element also open_loop and
         open_loop_intervals.
     no_lines : str or None
-        Why there is none, where an excitation was named.
+        Reason why there is no fit at the lines, if an excitation was named.
     excitation : str or None
-        Its channel.
+        Channel of the excitation.
     agreement : dict or None
-        The methods next to each other: coordinates (each by ``prediction_error``, ``lines`` and
-        ``riv_bj``), pairs of methods with chi2 and p_value, and chi2 and p_value of the pair that
-        agrees least (p_value times the number of pairs).
+        Comparison of the methods: coordinates (each by ``prediction_error``, ``lines`` and ``riv_bj``),
+        pairs of methods with chi2 and p_value, and chi2 and p_value of the pair that agrees least
+        (p_value times the number of pairs).
     riv_bj : dict or None
-        The operator by refined instrumental variables, the recorded excitation as instrument:
+        The operator by refined instrumental variables with the recorded excitation as instrument:
         parameters (an Estimate each), nd, converged, termination, and open_loop with a controlled
         element. None without an excitation.
     open_loop : dict or None
-        ``crossover_rad_s`` and ``phase_margin_deg``, an Estimate each, or None without a crossover;
+        ``crossover_rad_s`` and ``phase_margin_deg``, each an Estimate, or None without a crossover;
         None without a controlled element.
     loop_shape : dict or None
-        The whole of that loop: ``crossovers`` (every frequency in rad/s at which its gain is one, with
-        its phase margin in deg, a pair of Estimates each), ``smallest_phase_margin_deg``,
-        ``gain_margin_db``, ``phase_crossover_rad_s`` (None where there is none), and ``stable``: True,
-        False, or None if that cannot be determined. None without a controlled element.
+        Further properties of that loop: ``crossovers`` (each frequency in rad/s at which its gain is one,
+        with the phase margin in deg, as pairs of Estimates), ``smallest_phase_margin_deg``,
+        ``gain_margin_db``, ``phase_crossover_rad_s`` (None if there is none), and ``stable``: True,
+        False, or None if it cannot be determined. None without a controlled element.
     open_loop_intervals : dict or None
-        Their intervals of 95 %, (low, high) each, Student's: the errors rest on few runs or blocks.
+        95 % intervals (low, high) of both quantities from Student's t distribution, since the errors are
+        based on few runs or blocks.
     open_loop_person : dict or None
-        The same with the errors of the person, whose gain varies from one run to the next.
+        The same quantities with the errors of the person, whose gain varies from run to run.
     covariance : ndarray or None
-        Covariance of the coordinates, from the scatter of runs or blocks, with what the prior
-        leaves open.
+        Covariance of the coordinates, from the scatter of runs or blocks and the uncertainty that the
+        prior leaves.
     coordinates : dict of str to float
-        The coordinates that the operator is fitted in, in the order of the covariance. Estimates
-        are nearly normal in them.
+        The coordinates in which the operator is fitted, in the order of the covariance. In these
+        coordinates the estimates are nearly normally distributed.
     noise : dict of str to ndarray
         Coefficients ``"c"`` and ``"d"`` of the noise model C/D, without their leading 1.
     box_jenkins : dict or None
-        A free model of the same orders: loss, likelihood_ratio, degrees_of_freedom, p_value.
+        A free Box-Jenkins model of the same orders: loss, likelihood_ratio, degrees_of_freedom, p_value.
     errors : dict
-        What the errors are made from: clusters, kind ("runs" or "blocks"), inflation (clustered
-        over model-based variances), largest_ratio_to_model_based.
+        Basis of the errors: clusters, kind ("runs" or "blocks"), inflation (ratio of clustered to
+        model-based variances), largest_ratio_to_model_based.
     intersample : dict
-        What e does between its samples: ``used`` (``"auto"``, ``"zoh"`` or ``"foh"``), and
-        ``tau_e_if_straight``, the delay in s if e was logged from what is faster or continuous; None
-        where the data show or `intersample` states what e does.
+        Behaviour of e between its samples: ``used`` (``"auto"``, ``"zoh"`` or ``"foh"``), and
+        ``tau_e_if_straight``, the delay in s if e was logged from a faster or continuous signal; None
+        if the data or `intersample` determine the behaviour.
     prior : dict of str to (float, float)
-        Centre, and standard deviation of the logarithm.
+        Centre of each parameter, and standard deviation of its logarithm.
     loss, innovation_variance : float
     coherent_share : float or None
         Mean coherence of u with the excitation at its lines.
     termination : dict
-        reason, converged, iterations.
+        How the search ended: reason, converged, iterations.
     records : tuple of Record
-        The records as they were fitted, without their mean.
+        The records as they were fitted, with their means removed.
     fits : tuple of Fit
         The same model as polynomials, one for each of `operators`: prediction, simulation,
-        residuals, frequency response. They take records without their mean, such as `records`.
+        residuals, frequency response. They require records with their means removed, such as `records`.
     faults : list of dict
-        Faults of the records that were searched for: record, kind, channel, from, to, samples, size,
+        Faults found in the records: record, kind, channel, from, to, samples, size,
         deviations, action, words.
     settings : dict
-        The keywords of the call, defaults included.
+        The keywords of the call, including defaults.
 
     Examples
     --------
@@ -226,7 +227,7 @@ class OperatorFit(Model, Result):
 
     @property
     def fit(self) -> Fit:
-        """The model of the first operator as polynomials; it predicts, simulates, and so on."""
+        """The polynomial model of the first operator, for prediction, simulation and similar uses."""
         return self.fits[0]
 
     @property
@@ -239,10 +240,10 @@ class OperatorFit(Model, Result):
     def margins(
         self, num: str | Sequence[float], den: Sequence[float] | None = None
     ) -> dict[str, Estimate | None]:
-        """Crossover frequency and phase margin with a controlled element.
+        """Return crossover frequency and phase margin with a controlled element.
 
-        `num` is the element as text, such as ``"90/(s(s+6))"``; or `num` and `den` are its
-        coefficients by descending powers of s.
+        `num` is the element as text, such as ``"90/(s(s+6))"``; or `num` and `den` are its coefficients
+        in descending powers of s.
 
         >>> person.margins("90/(s(s+6))")
         """
@@ -250,12 +251,12 @@ class OperatorFit(Model, Result):
 
     @property
     def channels(self) -> list[dict[str, Any]]:
-        """The responses to several inputs, that to the error first; empty for one input.
+        """The responses to several inputs, the response to the error first; empty for one input.
 
         Each has input, role, form, parameters (name, value, standard_error, interval, determined, ...)
-        and response (gain and phase with errors over frequency). Those in addition to the error have preview (s),
-        p_value (of the best form by chance) and forms (those that were compared; form None is no
-        response), and form None where no response was found.
+        and response (gain and phase with errors over frequency). Responses to inputs other than the error
+        also have preview (s), p_value (that the best form is due to chance) and forms (those compared; form
+        None is no response). Their form is None if no response was found.
 
         >>> [(c["input"], c["role"], c["form"]) for c in fit.channels]
         [('e', 'feedback', 'gain'), ('r', 'feedforward', 'derivative')]
@@ -265,12 +266,12 @@ class OperatorFit(Model, Result):
 
     @property
     def quality(self) -> dict[str, float]:
-        """VAF and NRMSE fit (both in %) of simulation and one-step prediction, over its records."""
+        """VAF and NRMSE fit (both in %) of simulation and one-step prediction, over the fitted records."""
         figures = json.loads(self.to_json())["fit"]
         return {name: float(figures[name]) for name in QUALITY}
 
     def to_xarray(self) -> xr.Dataset:
-        """Parameters, and the covariance of the coordinates in which the operator is fitted.
+        """Return the parameters, and the covariance of the coordinates in which the operator is fitted.
 
         >>> person.to_xarray()
         """
@@ -292,16 +293,16 @@ class OperatorFit(Model, Result):
         return xr.Dataset(variables, coords=places, attrs={"form": self.form})
 
     def plot(self, record: Record | None = None, ax: Axes | None = None) -> Axes:
-        """Plot the time response on a record, by default the first; see `pyhoid.plots`.
+        """Plot the time response on a record, by default the first record; see `pyhoid.plots`.
 
         >>> axes = person.plot(person.records[0].span(20, 40))
         """
         return self.fit.plot(record, ax)
 
     def report(self, directory: str | PathLike[str], *, title: str | None = None) -> Path:
-        """Write the page about the operator, ``report.html``, into a directory.
+        """Write the report page of the operator, ``report.html``, to a directory.
 
-        It is the page that ``hoid identify --report`` writes.
+        It is the same page as ``hoid identify --report`` writes.
 
         Parameters
         ----------
@@ -313,20 +314,20 @@ class OperatorFit(Model, Result):
         Returns
         -------
         Path
-            The page.
+            Path of the page.
 
         Raises
         ------
         FileError
-            When the page cannot be written.
+            If the page cannot be written.
         DataError
-            For a result that was read from JSON: it has no records for the page to show.
+            For a result that was read from JSON, since it has no records to show.
 
         >>> page = person.report("out")
         """
         if not self.records:
             raise DataError(
-                "the result has no records for the page to show; a result of identify has them"
+                "the result has no records for the page to show; a result of identify has records"
             )
         return Path(self._native.report(list(self.records), Path(directory), title=title))
 
@@ -336,7 +337,7 @@ class OperatorFit(Model, Result):
         return bool(self.termination["converged"])
 
     def to_pandas(self) -> pd.DataFrame:
-        """The parameters as a table.
+        """Return the parameters as a table.
 
         >>> person.to_pandas()
         """
@@ -357,7 +358,7 @@ class OperatorFit(Model, Result):
         return pd.DataFrame(rows, index=pd.Index(list(self.parameters), name="parameter"))
 
     def summary(self) -> str:
-        """Verdict, parameters, and what they rest on, in plain text.
+        """Return verdict, parameters, and the basis of the errors, in plain text.
 
         >>> print(person.summary())
         """

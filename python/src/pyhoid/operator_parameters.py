@@ -1,4 +1,4 @@
-"""Parameters of an operator, and how much of each the data show."""
+"""Parameters of an operator, and how well the data determine them."""
 
 from __future__ import annotations
 
@@ -12,20 +12,22 @@ __all__ = ["OperatorParameter", "OperatorParameters"]
 
 
 class OperatorParameter(NamedTuple):
-    """A parameter of an operator, and how much of it the data show.
+    """A parameter of an operator, and how well the data determine it.
 
     Attributes
     ----------
     value : float
-        Infinite for the lag of a pure integration.
+        Value of the parameter; infinite for the lag of a pure integration.
     standard_error : float or None
-        To first order, of the operator of these runs; None if there is none, such as at a bound.
+        Standard error to first order, for the operator of these runs; None if there is none, for example
+        at a bound.
     standard_error_person : float or None
-        That of the person, whose gain varies from one run to the next.
+        Standard error for the person, whose gain varies from run to run.
     interval : (float, float) or None
-        Interval of 95 %; an end that is open is infinite.
+        95 % interval; an open end is infinite.
     prior_share : float
-        Variance after the data over that before it; 0 without a prior, 1 for the prior alone.
+        Ratio of the variance after the data to that of the prior; 0 without a prior, 1 if the data add
+        no information.
     determined : bool
         Whether the data determine the parameter.
     unit : str
@@ -58,7 +60,7 @@ class OperatorParameter(NamedTuple):
         return "(the prior alone)" if self.prior_share > 0.5 else "(not determined)"
 
     def _shown(self) -> str:
-        """Value and error; nothing if the data carry no information, and no prior either."""
+        """Format value and error; empty if neither the data nor a prior carry information."""
         if not self.determined and self.prior_share <= 0.5:
             return ""
         if self.standard_error is not None and self.standard_error > abs(self.value):
@@ -67,7 +69,7 @@ class OperatorParameter(NamedTuple):
 
 
 class OperatorParameters(Named[OperatorParameter]):
-    """Parameters of an operator by name; they are also attributes (``parameters.K.value``)."""
+    """Parameters of an operator by name, which are also attributes (``parameters.K.value``)."""
 
     _owner = "the operator"
 

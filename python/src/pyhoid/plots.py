@@ -1,8 +1,8 @@
-"""Figures with matplotlib in the style of hoid's reports, on new axes or on yours.
+"""Figures with matplotlib in the style of hoid's reports, on new or existing axes.
 
-The hue reports the model or method (blue, vermillion, green, ... of Okabe and Ito); black is the
-truth or the measurement. Bands are two standard errors wide on each side (`deviations`), error bars
-one. Every function returns the axes that it has drawn on.
+The hue identifies the model or method (blue, vermillion, green, ... of Okabe and Ito); black is the
+true or the measured signal. Bands extend two standard errors to each side (`deviations`), error bars
+one. Every function returns the axes on which it has drawn.
 """
 
 from __future__ import annotations
@@ -95,8 +95,8 @@ def style() -> Iterator[None]:
     >>> with pyhoid.plots.style():
     ...     pyhoid.plots.bode(fit)
     """
-    # Only the style's settings: matplotlib.rc_context would also take back what the backend of a
-    # notebook sets at the first figure.
+    # Only the style's own settings are restored: matplotlib.rc_context would also undo what the backend
+    # of a notebook sets at the first figure.
     settings: Any = rcParams
     before = {name: settings[name] for name in STYLE}
     settings.update(STYLE)
@@ -122,7 +122,7 @@ def _label(name: str, unit: str | None = None) -> str:
     return f"{symbol} ({unit})" if unit else symbol
 
 
-#: What is drawn as a model: a fit, or the operator of a person.
+#: A model that can be drawn: a fit, or the operator of a person.
 Model: TypeAlias = Fit | OperatorFit
 
 
@@ -131,7 +131,7 @@ def _fits(fits: Model | Mapping[str, Model] | Sequence[Model]) -> dict[str, Fit]
         fits = [fits]
     if not isinstance(fits, Mapping):
         fits = {_title(fit): fit for fit in fits}
-    # An operator is drawn by its polynomials.
+    # An operator is represented by its polynomial model.
     return {name: fit.fit if isinstance(fit, OperatorFit) else fit for name, fit in fits.items()}
 
 
@@ -146,15 +146,15 @@ def time_response(
     predict: bool = False,
     ax: Axes | None = None,
 ) -> Axes:
-    """The measured output and the response of one or more models.
+    """Draw the measured output and the response of one or more models.
 
     Parameters
     ----------
     fits : Fit, sequence or mapping from names to Fit
     record : Record, optional
-        Default the first record of the first fit.
+        By default the first record of the first fit.
     predict : bool
-        Show the one-step prediction instead of the simulation.
+        True draws the one-step prediction instead of the simulation.
 
     Examples
     --------
@@ -183,7 +183,7 @@ def time_response(
 
 
 def _legend(ax: Axes) -> None:
-    """A legend above the axes, where it hides nothing."""
+    """Draw a legend above the axes, where it hides no curve."""
     handles, labels = ax.get_legend_handles_labels()
     if handles:
         columns = 1 if max(map(len, labels)) > 34 and len(labels) > 2 else min(len(handles), 3)
@@ -206,9 +206,9 @@ def bode(
     axes: Sequence[Axes] | None = None,
     deviations: float = 2.0,
 ) -> Sequence[Axes]:
-    """Bode plot from e to u with bands of `deviations` standard errors.
+    """Draw a Bode plot from e to u with bands of `deviations` standard errors.
 
-    Models are fits, or operators of people. `axes` are two, for magnitude and phase.
+    Models are fits or operators of people. `axes` are two axes, for magnitude and phase.
 
     Examples
     --------
@@ -245,7 +245,7 @@ def _dress_bode(pair: Sequence[Axes]) -> None:
     for ax in pair:
         ax.set_xscale("log")
         ax.margins(x=0)
-        # The curves set the scale: where a response vanishes its band has no end.
+        # The curves set the scale, since the band is unbounded where a response vanishes.
         _limits(ax, [np.asarray(line.get_ydata(), dtype=float) for line in ax.get_lines()])
     pair[0].set_ylabel("magnitude (dB)")
     pair[1].set_ylabel("phase (deg)")
@@ -259,9 +259,9 @@ def describing(
     *,
     axes: Sequence[Axes] | None = None,
 ) -> Sequence[Axes]:
-    """The describing function as points with error bars, over the Bode plot of the models.
+    """Draw the describing function as points with error bars, over the Bode plot of the models.
 
-    `found` is what `describe` or `describing_function` gives.
+    `found` is the result of `describe` or `describing_function`.
 
     Examples
     --------
@@ -299,9 +299,9 @@ def describing(
 def residual_tests(
     fit: Fit, record: Record | None = None, *, axes: Sequence[Axes] | None = None
 ) -> Sequence[Axes]:
-    """Autocorrelation of the residuals and their cross-correlation with e.
+    """Draw the autocorrelation of the residuals and their cross-correlation with e.
 
-    The grey bands are the bounds that 99 % of white residuals stay within.
+    The grey bands are the bounds within which 99 % of the values for white residuals lie.
 
     Examples
     --------
@@ -344,15 +344,15 @@ def trace(
     truth: bool = True,
     deviations: float = 2.0,
 ) -> Sequence[Axes]:
-    """Parameters over time, each in a panel, with bands of `deviations` standard errors.
+    """Draw parameters over time, one per panel, with bands of `deviations` standard errors.
 
     Parameters
     ----------
     traces : Trace, sequence or mapping from names to Trace
     names : sequence of str, optional
-        Columns to show; default the operator's parameters.
+        Columns to draw; by default the operator's parameters.
     truth : bool
-        Draw the true values in black where the record has them.
+        True draws the true values in black if the record contains them.
 
     Examples
     --------
@@ -413,7 +413,7 @@ def trace(
 
 
 def _mark_changes(ax: Axes, traces: Iterable[Trace], *, words: bool) -> None:
-    """A dashed line where a change was declared, with the change."""
+    """Draw a dashed line and a label where a change was declared."""
     for change in (change for one in traces for change in one.changes):
         ax.axvline(change["t"], color="#444444", linestyle=(0, (6, 3)), linewidth=0.9)
         if words:
@@ -429,9 +429,9 @@ def _mark_changes(ax: Axes, traces: Iterable[Trace], *, words: bool) -> None:
 
 
 def _limits(ax: Axes, extent: Iterable[Any]) -> None:
-    """Limits with room for nearly all of the curves.
+    """Return limits with room for nearly all of the curves.
 
-    Single values where a gain nearly vanishes do not set the scale.
+    Single values near a vanishing gain do not set the scale.
     """
     parts = [np.asarray(part)[np.isfinite(part)] for part in extent]
     values = np.concatenate(parts) if parts else np.array([])
@@ -448,15 +448,15 @@ def box_plots(
     label: str = "",
     ax: Axes | None = None,
 ) -> Axes:
-    """Box plots of samples by name.
+    """Draw box plots of samples by name.
 
-    They show the median, the quartiles, whiskers to 1.5 times their distance, and the rest as
-    points.
+    They show the median, the quartiles, whiskers of up to 1.5 interquartile ranges, and all other values
+    as points.
 
     Parameters
     ----------
     groups : mapping from str to array_like
-        Values that are not finite are left out; their number is shown below the name.
+        Values that are not finite are left out; their number is given below the name.
     truth : float, optional
         The true value, drawn as a dashed line.
     label : str
@@ -500,12 +500,12 @@ def reference(name: str, directory: str | PathLike[str]) -> Figure:
     name : str
         ``"fig-11"``, ``"C.1"``, ``"A.1"``, ...; ``hoid reproduce --list`` shows all names.
     directory : path
-        The directory that ``hoid reproduce --out`` has written.
+        The directory that ``hoid reproduce --out`` wrote.
 
     Raises
     ------
     FileMissingError
-        When the figure has not been reproduced there.
+        If the figure has not been reproduced in that directory.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Files: reading and writing records, and what is in a file."""
+"""Files: reading and writing of records, and surveys of files."""
 
 from __future__ import annotations
 
@@ -67,51 +67,51 @@ def read(
 ) -> Record:
     """Read a record from a CSV, Parquet, NPZ, NPY, MATLAB .mat or XDF file.
 
-    Packed text (``.csv.gz``), Arrow and Feather (by polars) and Excel (by pandas) are read too.
+    Compressed text (``.csv.gz``), Arrow and Feather (with polars) and Excel (with pandas) are also read.
 
     Parameters
     ----------
     path : path
     input, output : str
-        Columns: a name, ``-name``, or a difference such as ``"r-y"``. ``input=None`` reads only an
-        output.
+        Columns: a name, ``-name``, or a difference such as ``"r-y"``. With ``input=None`` only an output
+        is read.
     time : str, optional
-        Column of the time, with its unit where that is not found: ``"clock:ms"`` (s, ms, us, ns,
-        min, h, iso, sec+nanosec). Without it ``t``, or the column with a common name of a time.
+        Column of the time, with its unit if the file does not give it: ``"clock:ms"`` (s, ms, us, ns, min,
+        h, iso, sec+nanosec). By default ``t``, or a column with another common name for time.
     trial : str, optional
-        The trial to read of a file with several: ``"trial=3"``. `read_trials` reads all.
+        The trial to read from a file with several trials: ``"trial=3"``. `read_trials` reads all trials.
     sampling_frequency : float, optional
-        Hz; without it the column ``t`` (s) gives the sampling.
+        Sampling frequency in Hz; by default from the column ``t`` (s).
     start, stop : float, optional
-        Span to use, in s, without `stop` itself.
+        Span to use, in s; `stop` itself is excluded.
     resample : bool
-        Resample unevenly sampled data on an even grid by linear interpolation.
+        Resample unevenly spaced samples to an even grid by linear interpolation.
     fill : bool
         Bridge missing values by linear interpolation.
     sparse : mapping, optional
-        Columns logged at instants of their own, so that some rows lack them, by name: ``{"u":
-        "hold"}`` holds the last value, ``"linear"`` draws straight lines, ``"drop"`` drops the rows.
+        Columns logged at their own times, so that they are missing in some rows, by name:
+        ``{"u": "hold"}`` holds the last value, ``"linear"`` interpolates, ``"drop"`` drops those rows.
     columns : sequence of str, optional
-        Columns to keep in addition to input, output and time; ``[]`` for none. Of a long CSV file the others
-        take neither time nor memory. Without it all.
+        Columns to keep in addition to input, output and time; ``[]`` for none. The other columns of a
+        long CSV file then take neither time nor memory. By default all columns are kept.
     drop_repeated : bool
-        Drop rows that occur twice, with the same time.
+        Drop duplicated rows, which have the same time.
     unit : mapping, optional
-        Units that the file does not report, by channel: ``{"e": "deg", "u": "V"}``. No number changes.
+        Units that the file does not give, by channel: ``{"e": "deg", "u": "V"}``. The numbers are unchanged.
     scale : mapping, optional
-        Factors by channel (``e`` and ``u`` are input and output): ``{"u": 12.5}``, into a unit
-        ``{"u": "12.5:deg"}``, or from unit to unit ``{"e": "rad:deg"}``.
+        Factors by channel (``e`` and ``u`` are input and output): ``{"u": 12.5}``; with the new unit
+        ``{"u": "12.5:deg"}``; or a conversion between units ``{"e": "rad:deg"}``.
     offset : mapping, optional
-        By how much channels were recorded late: in samples ``{"u": 1}`` or in seconds
+        Delay with which channels were recorded: in samples ``{"u": 1}`` or in seconds
         ``{"u": "0.0167s"}``.
     decimate : int, optional
         Keep every M-th sample, after a low-pass filter.
     new_sampling_frequency : float, optional
-        Another sampling frequency in Hz, after a low-pass filter.
+        New sampling frequency in Hz, after a low-pass filter.
     run_in : float
-        Seconds dropped at the start.
+        Time dropped at the start, in s.
     detrend : {"none", "mean", "linear"}
-        The trend removed from input and output, as the last step.
+        Trend removed from input and output, as the last step.
 
     Returns
     -------
@@ -120,14 +120,14 @@ def read(
     Raises
     ------
     FileError
-        When the file is missing (`FileNotFoundError`) or cannot be read (`OSError`).
+        If the file is missing (`FileNotFoundError`) or cannot be read (`OSError`).
     FormatError
-        When the content is not as expected; the message names the row.
+        If the content is not as expected; the message names the row.
 
     Warns
     -----
     UserWarning
-        What a person should know about the file: columns left out, trouble with the sampling.
+        Problems that the user should know about: columns left out, problems with the sampling.
         `Record.steps` lists the processing applied to the numbers.
 
     Examples
@@ -169,19 +169,19 @@ def read_segments(
     shortest: float = 2.0,
     **options: Unpack[ReadOptions],
 ) -> list[Record]:
-    """Read the good segments of a file, between the problems of its sampling.
+    """Read the valid segments of a file, between the problems of its sampling.
 
-    Each segment is a record: `identify` gives each its own initial states. Leaving samples out can
-    bias the result: without the samples at a rail, for example, the largest responses are gone.
+    Each segment is a record, to which `identify` gives its own initial states. Leaving samples out can
+    bias the result: for example, without saturated samples the largest responses are missing.
 
     Parameters
     ----------
     path : path
     mask : sequence of str
-        What is left out: any of ``"missing"``, ``"gap"``, ``"stalled"`` and ``"saturated"``
-        (`info` shows what a file has).
+        Kinds of samples to leave out: any of ``"missing"``, ``"gap"``, ``"stalled"`` and
+        ``"saturated"`` (`info` shows which of them a file contains).
     shortest : float
-        Length in s of the shortest segment to use.
+        Length of the shortest segment to use, in s.
     **options
         As in `read`.
 
@@ -192,7 +192,7 @@ def read_segments(
     Raises
     ------
     FileError, FormatError
-        As in `read`; also when no segment is left.
+        As in `read`; also if no segment remains.
 
     Examples
     --------
@@ -202,14 +202,14 @@ def read_segments(
 
 
 def read_trials(path: str | PathLike[str], **options: Unpack[ReadOptions]) -> list[Record]:
-    """Read the trials of one file, each as a record of its own.
+    """Read the trials of a file, each as a separate record.
 
     Parameters
     ----------
     path : path
     **options
-        As in `read`. ``trial="trial"`` names the column that counts the trials, ``"t"`` the places
-        where the time starts again, which are found without it too.
+        As in `read`. ``trial="trial"`` names the column that numbers the trials. With ``trial="t"``, which
+        is the default, a trial starts where the time restarts.
 
     Returns
     -------
@@ -296,7 +296,7 @@ def _written(value: float | str) -> str:
 def write(path: str | PathLike[str], record: Record) -> None:
     """Write a record as CSV, Parquet, NPZ or .mat.
 
-    The numbers have enough digits to read the same ones back.
+    The numbers are written with enough digits to be read back exactly.
 
     Raises
     ------
@@ -320,29 +320,29 @@ def info(
     trial: str | None = None,
     sampling_frequency: float | None = None,
 ) -> dict[str, Any]:
-    """Describe a file and what it looks like, as ``hoid info --json`` does.
+    """Describe the contents and the apparent layout of a file, as ``hoid info --json`` does.
 
     Parameters
     ----------
     path : path
     input, output, excitation : str, optional
-        Columns that are known, which are not searched for; ``excitation="none"`` looks for none.
+        Columns that are known and need not be found; with ``excitation="none"`` no excitation is searched.
     controlled_element : str, optional
-        As ``"90/(s(s+6))"``: with it and a column y it is found by how many samples the control was
-        recorded late.
+        Text such as ``"90/(s(s+6))"``. With it and a column y, the number of samples by which the control
+        was recorded late can be determined.
     time, trial : str, optional
-        As in `read`: the column of the time with its unit, and what makes the trials of the file.
+        As in `read`: the column of the time with its unit, and the column that defines the trials.
     sampling_frequency : float, optional
-        Hz; without it the column ``t`` (s) gives the sampling.
+        Sampling frequency in Hz; by default from the column ``t`` (s).
 
     Returns
     -------
     dict
-        ``format``; ``columns`` with unit, type, rows and the range of their values; ``samplings``
-        with frequency, gaps and jitter; ``trouble`` with the problems of the sampling, where,
-        how much, and the remedy; ``notes``; ``look`` with the columns of error and control, the
-        excitation and its longest span of whole periods, by how much the control is late, and in
-        ``read`` the keywords by which `read` takes the file so (None if that is not certain).
+        ``format``; ``columns`` with unit, type, rows and range of values; ``samplings`` with frequency,
+        gaps and jitter; ``trouble`` with the problems of the sampling, their positions, sizes and
+        remedies; ``notes``; ``look`` with the columns of error and control, the excitation and its longest
+        span of whole periods, the lateness of the control, and in ``read`` the keywords with which `read`
+        reads the file accordingly (None if they are not certain).
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Records: evenly sampled signals of one run."""
+"""Records: evenly spaced samples of the signals of one run."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ __all__ = ["Record"]
 
 
 def _is_frozen(array: FloatArray) -> bool:
-    """Whether no one can write into an array: it owns its numbers or looks at such a one, and none
-    of them is writeable."""
+    """Return whether no code can write to an array: the array owns its numbers or is a view of one that
+    does, and none of these arrays is writeable."""
     at: Any = array
     while isinstance(at, np.ndarray):
         if at.flags.writeable:
@@ -35,12 +35,12 @@ def _is_frozen(array: FloatArray) -> bool:
 
 
 def _read_only(array: FloatArray) -> FloatArray:
-    """The array as no one can change it: a copy, unless it is so already."""
+    """Return a read-only array: a copy, unless the given array is already read-only."""
     if _is_frozen(array):
         return array
     own = np.array(array, dtype=np.float64, copy=True)
     own.flags.writeable = False
-    # A view of it cannot be made writeable.
+    # A view of a read-only array cannot be made writeable.
     return own.view()
 
 
@@ -49,7 +49,7 @@ def _is_instant(times: npt.NDArray[Any] | None) -> bool:
 
 
 def _seconds(times: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Times in s: durations as they are, dates from the first on."""
+    """Convert times to s: durations directly, dates relative to the first date."""
     if times.dtype.kind not in "mM":
         try:
             return np.asarray(times, dtype=np.float64)
@@ -63,12 +63,12 @@ def _seconds(times: npt.NDArray[Any]) -> npt.NDArray[Any]:
         raise DataError(f"the time of row {row} is missing; fill it, or give sample_time")
     elapsed = times - times[0] if times.dtype.kind == "M" else times
     nanoseconds = elapsed.astype("timedelta64[ns]").astype(np.int64)
-    # What makes times out of decimals cuts at a ns; whole tenths of ms are to stay what they are.
+    # Conversion of decimals to times truncates to 1 ns; whole tenths of a millisecond must be kept.
     return np.asarray(np.round(nanoseconds / 1e9, 8), dtype=np.float64)
 
 
 def _own(array: FloatArray) -> FloatArray:
-    """An array that no other code holds, frozen as it is."""
+    """Make an array read-only; no other code holds a reference to it."""
     array.flags.writeable = False
     return array.view()
 
@@ -76,14 +76,13 @@ def _own(array: FloatArray) -> FloatArray:
 class Record:
     """The signals of one run, with one value for each sample.
 
-    The numbers are the record's own: arrays that others can write into are copied, so that nothing
-    changes behind its back; arrays that no one can write into (such as those of another record) are
-    not.
+    The numbers belong to the record: arrays that other code can write to are copied, so that the record
+    cannot change unexpectedly; read-only arrays (such as those of another record) are shared.
 
     Parameters
     ----------
     e : array_like, shape (N,), optional
-        Input, the tracking error. Leave it out for structures without an input (ar, ma, arma).
+        Input, the tracking error. Omit it for structures without an input (ar, ma, arma).
     u : array_like, shape (N,)
         Output, the control.
     sample_time : float
@@ -91,16 +90,16 @@ class Record:
     start_time : float, default 0
         Time of the first sample in s.
     label : str, optional
-        Name for messages and reports.
+        Name of the record for messages and reports.
     units : mapping of str to str, optional
-        Units of channels.
+        Units of the channels.
     **channels : array_like, shape (N,)
         Other channels by name, such as ``f_t`` for the forcing function.
 
     Raises
     ------
     DataError
-        For values that are masked or not finite, unequal lengths, and arrays with more than one
+        For values that are masked or not finite, channels of unequal lengths, or arrays with more than one
         dimension. It is a `ValueError`.
 
     Examples
@@ -158,10 +157,10 @@ class Record:
         }
         self.input_name: str = input_name
         self.output_name: str = output_name
-        #: By how much a sample of e is taken later than that of u next to it, s: in the middle of its
-        #: hold where the record was decimated.
+        #: Time by which a sample of e is later than the sample of u in the same row, s: if the record was
+        #: decimated, e is taken in the middle of its hold.
         self.input_lead: float = input_lead
-        #: What was done to the numbers, when the record was read from a file and since.
+        #: Processing applied to the numbers, when the record was read from a file and afterwards.
         self.steps: list[str] = []
 
     @classmethod
@@ -179,12 +178,13 @@ class Record:
         output: str = "u",
         sample_time: float | None = None,
     ) -> Record:
-        """Make a record from a table; other columns with numbers become channels.
+        """Create a record from a table; other numeric columns become channels.
 
-        `input` and `output` are columns, a difference of two (``"r-y"``) or one with its sign (``"-e"``).
+        `input` and `output` are columns, differences of two columns (``"r-y"``), or columns with a sign
+        (``"-e"``).
 
-        The sample time is `sample_time`, or that of a column ``t`` or an index: times in s, a
-        DatetimeIndex (whose first time becomes 0) or a TimedeltaIndex. They must be even.
+        The sample time is `sample_time`, or follows from a column ``t`` or the index: times in s, a
+        DatetimeIndex (whose first time becomes 0) or a TimedeltaIndex. The times must be evenly spaced.
 
         Examples
         --------
@@ -193,7 +193,7 @@ class Record:
         columns = {str(name): frame[name].to_numpy() for name in frame.columns}
         index = frame.index
         if index.dtype.kind in "mM" or "datetime64" in str(index.dtype):
-            # Times with a zone are those of UTC.
+            # Times with a time zone are converted to UTC.
             times = index.to_numpy(dtype="datetime64[ns]" if index.dtype.kind != "m" else None)
         else:
             times = np.asarray(index)
@@ -209,9 +209,9 @@ class Record:
         output: str = "u",
         sample_time: float | None = None,
     ) -> Record:
-        """Make a record from a table of polars; other columns with numbers become channels.
+        """Create a record from a table of polars; other numeric columns become channels.
 
-        The sample time is `sample_time`, or that of a column ``t``: times in s, dates with times, or
+        The sample time is `sample_time`, or follows from a column ``t``: times in s, dates with times, or
         durations.
 
         Examples
@@ -231,11 +231,11 @@ class Record:
         output: str,
         sample_time: float | None,
     ) -> Record:
-        """A record from columns by name, and from the times next to them where there is no column t."""
+        """Create a record from columns by name, with separate times if there is no column t."""
         for name in (input, output):
             if name is not None and name not in columns:
                 if "-" in name:
-                    # A difference of columns, or one with its sign, as in files.
+                    # A difference of columns or a column with a sign, as in files.
                     names = list(columns)
                     terms = _pyhoid.signal_of(name, names)
                     columns[name] = np.sum(
@@ -256,13 +256,13 @@ class Record:
         if sample_time is None:
             if times is None or len(times) < 2:
                 raise OptionError("the table has no times: give sample_time in s, or a column t")
-            # By the rules of files, so that both give the same record.
+            # The same rules as for files apply, so that both give the same record.
             sample_time, row = _pyhoid.even_times(times)
             if sample_time is None:
                 steps = np.diff(times)
                 raise DataError(
                     f"the sampling is uneven: row {row} comes {steps[max(row, 1) - 1]:g} s after the"
-                    f" one before, expected {float(np.median(steps)):g} s;"
+                    f" row before, expected {float(np.median(steps)):g} s;"
                     " write the table to a file and read it with resample=True, or give sample_time"
                 )
         if times is not None:
@@ -273,7 +273,7 @@ class Record:
             if name not in (input, output) and values.dtype.kind in "fiu"
         }
         record = cls.__new__(cls)
-        # A column may have any name, even that of a keyword.
+        # A column may have any name, even the name of a keyword.
         record._fill(
             e=None if input is None else signal(columns[input], input),
             u=signal(columns[output], output),
@@ -311,22 +311,22 @@ class Record:
 
     @property
     def names(self) -> list[str]:
-        """Names of the channels: input, output, others."""
+        """Names of the channels: input, output, other channels."""
         first = [] if self.e is None else [self.input_name]
         return [*first, self.output_name, *self.channels]
 
     def span(self, start: float | None = None, stop: float | None = None) -> Record:
-        """The samples with ``start <= t < stop`` (s), as views of the same arrays.
+        """Return the samples with ``start <= t < stop`` (s), as views of the same arrays.
 
         Raises
         ------
         DataError
-            When the span has no samples.
+            If the span contains no samples.
 
         >>> record.span(5, 45)
         """
 
-        # A bound that falls on a sample, apart from rounding, takes that sample.
+        # If a bound coincides with a sample, apart from rounding, it refers to this sample.
         def index(time: float | None, usual: int) -> int:
             if time is None:
                 return usual
@@ -356,7 +356,7 @@ class Record:
         return record
 
     def detrended(self, how: Detrending = "mean") -> Record:
-        """The record with the ``"mean"`` or the ``"linear"`` trend of input and output removed.
+        """Return the record with the ``"mean"`` or the ``"linear"`` trend of input and output removed.
 
         >>> record.detrended("linear")
         """
@@ -365,16 +365,16 @@ class Record:
         return record
 
     def decimated(self, decimate: int | str = "auto") -> Record:
-        """The record at a lower rate: every n-th sample after a linear-phase low-pass filter.
+        """Return the record at a lower rate: every n-th sample after a linear-phase low-pass filter.
 
-        The filter is the same for all channels; the input is taken in the middle of the n samples
-        over which it is held then, so that delays stay. It is what `identify`, `track` and
-        `describe` do automatically above 200 Hz.
+        All channels have the same filter. The input is taken in the middle of the n samples over which it is
+        then held, so that delays are unchanged. `identify`, `track` and `describe` do this automatically
+        above 200 Hz.
 
         Parameters
         ----------
         decimate : "auto", "off" or int
-            ``"auto"``: above 200 Hz by the number that comes nearest to 100 Hz.
+            ``"auto"``: for rates above 200 Hz, the factor whose new rate is nearest to 100 Hz.
 
         >>> record.decimated(10)
         """
@@ -387,7 +387,7 @@ class Record:
         return record
 
     def to_pandas(self) -> pd.DataFrame:
-        """All channels as a table with the time in s as index.
+        """Return all channels as a table with the time in s as index.
 
         >>> record.to_pandas()
         """
@@ -400,7 +400,7 @@ class Record:
         )
 
     def to_polars(self) -> pl.DataFrame:
-        """All channels as a table of polars, after the time in s as column ``t``.
+        """Return all channels as a table of polars, after the time in s as column ``t``.
 
         >>> record.to_polars()
         """
@@ -409,7 +409,7 @@ class Record:
         return pl.DataFrame({"t": self.time, **{name: self[name] for name in self.names}})
 
     def to_xarray(self) -> xr.Dataset:
-        """All channels over the coordinate ``t`` (s), with their units.
+        """Return all channels over the coordinate ``t`` (s), with their units.
 
         >>> record.to_xarray()
         """
@@ -467,7 +467,7 @@ class Record:
 
 
 def _record_of(parts: Mapping[str, Any], steps: Sequence[str] = ()) -> Record:
-    """A record out of its pickle, checked as one that is made by hand."""
+    """Restore a record from a pickle, with the same checks as for a new record."""
     record = Record._of(parts)
     record.steps = list(steps)
     _pyhoid.check_record(record)

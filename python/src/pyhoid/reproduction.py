@@ -1,4 +1,4 @@
-"""The tables, figures and claims of the thesis."""
+"""Reproduction of the tables, figures and claims of the thesis."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ __all__ = ["Reproduction", "reproduce"]
 
 
 class Reproduction(NamedTuple):
-    """What `reproduce` has made.
+    """The result of `reproduce`.
 
     Examples
     --------
     >>> pyhoid.reproduce("out", only=["fig-5"]).figures["fig-5"]
     """
 
-    #: The page that shows all of it.
+    #: The page that shows the whole reproduction.
     page: Path
-    #: Pictures by name, as in ``figures["fig-11"]``; `pyhoid.plots.reference` draws them again.
+    #: Image files by name, as in ``figures["fig-11"]``; `pyhoid.plots.reference` draws them again.
     figures: dict[str, Path]
     #: Tables, and the numbers of each figure, by name.
     tables: dict[str, Table]
     #: Results of the studies by name.
     studies: dict[str, Results]
-    #: How many claims hold, hold in part, do not hold and cannot be tested; None if not requested.
+    #: Number of claims that hold, hold in part, do not hold and cannot be tested; None if not requested.
     claims: dict[str, int] | None
 
 
@@ -44,22 +44,22 @@ def reproduce(
     recordings: str | PathLike[str] | None = None,
     progress: Progress = False,
 ) -> Reproduction:
-    """Make the tables, figures and claims of the thesis (Ortiz Moya 2023).
+    """Reproduce the tables, figures and claims of the thesis (Ortiz Moya 2023).
 
-    This does what ``hoid reproduce`` does. Studies that are already there are not run again; one
-    that was interrupted continues.
+    This is ``hoid reproduce``. Completed studies are not run again; an interrupted study
+    continues.
 
     Parameters
     ----------
     directory : path
     only : sequence of str
-        Tables, figures, appendices, studies, ``"experiment"``, or ``"claims"``; default all.
+        Tables, figures, appendices, studies, ``"experiment"``, or ``"claims"``; by default everything.
     replications : int
-        Replications of each cell.
+        Number of replications of each cell.
     jobs : int, optional
-        Threads; default one for each core.
+        Number of threads; by default one per core.
     recordings : path, optional
-        Recorded people in place of virtual ones, with ``only="experiment"``: a directory with the
+        Recorded people in place of virtual people, with ``only="experiment"``: a directory with the
         manifest that ``hoid group init`` writes, or a manifest.
     progress : bool or callable
 
@@ -72,7 +72,7 @@ def reproduce(
     OptionError
         For an unknown name.
     StudyStateError
-        When the directory holds studies with another number of replications.
+        If the directory holds studies with another number of replications.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Closed-loop runs of a scenario, and the margins of its loop."""
+"""Simulation of closed-loop runs of a scenario, and margins of its loop."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["margins", "simulate"]
 def _base(condition: str | None, scenario: str | PathLike[str] | None) -> dict[str, Any]:
     if (condition is None) == (scenario is None):
         raise OptionError('give either condition, such as "C4", or scenario')
-    # A text of several lines is a scenario itself; anything else is the name of its file.
+    # A text of several lines is a scenario itself; any other text is the name of its file.
     text = scenario if isinstance(scenario, str) and "\n" in scenario else None
     return {
         "condition": condition,
@@ -47,21 +47,21 @@ def simulate(
     condition : {"C1", ..., "C6"}, optional
         A condition of the thesis (Ortiz Moya 2023, Table 4.4).
     scenario : path or str, optional
-        A scenario file (TOML), or the text of one.
+        A scenario file (TOML), or the text of a scenario.
     remnant_order : int, optional
-        Order m of the remnant filter, 1 to 4; default 1 or the scenario's.
+        Order m of the remnant filter, 1 to 4; by default 1 or that of the scenario.
     noise_level : float, optional
-        Noise level P_n, 0 for a run without remnant; default 0.1 or the scenario's.
+        Noise level P_n, 0 for a run without remnant; by default 0.1 or that of the scenario.
     noise_definition : {"response", "remnant"}, optional
-        What P_n is a share of: var(u_n)/var(u) or var(n)/var(u).
+        Definition of P_n: var(u_n)/var(u) or var(n)/var(u).
     remnant_time_constant : float, optional
-        T_n in s; default 0.06.
+        Time constant T_n in s; by default 0.06.
     sample_time : float, optional
-        Ts in s; default 0.01.
+        Sample time Ts in s; by default 0.01.
     realisation : {"input", "output"}, optional
-        Where K_c is in the controlled element, which matters when it changes.
+        Position of the gain K_c in the controlled element, which matters if K_c changes.
     seed, cell, replication : int
-        They select the random stream; runs with different replications are independent.
+        Numbers that select the random stream; runs with different replications are independent.
     keep_run_in : bool
         Keep the samples with t < 0.
 
@@ -102,16 +102,16 @@ def margins(
     noise_levels: Sequence[float] = (0.01, 0.1, 0.2, 0.3),
     noise_definition: str = "response",
 ) -> dict[str, Any]:
-    """Crossover frequency, margins and remnant gains of a scenario.
+    """Return crossover frequency, margins and remnant gains of a scenario.
 
     Parameters
     ----------
     condition, scenario
         As in `simulate`.
     state : {"initial", "last"}
-        Which state, for a scenario that changes.
+        State to evaluate, for a scenario that changes.
     noise_levels : sequence of float
-        Noise levels P_n for the remnant gains.
+        Noise levels P_n for which the remnant gains are computed.
     noise_definition : {"response", "remnant"}
 
     Returns

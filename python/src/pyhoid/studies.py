@@ -30,7 +30,7 @@ class Table(Mapping[str, Any]):
     Parameters
     ----------
     path : path
-        The file; it is read when a column is first asked for.
+        Path of the file, which is read when a column is first accessed.
 
     Examples
     --------
@@ -43,7 +43,7 @@ class Table(Mapping[str, Any]):
         self._columns: dict[str, Any] | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """All columns by name.
+        """Return all columns by name.
 
         >>> results["fits"].to_dict()["K_e"]
         """
@@ -55,7 +55,7 @@ class Table(Mapping[str, Any]):
         return self._columns
 
     def to_pandas(self) -> pd.DataFrame:
-        """The table as a pandas DataFrame.
+        """Return the table as a pandas DataFrame.
 
         >>> results["fits"].to_pandas()
         """
@@ -64,7 +64,7 @@ class Table(Mapping[str, Any]):
         return pd.DataFrame(self.to_dict())
 
     def to_polars(self) -> pl.DataFrame:
-        """The table as a polars DataFrame.
+        """Return the table as a polars DataFrame.
 
         >>> results["fits"].to_polars()
         """
@@ -73,7 +73,7 @@ class Table(Mapping[str, Any]):
         return pl.DataFrame({name: _listed(values) for name, values in self.to_dict().items()})
 
     def to_arrow(self) -> pa.Table:
-        """The table as an Arrow table.
+        """Return the table as an Arrow table.
 
         >>> results["fits"].to_arrow()
         """
@@ -112,11 +112,11 @@ class Results(Mapping[str, Table]):
     ----------
     directory : Path
     finished : bool
-        False for a shard that is still to be merged.
+        False for a shard that has not been merged.
     estimates : int
-        Number of estimates that this run made.
+        Number of estimates made by this run.
     pages : list of Path
-        The pages next to the tables, for a group.
+        The pages of a group, in the directory of the tables.
 
     Examples
     --------
@@ -165,14 +165,14 @@ def plan(source: str | PathLike[str] | Plan, *, replications: int | None = None)
     Parameters
     ----------
     source : path, str or Plan
-        A file (TOML), the text of one, or the name of a plan that comes with hoid (see `plans`).
+        A file (TOML), the text of a plan, or the name of a plan included with hoid (see `plans`).
     replications : int, optional
-        Replaces the number in the plan.
+        Replaces the number of replications in the plan.
 
     Raises
     ------
     OptionError
-        For a plan that is not valid; the message names the line.
+        For an invalid plan; the message names the line.
 
     Examples
     --------
@@ -191,7 +191,7 @@ def plan(source: str | PathLike[str] | Plan, *, replications: int | None = None)
 
 
 def plans() -> dict[str, str]:
-    """Names and titles of the plans that come with hoid.
+    """Return names and titles of the plans included with hoid.
 
     Examples
     --------
@@ -211,10 +211,10 @@ def study(
     csv: bool = False,
     progress: Progress = False,
 ) -> Results:
-    """Run a study, or a share of it, and write its tables into a directory.
+    """Run a study or one of its shards, and write the tables to a directory.
 
-    An interrupt stops it within a second; ``resume=True`` then continues, with nothing lost or done
-    twice.
+    An interrupt stops the study within a second; with ``resume=True`` it then continues, with nothing lost
+    or computed twice.
 
     Parameters
     ----------
@@ -222,15 +222,15 @@ def study(
         As in `plan`.
     directory : path
     shard : str or (int, int), optional
-        ``"2/7"`` or ``(2, 7)`` runs the second of seven shares; `merge` joins them.
+        ``"2/7"`` or ``(2, 7)`` runs the second of seven shards; `merge` joins them.
     jobs : int, optional
-        Threads; default one for each core.
+        Number of threads; by default one per core.
     replications : int, optional
-        Replaces the number in the plan.
+        Replaces the number of replications in the plan.
     resume : bool
-        Continue with a study that was stopped.
+        Whether a stopped study is continued.
     csv : bool
-        Write the tables as CSV instead of Parquet.
+        Whether the tables are written as CSV instead of Parquet.
     progress : bool or callable
 
     Returns
@@ -240,9 +240,9 @@ def study(
     Raises
     ------
     OptionError
-        For a plan that is not valid.
+        For an invalid plan.
     StudyStateError
-        When the directory holds a study and `resume` is False.
+        If the directory holds a study and `resume` is False.
 
     Examples
     --------
@@ -269,12 +269,12 @@ def study(
 def merge(
     shards: Sequence[str | PathLike[str]], directory: str | PathLike[str], *, csv: bool = False
 ) -> Results:
-    """Join the shards of a study.
+    """Merge the shards of a study.
 
     Raises
     ------
     StudyStateError
-        For shards of different plans, and when a shard is missing or there twice.
+        If shards belong to different plans, or if a shard is missing or duplicated.
 
     Examples
     --------
@@ -287,12 +287,12 @@ def merge(
 
 
 def results(directory: str | PathLike[str]) -> Results:
-    """The tables in the directory of a study or a group.
+    """Return the tables in the directory of a study or a group.
 
     Raises
     ------
     StudyStateError
-        When there are none.
+        If the directory contains no tables.
 
     Examples
     --------

@@ -23,7 +23,7 @@ __all__ = ["TimeVaryingFit"]
 class TimeVaryingFit(Result):
     """A fitted operator whose gains change once, along a sigmoid.
 
-    `identify` makes it with ``change="sigmoid"``.
+    `identify` with ``change="sigmoid"`` creates it.
 
     Examples
     --------
@@ -37,7 +37,7 @@ class TimeVaryingFit(Result):
 
     @property
     def form(self) -> str:
-        """The form of the operator: ``"lead"``, ``"lead-lag"`` ..."""
+        """Form of the operator, such as ``"lead"`` or ``"lead-lag"``."""
         return self._native.form
 
     @property
@@ -84,7 +84,7 @@ class TimeVaryingFit(Result):
 
     @property
     def verdict(self) -> Verdict:
-        """What the fit is worth on its records: `level`, `reasons` and `notes`."""
+        """Reliability of the fit on its records: `level`, `reasons` and `notes`."""
         return Verdict(*self._native.verdict)
 
     @property
@@ -94,9 +94,9 @@ class TimeVaryingFit(Result):
 
     @property
     def levels(self) -> list[Estimate | None]:
-        """The level of u of each record: the constant that is not a response to e, in the unit of u.
+        """The constant of u in each record that is not a response to e, in the unit of u.
 
-        None if it was not estimated: of simulated runs and with ``faults="keep"``.
+        None if it was not estimated: for simulated runs and with ``faults="keep"``.
         """
         return [None if pair is None else Estimate(*pair) for pair in self._native.levels]
 
@@ -113,30 +113,30 @@ class TimeVaryingFit(Result):
         return None if found is None else Operator(found)
 
     def gains(self, times: Any) -> dict[str, FloatArray]:
-        """``t`` and what changes at these times in s, with standard errors under ``_se``.
+        """Return ``t`` and the changing parameters at these times in s, with standard errors under ``_se``.
 
-        K_e, T_L and K_e_dot of a gain and a lead; K (and K_over_T_I) and T_L of other forms.
+        They are K_e, T_L and K_e_dot for a gain with a lead; K (and K_over_T_I) and T_L for other forms.
 
         >>> change.gains([20.0, 60.0])
         """
         return self._native.gains([float(t) for t in signal(np.atleast_1d(times), "times")])
 
     def residuals(self, record: Record) -> Series:
-        """One-step prediction errors.
+        """Return the one-step prediction errors.
 
         >>> change.residuals(record).values.std()
         """
         return Series(*self._native.residuals(record))
 
     def simulate(self, record: Record) -> Series:
-        """Response to e alone.
+        """Simulate the response to e alone.
 
         >>> change.simulate(record)
         """
         return Series(*self._native.simulate(record))
 
     def to_pandas(self) -> pd.DataFrame:
-        """Parameters as a table: value, standard_error, unit, remark.
+        """Return the parameters as a table: value, standard_error, unit, remark.
 
         >>> change.to_pandas()
         """
@@ -156,7 +156,7 @@ class TimeVaryingFit(Result):
         )
 
     def summary(self) -> str:
-        """The fit as a text table.
+        """Return the fit as a text table.
 
         >>> print(change.summary())
         """

@@ -1,4 +1,4 @@
-"""A recursive estimate over a record: columns by name, tables, figures, its page."""
+"""A recursive estimate over a record: columns by name, tables, figures, report page."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["Trace"]
 
 
-#: What a pickle keeps of the native side.
+#: Attributes of the native object that a pickle contains.
 _ANSWERS = (
     "len",
     "method",
@@ -49,20 +49,20 @@ _ANSWERS = (
 
 
 class Trace:
-    """The estimate at every sample that was kept, with its uncertainty. `track` makes it.
+    """The estimate at each stored sample, with its uncertainty. `track` creates it.
 
-    Columns are read by name: ``trace["K_e"]``, and ``trace["K_e_se"]`` for its standard errors. All
-    have shape (N,), and NaN if a row has no operator. With `at` and `controlled_element` there
-    are ``trace["gain_db@2.5"]``, ``trace["phase_deg@2.5"]``, ``trace["crossover_rad_s"]`` and
-    ``trace["phase_margin_deg"]``; ``"adaptive"`` adds ``trace["omega_nm_determined"]`` and the
-    like, 1 where the data determine a parameter.
+    Columns are accessed by name: ``trace["K_e"]``, and ``trace["K_e_se"]`` for its standard errors. All
+    columns have shape (N,) and are NaN if a row has no operator. With `at` and `controlled_element` there
+    are also ``trace["gain_db@2.5"]``, ``trace["phase_deg@2.5"]``, ``trace["crossover_rad_s"]`` and
+    ``trace["phase_margin_deg"]``. ``"adaptive"`` adds columns such as ``trace["omega_nm_determined"]``,
+    which are 1 where the data determine the parameter.
 
     Attributes
     ----------
     record : Record
         The record that was tracked.
     settings : dict
-        The keywords of the call, defaults included.
+        The keywords of the call, including defaults.
 
     Examples
     --------
@@ -79,14 +79,14 @@ class Trace:
     ) -> None:
         self._native = native
         self._call = call
-        # A record that is tracked as it was given stays the object that was given.
+        # For an unchanged record, the given object itself is returned.
         (self.record,) = used(native, [record])
         self.settings: dict[str, Any] = dict(settings or {})
         self._columns: dict[str, npt.NDArray[Any]] | None = None
         self._verdict: Verdict | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        # What a table and a summary show is reported before it is stored.
+        # Everything that a table and a summary show is computed before the pickle is written.
         _ = self.columns, self.verdict
         return state_of(self, _ANSWERS)
 
@@ -121,24 +121,24 @@ class Trace:
 
     @property
     def method(self) -> str:
-        """The recursion."""
+        """Name of the recursive method."""
         return self._native.method
 
     @property
     def structure(self) -> str:
-        """The structure."""
+        """Structure of the model."""
         return self._native.structure
 
     @property
     def orders(self) -> dict[str, int]:
-        """na, nb, nc, nd, nf and nk."""
+        """Orders na, nb, nc, nd, nf and nk."""
         return self._native.orders
 
     @property
     def covariance_choice(self) -> dict[str, Any] | None:
-        """With `validate` the start covariances that were tried: ``covariance``, the one that was
-        taken; ``candidates``, each with the VAF in % of the second run; ``from`` and ``to``, the span
-        that was compared, in s from its first sample. Otherwise None."""
+        """The start covariances tried with `validate`: ``covariance``, the one selected; ``candidates``,
+        each with the VAF in % of the second run; ``from`` and ``to``, the span that was compared, in s from
+        its first sample. None without `validate`."""
         return self._native.covariance_choice
 
     @property
@@ -153,30 +153,30 @@ class Trace:
 
     @property
     def response_names(self) -> list[str]:
-        """Names of gain and phase at the frequencies of `at`, crossover and margin: of those
-        that were requested, without their errors."""
+        """Names of gain and phase at the frequencies of `at`, and of crossover and margin, as far as they
+        were requested, without their errors."""
         starts = ("gain_db@", "phase_deg@", "crossover_rad_s", "phase_margin_deg")
         return [n for n in self.columns if n.startswith(starts) and not n.endswith("_se")]
 
     @property
     def no_crossover(self) -> tuple[int, str | None] | None:
-        """How many rows have no crossover, and why most of them; None without a controlled
+        """Number of rows without a crossover, and the most frequent reason; None without a controlled
         element."""
         return self._native.no_crossover
 
     @property
     def updated_from(self) -> float:
-        """Time in s from which the estimate was updated."""
+        """Time in s after which the estimate was updated."""
         return self._native.updated_from
 
     @property
     def counts(self) -> dict[str, int]:
-        """samples, skipped, held, restarts, steps_shortened."""
+        """Counts: samples, skipped, held, restarts, steps_shortened."""
         return self._native.counts
 
     @property
     def faults(self) -> list[dict[str, Any]]:
-        """What the guard found in e and u, and what it did.
+        """Faults that the guard found in e and u, and its actions.
 
         Each has its kind, its channel, the times `from` and `to` in s, its size and the action.
         """
@@ -184,7 +184,7 @@ class Trace:
 
     @property
     def verdict(self) -> Verdict:
-        """What the trace is worth: `level`, `reasons` and `notes`."""
+        """Reliability of the trace: `level`, `reasons` and `notes`."""
         if self._verdict is None:
             self._verdict = Verdict(*self._native.verdict)
         return self._verdict
@@ -193,8 +193,8 @@ class Trace:
     def changes(self) -> list[dict[str, Any]]:
         """The changes that ``"adaptive"`` or ``"multiple-model"`` declared.
 
-        Each has its time `t`, how long ago it was, the odds, what changed (`changed`), and the
-        gains before and after with their standard errors.
+        Each has the time `t` of its declaration, how long before that it occurred, the odds, the quantities
+        that changed (`changed`), and the gains before and after with their standard errors.
         """
         return self._native.changes
 
@@ -205,14 +205,14 @@ class Trace:
 
     @property
     def start(self) -> Fit | None:
-        """The batch fit that the recursion started from."""
+        """The batch fit from which the recursion started."""
         native = self._native.start
         if native is None:
             return None
         return Fit(native, [self.record])
 
     def operator(self, row: int = -1) -> Operator | None:
-        """The operator of a row, by default the last.
+        """Return the operator of a row, by default the last.
 
         >>> trace.operator()
         """
@@ -220,7 +220,7 @@ class Trace:
         return None if found is None else Operator(found, channel_units([self.record]))
 
     def to_pandas(self) -> pd.DataFrame:
-        """All columns with the time in s as index.
+        """Return all columns with the time in s as index.
 
         >>> trace.to_pandas()
         """
@@ -230,7 +230,7 @@ class Trace:
         return pd.DataFrame(columns, index=pd.Index(self.time, name="t"), copy=False)
 
     def to_polars(self) -> pl.DataFrame:
-        """All columns.
+        """Return all columns as a table of polars.
 
         >>> trace.to_polars()
         """
@@ -239,13 +239,13 @@ class Trace:
         return pl.DataFrame(dict(self.columns))
 
     def _unit(self, name: str) -> str:
-        """The unit of a column."""
+        """Return the unit of a column."""
         base = name.removesuffix("_se")
         of_response = {"gain_db": "dB", "phase_deg": "deg"}.get(base.partition("@")[0])
         return of_response or unit_of(base, channel_units([self.record]))
 
     def to_xarray(self) -> xr.Dataset:
-        """All columns over the coordinate ``t`` (s).
+        """Return all columns over the coordinate ``t`` (s).
 
         >>> trace.to_xarray()
         """
@@ -262,7 +262,7 @@ class Trace:
         )
 
     def to_json(self) -> str:
-        """The result as text: the object of ``hoid track --json``.
+        """Return the result as text: the object of ``hoid track --json``.
 
         >>> from pathlib import Path
         >>> Path("trace.json").write_text(trace.to_json())
@@ -288,10 +288,10 @@ class Trace:
         return plots.trace(self, names, axes=axes)
 
     def report(self, directory: str | PathLike[str], *, title: str | None = None) -> Path:
-        """Write the page about the trace, ``report.html``, into a directory.
+        """Write the report page of the trace, ``report.html``, to a directory.
 
-        It is the page that ``hoid track --report`` writes. It compares the trace with batch fits of
-        the start and of the last third of the record, and with the truth if the record has it.
+        It is the same page as ``hoid track --report`` writes. It compares the trace with batch fits of the
+        start and of the last third of the record, and with the true values if the record contains them.
 
         Parameters
         ----------
@@ -303,12 +303,12 @@ class Trace:
         Returns
         -------
         Path
-            The page.
+            Path of the page.
 
         Raises
         ------
         FileError
-            When the page cannot be written.
+            If the page cannot be written.
 
         >>> page = trace.report("out")
         """

@@ -1,4 +1,4 @@
-"""Live recursive estimates."""
+"""Online recursive estimates."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ __all__ = ["Tracker"]
 
 
 class Tracker(_pyhoid.Tracker):
-    """A recursive estimate that takes one sample at a time.
+    """A recursive estimate that processes one sample at a time.
 
-    The default, ``"adaptive"``, speaks at once. Other methods without a start collect `warm_up`
-    seconds, fit them, and continue from there; until then `ready` is False. It can be pickled, and
-    continues with the same digits.
+    The default method, ``"adaptive"``, gives its first estimate after one second. Other methods without a
+    given start collect `warm_up` seconds, fit them, and continue from there; until then `ready` is False. A
+    tracker can be pickled, and then continues with the same digits.
 
     Parameters
     ----------
@@ -35,18 +35,18 @@ class Tracker(_pyhoid.Tracker):
     sample_time : float, default 0.01
         Ts in s.
     warm_up : float, default 20
-        Seconds collected before the start fit.
+        Time collected before the start fit, in s.
     at : sequence of float
-        Frequencies in rad/s that `responses` reports.
+        Frequencies in rad/s at which `responses` gives gain and phase.
     controlled_element : str or (sequence of float, sequence of float), optional
-        What the person controls, as in `track`: then `crossover` and `phase_margin` are reported.
+        Controlled element, as in `track`; with it, `crossover` and `phase_margin` are available.
     decimate : "auto", "off" or int
-        As in `track`: above 200 Hz every n-th sample is tracked by default, .15 s after the last one
-        taken; between them the estimate stays, and `step` returns NaN. `decimation` states what is
-        done.
+        As in `track`: above 200 Hz every n-th sample is tracked by default, and the estimate lags by .15 s.
+        Between these samples the estimate stays constant and `step` returns NaN. `decimation` describes
+        the reduction.
     record : Record, optional
-        A record to start from, instead of the warm-up: its fit is the start, and the filters have
-        run over it.
+        A record from which the tracker starts, instead of the warm-up: its fit is the start, and the
+        filters have processed it.
 
     Examples
     --------
@@ -94,15 +94,15 @@ class Tracker(_pyhoid.Tracker):
         return tracker
 
     def update(self, e: Any, u: Any, f_t: Any = None, *, update: bool = True) -> FloatArray:
-        """Take samples one after the other.
+        """Process samples one after the other.
 
         Parameters
         ----------
         e, u : array_like, shape (N,)
         f_t : array_like, shape (N,), optional
-            Forcing function, from which ``"rriv"`` makes its instruments.
+            Forcing function, from which ``"rriv"`` computes its instruments.
         update : bool
-            False runs the filters on and keeps the estimate.
+            False updates only the filters and keeps the estimate constant.
 
         Returns
         -------
@@ -122,7 +122,7 @@ class Tracker(_pyhoid.Tracker):
 
     @property
     def responses(self) -> dict[float, tuple[Estimate, Estimate]]:
-        """Gain in dB and phase in degrees at the frequencies of `at`; empty before the first estimate.
+        """Gain in dB and phase in deg at the frequencies of `at`; empty before the first estimate.
 
         Examples
         --------
@@ -140,35 +140,35 @@ class Tracker(_pyhoid.Tracker):
     def crossover(self) -> Estimate | None:
         """Crossover frequency in rad/s.
 
-        None without a controlled element, and where there is none; then `no_crossover` gives the reason.
+        None without a controlled element, or if there is no crossover; then `no_crossover` gives the reason.
         """
         found = self.open_loop
         return None if found is None or found[0] is None else Estimate(*found[0][0])
 
     @property
     def phase_margin(self) -> Estimate | None:
-        """Phase margin in degrees; None as `crossover`."""
+        """Phase margin in deg; None if `crossover` is None."""
         found = self.open_loop
         return None if found is None or found[0] is None else Estimate(*found[0][1])
 
     @property
     def no_crossover(self) -> str | None:
-        """Why there is no crossover now."""
+        """Reason why there is currently no crossover."""
         found = self.open_loop
         return None if found is None else found[1]
 
     @property
     def start_fit(self) -> Fit | None:
-        """The batch fit that the tracker started from.
+        """The batch fit from which the tracker started.
 
-        None for a tracker that was given a start or came out of a pickle.
+        None if the start was given or the tracker was restored from a pickle.
         """
         native = self.start
         return None if native is None else Fit(native, [])
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The keywords that it was made with, defaults included; a prior from a fit by its source."""
+        """The keywords of the tracker, including defaults; a prior from a fit is given by its source."""
         shared = {
             name: self._options[name] for name in _recursion.KEYWORDS if name in self._options
         }
@@ -179,7 +179,7 @@ class Tracker(_pyhoid.Tracker):
         return told
 
     def operator_estimate(self) -> Operator | None:
-        """The operator with standard errors; None if the structure cannot represent one.
+        """Return the operator with standard errors; None if the structure cannot represent one.
 
         >>> tracker.operator_estimate()
         """
@@ -205,7 +205,7 @@ def _restored(
     orders: dict[str, int] | None,
     numbers: FloatArray,
 ) -> Tracker:
-    # The length of the warm-up is in the numbers: any valid one serves here.
+    # The saved numbers contain the length of the warm-up, so any valid length can be given here.
     tracker = kind._made(options, sample_time, max(20.0, sample_time), None)
     tracker.restore(orders, numbers)
     return tracker

@@ -51,9 +51,9 @@ def track(
 ) -> Trace:
     """Track a model and the operator's parameters over a record, sample by sample.
 
-    Without options this is ``"adaptive"``: gains in a basis that people share. It needs no start
-    fit, speaks from the second second on, and is made for recorded people. Where the form of the
-    operator and its delay are known, ``"multiple-model"`` is more precise.
+    Without options this is ``"adaptive"``, which estimates gains in a basis common to people. It needs no
+    start fit, gives its first estimate after one second, and is intended for recorded people. If the form
+    and the delay of the operator are known, ``"multiple-model"`` is more precise.
 
     Parameters
     ----------
@@ -61,44 +61,44 @@ def track(
     method : str
         {methods}
     structure : str, optional
-        Default ``"arx"`` for ``"rls"``, otherwise ``"bj"``.
+        By default ``"arx"`` for ``"rls"``, otherwise ``"bj"``.
     na, nb, nc, nd, nf, nk : int or (int, int) or range, optional
-        Orders; pairs are searched on the start span.
+        Orders; pairs are ranges that are searched on the start span.
     delay : float or (float, float), optional
-        Delay tau_e in s in place of `nk`, or the shortest and the longest that are searched.
+        Delay tau_e in s in place of `nk`, or the shortest and the longest delay of a search.
     criterion : str
-        The criterion that chooses between candidates.
+        Criterion that selects among candidates.
     start : mapping of str to float, or "nothing", optional
-        All coefficients; default a batch fit of the start span. ``"adaptive"`` has `prior` in
-        its place.
+        Start values of all coefficients; by default from a batch fit of the start span. ``"adaptive"``
+        uses `prior` instead.
     largest : float
-        Magnitude of e or u beyond which a sample is a fault.
+        Magnitude of e or u above which a sample counts as faulty.
     at : sequence of float
-        Frequencies in rad/s at which gain in dB and phase in degrees are columns of the trace
+        Frequencies in rad/s at which the trace has columns for gain in dB and phase in deg
         (``gain_db@2.5``, ``phase_deg@2.5``), with standard errors.
     controlled_element : str or (sequence of float, sequence of float), optional
-        What the person controls, as ``"90/(s(s+6))"`` or numerator and denominator by descending
-        powers of s: adds the columns ``crossover_rad_s`` and ``phase_margin_deg``, with standard
-        errors.
+        Controlled element, such as ``"90/(s(s+6))"``, or numerator and denominator in descending powers
+        of s: adds the columns ``crossover_rad_s`` and ``phase_margin_deg``, with standard errors.
     start_span : (float, float), optional
-        Span of the start fit in s; default the first third.
+        Span of the start fit in s; by default the first third.
     update_from : float, optional
-        Time in s from which the estimate is updated.
+        Time in s after which the estimate is updated.
     validate : Record, optional
-        A second run of the same person in the same task. `covariance` is then the one of a grid
-        whose trace explains most of it (VAF); ``trace.covariance_choice`` has the table. For methods
-        with `covariance`, which is not given then.
+        A second run of the same person in the same task. The initial `covariance` is then selected from a
+        grid, so that the trace explains as much as possible of the second run (VAF);
+        ``trace.covariance_choice`` contains the table. For methods with `covariance`, which must then not
+        be given.
     update_covariance : bool
-        With `validate`: P is not chosen at the start but made smaller in course, every half a
-        second in which the estimate has come to explain less of the second run.
+        With `validate`: P is not selected at the start but reduced during the run, whenever the estimate
+        explains less of the second run than half a second earlier.
     moving_average : float, optional
         Replace each estimate by the mean over this many seconds.
     every : int
-        Keep every n-th sample.
+        Store every n-th sample.
     decimate : "auto", "off" or int
-        Track every n-th sample after a linear-phase low-pass filter; ``"auto"``: above 200 Hz by the
-        number that comes nearest to 100 Hz, unless `nk` is given or the method counts samples (its
-        memory or orders are those of a polynomial). ``trace.record`` is the decimated record.
+        Track every n-th sample after a linear-phase low-pass filter. ``"auto"`` reduces rates above
+        200 Hz by the factor whose new rate is nearest to 100 Hz, unless `nk` is given or the method counts
+        samples (its memory or orders are those of a polynomial). ``trace.record`` is the decimated record.
     progress : bool or callable
         As in `identify`.
     **settings
@@ -134,7 +134,7 @@ def track(
     if validate is not None and not isinstance(validate, Record):
         raise DataError(f"validate: expected a pyhoid.Record, found {type(validate).__name__}")
     if update_covariance and validate is None:
-        raise OptionError("update_covariance belongs to validate, a second run; give it too")
+        raise OptionError("update_covariance applies only with validate, a second run")
     options = _recursion.plain(shared, settings)
     if every < 1:
         raise OptionError(f"every is {every}, expected 1 or more")

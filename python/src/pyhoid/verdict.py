@@ -1,4 +1,4 @@
-"""What a result is worth."""
+"""Reliability of a result."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ __all__ = ["Verdict"]
 
 
 class Verdict(NamedTuple):
-    """What a result is worth, and why.
+    """Reliability of a result, with the reasons.
 
-    `level` is ``"trustworthy"``, ``"doubtful"`` or ``"not determined"``; `reasons` report what speaks
-    against the result, `notes` additional notes.
+    `level` is ``"trustworthy"``, ``"doubtful"`` or ``"not determined"``; `reasons` contains the reasons
+    against trusting the result, `notes` contains additional notes.
 
     Examples
     --------

@@ -1,52 +1,53 @@
-//! Definition of a case of the challenge: data, no code.
+//! Definition of a case of the challenge as data without code.
 
 use super::operator::{Parameter, Plant};
 
-/// The operator's form; its parameters are drawn again in each run.
+/// Form of the operator, whose parameters are drawn again for each run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
     /// Gain and lead: the operator of the thesis.
     Lead,
     /// A gain only.
     Gain,
-    /// Gain, lead and lag: people on `1/s`.
+    /// Gain, lead and lag, as for people controlling `1/s`.
     LeadLag,
-    /// Gain, two leads and a lag: people on plants of second order.
+    /// Gain, two leads and a lag, as for people controlling second-order plants.
     Lead2Lag,
-    /// Gain and lead after a neuromuscular system of third order.
+    /// Gain and lead, with a third-order neuromuscular system.
     ThirdOrder,
-    /// Gain and lead, and the dynamics of a stick with 20 to 30 rad/s.
+    /// Gain and lead, with the dynamics of a stick at 20 to 30 rad/s.
     StickDynamics,
 }
 
-/// The excitation; its phases are drawn again in each run.
+/// Excitation, whose phases are drawn again for each run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Forcing {
-    /// A disturbance at the input of the plant: primes times 0.05 Hz up to 1.55 Hz, amplitudes as
-    /// 1 over frequency.
+    /// A disturbance at the input of the plant: lines at primes times 0.05 Hz up to 1.55 Hz, with amplitudes inversely
+    /// proportional to frequency.
     Disturbance,
-    /// The same lines as a target.
+    /// A target with the same lines as the disturbance.
     Target,
-    /// Ten sines from 0.157 to 13.8 rad/s as a target, those above 2.6 rad/s ten times smaller (D. T.
-    /// McRuer et al., AFFDL-TR-65-15, 1965).
+    /// A target of ten sinusoids from 0.157 to 13.8 rad/s, whose amplitudes above 2.6 rad/s are ten times smaller (D.
+    /// T. McRuer et al., AFFDL-TR-65-15, 1965).
     McRuer,
 }
 
 /// Sampling of the operator's input and output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sight {
-    /// Error and control are held over each sample, as with a sampled display and stick.
+pub enum Sampling {
+    /// Error and control are held over each sample, as for a sampled display and stick.
     Held,
-    /// Continuous; only the recorder samples.
+    /// Error and control are continuous; only the recorder samples them.
     Continuous,
 }
 
 /// Spectrum of the remnant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Spectrum {
-    /// `1/(T_n s + 1)^m`.
+    /// A lag of order m, `1/(T_n s + 1)^m`.
     Lag(usize),
-    /// A first-order lag, a peak at omega_nm (20 % of the variance) and a drift of 3 to 10 s (10 %).
+    /// A first-order lag, a peak at omega_nm (20 % of the variance) and a slow drift with a time constant of 3 to 10 s
+    /// (10 %).
     Rich,
     /// A first-order lag, and a narrow peak at 50 to 60 rad/s with a quarter of the variance.
     Tremor,
@@ -55,90 +56,90 @@ pub enum Spectrum {
 /// Time course of the remnant's strength.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Course {
-    /// Constant.
+    /// Constant strength.
     Steady,
-    /// Standard deviation times `1 + a sin(2 pi t/30 s + phase)`: from one end to the other in 15 s.
+    /// The standard deviation is multiplied by `1 + a sin(2 pi t/30 s + phase)`, which goes from one extreme to the
+    /// other in 15 s.
     Wander(f64),
-    /// Times a factor in every second span of 15 s.
+    /// The standard deviation is multiplied by a factor in every second span of 15 s.
     Steps(f64),
     /// Proportional to |e|.
     Error,
     /// Proportional to the running rms of u over 1 s.
     Control,
-    /// One sample in fifty is seven times as large.
+    /// One sample in fifty, on average, is seven times as large as the others.
     Impulsive,
-    /// 80 % of the variance in two pulses per second.
+    /// 80 % of the variance is in two pulses per second on average.
     Pulsed,
-    /// Alternately on and off for 2 s each on average; with a ninth of the variance when off.
+    /// Alternately on and off for 2 s each on average; the variance when off is a ninth of that when on.
     Intermittent,
 }
 
-/// Imperfections of stick and recorder.
+/// Imperfection of the stick or the recorder.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Blemish {
-    /// None.
+pub enum Imperfection {
+    /// No imperfection.
     None,
-    /// A random walk of the stick in the loop, rms of u per root second.
+    /// Random walk of the stick in the loop, in multiples of the rms of u per root second.
     Drift(f64),
-    /// Offset of recorded e and u, relative to their rms.
+    /// Offsets of the recorded e and u, relative to their rms.
     Offset(f64),
     /// Quantisation of the stick in the loop, in steps of this fraction of the rms of u.
     Quantised(f64),
     /// Saturation of the stick in the loop at this multiple of the rms of u.
     Saturated(f64),
-    /// Outliers of recorded u every 50 s on average, by this number of standard deviations of the
-    /// innovations.
+    /// Outliers of the recorded u, every 50 s on average, with this number of standard deviations of the innovations.
     Glitches(f64),
-    /// Recorded e and u are NaN for 3 s from 60 s on.
+    /// The recorded e and u are NaN from 60 s to 63 s.
     Missing,
-    /// Recorded e and u are zero for 3 s from 60 s on.
+    /// The recorded e and u are zero from 60 s to 63 s.
     Silent,
-    /// No activity for the first seconds, of the given number.
+    /// There is no activity for this number of seconds at the start.
     IdleStart(f64),
-    /// From this time on, s, u is recorded with the wrong sign.
+    /// From this time on, s, u is recorded with the opposite sign.
     Polarity(f64),
 }
 
 /// A change of the operator only: remnant, plant and forcing function are unchanged.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Shift {
-    /// When it starts, s.
+pub struct OperatorChange {
+    /// Time at which the change starts, s.
     pub at_s: f64,
-    /// Duration, s; the factor changes geometrically.
+    /// Duration of the change, s; the parameter changes exponentially.
     pub takes_s: f64,
-    /// The parameter that changes.
+    /// Parameter that changes.
     pub parameter: Parameter,
-    /// Its factor.
+    /// Factor by which the parameter is multiplied.
     pub factor: f64,
 }
 
-/// Information about the delay that is given to a method.
+/// Information about the delay that the methods receive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DelayKnown {
-    /// Its value, a whole number of samples.
+    /// The value of the delay, which is a whole number of samples.
     Whole,
-    /// Its value rounded to a sample; it differs by half a sample.
+    /// The value of the delay rounded down to a whole sample; the true delay is half a sample longer.
     Fraction,
-    /// None.
+    /// No information.
     No,
 }
 
 /// A theme of the challenge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Theme {
-    /// Remnants, without a change.
+    /// Remnants without a change of the operator.
     Remnants,
-    /// Changes of each size.
+    /// Changes of different parameters and sizes.
     Changes,
-    /// Time and course of changes.
+    /// Times and courses of changes.
     Courses,
-    /// Changes under each remnant.
+    /// Changes with each kind of remnant.
     ChangesInRemnants,
     /// Delays.
     Delays,
     /// Plants, operators, forcing.
     Loops,
-    /// Sample rates.
+    /// Sampling rates.
     Rates,
 }
 
@@ -152,44 +153,44 @@ hoid_model::named_choice!(Theme, "theme of the challenge", 7, {
     Rates => "rates",
 });
 
-/// A case.
+/// A case of the challenge.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Case {
-    /// Its name, which determines its random streams.
+    /// Name of the case, which determines its random streams.
     pub name: String,
-    /// Its theme.
+    /// Theme of the case.
     pub theme: Theme,
-    /// Description, one line.
+    /// Description in one line.
     pub meaning: String,
-    /// Samples per second.
+    /// Sampling rate, Hz.
     pub rate_hz: f64,
     /// Length of a record, s.
     pub length_s: f64,
-    /// The plant.
+    /// Controlled element.
     pub plant: Plant,
-    /// The operator.
+    /// Form of the operator.
     pub form: Form,
-    /// The excitation.
+    /// Target or disturbance.
     pub forcing: Forcing,
     /// Sampling of the operator's input and output.
-    pub sight: Sight,
+    pub sampling: Sampling,
     /// Spectrum of the remnant.
     pub spectrum: Spectrum,
-    /// Time course of its strength.
+    /// Time course of the remnant's strength.
     pub course: Course,
-    /// Its standard deviation relative to that of u without it.
+    /// Standard deviation of the remnant, relative to that of u without remnant.
     pub ratio: f64,
-    /// Imperfections of stick and recorder.
-    pub blemish: Blemish,
-    /// Changes in order of time.
-    pub shifts: Vec<Shift>,
-    /// Information about the delay.
+    /// Imperfection of the stick or the recorder.
+    pub imperfection: Imperfection,
+    /// Changes of the operator in the order of time.
+    pub operator_changes: Vec<OperatorChange>,
+    /// Information about the delay that the methods receive.
     pub delay: DelayKnown,
 }
 
 impl Case {
-    /// The base case: gain and lead on `1/s^2`, a disturbance, a steady first-order remnant, 100
-    /// Hz, 90 s, no change.
+    /// The base case: gain and lead on `1/s^2`, a disturbance, a first-order remnant of constant strength, 100 Hz, 90
+    /// s, no change.
     pub(super) fn baseline(theme: Theme, name: impl Into<String>, meaning: impl Into<String>) -> Self {
         Self {
             name: name.into(),
@@ -200,33 +201,33 @@ impl Case {
             plant: Plant::DoubleIntegrator,
             form: Form::Lead,
             forcing: Forcing::Disturbance,
-            sight: Sight::Held,
+            sampling: Sampling::Held,
             spectrum: Spectrum::Lag(1),
             course: Course::Steady,
             ratio: 0.3,
-            blemish: Blemish::None,
-            shifts: Vec::new(),
+            imperfection: Imperfection::None,
+            operator_changes: Vec::new(),
             delay: DelayKnown::Whole,
         }
     }
 
-    /// The start span given to every method, s: the first third, at most 30 s.
+    /// Start span for every method, s: the first third, at most 30 s.
     pub fn start_s(&self) -> (f64, f64) {
         (0.0, (self.length_s / 3.0).min(30.0))
     }
 
-    /// Times of the changes, s.
+    /// Times at which the changes start, s.
     pub fn changes_s(&self) -> Vec<f64> {
-        let mut times: Vec<f64> = self.shifts.iter().map(|shift| shift.at_s).collect();
-        if let Blemish::Polarity(at_s) = self.blemish {
+        let mut times: Vec<f64> = self.operator_changes.iter().map(|shift| shift.at_s).collect();
+        if let Imperfection::Polarity(at_s) = self.imperfection {
             times.push(at_s);
         }
         times.dedup();
         times
     }
 
-    /// True if all changes are completed within two seconds, so that they have a definite time.
+    /// True if every change takes at most two seconds, so that the changes have definite times.
     pub fn changes_at_once(&self) -> bool {
-        self.shifts.iter().all(|shift| shift.takes_s <= 2.0)
+        self.operator_changes.iter().all(|shift| shift.takes_s <= 2.0)
     }
 }

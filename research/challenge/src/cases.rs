@@ -1,20 +1,20 @@
-//! The cases.
+//! All cases of the challenge.
 //!
-//! A change starts at 45 s unless specified otherwise and takes half a second. Sizes for which most
-//! loops are unstable (a delay times two on `1/s^2`) apply to persons with a stable loop: others
-//! are drawn again ([`draw`](super::draw)).
+//! Unless specified otherwise, a change starts at 45 s and takes half a second. A change that makes most loops unstable
+//! (such as doubling the delay on `1/s^2`) is applied only to people whose loop remains stable; other people are drawn
+//! again ([`draw`](super::draw)).
 
 use super::{
-    case::{Blemish, Case, Course, DelayKnown, Forcing, Form, Shift, Sight, Spectrum, Theme},
+    case::{Imperfection, Case, Course, DelayKnown, Forcing, Form, OperatorChange, Sampling, Spectrum, Theme},
     operator::{Parameter, Plant},
 };
 
-/// Default start and duration of a change, s.
+/// Default start of a change, s; `TAKES_S` is its default duration.
 const AT_S: f64 = 45.0;
 const TAKES_S: f64 = 0.5;
 
-fn shift(parameter: Parameter, factor: f64) -> Shift {
-    Shift {
+fn shift(parameter: Parameter, factor: f64) -> OperatorChange {
+    OperatorChange {
         at_s: AT_S,
         takes_s: TAKES_S,
         parameter,
@@ -34,12 +34,12 @@ pub fn cases() -> Vec<Case> {
     all
 }
 
-/// A named spectrum, course or blemish.
-type Kind = (&'static str, &'static str, Spectrum, Course, Blemish);
+/// Name and description of a kind of remnant or imperfection, with its spectrum, course and imperfection.
+type Kind = (&'static str, &'static str, Spectrum, Course, Imperfection);
 
-/// All remnants, and all imperfections of stick and recorder.
+/// All remnants, and all imperfections of the stick and the recorder.
 const KINDS: [Kind; 21] = {
-    use Blemish as B;
+    use Imperfection as B;
     use Course as C;
     use Spectrum as S;
     [
@@ -163,11 +163,11 @@ const KINDS: [Kind; 21] = {
     ]
 };
 
-fn of_kind(theme: Theme, name: String, (_, meaning, spectrum, course, blemish): Kind) -> Case {
+fn of_kind(theme: Theme, name: String, (_, meaning, spectrum, course, imperfection): Kind) -> Case {
     Case {
         spectrum,
         course,
-        blemish,
+        imperfection,
         ..Case::baseline(theme, name, meaning)
     }
 }
@@ -205,7 +205,7 @@ fn changes() -> Vec<Case> {
     let mut all = Vec::new();
     for (name, parameter) in named {
         for (percent, factor) in [(10, 1.1), (30, 1.3), (100, 2.0)] {
-            // Increased if the loop remains stable, otherwise decreased.
+            // The parameter is increased if the loop then remains stable, otherwise decreased.
             let factor = if parameter == Gain || parameter == KE {
                 1.0 / factor
             } else {
@@ -213,7 +213,7 @@ fn changes() -> Vec<Case> {
             };
             let meaning = format!("{name} of the operator alone times {factor:.2}");
             all.push(Case {
-                shifts: vec![shift(parameter, factor)],
+                operator_changes: vec![shift(parameter, factor)],
                 ..Case::baseline(Theme::Changes, format!("change-{name}-{percent}"), meaning)
             });
         }
@@ -225,7 +225,7 @@ fn courses() -> Vec<Case> {
     let default = |name, meaning| Case::baseline(Theme::Courses, name, meaning);
     let twice = shift(Parameter::KEDot, 2.0);
     let six = (0..6)
-        .map(|i| Shift {
+        .map(|i| OperatorChange {
             at_s: 40.0 + 12.0 * f64::from(i),
             factor: if i % 2 == 0 { 1.8 } else { 1.0 / 1.8 },
             ..twice
@@ -233,7 +233,7 @@ fn courses() -> Vec<Case> {
         .collect();
     vec![
         Case {
-            shifts: vec![Shift {
+            operator_changes: vec![OperatorChange {
                 at_s: 40.0,
                 takes_s: 40.0,
                 ..twice
@@ -242,32 +242,32 @@ fn courses() -> Vec<Case> {
         },
         Case {
             length_s: 120.0,
-            shifts: six,
+            operator_changes: six,
             ..default("six-changes", "K_e_dot times 1.8 and back, every 12 s")
         },
         Case {
-            shifts: vec![Shift { at_s: 15.0, ..twice }],
+            operator_changes: vec![OperatorChange { at_s: 15.0, ..twice }],
             ..default("within-start", "K_e_dot doubles in the middle of the start span")
         },
         Case {
-            shifts: vec![Shift { at_s: 80.0, ..twice }],
+            operator_changes: vec![OperatorChange { at_s: 80.0, ..twice }],
             ..default("near-end", "K_e_dot doubles 10 s before the end")
         },
         Case {
-            blemish: Blemish::Polarity(AT_S),
+            imperfection: Imperfection::Polarity(AT_S),
             ..default("polarity", "u is recorded with the wrong sign from 45 s on")
         },
         Case {
-            blemish: Blemish::Missing,
-            shifts: vec![Shift { at_s: 60.0, ..twice }],
+            imperfection: Imperfection::Missing,
+            operator_changes: vec![OperatorChange { at_s: 60.0, ..twice }],
             ..default("missing-change", "K_e_dot doubles as 3 s of NaN start")
         },
         Case {
-            blemish: Blemish::IdleStart(15.0),
+            imperfection: Imperfection::IdleStart(15.0),
             ..default("idle-start", "nothing happens in the first 15 s")
         },
         Case {
-            blemish: Blemish::IdleStart(15.0),
+            imperfection: Imperfection::IdleStart(15.0),
             delay: DelayKnown::No,
             ..default("idle-start-unknown", "the same, the delay unknown")
         },
@@ -277,7 +277,7 @@ fn courses() -> Vec<Case> {
 fn changes_in_remnants() -> Vec<Case> {
     let twice = shift(Parameter::KEDot, 2.0);
     let with_change = |kind: Kind| Case {
-        shifts: vec![twice],
+        operator_changes: vec![twice],
         ..of_kind(Theme::ChangesInRemnants, format!("change-in-{}", kind.0), kind)
     };
     (KINDS.into_iter())
@@ -294,7 +294,7 @@ fn changes_in_remnants() -> Vec<Case> {
 
 fn delays() -> Vec<Case> {
     let default = |name, meaning| Case {
-        shifts: vec![shift(Parameter::KEDot, 1.5)],
+        operator_changes: vec![shift(Parameter::KEDot, 1.5)],
         ..Case::baseline(Theme::Delays, name, meaning)
     };
     vec![
@@ -309,11 +309,11 @@ fn delays() -> Vec<Case> {
         },
         Case {
             rate_hz: 60.0,
-            sight: Sight::Continuous,
+            sampling: Sampling::Continuous,
             ..default("continuous-60", "a person who sees and acts all the time, 60 Hz")
         },
         Case {
-            sight: Sight::Continuous,
+            sampling: Sampling::Continuous,
             ..default("continuous-100", "the same at 100 Hz")
         },
         Case {
@@ -322,7 +322,7 @@ fn delays() -> Vec<Case> {
         },
         Case {
             rate_hz: 60.0,
-            sight: Sight::Continuous,
+            sampling: Sampling::Continuous,
             delay: DelayKnown::No,
             spectrum: Spectrum::Rich,
             ..default(
@@ -337,7 +337,7 @@ fn loops() -> Vec<Case> {
     let default = |name, meaning, plant, form| Case {
         plant,
         form,
-        shifts: vec![shift(Parameter::Gain, 1.0 / 1.6)],
+        operator_changes: vec![shift(Parameter::Gain, 1.0 / 1.6)],
         ..Case::baseline(Theme::Loops, name, meaning)
     };
     let mut all = vec![
@@ -369,9 +369,9 @@ fn loops() -> Vec<Case> {
             Form::ThirdOrder,
         ),
     ];
-    // With an unstable plant the gain may increase, not decrease: below one the loop is unstable.
+    // With an unstable plant the gain may only increase: at too low a gain the loop is unstable.
     for case in all.iter_mut().filter(|case| case.plant == Plant::Unstable) {
-        case.shifts = vec![shift(Parameter::Gain, 1.4)];
+        case.operator_changes = vec![shift(Parameter::Gain, 1.4)];
     }
     for (name, meaning, forcing) in [
         ("target", "1/s^2, a target in place of the disturbance", Forcing::Target),
@@ -379,7 +379,7 @@ fn loops() -> Vec<Case> {
     ] {
         all.push(Case {
             forcing,
-            shifts: vec![shift(Parameter::KEDot, 1.6)],
+            operator_changes: vec![shift(Parameter::KEDot, 1.6)],
             ..Case::baseline(Theme::Loops, name, meaning)
         });
     }
@@ -389,7 +389,7 @@ fn loops() -> Vec<Case> {
 fn rates() -> Vec<Case> {
     let of = |rate: u32| Case {
         rate_hz: f64::from(rate),
-        shifts: vec![shift(Parameter::KEDot, 1.6)],
+        operator_changes: vec![shift(Parameter::KEDot, 1.6)],
         ..Case::baseline(
             Theme::Rates,
             format!("rate-{rate}"),

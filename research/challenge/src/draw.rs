@@ -1,9 +1,9 @@
-//! Seeds and persons of a run.
+//! Seeds of a run, and the person who is drawn for it.
 //!
-//! Every run has a different person, so that no method can know the parameters. Parameters are
-//! uniform over ranges of people (see [`hoid_sim::people`] for the sources), the gain follows from
-//! a random crossover frequency. A person whose loop is unstable, or poorly damped (`|1/(1 + Y P)|`
-//! over 3.5), before, after or half-way through a change, is drawn again.
+//! Every run has a different person, so that no method can know the parameters. The parameters are uniformly
+//! distributed over the ranges of people (see [`hoid_sim::people`] for the sources), and the gain follows from a random
+//! crossover frequency. A person is drawn again if the loop is unstable or poorly damped (`|1/(1 + Y P)|` above 3.5)
+//! before, after or half-way through a change.
 
 use std::{fmt, str::FromStr};
 
@@ -11,23 +11,23 @@ use hoid_model::{Complex64, ModelError, SampleTime, margins::closed_loop_is_stab
 use hoid_sim::{RunSeed, SimError};
 
 use super::{
-    case::{Case, DelayKnown, Form, Sight},
+    case::{Case, DelayKnown, Form, Sampling},
     operator::{Operator, Plant},
 };
 
 /// Set of seeds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Seeds {
-    /// Seeds for the development of a method.
+    /// Seeds for developing a method.
     Open,
-    /// Seeds for its evaluation, used once when it is finished.
+    /// Seeds for evaluating a method, used once after its development.
     Sealed,
 }
 
 hoid_model::named_choice!(Seeds, "seeds of the challenge", 2, { Open => "open", Sealed => "sealed" });
 
 impl Seeds {
-    /// The seed of all runs of the set.
+    /// Returns the seed of all runs of the set.
     pub(super) fn seed(self) -> u64 {
         match self {
             Self::Open => 2_026_112_201,
@@ -46,9 +46,9 @@ pub struct RunOf {
 }
 
 impl RunOf {
-    /// A random stream of the run: those of a case depend on its name only, so that cases can be added.
+    /// Returns a random stream of the run. The streams depend only on the name of the case, so that cases can be added.
     pub(super) fn stream(self, case: &Case, tag: u64) -> RunSeed {
-        // FNV-1a.
+        // FNV-1a hash of the name.
         let name = case.name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
             (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
         });
@@ -60,7 +60,7 @@ impl RunOf {
     }
 }
 
-/// A part of the work, `2/7`: every seventh run from the second on.
+/// A part of the work, such as `2/7`: every seventh run, starting with the second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Portion {
     index: usize,
@@ -71,7 +71,7 @@ impl Portion {
     /// The whole work.
     pub const ALL: Self = Self { index: 1, of: 1 };
 
-    /// True if item i belongs to it.
+    /// True if item i belongs to the part.
     pub fn holds(self, i: usize) -> bool {
         i % self.of + 1 == self.index
     }
@@ -95,14 +95,14 @@ impl fmt::Display for Portion {
     }
 }
 
-/// Number of draws after which no person can stabilise a case.
+/// Maximum number of draws for a run; if they do not suffice, no person can stabilise the case.
 const MOST_DRAWS: usize = 2000;
 const NUMBERS: usize = 10;
-/// Largest `|1/(1 + Y P)|`.
+/// Largest permitted value of `|1/(1 + Y P)|`.
 const LARGEST_SENSITIVITY: f64 = 3.5;
 const PERSON: u64 = 1;
 
-/// The person of a run; `attempt` counts previous persons who lost control in the simulation.
+/// Returns the person of a run; `attempt` is the number of earlier people who lost control in the simulation.
 pub(super) fn person(case: &Case, run: RunOf, ts: SampleTime, attempt: usize) -> Result<Operator, SimError> {
     let numbers = run.stream(case, PERSON).uniform(NUMBERS * MOST_DRAWS);
     let mut left = attempt;
@@ -115,7 +115,7 @@ pub(super) fn person(case: &Case, run: RunOf, ts: SampleTime, attempt: usize) ->
         }
         left -= 1;
     }
-    Err(SimError::NobodyFound {
+    Err(SimError::NoAcceptablePerson {
         form: format!("{:?} of the case {}", case.form, case.name),
         plant: format!("{:?}", case.plant),
         draws: MOST_DRAWS,
@@ -127,7 +127,7 @@ fn drawn(case: &Case, ts: SampleTime, draw: &[f64]) -> Result<Option<Operator>, 
     let (lead, delay, crossover) = match case.plant {
         Plant::Integrator => ((0.3, 0.7), (0.12, 0.22), (2.0, 4.0)),
         Plant::Unstable => ((0.3, 0.7), (0.1, 0.16), (2.5, 4.0)),
-        // Each of the two leads is as long as the single one on a second-order plant.
+        // Each of the two leads is as long as the single lead for other second-order plants.
         Plant::Lagged if case.form == Form::Lead2Lag => ((0.5, 1.0), (0.14, 0.24), (1.2, 2.5)),
         Plant::Lagged => ((0.4, 0.9), (0.16, 0.28), (1.5, 2.8)),
         Plant::DoubleIntegrator => ((0.5, 1.5), (0.16, 0.3), (1.0, 2.2)),
@@ -167,19 +167,19 @@ fn drawn(case: &Case, ts: SampleTime, draw: &[f64]) -> Result<Option<Operator>, 
     let gain = 1.0 / (unit.response(at) * case.plant.response(at)).norm();
     let first = Operator { gain, ..unit };
     let mut states = vec![first];
-    for shift in &case.shifts {
+    for shift in &case.operator_changes {
         let before = states[states.len() - 1];
         states.push(before.times(shift.parameter, shift.factor.sqrt()));
         states.push(before.times(shift.parameter, shift.factor));
     }
-    // Two holds add half a sample of delay each.
-    let late = if case.sight == Sight::Held { ts.s() } else { 0.0 };
+    // There are two holds, each of which adds half a sample of delay.
+    let late = if case.sampling == Sampling::Held { ts.s() } else { 0.0 };
     for state in states {
         let state = Operator {
             tau_e_s: state.tau_e_s + late,
             ..state
         };
-        if !is_borne(&state, case.plant).map_err(SimError::Model)? {
+        if !is_stable_and_damped(&state, case.plant).map_err(SimError::Model)? {
             return Ok(None);
         }
     }
@@ -187,7 +187,7 @@ fn drawn(case: &Case, ts: SampleTime, draw: &[f64]) -> Result<Option<Operator>, 
 }
 
 /// True if the loop is stable and sufficiently damped.
-fn is_borne(operator: &Operator, plant: Plant) -> Result<bool, ModelError> {
+fn is_stable_and_damped(operator: &Operator, plant: Plant) -> Result<bool, ModelError> {
     let sensitivity = |i: i32| {
         let omega = 0.1 * 10f64.powf(f64::from(i) / 40.0);
         let open_loop = operator.response(omega) * plant.response(omega);

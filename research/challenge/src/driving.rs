@@ -1,5 +1,5 @@
-//! Excitation of the loop of a case: target or disturbance, their size in u and e, and the time
-//! course of the remnant's strength.
+//! Excitation of the loop of a case: target or disturbance, the resulting rms of u and e, and the time course of the
+//! remnant's strength.
 
 use std::f64::consts::TAU;
 
@@ -27,7 +27,7 @@ pub(super) struct Strength {
     square: f64,
 }
 
-/// Period of [`Course::Wander`] and of two spans of [`Course::Steps`], s.
+/// Period of [`Course::Wander`], and length of two spans of [`Course::Steps`], s.
 const PERIOD_S: f64 = 30.0;
 
 impl Strength {
@@ -52,13 +52,13 @@ impl Strength {
         }
     }
 
-    /// Updates the running mean square of u over 1 s.
+    /// Updates the running mean square of u, which has a time constant of 1 s.
     pub fn follow(&mut self, u: f64) {
         self.square += self.forgets * (u * u - self.square);
     }
 }
 
-/// Target or disturbance of a run, with unit rms.
+/// Returns the target or disturbance of a run, with unit rms.
 pub(super) fn forcing(case: &Case, run: RunOf) -> Result<ForcingFunction, SimError> {
     let lines: Vec<Sinusoid> = match case.forcing {
         Forcing::McRuer => MCRUER_RAD_S
@@ -70,7 +70,7 @@ pub(super) fn forcing(case: &Case, run: RunOf) -> Result<ForcingFunction, SimErr
             })
             .collect(),
         Forcing::Disturbance | Forcing::Target => {
-            // Loops on second-order plants are slower.
+            // Loops with second-order plants are slower.
             let largest = if matches!(case.plant, Plant::Integrator | Plant::Unstable) {
                 31
             } else {
@@ -96,7 +96,7 @@ pub(super) fn forcing(case: &Case, run: RunOf) -> Result<ForcingFunction, SimErr
 const MCRUER_RAD_S: [f64; 10] = [0.157, 0.262, 0.393, 0.602, 0.969, 1.49, 2.54, 4.03, 7.57, 13.8];
 const MCRUER_SHELF_RAD_S: f64 = 3.0;
 
-/// Rms of u and e without a remnant.
+/// Returns the rms of u and e without remnant.
 pub(super) fn sizes(operator: &Operator, case: &Case, lines: &ForcingFunction) -> [f64; 2] {
     let mut squares = [0.0; 2];
     for line in lines.sinusoids() {

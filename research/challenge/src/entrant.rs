@@ -1,40 +1,39 @@
-//! An entrant: anything that estimates the response of a person and the times of changes.
+//! An entrant: any method that estimates the response of a person and the times of changes.
 
 use hoid_model::{Complex64, Record, SampleTime};
 
-/// Signals to process, sample by sample.
+/// Signals that an entrant processes sample by sample, and the estimates that are requested.
 #[derive(Debug, Clone)]
 pub struct Task {
-    /// Time between two samples.
+    /// Sample time.
     pub sample_time: SampleTime,
-    /// Error; NaN if nothing was recorded. The first sample is at time 0.
+    /// Error; NaN where nothing was recorded. The first sample is at time 0.
     pub e: Vec<f64>,
-    /// Control.
+    /// Control output.
     pub u: Vec<f64>,
     /// Name of the run.
     pub label: String,
-    /// The span that may be used at once for a start, s. No estimate is requested before its end.
+    /// Span that may be used as a whole for a start fit, s. No estimate is requested before its end.
     pub start_s: (f64, f64),
-    /// The delay in samples including that of the hold, if given.
+    /// Delay in samples including that of the hold; `None` if it is not given.
     pub nk: Option<usize>,
     /// Frequencies at which the response is requested, rad/s.
     pub lines_rad_s: Vec<f64>,
-    /// Times at which it is requested, s, in order.
+    /// Times at which the response is requested, s, in ascending order.
     pub asked_s: Vec<f64>,
-    /// The seam of two joined recordings.
+    /// Seam between two joined recordings; `None` for a single recording.
     pub seam: Option<Seam>,
 }
 
-/// Data before the second of two recordings. A filter whose state is that of the end of the first
-/// would jump at the seam as no person does: it processes these samples first, without an update of
-/// the estimate.
+/// Data before the second of two joined recordings. A filter with the state from the end of the first recording would
+/// jump at the seam as no person does. It therefore processes these samples first, without an update of the estimate.
 #[derive(Debug, Clone)]
 pub struct Seam {
-    /// First sample of the second recording.
+    /// Index of the first sample of the second recording.
     pub at: usize,
-    /// Error before it.
+    /// Error before the second recording.
     pub e: Vec<f64>,
-    /// Control before it.
+    /// Control output before the second recording.
     pub u: Vec<f64>,
 }
 
@@ -44,30 +43,30 @@ impl Task {
         k as f64 * self.sample_time.s()
     }
 
-    /// The sample at or before a time.
+    /// Index of the last sample at or before a time.
     pub fn sample(&self, t_s: f64) -> usize {
         ((t_s / self.sample_time.s() + 1e-6) as usize).min(self.e.len().saturating_sub(1))
     }
 
-    /// The whole as a record, if all of it was recorded.
+    /// All samples as a record; `None` if samples are missing.
     pub fn record(&self) -> Option<Record> {
         self.span(0, self.e.len())
     }
 
-    /// The start span as a record, if all of it was recorded.
+    /// The start span as a record; `None` if samples are missing.
     pub fn start_record(&self) -> Option<Record> {
         self.span(self.sample(self.start_s.0), self.sample(self.start_s.1))
     }
 
-    /// Some samples as a record.
+    /// The samples of a span as a record; `None` if samples are missing.
     pub fn span(&self, from: usize, to: usize) -> Option<Record> {
         let channel = |name: &str, x: &[f64]| hoid_model::Channel::new(name, "", x[from..to].to_vec());
         let record = Record::new(self.sample_time, channel("e", &self.e), channel("u", &self.u)).ok()?;
         Some(record.labelled(self.label.clone()).starting_at(self.time_s(from)))
     }
 
-    /// All samples in order, with the history of the second recording before it: sample index, or
-    /// none for the history; error; control.
+    /// All samples in order, with the history of the second recording before it, as index, error and control output;
+    /// the index is `None` for the history.
     pub fn samples(&self) -> impl Iterator<Item = (Option<usize>, f64, f64)> + '_ {
         let at = self.seam.as_ref().map_or(self.e.len(), |seam| seam.at);
         let own = move |from: usize, to: usize| (from..to).map(move |k| (Some(k), self.e[k], self.u[k]));
@@ -81,49 +80,49 @@ impl Task {
 /// Estimate of the response at a time.
 #[derive(Debug, Clone, Default)]
 pub struct ReportedResponse {
-    /// H at each line; empty if there is none.
+    /// Response H at each line; empty if there is no estimate.
     pub response: Vec<Complex64>,
-    /// Variances of its real and imaginary part and their covariance, at each line.
+    /// Variances of the real and the imaginary part of the response and their covariance, at each line.
     pub covariance: Option<Vec<[f64; 3]>>,
-    /// Parameters under the names of [`Operator::named`](super::Operator::named), with standard
-    /// errors.
+    /// Parameters as name, value and standard error; the names are those of
+    /// [`Operator::named`](super::Operator::named).
     pub parameters: Vec<(&'static str, f64, Option<f64>)>,
 }
 
 /// A declared change.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Alarm {
-    /// Time, s.
+    /// Time at which the change is declared, s.
     pub t_s: f64,
-    /// True if it is attributed to the remnant only.
+    /// True if the change is attributed only to the remnant.
     pub of_remnant: bool,
 }
 
 /// Result of an entrant.
 #[derive(Debug, Clone, Default)]
 pub struct EntrantResult {
-    /// The estimate at each requested time.
-    pub said: Vec<ReportedResponse>,
-    /// The declared changes; none for an entrant that declares none.
+    /// Estimates at the requested times.
+    pub estimates: Vec<ReportedResponse>,
+    /// Declared changes; `None` for an entrant that does not detect changes.
     pub alarms: Option<Vec<Alarm>>,
-    /// Names of the findings against the result.
+    /// Names of the findings about the result.
     pub findings: Vec<String>,
 }
 
 /// A participant of the challenge.
 pub trait Entrant: Send + Sync {
-    /// Its name.
+    /// Returns the name of the entrant.
     fn name(&self) -> String;
 
-    /// Processes the signals.
+    /// Processes the signals and returns the estimates.
     ///
     /// # Errors
-    /// The reason for a failure.
+    /// The reason why the entrant fails.
     fn follow(&self, task: &Task) -> Result<EntrantResult, String>;
 }
 
-/// Covariance of a complex sum `sum g_i theta_i`: variance of the real part, of the imaginary part,
-/// and their covariance.
+/// Covariance of a complex sum `sum g_i theta_i`: variance of the real part, variance of the imaginary part, and their
+/// covariance.
 pub(super) fn of_complex(gradient: &[Complex64], covariance: &[f64]) -> [f64; 3] {
     let p = gradient.len();
     let mut sums = [0.0; 3];

@@ -3,7 +3,7 @@
 use hoid_io::IoError;
 use thiserror::Error;
 
-/// Errors of a challenge as a whole. An entrant that fails is a line with its reason, not an error.
+/// Errors that stop a challenge. If an entrant fails, its line contains the reason and the challenge continues.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ChallengeError {

@@ -1,26 +1,27 @@
-//! The challenge: cases that can refute a tracker, and the performance of its estimates in them.
+//! The challenge: cases that can reveal the weaknesses of a tracker, and the performance of its estimates in these
+//! cases.
 //!
-//! A tracker that is only evaluated on loops like those it was developed on is not tested independently. Here the loop
-//! is different ([`simulate()`] shares nothing with the simulators of the methods), every run has a different person,
-//! the remnant need not be steady, normal or small, the operator need not have the assumed form, and the figures of
-//! merit are those of the response of a person, compared with bounds: the likelihood ratio of the true models, and a
-//! batch fit with known changes. There are two sets of seeds, one for the development of a method and one for its
-//! evaluation, used once.
+//! A tracker that is evaluated only on loops like those for which it was developed is not tested independently. Here
+//! the loop is different ([`simulate()`] shares only the random streams with the simulators of the methods), every run
+//! has a different person, the remnant need not be of constant strength, normally distributed or small, and the
+//! operator need not have the assumed form. The figures of merit concern the response of a person and are compared with
+//! two bounds: the likelihood ratio of the true models, and a batch fit with known changes. There are two sets of
+//! seeds, one for the development of a method and one for its evaluation, which is used only once.
 //!
 //! | file | contents |
 //! |---|---|
-//! | `case`, `cases` | [`Case`]: what a case is; [`cases()`]: all of them |
-//! | `operator` | [`Operator`], [`Plant`]: who acts on what, in continuous time |
-//! | `draw` | [`Seeds`]: open and sealed; the person of a run; [`Portion`] |
+//! | `case`, `cases` | [`Case`]: definition of a case; [`cases()`]: all cases |
+//! | `operator` | [`Operator`], [`Plant`]: operators and controlled elements in continuous time |
+//! | `draw` | [`Seeds`]: open and sealed seeds; the person of a run; [`Portion`] |
 //! | `noise` | remnants, and the filters that whiten them |
-//! | `driving`, `world` | excitation and strength of the remnant; operator and plant between two samples |
-//! | `simulate` | [`simulate()`]: the loop of a case |
-//! | `entrant`, `entrants` | [`Entrant`]: one who takes part; the methods, and plain ones |
-//! | `oracle` | what could be known |
-//! | `measure` | [`Line`]: what an entrant was worth in a run |
-//! | `run` | [`challenge()`]: all of it, kept on disk |
-//! | `people` | [`challenge_people`]: the same on recorded people |
-//! | `tables`, `page` | [`tables()`], [`page()`] |
+//! | `driving`, `world` | excitation and strength of the remnant; operator and plant between samples |
+//! | `simulate` | [`simulate()`]: simulation of the loop of a case |
+//! | `entrant`, `entrants` | [`Entrant`]: interface of a participant; the methods and some simple participants |
+//! | `oracle` | bounds from the available information |
+//! | `measure` | [`Line`]: results of an entrant in a run |
+//! | `run` | [`challenge()`]: all runs, with results stored on disk |
+//! | `people` | [`challenge_people`]: the same evaluation with recorded people |
+//! | `tables`, `page` | [`tables()`], [`page()`]: tables of the results, and the page that contains them |
 //! | `error` | [`ChallengeError`] |
 
 mod case;
@@ -41,16 +42,16 @@ mod simulate;
 mod tables;
 mod world;
 
-pub use case::{Blemish, Case, Course, DelayKnown, Forcing, Form, Shift, Sight, Spectrum, Theme};
+pub use case::{Imperfection, Case, Course, DelayKnown, Forcing, Form, OperatorChange, Sampling, Spectrum, Theme};
 pub use cases::cases;
 pub use draw::{Portion, RunOf, Seeds};
 pub use entrant::{Alarm, Entrant, EntrantResult, ReportedResponse, Seam, Task};
 pub use entrants::entrants;
 pub use error::ChallengeError;
-pub use measure::{ChangeOutcome, Line, Moment, Posed};
+pub use measure::{ChangeOutcome, Line, Moment, EvaluationRun};
 pub use operator::{Operator, Parameter, Plant, hold};
 pub use page::page;
 pub use people::{PeopleOptions, challenge_people};
 pub use run::{ChallengeOptions, challenge, chosen_cases};
-pub use simulate::{Hidden, Run, Truth, simulate};
+pub use simulate::{OracleData, Run, Truth, simulate};
 pub use tables::tables;

@@ -1,9 +1,10 @@
-//! Evaluation of an entrant in a run: one line.
+//! Evaluation of an entrant in a run; the result is one line.
 //!
 //! The response is requested at seven lines from .5 to 6 rad/s, at +2, +4, +8, +13, +18 and +28 s after each change,
-//! once before the first, and every 10 s without a change. The error is the mean of `|dH|/|H|` over the lines; a
-//! missing estimate, or one that is not a number, has the error 1, that of a zero response. The band of a line covers
-//! if the real or imaginary part lies within 1.96 standard errors, each counted separately.
+//! once before the first change, and every 10 s if there is no change. The error is the mean of `|dH|/|H|` over the
+//! lines. A missing estimate has the error 1, which is that of a zero response; an estimate that is not finite has the
+//! largest error, 10. Coverage is counted separately for the real and the imaginary part at each line: a part is
+//! covered if the truth lies within 1.96 standard errors.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +12,7 @@ use hoid_model::Complex64;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    case::{Blemish, Case},
+    case::{Imperfection, Case},
     draw::RunOf,
     entrant::{Entrant, EntrantResult, ReportedResponse, Task},
     oracle::{batch, evidence},
@@ -20,84 +21,85 @@ use super::{
 
 /// Times after a change at which the response is requested, s.
 pub const AFTER_S: [f64; 6] = [2.0, 4.0, 8.0, 13.0, 18.0, 28.0];
-/// Lines, rad/s: seven from .5 to 6 on a logarithmic scale.
+/// Number of lines; they are evenly spaced on a logarithmic scale over `LINES_RAD_S`.
 const LINES: usize = 7;
 const LINES_RAD_S: (f64, f64) = (0.5, 6.0);
-/// Time before the first change at which it is requested, s.
+/// Time before the first change at which the response is requested, s.
 const BEFORE_S: f64 = 0.5;
-/// Interval of the requests without a change, s, and separate times for the long case.
+/// Interval between requests if there is no change, s; `LONG_S` are the times for the long case.
 const STEADY_S: f64 = 10.0;
 const LONG_S: [f64; 4] = [60.0, 120.0, 200.0, 300.0];
-/// Largest error: that of a diverging response is limited to this.
+/// Largest error, to which larger errors are limited.
 const LARGEST: f64 = 10.0;
 const STUDENT: f64 = 1.96;
-/// Time after a change within which an alarm is not false; within [`FOUND_S`] it has found the change.
+/// Time after a change within which an alarm is not counted as false, s. An alarm within [`FOUND_S`] has found the
+/// change.
 const OF_CHANGE_S: f64 = 12.0;
-/// Times within which a change is to be found, s.
+/// Times after a change within which it should be found, s.
 pub const FOUND_S: [f64; 2] = [5.0, 8.0];
 
-/// The name of the batch fit with known changes.
+/// Name of the batch fit with known changes.
 pub const BATCH: &str = "batch (oracle)";
 
 /// Results of an entrant in a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Line {
-    /// The case.
+    /// Name of the case.
     pub case: String,
-    /// Number of the run in the seeds.
+    /// Number of the run within the set of seeds.
     pub run: u64,
-    /// The entrant.
+    /// Name of the entrant.
     pub method: String,
-    /// Reason for a failure.
+    /// Reason for a failure; `None` if the entrant did not fail.
     pub failed: Option<String>,
-    /// Results at each time.
+    /// Results at each requested time.
     pub moments: Vec<Moment>,
-    /// Number of alarms without a change; none for an entrant that declares none.
+    /// Number of alarms that belong to no change; `None` for an entrant that does not detect changes.
     pub false_alarms: Option<usize>,
-    /// Number of these that are attributed to the remnant only.
+    /// Number of further alarms that belong to no change and are attributed only to the remnant.
     pub of_remnant: usize,
-    /// Time in which an alarm is false, s.
+    /// Total time in which an alarm counts as false, s.
     pub exposed_s: f64,
-    /// The changes.
+    /// Results for each change.
     pub changes: Vec<ChangeOutcome>,
-    /// Findings against the result.
+    /// Names of the findings about the result.
     pub findings: Vec<String>,
 }
 
-/// Result at a time.
+/// Result at one requested time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Moment {
-    /// `+8` after a change, `before`, `steady`, or the time of the long case.
+    /// Label such as `+8` (seconds after a change), `before` or `steady`, or the time in the long case.
     pub label: String,
     /// Time, s.
     pub t_s: f64,
-    /// Mean of |dH|/|H|.
+    /// Mean of |dH|/|H| over the lines.
     pub error: f64,
-    /// Number of bands of the response that cover the truth, and of all.
+    /// Number of bands of the response that cover the truth, and number of all bands.
     pub covered: [usize; 2],
     /// Relative error of each parameter, and whether its band covers the truth.
     pub parameters: BTreeMap<String, (f64, Option<bool>)>,
 }
 
-/// A change, and whether it was found.
+/// A change, and the time to its detection.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ChangeOutcome {
-    /// When it started, s.
+    /// Time at which the change started, s.
     pub at_s: f64,
-    /// Logarithm of the true likelihood ratio within 5 and 8 s.
+    /// Logarithm of the likelihood ratio of the true models within 5 and 8 s.
     pub evidence: [f64; 2],
-    /// Time to the first alarm, s, if there is one within 8 s.
+    /// Time to the first alarm, s; `None` if there is no alarm within 8 s.
     pub after_s: Option<f64>,
 }
 
-/// The lines of the response, rad/s.
+/// Frequencies of the lines at which the response is requested, rad/s.
 pub(super) fn lines_rad_s() -> Vec<f64> {
     let (low, high) = LINES_RAD_S;
     let of = |i: usize| low * (high / low).powf(i as f64 / (LINES - 1) as f64);
     (0..LINES).map(of).collect()
 }
 
-/// Requested times with their labels.
+/// Times at which the response is requested, with their labels.
 pub(super) fn asked(changes_s: &[f64], start_s: f64, length_s: f64, is_long: bool) -> Vec<(String, f64)> {
     let mut all = Vec::new();
     let steady = |from: f64| {
@@ -118,8 +120,8 @@ pub(super) fn asked(changes_s: &[f64], start_s: f64, length_s: f64, is_long: boo
     all
 }
 
-/// A run with its task.
-pub struct Posed {
+/// A run with the task that it poses.
+pub struct EvaluationRun {
     case: Case,
     number: u64,
     run: Run,
@@ -129,11 +131,11 @@ pub struct Posed {
     changes: Vec<ChangeOutcome>,
 }
 
-impl Posed {
-    /// The run of a case.
+impl EvaluationRun {
+    /// Simulates a run of a case and poses the task.
     ///
     /// # Errors
-    /// If no person can stabilise the case.
+    /// The reason, if no person can stabilise the case.
     pub fn new(case: &Case, of: RunOf) -> Result<Self, String> {
         let run = simulate(case, of).map_err(|e| e.to_string())?;
         let changes_s = if case.changes_at_once() {
@@ -157,7 +159,7 @@ impl Posed {
             u: run.u.clone(),
             label: format!("{} {}", case.name, of.number),
             start_s,
-            nk: run.truth.told_nk(),
+            nk: run.truth.given_nk(),
             lines_rad_s: lines_rad_s(),
             asked_s,
             seam: None,
@@ -172,22 +174,22 @@ impl Posed {
         })
     }
 
-    /// The line of an entrant.
+    /// Evaluates an entrant in the run.
     pub fn line(&self, entrant: &dyn Entrant) -> Line {
         let mut line = self.measured(entrant.name(), entrant.follow(&self.task));
         if !self.case.changes_at_once() {
-            // During a slow change an alarm is neither false nor late.
+            // An alarm during a slow change is neither false nor late.
             (line.false_alarms, line.exposed_s, line.of_remnant) = (None, 0.0, 0);
         }
         line
     }
 
-    /// The line of the batch fit with known changes.
+    /// Evaluates the batch fit with known changes.
     pub fn batch(&self) -> Line {
         let changes_s: Vec<f64> = self.changes.iter().map(|change| change.at_s).collect();
         let tau_e_s = self.run.truth.operator(0.0).tau_e_s;
         let answer = EntrantResult {
-            said: batch(&self.task, &changes_s, tau_e_s),
+            estimates: batch(&self.task, &changes_s, tau_e_s),
             ..EntrantResult::default()
         };
         self.measured(BATCH.to_owned(), Ok(answer))
@@ -198,8 +200,8 @@ impl Posed {
         let at = |omega: f64, t_s: f64| truth.response(omega, t_s);
         let mut line = scored(&self.task, &self.labels, &at, method, answer, &self.changes);
         (line.case, line.run) = (self.case.name.clone(), self.number);
-        // Parameters have names if the operator is that of the thesis, as recorded.
-        let named = truth.operator(0.0).is_lead() && !matches!(self.case.blemish, Blemish::Polarity(_));
+        // Parameters are evaluated only if the recorded operator has the form of the thesis.
+        let named = truth.operator(0.0).is_lead() && !matches!(self.case.imperfection, Imperfection::Polarity(_));
         for moment in &mut line.moments {
             match named {
                 true => with_truth(&mut moment.parameters, truth, moment.t_s),
@@ -210,7 +212,8 @@ impl Posed {
     }
 }
 
-/// Converts values and bands to errors: [`scored`] leaves `(value, None)` and the name with ` se`.
+/// Converts parameter values to errors and coverage. [`scored`] stores a value as `(value, None)` and its standard
+/// error under the name with ` se` appended.
 fn with_truth(parameters: &mut BTreeMap<String, (f64, Option<bool>)>, truth: &Truth, t_s: f64) {
     let said = std::mem::take(parameters);
     for (name, value) in truth.operator(t_s).named() {
@@ -225,7 +228,7 @@ fn with_truth(parameters: &mut BTreeMap<String, (f64, Option<bool>)>, truth: &Tr
     }
 }
 
-/// Evaluates an estimate with a true response; parameters are left unchanged.
+/// Evaluates a result against the true response; the parameters are copied without evaluation.
 pub(super) fn scored(
     task: &Task,
     labels: &[String],
@@ -241,7 +244,7 @@ pub(super) fn scored(
     let nothing = ReportedResponse::default();
     let moments = (labels.iter().zip(&task.asked_s).enumerate())
         .map(|(i, (label, t_s))| {
-            let said = answer.said.get(i).unwrap_or(&nothing);
+            let said = answer.estimates.get(i).unwrap_or(&nothing);
             let truths: Vec<Complex64> = task.lines_rad_s.iter().map(|omega| truth(*omega, *t_s)).collect();
             let (error, covered) = of_response(said, &truths);
             let mut parameters = BTreeMap::new();
@@ -292,7 +295,7 @@ pub(super) fn scored(
     }
 }
 
-/// Mean of |dH|/|H|, number of bands that cover, and of all.
+/// Returns the mean of |dH|/|H|, the number of bands that cover the truth, and the number of all bands.
 fn of_response(said: &ReportedResponse, truths: &[Complex64]) -> (f64, [usize; 2]) {
     if said.response.len() != truths.len() {
         return (1.0, [0, 0]);
@@ -311,10 +314,10 @@ fn of_response(said: &ReportedResponse, truths: &[Complex64]) -> (f64, [usize; 2
     (error, covered)
 }
 
-/// Task of a run, for tests of entrants.
+/// Returns the task of a run, for tests of entrants.
 #[cfg(test)]
 pub(super) fn posed_task(case: &Case, of: RunOf) -> Task {
-    Posed::new(case, of).unwrap_or_else(|e| panic!("{e}")).task
+    EvaluationRun::new(case, of).unwrap_or_else(|e| panic!("{e}")).task
 }
 
 #[cfg(test)]
@@ -353,7 +356,7 @@ mod tests {
             .into_iter()
             .find(|c| c.name == "change-K_e_dot-100")
             .unwrap();
-        let posed = Posed::new(
+        let posed = EvaluationRun::new(
             &case,
             RunOf {
                 seeds: crate::Seeds::Open,
@@ -374,7 +377,7 @@ mod tests {
             })
             .collect();
         let answer = EntrantResult {
-            said,
+            estimates: said,
             alarms: Some(vec![alarm(33.0), alarm(48.5), alarm(56.0), alarm(80.0)]),
             findings: Vec::new(),
         };

@@ -1,19 +1,18 @@
 //! Remnants of the challenge.
 //!
-//! `n(k) = sigma sum over parts of G_i(q) s(k) w_i(k)`: G_i of unit power, w_i white with unit
-//! variance, s(k) the time course of the strength, known before sample k. A lag is
-//! `x += (1 - e^(-Ts/T)) (w - x)`, repeated according to its order; a peak has its poles at
-//! `e^(-zeta omega Ts) e^(+-j omega sqrt(1 - zeta^2) Ts)`.
+//! `n(k) = sigma sum over parts of G_i(q) s(k) w_i(k)`, where G_i has unit power, w_i is white with unit variance, and
+//! s(k) is the strength, which is known before sample k. A lag is `x += (1 - e^(-Ts/T)) (w - x)`, repeated according to
+//! its order; a peak has its poles at `e^(-zeta omega Ts) e^(+-j omega sqrt(1 - zeta^2) Ts)`.
 
 use hoid_sim::RunSeed;
 
 use super::case::{Course, Spectrum};
 
-/// One part: its filter and its weight.
+/// One part of a remnant: its filter and its weight.
 #[derive(Debug, Clone)]
 struct Part {
     filter: Filter,
-    /// Standard deviation relative to that of the filter's output for white noise.
+    /// Factor on the output of the filter, which gives the part its share of the variance.
     scale: f64,
 }
 
@@ -76,14 +75,14 @@ pub(super) struct Noise {
     ts_s: f64,
 }
 
-/// Length of an impulse response, s: the slowest part is a drift of 10 s.
+/// Length of the computed impulse responses, s; the slowest part is a drift with a time constant of 10 s.
 const MEMORY_S: f64 = 60.0;
-/// Order of the autoregressive model for whitening a remnant.
+/// Order of the autoregressive model that whitens a remnant.
 const WHITENING: usize = 30;
 
 impl Noise {
-    /// The remnant of a run of the given length; `numbers` from `[0, 1)` give time constants,
-    /// `streams` the random streams of the parts and their pulses.
+    /// Creates the remnant of a run of the given length. `numbers` from `[0, 1)` determine the time constants and
+    /// peaks; `streams` are the random streams of the parts and their pulses.
     pub fn new(
         spectrum: Spectrum,
         course: Course,
@@ -123,14 +122,14 @@ impl Noise {
         Self { parts, driving, ts_s }
     }
 
-    /// The value at sample k, with unit variance for s = 1.
+    /// Returns the remnant at sample k, which has unit variance for s = 1.
     pub fn step(&mut self, k: usize, s: f64) -> f64 {
         let each = self.parts.iter_mut().zip(&self.driving);
         each.map(|(part, w)| part.scale * part.filter.step(s * w[k])).sum()
     }
 
-    /// The whitening filter `1 + a_1 q^-1 + ...` and the variance of the innovations, by the
-    /// recursion of Levinson and Durbin on the autocovariance.
+    /// Returns the whitening filter `1 + a_1 q^-1 + ...` and the variance of the innovations, by the Levinson-Durbin
+    /// recursion on the autocovariance.
     pub fn whitening(&self) -> (Vec<f64>, f64) {
         let length = (MEMORY_S / self.ts_s) as usize;
         let mut covariance = vec![0.0; WHITENING + 1];
@@ -141,13 +140,13 @@ impl Noise {
                 *sum += part.scale * part.scale * products;
             }
         }
-        // White noise is added against rounding errors of the recursion.
+        // A little white noise protects the recursion from rounding errors.
         covariance[0] *= 1.0 + 1e-9;
         levinson(&covariance)
     }
 }
 
-/// Coefficients `[1, a_1, ...]` and innovation variance of the autoregressive model with this
+/// Returns the coefficients `[1, a_1, ...]` and the innovation variance of the autoregressive model with this
 /// autocovariance (J. Durbin, Rev. Int. Stat. Inst. 28 (1960) 233-244).
 pub(super) fn levinson(covariance: &[f64]) -> (Vec<f64>, f64) {
     let order = covariance.len() - 1;
@@ -166,15 +165,16 @@ pub(super) fn levinson(covariance: &[f64]) -> (Vec<f64>, f64) {
     (a, variance)
 }
 
-/// Number of pulses per second, and size of one sample in fifty.
+/// Number of pulses per second; `PULSES_PART` is their share of the variance, and `IMPULSES` the probability and the
+/// size of impulses.
 const PULSES_PER_S: f64 = 2.0;
 const PULSES_PART: f64 = 0.8;
 const IMPULSES: (f64, f64) = (0.02, 7.0);
 const ON_OFF_S: f64 = 2.0;
 const ON_OFF: [f64; 2] = [0.2, 1.8];
 
-/// The density of w as weights and variances of normal densities, for the oracle. Each mixture has
-/// unit variance.
+/// Returns the density of w as a mixture of normal densities, given by their weights and variances, for the oracle.
+/// Each mixture has unit variance.
 pub(super) fn density(course: Course, ts_s: f64) -> Vec<(f64, f64)> {
     match course {
         Course::Impulsive => {
@@ -204,7 +204,7 @@ fn driven(course: Course, normal: RunSeed, uniform: RunSeed, ts_s: f64, samples:
             }
         }
         Course::Intermittent => {
-            // The two-state chain with these mean times, sampled.
+            // Switching probability per sample of a two-state Markov chain with these mean times.
             let chance = 0.5 * (1.0 - (-2.0 * ts_s / ON_OFF_S).exp());
             let mut on = draws.first().is_some_and(|draw| *draw < 0.5);
             for (w, draw) in w.iter_mut().zip(draws.into_iter().rev()) {

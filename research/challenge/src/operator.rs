@@ -1,59 +1,59 @@
 //! Operators and plants of the challenge, in continuous time.
 //!
-//! `Y(s) = K (T_L s + 1)^p / (T_I s + 1) * omega^2/(s^2 + 2 zeta omega s + omega^2) / (T_3 s + 1)
-//! * omega_s^2/(s^2 + 1.4 omega_s s + omega_s^2) * e^(-tau s)`,
+//! `Y(s) = K (T_L s + 1)^p/(T_I s + 1) H_nm(s) H_s(s) e^(-tau s)`, `H_nm = omega^2/((s^2 + 2 zeta omega s + omega^2)
+//! (T_3 s + 1))`, `H_s = omega_s^2/(s^2 + 1.4 omega_s s + omega_s^2)`,
 //!
-//! each factor if the form has it: the lag of operators on `1/s` (D. T. McRuer and H. R. Jex, IEEE
-//! Trans. Human Factors in Electronics 8 (1967) 231-249), the neuromuscular system of third order
-//! (R. E. Magdaleno and D. T. McRuer, NASA CR-1757 (1971)), the dynamics of a stick.
+//! where a factor is present only if the form contains it: the lag of people controlling `1/s` (D. T. McRuer and H. R.
+//! Jex, IEEE Trans. Human Factors in Electronics 8 (1967) 231-249), the third-order neuromuscular system (R. E.
+//! Magdaleno and D. T. McRuer, NASA CR-1757 (1971)), and the dynamics of a stick.
 //!
-//! The response seen in the record depends on the intersample behaviour: if each error is held over
-//! a sample, the response from sampled e to sampled u at low frequencies is `Y(j omega)` times the
-//! hold `(1 - e^(-j omega Ts))/(j omega Ts)`; for a continuous error it is `Y(j omega)`.
+//! The response in the record depends on the intersample behaviour. If each error is held over a sample, the response
+//! from sampled e to sampled u at low frequencies is `Y(j omega)` times the hold `(1 - e^(-j omega Ts))/(j omega Ts)`;
+//! for a continuous error it is `Y(j omega)`.
 
 use hoid_model::{Complex64, ContinuousTransferFunction, ModelError, SampleTime, polynomial};
 
-/// An operator. Times in s, frequencies in rad/s; zero if a factor is missing.
+/// An operator. Times are in s and frequencies in rad/s; the time or frequency of a missing factor is zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Operator {
-    /// K, control per error.
+    /// Gain K, control output per error.
     pub gain: f64,
-    /// T_L.
+    /// Time constant T_L of the lead.
     pub lead_s: f64,
-    /// p, 0 to 2.
+    /// Number p of leads, 0 to 2.
     pub leads: usize,
-    /// T_I.
+    /// Time constant T_I of the lag.
     pub lag_s: f64,
-    /// omega_nm.
+    /// Natural frequency omega_nm of the neuromuscular system.
     pub omega_nm_rad_s: f64,
-    /// zeta_nm.
+    /// Damping ratio zeta_nm of the neuromuscular system.
     pub zeta_nm: f64,
-    /// T_3.
+    /// Time constant T_3 of the third-order neuromuscular system.
     pub third_s: f64,
-    /// omega_s.
+    /// Natural frequency omega_s of the stick.
     pub stick_rad_s: f64,
-    /// tau_e.
+    /// Delay tau_e.
     pub tau_e_s: f64,
 }
 
-/// Parameter of an operator that changes.
+/// Parameter of an operator that can change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parameter {
-    /// K_e: the gain at low frequencies; K_e_dot is unchanged.
+    /// K_e, the gain at low frequencies, with K_e_dot unchanged.
     KE,
-    /// K_e_dot: the lead; K_e is unchanged.
+    /// K_e_dot, by a change of the lead, with K_e unchanged.
     KEDot,
-    /// Both: K.
+    /// The gain K, and with it K_e and K_e_dot.
     Gain,
-    /// omega_nm.
+    /// Natural frequency omega_nm.
     Omega,
-    /// zeta_nm.
+    /// Damping ratio zeta_nm.
     Zeta,
-    /// tau_e.
+    /// Delay tau_e.
     Delay,
 }
 
-/// Damping of the stick.
+/// Damping ratio of the stick.
 const STICK_DAMPING: f64 = 0.7;
 
 impl Operator {
@@ -74,7 +74,7 @@ impl Operator {
         self
     }
 
-    /// Coefficients of the numerator by ascending powers of s.
+    /// Coefficients of the numerator in ascending powers of s.
     pub(super) fn numerator(&self) -> Vec<f64> {
         let mut all = vec![self.gain];
         for _ in 0..self.leads {
@@ -83,7 +83,7 @@ impl Operator {
         all
     }
 
-    /// Coefficients of the denominator by ascending powers of s; the first is one.
+    /// Coefficients of the denominator in ascending powers of s; the first is one.
     pub(super) fn denominator(&self) -> Vec<f64> {
         let second = |omega: f64, zeta: f64| [1.0, 2.0 * zeta / omega, 1.0 / (omega * omega)];
         let mut all = second(self.omega_nm_rad_s, self.zeta_nm).to_vec();
@@ -98,14 +98,14 @@ impl Operator {
         all
     }
 
-    /// `Y(j omega)`.
+    /// Returns the response `Y(j omega)`.
     pub fn response(&self, omega_rad_s: f64) -> Complex64 {
         let s = Complex64::new(0.0, omega_rad_s);
         polynomial::value(&self.numerator(), s) / polynomial::value(&self.denominator(), s) * (-s * self.tau_e_s).exp()
     }
 
-    /// Names and values as those of the operator of the thesis: K_e, K_e_dot in s, omega_nm in
-    /// rad/s, zeta_nm, tau_e in s.
+    /// Names and values of the parameters as in the operator of the thesis: K_e, K_e_dot in s, omega_nm in rad/s,
+    /// zeta_nm, tau_e in s.
     pub fn named(&self) -> [(&'static str, f64); 5] {
         [
             ("K_e", self.gain),
@@ -116,15 +116,15 @@ impl Operator {
         ]
     }
 
-    /// True if it is the operator of the thesis: gain, lead, neuromuscular system, delay.
+    /// True if the operator has the form of the thesis: gain, lead, neuromuscular system, delay.
     pub fn is_lead(&self) -> bool {
         self.leads == 1 && self.lag_s == 0.0 && self.third_s == 0.0 && self.stick_rad_s == 0.0
     }
 
-    /// `Y P`.
+    /// Returns the open loop `Y P`.
     ///
     /// # Errors
-    /// [`ModelError`] for numbers that are not a transfer function.
+    /// [`ModelError`] if the parameters do not give a transfer function.
     pub(super) fn open_loop(&self, plant: Plant) -> Result<ContinuousTransferFunction, ModelError> {
         let descending = |ascending: Vec<f64>| ascending.into_iter().rev().collect::<Vec<_>>();
         let own = ContinuousTransferFunction::new(&descending(self.numerator()), &descending(self.denominator()))?;
@@ -136,18 +136,18 @@ impl Operator {
 /// The controlled element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Plant {
-    /// `1/s`.
+    /// Single integrator, `1/s`.
     Integrator,
-    /// `1/s^2`.
+    /// Double integrator, `1/s^2`.
     DoubleIntegrator,
-    /// `1/(s(s+1))`.
+    /// Integrator with a lag, `1/(s(s+1))`.
     Lagged,
-    /// `1/(s-1)`.
+    /// Unstable first-order plant, `1/(s-1)`.
     Unstable,
 }
 
 impl Plant {
-    /// Its denominator by ascending powers of s; the numerator is one.
+    /// Coefficients of the denominator in ascending powers of s; the numerator is one.
     pub(super) fn denominator(self) -> &'static [f64] {
         match self {
             Self::Integrator => &[0.0, 1.0],
@@ -157,13 +157,13 @@ impl Plant {
         }
     }
 
-    /// `P(j omega)`.
+    /// Returns the response `P(j omega)`.
     pub(super) fn response(self, omega_rad_s: f64) -> Complex64 {
         Complex64::from(1.0) / polynomial::value(self.denominator(), Complex64::new(0.0, omega_rad_s))
     }
 }
 
-/// The hold of a sample, `(1 - e^(-j omega Ts))/(j omega Ts)`.
+/// Response of the hold over a sample, `(1 - e^(-j omega Ts))/(j omega Ts)`.
 pub fn hold(omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
     let turn = omega_rad_s * sample_time.s();
     if turn == 0.0 {
@@ -176,11 +176,11 @@ pub fn hold(omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
 /// Largest order of a system.
 pub(super) const MOST_STATES: usize = 6;
 
-/// A system without numerator, `x = v/(a_0 + a_1 s + ... + a_n s^n)`, with x and its derivatives as
-/// states: outputs are sums of them, so that a change of the gain acts at once.
+/// A system without zeros, `x = v/(a_0 + a_1 s + ... + a_n s^n)`, whose states are x and its derivatives. Outputs are
+/// weighted sums of the states, so that a change of the gain acts at once.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Canonical {
-    /// x, its first derivative, ...
+    /// The state: x, its first derivative, and so on.
     pub x: [f64; MOST_STATES],
 }
 
@@ -189,7 +189,8 @@ impl Canonical {
         Self { x: [0.0; MOST_STATES] }
     }
 
-    /// A Runge-Kutta step of fourth order with the input at its start, middle and end.
+    /// Advances the state by a fourth-order Runge-Kutta step of length h; `v` is the input at the start, the middle and
+    /// the end of the step.
     pub fn advance(&mut self, denominator: &[f64], v: [f64; 3], h: f64) {
         let n = denominator.len() - 1;
         let slope = |x: &[f64; MOST_STATES], v: f64| {
@@ -213,7 +214,7 @@ impl Canonical {
         }
     }
 
-    /// The sum of the states with these coefficients.
+    /// Returns the sum of the states weighted by these coefficients.
     pub fn output(&self, numerator: &[f64]) -> f64 {
         numerator.iter().zip(&self.x).map(|(b, x)| b * x).sum()
     }

@@ -1,15 +1,15 @@
-//! Bounds from the available information that no method can exceed.
+//! Bounds that follow from the available information and that no method can exceed.
 //!
 //! **Evidence of a change.** The logarithm of the likelihood ratio of the true model after a change against the true
-//! model before it, with known time of the change and known spectrum, density and time course of the remnant:
-//! `sum over k of log f(A n/s) - log f(A (n + delta)/s)`, n the remnant, delta the response of the present operator
-//! minus that of the operator before the change to the same errors, A the whitening filter. Above 12 a change is
-//! certain: a good test with one false alarm per hour finds it. It is computed before stick and recorder, where the
-//! model is exact.
+//! model before it, if the time of the change and the spectrum, density and time course of the remnant are known: `sum
+//! over k of log f(A n/s) - log f(A (n + delta)/s)`. Here n is the remnant, delta the response of the present operator
+//! minus that of the operator before the change to the same errors, and A the whitening filter. Above 12 a change is
+//! certain: a good test with one false alarm per hour finds it. The ratio is computed before stick and recorder, where
+//! the model is exact.
 //!
-//! **Batch fit with known changes.** Box-Jenkins by the prediction error method with the true delay
-//! and a noise model of order 4 on all data since the last change: it uses every sample, and its
-//! errors are those that the same data give without tracking.
+//! **Batch fit with known changes.** A Box-Jenkins model with the true delay and a noise model of order 4 is fitted by
+//! the prediction-error method to all data since the last change. It uses every sample, and its errors are those that
+//! the same data give without tracking.
 
 use hoid_ident::Estimator;
 use hoid_model::{Orders, Structure};
@@ -23,14 +23,13 @@ use super::{
 
 /// Logarithm of the likelihood ratio above which a change is certain.
 pub const CERTAIN: f64 = 12.0;
-/// Lower limit of the strength: otherwise the remnant would vanish at a zero of the error and
-/// reveal the response.
+/// Lower limit of the strength; without it the remnant would vanish where the error is zero and reveal the response.
 const LEAST_LEVEL: f64 = 0.05;
-/// Order of the noise model of the batch fit, and its shortest span, s.
+/// Order of the noise model of the batch fit; `LEAST_S` is the shortest span of the fit, s.
 const ND: usize = 4;
 const LEAST_S: f64 = 7.5;
 
-/// Logarithm of the likelihood ratio over some seconds after a change, by its index.
+/// Returns the logarithm of the likelihood ratio over the first `seconds` after the change with this index.
 pub fn evidence(case: &Case, run: &Run, change: usize, seconds: f64) -> f64 {
     let hidden = &run.hidden;
     let Some((first, before)) = hidden.before.get(change) else {
@@ -40,7 +39,7 @@ pub fn evidence(case: &Case, run: &Run, change: usize, seconds: f64) -> f64 {
     let density = density(case.course, run.sample_time.s());
     let log = |w: f64| {
         let each = density.iter().map(|(p, v)| p / v.sqrt() * (-0.5 * w * w / v).exp());
-        // If all underflow the widest density determines the result.
+        // If all densities underflow, the widest determines the result.
         let widest = density.iter().map(|(_, v)| *v).fold(0.0, f64::max);
         each.sum::<f64>().ln().max(-0.5 * w * w / widest - 20.0)
     };
@@ -64,8 +63,8 @@ pub fn evidence(case: &Case, run: &Run, change: usize, seconds: f64) -> f64 {
         .sum()
 }
 
-/// Batch fit at the requested times, with known `changes_s`; nothing if the span is too short or
-/// the fit fails.
+/// Returns the batch fits at the requested times, with known `changes_s`; an estimate is empty if the span is too short
+/// or the fit fails.
 pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<ReportedResponse> {
     let nk = (tau_e_s / task.sample_time.s()).round() as usize + 1;
     let structure = Structure::BoxJenkins;

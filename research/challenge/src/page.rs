@@ -1,10 +1,10 @@
-//! The page `research/notes/challenge.md`: the cases, and the tables.
+//! The page `research/notes/challenge.md`: the cases and the tables.
 
 use std::fmt::Write as _;
 
 use super::{cases::cases, measure::Line, tables::tables};
 
-/// The page; `measured` describes date, conditions and number of runs.
+/// Returns the text of the page; `measured` describes the date, the conditions and the number of runs.
 pub fn page(lines: &[Line], measured: &str) -> String {
     let mut text = format!(
         "# The challenge: cases that can refute a tracker\n\n{measured}\n\n\

@@ -1,11 +1,12 @@
-//! The same measures on recorded people.
+//! The same evaluation with recorded people.
 //!
-//! Trials of one person, each 40 s after its ramp at 60 Hz, are joined: one on `1/s` to one on `1/(s(s+1))` and vice
-//! versa, a change of the plant and so of the operator at 40 s, and two of one plant, a seam without a change. The
-//! second trial has its own ramp as history ([`Seam`]): no filter jumps. Single trials are time without a change. The
-//! true response is the person's average describing function over their other trials on that plant, at the seven lowest
-//! lines of the disturbance: `sum U conj(D) / sum E conj(D)` over trials of two whole periods. The delay is not given.
-//! The control of a row was read a sample before it was written: e(k) is aligned with u(k+1).
+//! Trials of one person, each with 40 s after a ramp and sampled at 60 Hz, are joined. A trial on `1/s` joined to one
+//! on `1/(s(s+1))`, or vice versa, gives a change of the plant and hence of the operator at 40 s; two trials on the
+//! same plant give a seam without a change. The second trial has its own ramp as history ([`Seam`]), so that no filter
+//! jumps. Single trials contain no change. The true response is the average describing function of the person over
+//! their other trials on that plant, at the seven lowest lines of the disturbance: `sum U conj(D) / sum E conj(D)` over
+//! trials of two whole periods. The delay is not given. The control output of a row was read one sample before it was
+//! written, so that e(k) is aligned with u(k+1).
 //!
 //! The recordings are not part of the project.
 
@@ -23,19 +24,20 @@ use super::{
 };
 use crate::ChallengeError;
 
-/// Length of the ramp, of a trial after it, and of a period, s.
+/// Length of the ramp, s; `TRIAL_S` is the length of a trial after the ramp and `PERIOD_S` the period of the
+/// disturbance.
 const RAMP_S: f64 = 5.0;
 const TRIAL_S: f64 = 40.0;
 const PERIOD_S: f64 = 20.0;
-/// The lines, multiples of 1/period.
+/// Frequencies of the lines as multiples of 1/period.
 const MULTIPLES: [f64; 7] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0];
 const RATE_HZ: f64 = 60.0;
-/// Start spans of joined trials and of single ones, s.
+/// Start span of joined trials, s; `SINGLE_START_S` is that of single trials.
 const START_S: (f64, f64) = (5.0, 30.0);
 const SINGLE_START_S: (f64, f64) = (5.0, 20.0);
 
-/// The change of the plant is known: its evidence is not computed.
-const SURE: f64 = 1e9;
+/// Evidence assigned to a change of the plant, which is known and therefore not computed.
+const KNOWN_CHANGE_EVIDENCE: f64 = 1e9;
 
 /// Options of the runs.
 #[derive(Debug, Clone)]
@@ -44,31 +46,31 @@ pub struct PeopleOptions {
     pub recordings: std::path::PathBuf,
     /// Directory of the results.
     pub directory: std::path::PathBuf,
-    /// Maximum number of joined records of each kind and person.
+    /// Maximum number of records of each kind for each person.
     pub runs: usize,
-    /// Kinds: `fo-so`, `so-fo`, `fo-fo`, `so-so`, `fo`, `so`; none for all.
+    /// Kinds `fo-so`, `so-fo`, `fo-fo`, `so-so`, `fo`, `so`; empty for all kinds.
     pub kinds: Vec<String>,
-    /// Names of entrants; none for all.
+    /// Names of entrants; empty for all entrants.
     pub methods: Vec<String>,
-    /// Part of the runs.
+    /// Part of the runs that is computed.
     pub portion: Portion,
 }
 
-/// A trial: e and u with the ramp, and their coefficients at the lines after it.
+/// A trial: e and u including the ramp, and products of their Fourier coefficients at the lines after the ramp.
 struct Trial {
     e: Vec<f64>,
     u: Vec<f64>,
-    /// `U conj(D)` and `E conj(D)` at each line.
+    /// Products `U conj(D)` and `E conj(D)` at each line.
     products: Vec<[Complex64; 2]>,
 }
 
-/// The trials of a person on a plant.
+/// Trials by person and plant.
 type Cells = BTreeMap<(String, String), Vec<Trial>>;
 
-/// Runs the missing parts.
+/// Computes the missing results and returns the lines of all selected runs.
 ///
 /// # Errors
-/// [`ChallengeError`] for recordings that cannot be read, unknown names, and failures of files.
+/// [`ChallengeError`] if recordings or results cannot be read or written, or a name is unknown.
 pub fn challenge_people(options: &PeopleOptions, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Line>, ChallengeError> {
     let cells = read_all(&options.recordings)?;
     let (entrants, _) = chosen_entrants(&options.methods)?;
@@ -101,7 +103,7 @@ pub fn challenge_people(options: &PeopleOptions, each: &(dyn Fn(&str) + Sync)) -
                 .join(&joined.person)
                 .join(joined.kind());
             let lines = kept(&folder, joined.first.1 as u64, &entrants, false, &mut || {
-                let posed = joined.posed(&cells)?;
+                let posed = joined.evaluation_run(&cells)?;
                 Ok(Box::new(move |entrant: Option<&dyn Entrant>| posed.line(entrant)))
             });
             each(&format!("{} {} {}", joined.person, joined.kind(), joined.first.1));
@@ -168,7 +170,7 @@ impl Trial {
     }
 }
 
-/// The trials of a record: plant and index of the first and of the second.
+/// The trials of a joined record: plant and index of the first trial and, if there is one, of the second.
 struct Joined {
     person: String,
     first: (String, usize),
@@ -191,7 +193,7 @@ impl Joined {
         }
     }
 
-    /// Its index among those of its kind.
+    /// Returns the index of the record among the records of its kind.
     fn number(&self) -> usize {
         match &self.second {
             Some((second, _)) if *second == self.first.0 => self.first.1 / 2,
@@ -199,7 +201,7 @@ impl Joined {
         }
     }
 
-    fn posed(&self, cells: &Cells) -> Result<Posed, ChallengeError> {
+    fn evaluation_run(&self, cells: &Cells) -> Result<EvaluationRun, ChallengeError> {
         let sample_time = SampleTime::new(1.0 / RATE_HZ).map_err(|e| refused(e.to_string()))?;
         let ramp = (RAMP_S * RATE_HZ) as usize;
         let cell = |plant: &str| &cells[&(self.person.clone(), plant.to_owned())];
@@ -217,7 +219,7 @@ impl Joined {
                 u: next.u[..ramp].to_vec(),
             }
         });
-        // The person's response on a plant, without the trials in the record.
+        // The average response of the person on a plant, without the trials in this record.
         let average = |plant: &str| -> Vec<Complex64> {
             let used: Vec<usize> = [Some(&self.first), self.second.as_ref()]
                 .into_iter()
@@ -243,10 +245,10 @@ impl Joined {
         let (labels, asked_s): (Vec<String>, Vec<f64>) = asked(at_s, start_s.1, length_s, false).into_iter().unzip();
         let found = ChangeOutcome {
             at_s: TRIAL_S,
-            evidence: [SURE; 2],
+            evidence: [KNOWN_CHANGE_EVIDENCE; 2],
             after_s: None,
         };
-        Ok(Posed {
+        Ok(EvaluationRun {
             case: self.kind(),
             number: self.first.1 as u64,
             truths: [average(&self.first.0), average(&second.0)],
@@ -267,18 +269,18 @@ impl Joined {
     }
 }
 
-/// A joined record with its task.
-struct Posed {
+/// A joined record with the task that it poses.
+struct EvaluationRun {
     case: String,
     number: u64,
     task: Task,
     labels: Vec<String>,
     changes: Vec<ChangeOutcome>,
-    /// The response at the lines before and after the seam.
+    /// True responses at the lines before and after the seam.
     truths: [Vec<Complex64>; 2],
 }
 
-impl Posed {
+impl EvaluationRun {
     fn line(&self, entrant: Option<&dyn Entrant>) -> Line {
         let truth = |omega: f64, t_s: f64| {
             let at = self

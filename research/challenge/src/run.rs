@@ -1,9 +1,8 @@
-//! Runs of the challenge, on all threads, stored on disk.
+//! Runs of the challenge on all cores, with results stored on disk.
 //!
-//! Each run of a case is a file, with a line of JSON for each entrant. It is written to a temporary
-//! file and renamed; existing results are not computed again, so that a challenge can be stopped,
-//! continued, extended by another entrant, or run in parts on several machines. The results do not
-//! depend on the number of threads.
+//! Each run of a case is a file with a line of JSON for each entrant. The file is written under a temporary name and
+//! then renamed. Existing results are not computed again, so that a challenge can be stopped, continued, extended by
+//! another entrant, or run in parts on several machines. The results do not depend on the number of threads.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +14,7 @@ use super::{
     draw::{Portion, RunOf, Seeds},
     entrant::Entrant,
     entrants::entrants,
-    measure::{BATCH, Line, Posed},
+    measure::{BATCH, Line, EvaluationRun},
 };
 use crate::ChallengeError;
 
@@ -24,22 +23,22 @@ use crate::ChallengeError;
 pub struct ChallengeOptions {
     /// Directory of the results.
     pub directory: PathBuf,
-    /// Set of seeds.
+    /// Set of seeds that is used.
     pub seeds: Seeds,
     /// Number of runs of each case.
     pub runs: u64,
-    /// Names of cases, their starts (`none-`), or themes; none for all.
+    /// Names of cases, prefixes of names (`none-`), or themes; empty for all cases.
     pub cases: Vec<String>,
-    /// Names of entrants; none for all. `batch` is the batch fit with known changes.
+    /// Names of entrants; empty for all entrants. `batch` is the batch fit with known changes.
     pub methods: Vec<String>,
-    /// Part of the runs.
+    /// Part of the runs that is computed.
     pub portion: Portion,
 }
 
-/// The entrants with these names, all if none are given, and whether the batch fit is among them.
+/// Returns the entrants with these names, all entrants if `names` is empty, and whether the batch fit is included.
 ///
 /// # Errors
-/// [`ChallengeError::Refused`] for an invalid name.
+/// [`ChallengeError::Refused`] if a name is unknown.
 pub(super) fn chosen_entrants(names: &[String]) -> Result<(Vec<Box<dyn Entrant>>, bool), ChallengeError> {
     let mut all = entrants();
     let known: Vec<String> = all.iter().map(|c| c.name()).chain(["batch".to_owned()]).collect();
@@ -53,10 +52,10 @@ pub(super) fn chosen_entrants(names: &[String]) -> Result<(Vec<Box<dyn Entrant>>
     Ok((all, names.is_empty() || names.iter().any(|n| n == "batch")))
 }
 
-/// The cases with these names, name starts or themes; all if none are given.
+/// Returns the cases with these names, prefixes of names or themes; all cases if `names` is empty.
 ///
 /// # Errors
-/// [`ChallengeError::Refused`] for an unknown name.
+/// [`ChallengeError::Refused`] if a name is unknown.
 pub fn chosen_cases(names: &[String]) -> Result<Vec<Case>, ChallengeError> {
     let all = cases();
     let is = |case: &Case, name: &String| {
@@ -79,11 +78,11 @@ pub(super) fn refused(reason: String) -> ChallengeError {
     ChallengeError::Refused { reason }
 }
 
-/// Runs the missing parts; returns the lines of all selected cases, in the order of cases, runs and
-/// entrants. `each` is called after every run.
+/// Computes the missing results and returns the lines of all selected cases, ordered by case, run and entrant. `each`
+/// is called after every run.
 ///
 /// # Errors
-/// [`ChallengeError`] for invalid names, files, and cases that no person can stabilise.
+/// [`ChallengeError`] if a name is unknown, a file cannot be read or written, or no person can stabilise a case.
 pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Line>, ChallengeError> {
     let cases = chosen_cases(&options.cases)?;
     let (entrants, batch) = chosen_entrants(&options.methods)?;
@@ -103,7 +102,7 @@ pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Re
                     seeds: options.seeds,
                     number,
                 };
-                let posed = Posed::new(case, of).map_err(refused)?;
+                let posed = EvaluationRun::new(case, of).map_err(refused)?;
                 Ok(Box::new(move |entrant: Option<&dyn Entrant>| match entrant {
                     Some(entrant) => posed.line(entrant),
                     None => posed.batch(),
@@ -116,10 +115,10 @@ pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Re
     Ok(lines.concat())
 }
 
-/// Computes the line of an entrant, or of the batch fit.
+/// Function that computes the line of an entrant, or of the batch fit if there is no entrant.
 pub(super) type LineOf = Box<dyn Fn(Option<&dyn Entrant>) -> Line>;
 
-/// The lines of a run: those in the file, and missing ones, which are computed and added.
+/// Returns the lines of a run. Lines that are not in the file are computed and added to it.
 pub(super) fn kept(
     folder: &Path,
     number: u64,
@@ -141,7 +140,7 @@ pub(super) fn kept(
         let line_of = pose()?;
         lines.extend(missing.into_iter().map(|(_, entrant)| line_of(*entrant)));
         write(&path, folder, &lines)?;
-        // As they will be read: the last digit of a number may differ from the written data.
+        // The lines are read again, because the last digit of a number may differ from the computed one.
         lines = read(&path)?;
     }
     let of = |(name, _): &(String, _)| lines.iter().find(|line| line.method == *name).cloned();

@@ -1,14 +1,12 @@
 //! Simulation of the loop of a case, step by step in continuous time.
 //!
-//! `e = f - y`, `u = stick(Y e + n)`, `y = P (u + d)`; 15 s of run-in. Operator and plant are
-//! integrated in steps of at most a millisecond ([`Canonical`]); the delay is read from the history
-//! of e, at any fraction of a step: a held error enters each step with its mean over that step, a
-//! continuous one with its values between the steps. Only the random streams are shared with the
-//! simulators of [`hoid_sim`].
+//! The loop is `e = f - y`, `u = stick(Y e + n)`, `y = P (u + d)`, with a run-in of 15 s. Operator and plant are
+//! integrated in steps of at most a millisecond ([`Canonical`]). The delay is read from the history of e, at any
+//! fraction of a step: a held error enters each step with its mean over that step, a continuous error with its values
+//! interpolated between the steps. Only the random streams are shared with the simulators of [`hoid_sim`].
 //!
-//! In addition to the signals a run contains data for the oracle: the remnant, the time course of
-//! its strength, the true response, and the response of the operator before each change to the same
-//! errors.
+//! In addition to the signals, a run contains data for the oracle: the remnant, the time course of its strength, the
+//! true response, and the response to the same errors of the operator before each change.
 
 use std::f64::consts::TAU;
 
@@ -16,29 +14,29 @@ use hoid_model::{Channel, Complex64, Record, SampleTime};
 use hoid_sim::SimError;
 
 use super::{
-    case::{Blemish, Case, DelayKnown, Forcing, Sight},
+    case::{Imperfection, Case, DelayKnown, Forcing, Sampling},
     draw::{RunOf, person},
     driving::{Strength, forcing, sizes},
     noise::Noise,
     operator::{Canonical, Operator, hold},
-    world::{Held, World},
+    world::{OperatorPolynomials, LoopState},
 };
 
 /// A run with its true values.
 #[derive(Debug, Clone)]
 pub struct Run {
-    /// Time between two samples.
+    /// Sample time.
     pub sample_time: SampleTime,
-    /// Recorded error; NaN if nothing was recorded.
+    /// Recorded error; NaN where nothing was recorded.
     pub e: Vec<f64>,
-    /// Recorded control.
+    /// Recorded control output.
     pub u: Vec<f64>,
-    /// The disturbance, or the target.
+    /// The disturbance or the target.
     pub excitation: Vec<f64>,
     /// The operator over time.
     pub truth: Truth,
-    /// True values for an oracle.
-    pub hidden: Hidden,
+    /// True values for the oracle.
+    pub hidden: OracleData,
 }
 
 /// The operator over time.
@@ -50,45 +48,45 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// The operator at a time.
+    /// Returns the operator at a time.
     pub fn operator(&self, t_s: f64) -> Operator {
-        self.case.shifts.iter().fold(self.first, |operator, shift| {
+        self.case.operator_changes.iter().fold(self.first, |operator, shift| {
             let part = ((t_s - shift.at_s) / shift.takes_s).clamp(0.0, 1.0);
             operator.times(shift.parameter, shift.factor.powf(part))
         })
     }
 
-    /// The response from recorded e to recorded u.
+    /// Returns the response from recorded e to recorded u.
     pub fn response(&self, omega_rad_s: f64, t_s: f64) -> Complex64 {
         let operator = self.operator(t_s);
-        let response = match self.case.sight {
-            Sight::Held => held(&operator, omega_rad_s, self.sample_time),
-            Sight::Continuous => operator.response(omega_rad_s),
+        let response = match self.case.sampling {
+            Sampling::Held => held(&operator, omega_rad_s, self.sample_time),
+            Sampling::Continuous => operator.response(omega_rad_s),
         };
         response * self.sign(t_s)
     }
 
-    /// -1 where u is recorded with the wrong sign, otherwise 1.
+    /// Returns -1 if u is recorded with the opposite sign, otherwise 1.
     fn sign(&self, t_s: f64) -> f64 {
-        match self.case.blemish {
-            Blemish::Polarity(at_s) if t_s >= at_s => -1.0,
+        match self.case.imperfection {
+            Imperfection::Polarity(at_s) if t_s >= at_s => -1.0,
             _ => 1.0,
         }
     }
 
-    /// The operator's delay in samples of `q^-nk`, including that of the hold, if it is given.
-    pub fn told_nk(&self) -> Option<usize> {
+    /// Returns the delay in samples of `q^-nk`, including that of the hold; `None` if it is not given to the methods.
+    pub fn given_nk(&self) -> Option<usize> {
         let samples = self.first.tau_e_s / self.sample_time.s();
         match self.case.delay {
             DelayKnown::No => None,
-            // A rounded whole number is a whole number.
+            // The tolerance allows for rounding errors in a whole number of samples.
             DelayKnown::Whole | DelayKnown::Fraction => Some((samples + 1e-6).floor() as usize + 1),
         }
     }
 }
 
-/// The response between samples of a held error: `sum over m of (Y H)(omega + m 2 pi/Ts)`, H the hold
-/// (Poisson's sum; A. V. Oppenheim and R. W. Schafer, *Discrete-Time Signal Processing*, section 4.2).
+/// Returns the response at the sample times for a held error: `sum over m of (Y H)(omega + m 2 pi/Ts)`, where H is the
+/// hold (Poisson's sum; A. V. Oppenheim and R. W. Schafer, *Discrete-Time Signal Processing*, section 4.2).
 fn held(operator: &Operator, omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
     let each = (-ALIASES..=ALIASES).map(|m| {
         let omega = omega_rad_s + f64::from(m) * TAU / sample_time.s();
@@ -97,41 +95,40 @@ fn held(operator: &Operator, omega_rad_s: f64, sample_time: SampleTime) -> Compl
     each.sum()
 }
 
-/// Number of aliases on either side; they decrease with the square of their index, or faster.
+/// Number of aliases on either side; they decrease at least with the square of their index.
 const ALIASES: i32 = 100;
 
-/// True values, sample by sample.
+/// True values at each sample.
 #[derive(Debug, Clone)]
-pub struct Hidden {
-    /// Remnant, before stick and recorder.
+pub struct OracleData {
+    /// Remnant before stick and recorder, with the recorded sign.
     pub(super) n: Vec<f64>,
-    /// Time course s of its strength.
+    /// Time course s of the remnant's strength.
     pub(super) level: Vec<f64>,
-    /// Response to the error, before stick and recorder, with the recorded sign.
+    /// Response of the operator to the error, before stick and recorder, with the recorded sign.
     pub(super) response: Vec<f64>,
-    /// For each change its first sample, and from there on the response of the operator before the
-    /// change.
+    /// First sample of each change, with the response from this sample on of the operator before the change.
     pub(super) before: Vec<(usize, Vec<f64>)>,
-    /// Whitening filter of n divided by its standard deviation.
+    /// Whitening filter of the remnant n for constant strength.
     pub(super) whitening: Vec<f64>,
     /// Standard deviation of the innovations of n for s = 1.
     pub(super) innovation: f64,
 }
 
 const RUN_IN_S: f64 = 15.0;
-/// Maximum number of persons who lose control in the simulation.
+/// Maximum number of people who may lose control in the simulation before it fails.
 const MOST_ATTEMPTS: usize = 20;
-/// Standard deviations of u beyond which control is lost.
-const LOST: f64 = 30.0;
+/// Limit of u beyond which control is lost, standard deviations of u.
+const LOSS_LIMIT: f64 = 30.0;
 
 const NUMBERS: u64 = 2;
 const GLITCHES: u64 = 4;
 const WALK: u64 = 5;
 
-/// A run of a case.
+/// Simulates a run of a case.
 ///
 /// # Errors
-/// [`SimError`] for a case that is not feasible for any person.
+/// [`SimError`] if no person can control the case.
 pub fn simulate(case: &Case, run: RunOf) -> Result<Run, SimError> {
     let sample_time = SampleTime::new(1.0 / case.rate_hz)?;
     let mut outcome = Err(SimError::Diverged {
@@ -161,11 +158,11 @@ fn of_person(case: &Case, run: RunOf, operator: Operator, sample_time: SampleTim
         sample_time,
     };
     let lines = forcing(case, run)?;
-    let idle_s = match case.blemish {
-        Blemish::IdleStart(s) => s,
+    let idle_s = match case.imperfection {
+        Imperfection::IdleStart(s) => s,
         _ => f64::NEG_INFINITY,
     };
-    // One more sample, for interpolation.
+    // There is one more sample for interpolation.
     let mut excitation = lines.samples(time(0), sample_time, total + 1);
     for (k, value) in excitation.iter_mut().enumerate() {
         if time(k) < idle_s {
@@ -187,20 +184,20 @@ fn of_person(case: &Case, run: RunOf, operator: Operator, sample_time: SampleTim
         total + 1,
     );
     let (whitening, variance) = noise.whitening();
-    let steps = match case.blemish {
-        Blemish::Drift(_) => run.stream(case, WALK).white_noise(total),
+    let steps = match case.imperfection {
+        Imperfection::Drift(_) => run.stream(case, WALK).white_noise(total),
         _ => Vec::new(),
     };
-    let stick = |u: f64| match case.blemish {
-        Blemish::Quantised(part) => (u / (part * sigma_u)).round() * part * sigma_u,
-        Blemish::Saturated(at) => u.clamp(-at * sigma_u, at * sigma_u),
+    let stick = |u: f64| match case.imperfection {
+        Imperfection::Quantised(part) => (u / (part * sigma_u)).round() * part * sigma_u,
+        Imperfection::Saturated(at) => u.clamp(-at * sigma_u, at * sigma_u),
         _ => u,
     };
     let mut strength = Strength::new(case, [sigma_u, sigma_e], numbers[3], ts);
     let changes: Vec<usize> = (case.changes_s().iter())
         .map(|at_s| run_in + (at_s / ts).round() as usize)
         .collect();
-    let mut hidden = Hidden {
+    let mut hidden = OracleData {
         n: Vec::with_capacity(total),
         level: Vec::with_capacity(total),
         response: Vec::with_capacity(total),
@@ -209,35 +206,35 @@ fn of_person(case: &Case, run: RunOf, operator: Operator, sample_time: SampleTim
         innovation: variance.sqrt() * sigma_n,
     };
     let mut shadows: Vec<(Operator, Canonical)> = Vec::new();
-    let mut world = World::new(case, ts, total);
+    let mut world = LoopState::new(case, ts, total);
     let (mut e, mut u) = (Vec::with_capacity(total), Vec::with_capacity(total));
-    let (mut now, mut walk) = (Held::of(operator), 0.0);
+    let (mut now, mut walk) = (OperatorPolynomials::of(operator), 0.0);
     let target = case.forcing != Forcing::Disturbance;
     let mut next_noise = 0.0;
     for k in 0..total {
         let t = time(k);
         if changes.contains(&k) {
-            // The parameters of the sample before: this one is the first that may differ.
+            // The parameters are those of the previous sample; this sample is the first at which they may differ.
             shadows.push((truth.operator(t - ts), world.operator));
             hidden.before.push((k, Vec::new()));
         }
         let operator = truth.operator(t);
         if operator != now.operator {
-            now = Held::of(operator);
+            now = OperatorPolynomials::of(operator);
         }
         let error = (if target { excitation[k] } else { 0.0 }) - world.plant.x[0];
         let level = if t < idle_s { 0.0 } else { strength.of(t, error) };
-        let n = if case.sight == Sight::Held || k == 0 {
+        let n = if case.sampling == Sampling::Held || k == 0 {
             sigma_n * noise.step(k, level)
         } else {
             next_noise
         } + walk;
-        if case.sight == Sight::Continuous {
+        if case.sampling == Sampling::Continuous {
             next_noise = sigma_n * noise.step(k + 1, level);
         }
         let response = world.operator.output(&now.numerator);
         let control = stick(response + n);
-        if !(control.is_finite() && control.abs() < LOST * sigma_u) {
+        if !(control.is_finite() && control.abs() < LOSS_LIMIT * sigma_u) {
             return Err(SimError::Diverged {
                 signal: "u",
                 time_s: t,
@@ -251,14 +248,14 @@ fn of_person(case: &Case, run: RunOf, operator: Operator, sample_time: SampleTim
         let ends = [excitation[k], excitation[k + 1]];
         let noises = [
             n,
-            if case.sight == Sight::Held {
+            if case.sampling == Sampling::Held {
                 n
             } else {
                 next_noise + walk
             },
         ];
         world.sample(&now, &mut shadows, k, error, control, ends, noises, &stick);
-        if let Blemish::Drift(size) = case.blemish {
+        if let Imperfection::Drift(size) = case.imperfection {
             walk += size * sigma_u * ts.sqrt() * steps[k];
         }
         hidden.n.push(n);
@@ -286,17 +283,17 @@ fn of_person(case: &Case, run: RunOf, operator: Operator, sample_time: SampleTim
 }
 
 impl Run {
-    /// The signals as recorded.
+    /// Applies the imperfections of the recorder.
     fn recorded(&mut self, case: &Case, run: RunOf, [sigma_u, sigma_e]: [f64; 2]) {
         let ts = self.sample_time.s();
         let at = |t_s: f64| ((t_s / ts).round() as usize).min(self.e.len());
         let gap = at(60.0)..at(63.0);
-        match case.blemish {
-            Blemish::Offset(part) => {
+        match case.imperfection {
+            Imperfection::Offset(part) => {
                 self.e.iter_mut().for_each(|e| *e += part * sigma_e);
                 self.u.iter_mut().for_each(|u| *u -= part * sigma_u);
             }
-            Blemish::Glitches(size) => {
+            Imperfection::Glitches(size) => {
                 let draws = run.stream(case, GLITCHES).uniform(2 * self.u.len());
                 for (u, draw) in self.u.iter_mut().zip(draws.chunks_exact(2)) {
                     if draw[0] < ts / 50.0 {
@@ -304,8 +301,8 @@ impl Run {
                     }
                 }
             }
-            Blemish::Missing | Blemish::Silent => {
-                let value = if case.blemish == Blemish::Missing {
+            Imperfection::Missing | Imperfection::Silent => {
+                let value = if case.imperfection == Imperfection::Missing {
                     f64::NAN
                 } else {
                     0.0
@@ -313,9 +310,9 @@ impl Run {
                 self.e[gap.clone()].fill(value);
                 self.u[gap].fill(value);
             }
-            Blemish::Polarity(at_s) => {
+            Imperfection::Polarity(at_s) => {
                 let from = at(at_s);
-                let Hidden { n, response, .. } = &mut self.hidden;
+                let OracleData { n, response, .. } = &mut self.hidden;
                 for signal in [&mut self.u, n, response] {
                     signal[from..].iter_mut().for_each(|u| *u = -*u);
                 }
@@ -324,8 +321,8 @@ impl Run {
         }
     }
 
-    /// Recorded e and u as a record, if all of it was recorded; the excitation is the channel
-    /// `excitation`.
+    /// Returns recorded e and u as a record with the excitation in the channel `excitation`; `None` if samples are
+    /// missing.
     pub fn record(&self) -> Option<Record> {
         let channel = |name: &str, values: &[f64]| Channel::new(name, "", values.to_vec());
         let record = Record::new(self.sample_time, channel("e", &self.e), channel("u", &self.u)).ok()?;
@@ -355,7 +352,7 @@ mod tests {
             let quiet = Case {
                 ratio: 0.0,
                 length_s: 80.0,
-                shifts: Vec::new(),
+                operator_changes: Vec::new(),
                 ..case(name)
             };
             let run = simulate(&quiet, RUN).unwrap();
@@ -379,7 +376,7 @@ mod tests {
     #[test]
     fn the_shadow_is_the_person_of_before_and_the_sum_is_what_was_recorded() {
         let run = simulate(&case("change-K_e_dot-100"), RUN).unwrap();
-        let Hidden {
+        let OracleData {
             n, response, before, ..
         } = &run.hidden;
         for k in 0..run.u.len() {
@@ -413,7 +410,7 @@ mod tests {
     fn every_loop_runs() {
         let are_loops = |case: &Case| {
             let again = matches!(case.theme, Theme::Changes | Theme::ChangesInRemnants);
-            !again && !matches!(case.blemish, Blemish::IdleStart(_))
+            !again && !matches!(case.imperfection, Imperfection::IdleStart(_))
         };
         for case in cases()
             .into_iter()

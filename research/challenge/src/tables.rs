@@ -7,12 +7,13 @@ use super::{
     oracle::CERTAIN,
 };
 
-/// Number of methods in one table of a page 1200 pixels wide: for numbers, and for words.
-const BESIDE: usize = 7;
-const WORDS_BESIDE: usize = 5;
+/// Number of methods in one table of numbers on a page 1200 pixels wide; `METHODS_PER_WORD_TABLE` is the number in a
+/// table of words.
+const METHODS_PER_TABLE: usize = 7;
+const METHODS_PER_WORD_TABLE: usize = 5;
 
-/// The tables of results: error of H, its time course after a change, alarms, changes found,
-/// coverage, parameters, findings.
+/// Returns the tables of results: error of H, its time course after a change, alarms, detected changes, coverage,
+/// parameters, findings.
 pub fn tables(lines: &[Line]) -> String {
     let mut text = String::new();
     let methods = in_order(lines.iter().map(|line| line.method.as_str()));
@@ -20,7 +21,7 @@ pub fn tables(lines: &[Line]) -> String {
     text += &overview(lines, &methods, &cases);
 
     text += "\n### Error of H\n\nMean of |dH|/|H| over the lines, from 8 s after a change on or without a change; median over the runs.\n\n";
-    by_case(&mut text, &cases, &methods, BESIDE, |case, method| {
+    by_case(&mut text, &cases, &methods, METHODS_PER_TABLE, |case, method| {
         let of = own(lines, case, method).flat_map(|line| &line.moments);
         let settled = of.filter(|m| is_settled(&m.label)).map(|m| m.error);
         median(settled.collect()).map_or("–".to_owned(), |e| format!("{e:.2}"))
@@ -113,7 +114,7 @@ pub fn tables(lines: &[Line]) -> String {
     }
 
     text += "\n### Coverage\n\nBands of 1.96 standard errors of real and imaginary part of H that hold the truth, in percent; from 8 s after a change on or without a change.\n\n";
-    by_case(&mut text, &cases, &methods, BESIDE, |case, method| {
+    by_case(&mut text, &cases, &methods, METHODS_PER_TABLE, |case, method| {
         let of = own(lines, case, method)
             .flat_map(|line| &line.moments)
             .filter(|m| is_settled(&m.label));
@@ -151,7 +152,7 @@ pub fn tables(lines: &[Line]) -> String {
         .collect();
     if !judged.is_empty() {
         text += "\n### What their verdicts report\n\nThe two findings that a verdict has most often, with the runs that have them.\n\n";
-        by_case(&mut text, &cases, &judged, WORDS_BESIDE, |case, method| {
+        by_case(&mut text, &cases, &judged, METHODS_PER_WORD_TABLE, |case, method| {
             commonest(own(lines, case, method))
         });
     }
@@ -160,7 +161,7 @@ pub fn tables(lines: &[Line]) -> String {
     text
 }
 
-/// Each entrant in a row.
+/// Table with one row for each entrant.
 fn overview(lines: &[Line], methods: &[&str], cases: &[&str]) -> String {
     let mut text = "\n### In a row each\n\nError of H from 8 s after a change on or without a change: median and largest of the cases. Coverage of its bands in percent. Alarms an hour in runs without a change, those of the remnant alone after the plus sign. Changes found of those that the oracle finds with certainty, within 5 and 8 s.\n\n".to_owned();
     head(
@@ -226,7 +227,7 @@ fn overview(lines: &[Line], methods: &[&str], cases: &[&str]) -> String {
     text
 }
 
-/// Failed entrants, with reasons and cases.
+/// Table of failed entrants, with reasons and cases.
 fn failures(lines: &[Line]) -> String {
     let failed = || (lines.iter()).filter_map(|line| Some((line, line.failed.as_deref()?)));
     let mut text = String::new();
@@ -252,7 +253,7 @@ fn failures(lines: &[Line]) -> String {
     text
 }
 
-/// The two commonest findings.
+/// The two most frequent findings.
 fn commonest<'a>(lines: impl Iterator<Item = &'a Line> + Clone) -> String {
     let mut counts: Vec<(&str, usize)> = Vec::new();
     for kind in in_order(lines.clone().flat_map(|line| &line.findings).map(String::as_str)) {
@@ -275,7 +276,7 @@ fn commonest<'a>(lines: impl Iterator<Item = &'a Line> + Clone) -> String {
     }
 }
 
-/// True from 8 s after a change on, and without a change.
+/// True for results from 8 s after a change on, and for results without a change.
 fn is_settled(label: &str) -> bool {
     !matches!(label, "+2" | "+4" | "before")
 }
@@ -296,7 +297,7 @@ fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     all
 }
 
-/// A row for each case and a column for each method, split into tables with at most the given number of methods.
+/// Writes a row for each case and a column for each method, split into tables with at most `beside` methods.
 fn by_case(text: &mut String, cases: &[&str], methods: &[&str], beside: usize, cell: impl Fn(&str, &str) -> String) {
     let each = methods.len().div_ceil(methods.len().div_ceil(beside).max(1)).max(1);
     for (i, some) in methods.chunks(each).enumerate() {
@@ -330,7 +331,7 @@ fn share(of: usize, all: usize) -> String {
     }
 }
 
-/// The median; none if there are no values.
+/// The median; `None` if there are no values.
 fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let n = values.len();

@@ -1,11 +1,10 @@
-//! Operator and plant between two samples, and the history of the error.
+//! Operator and plant between two samples, with the history of the error.
 //!
-//! Steps of at most a millisecond. The delay is read from the history at any fraction of a step: a
-//! held error enters each step with its mean over that step, a continuous one with its values
-//! between the steps.
+//! The steps are at most a millisecond long. The delay is read from the history at any fraction of a step: a held error
+//! enters each step with its mean over that step, a continuous error with its values interpolated between the steps.
 
 use super::{
-    case::{Case, Forcing, Sight},
+    case::{Case, Forcing, Sampling},
     operator::{Canonical, Operator, Plant},
 };
 
@@ -13,13 +12,13 @@ use super::{
 const STEP_S: f64 = 0.001;
 
 /// An operator with its polynomials.
-pub(super) struct Held {
+pub(super) struct OperatorPolynomials {
     pub operator: Operator,
     pub numerator: Vec<f64>,
     denominator: Vec<f64>,
 }
 
-impl Held {
+impl OperatorPolynomials {
     pub fn of(operator: Operator) -> Self {
         Self {
             operator,
@@ -29,29 +28,29 @@ impl Held {
     }
 }
 
-/// States and the history of the error.
-pub(super) struct World {
+/// States of operator and plant, and the history of the error.
+pub(super) struct LoopState {
     pub operator: Canonical,
     pub plant: Canonical,
     element: Plant,
-    sight: Sight,
+    sampling: Sampling,
     disturbed: bool,
     ts: f64,
-    /// Number of steps per sample.
+    /// Number of integration steps per sample.
     steps: usize,
-    /// The error of each sample (held), or of each step.
+    /// Past errors: of each sample if the error is held, otherwise of each step.
     errors: Vec<f64>,
 }
 
-impl World {
+impl LoopState {
     pub fn new(case: &Case, ts: f64, total: usize) -> Self {
         let steps = (ts / STEP_S - 1e-9).ceil().max(1.0) as usize;
-        let each = if case.sight == Sight::Held { 1 } else { steps };
+        let each = if case.sampling == Sampling::Held { 1 } else { steps };
         Self {
             operator: Canonical::at_rest(),
             plant: Canonical::at_rest(),
             element: case.plant,
-            sight: case.sight,
+            sampling: case.sampling,
             disturbed: case.forcing == Forcing::Disturbance,
             ts,
             steps,
@@ -59,12 +58,12 @@ impl World {
         }
     }
 
-    /// Advances from sample k to the next: `error` and `control` at its start, excitation and
-    /// remnant at its start and end.
+    /// Advances from sample k to the next. `error` and `control` are values at its start, `excitation` and `noise`
+    /// values at its start and end.
     #[allow(clippy::too_many_arguments)]
     pub fn sample(
         &mut self,
-        now: &Held,
+        now: &OperatorPolynomials,
         shadows: &mut [(Operator, Canonical)],
         k: usize,
         error: f64,
@@ -79,10 +78,10 @@ impl World {
         let mut u = control;
         for i in 0..self.steps {
             let [f, d] = if self.disturbed { [0.0, 1.0] } else { [1.0, 0.0] };
-            match self.sight {
-                Sight::Held if i == 0 => self.errors.push(error),
-                Sight::Held => {}
-                Sight::Continuous => self.errors.push(f * between(excitation, i) - self.plant.x[0]),
+            match self.sampling {
+                Sampling::Held if i == 0 => self.errors.push(error),
+                Sampling::Held => {}
+                Sampling::Continuous => self.errors.push(f * between(excitation, i) - self.plant.x[0]),
             }
             let place = (k * self.steps + i) as f64;
             let input = self.input(place - now.operator.tau_e_s / h);
@@ -91,13 +90,13 @@ impl World {
                 let input = self.input(place - operator.tau_e_s / h);
                 state.advance(&operator.denominator(), input, h);
             }
-            let next = match self.sight {
-                Sight::Held => control,
-                Sight::Continuous => stick(self.operator.output(&now.numerator) + between(noise, i + 1)),
+            let next = match self.sampling {
+                Sampling::Held => control,
+                Sampling::Continuous => stick(self.operator.output(&now.numerator) + between(noise, i + 1)),
             };
-            let force = match self.sight {
-                Sight::Held => [d * excitation[0]; 2],
-                Sight::Continuous => [d * between(excitation, i), d * between(excitation, i + 1)],
+            let force = match self.sampling {
+                Sampling::Held => [d * excitation[0]; 2],
+                Sampling::Continuous => [d * between(excitation, i), d * between(excitation, i + 1)],
             };
             let ends = [u + force[0], next + force[1]];
             self.plant
@@ -106,15 +105,15 @@ impl World {
         }
     }
 
-    /// Input of the operator at start, middle and end of the step that starts at a position, in steps.
+    /// Returns the input of the operator at the start, middle and end of the step that starts at `place`, in steps.
     fn input(&self, place: f64) -> [f64; 3] {
-        match self.sight {
-            Sight::Held => [self.mean_held(place); 3],
-            Sight::Continuous => [0.0, 0.5, 1.0].map(|part| self.seen(place + part)),
+        match self.sampling {
+            Sampling::Held => [self.mean_held(place); 3],
+            Sampling::Continuous => [0.0, 0.5, 1.0].map(|part| self.interpolated_error(place + part)),
         }
     }
 
-    /// Mean of the held error over the step that starts at a position, in steps.
+    /// Returns the mean of the held error over the step that starts at `place`, in steps.
     fn mean_held(&self, place: f64) -> f64 {
         let n = self.steps as f64;
         let (first, last) = (place / n, (place + 1.0) / n);
@@ -125,7 +124,7 @@ impl World {
                 self.errors.get(sample as usize).copied().unwrap_or(0.0)
             }
         };
-        // A position on the border, up to rounding, is on it.
+        // The tolerance assigns a position at a sample boundary to the boundary in spite of rounding errors.
         let edge = (first + 1.0 - 1e-9).floor();
         if edge >= last || edge <= first {
             return value(first + 1e-9);
@@ -134,8 +133,8 @@ impl World {
         part * value(first) + (1.0 - part) * value(edge)
     }
 
-    /// The error at a position, in steps.
-    fn seen(&self, place: f64) -> f64 {
+    /// Returns the continuous error at `place`, in steps, by linear interpolation.
+    fn interpolated_error(&self, place: f64) -> f64 {
         if place < 0.0 {
             return 0.0;
         }

@@ -1,11 +1,11 @@
-//! Common parts of the studies of this crate. A study is a file in `examples/`, whose head
-//! describes its results and arguments.
+//! Common parts of the studies of this crate. Each study is a file in `examples/`; the comment at its top describes its
+//! results and arguments.
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`task`] | the conditions of the thesis, and runs on all cores |
-//! | [`told`] | methods that are given the delay |
-//! | [`oracle`] | what is known at most of a change: both persons are known |
+//! | [`task`] | the conditions of the thesis, and execution of runs on all cores |
+//! | [`told`] | methods with a given delay |
+//! | [`oracle`] | upper bound of the information about a change, if the operators before and after it are known |
 //! | [`pilots`] | the folder of recorded pilots |
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]

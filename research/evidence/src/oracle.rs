@@ -1,13 +1,14 @@
 //! Upper bound of the available information: the likelihood ratio of the operator after a change against that before
-//! it, if both are known.
+//! it, if both operators are known.
 //!
-//! The gains s of each are those of all trials of that element (except the examined one), in the basis of the default
-//! operator; after the whitening filter of the first trial's remnant, with its variance,
+//! The gains s of each operator are estimated from all trials with that element (except the examined trial), in the
+//! basis of the default operator. After the whitening filter of the first trial's remnant, whose variance is sigma^2,
+//! the ratio is
 //!
-//! `log Lambda = sum (limited (y - x' s_0))^2 - (limited (y - x' s_1))^2) / 2 sigma^2`
+//! `log Lambda = sum ((limited (y - x' s_0))^2 - (limited (y - x' s_1))^2) / (2 sigma^2)`
 //!
-//! over the first seconds after the change, each without its mean. A value of about 12 is needed for one false alarm
-//! per hour, and more if the operators are not known.
+//! over the first seconds after the change, where each residual has its mean removed. One false alarm per hour requires
+//! a value of about 12, or more if the operators are not known.
 use hoid_core::adaptive::{basis::Basis, defaults::DefaultOperator};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
@@ -15,7 +16,7 @@ const ORDER: usize = 16;
 const DELAY_S: f64 = 0.2;
 const LIMIT: f64 = 3.5;
 
-/// Regressors and output of a trial, and the analysed rows.
+/// Regressors and output of a trial, with the first row that is analysed.
 pub struct Rows {
     x: Vec<Vector3<f64>>,
     u: Vec<f64>,
@@ -23,7 +24,7 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Computes the rows from error and output, with a ramp of `from` rows before.
+    /// Computes the regressors from the error; the first `from` rows are a ramp and are not analysed.
     pub fn new(e: &[f64], u: &[f64], from: usize, ts: f64) -> Self {
         let point = DefaultOperator::with_delay(DELAY_S + 0.5 * ts).point;
         let mut basis = Basis::new(point, ts).unwrap();
@@ -40,7 +41,7 @@ impl Rows {
         }
     }
 
-    /// Rows after the whitening filter `1 + d_1 q^-1 + ..`, without their means.
+    /// Returns regressors and output after the whitening filter `1 + d_1 q^-1 + ..`, with their means removed.
     fn whitened(&self, d: &[f64]) -> (Vec<Vector3<f64>>, Vec<f64>) {
         let rows = self.from..self.u.len();
         let x: Vec<Vector3<f64>> = rows
@@ -77,7 +78,7 @@ fn gains(trials: &[&Rows], d: &[f64]) -> Vector3<f64> {
     products.lu().solve(&with_output).unwrap()
 }
 
-/// The autoregression with the smallest residuals of v.
+/// Returns the least-squares autoregressive model of v.
 fn autoregression(v: &[f64]) -> Vec<f64> {
     let before = DMatrix::from_fn(v.len() - ORDER, ORDER, |k, j| v[k + ORDER - 1 - j]);
     let mut now = DVector::from_column_slice(&v[ORDER..]);
@@ -87,8 +88,9 @@ fn autoregression(v: &[f64]) -> Vec<f64> {
     core::iter::once(1.0).chain(d.iter().map(|d| -d)).collect()
 }
 
-/// `log Lambda` over the first `samples` of the second trial: `before` are the first operator's trials, with the joined
-/// one at `joined`; `after` those of the second without the examined one.
+/// Returns `log Lambda` over the first `samples` of the second trial. `before` are the trials with the first operator,
+/// of which the trial `joined` precedes the second trial; `after` are the trials with the second operator, without the
+/// examined trial.
 pub fn log_ratio(before: &[&Rows], joined: usize, after: &[&Rows], second: &Rows, samples: usize) -> f64 {
     let first = before[joined];
     let mut d: Vec<f64> = (0..=ORDER).map(|j| f64::from(j == 0)).collect();

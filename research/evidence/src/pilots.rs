@@ -1,4 +1,4 @@
-//! The folder of recorded pilots, for the examples that read it.
+//! The folder of recorded pilots, for the examples that read them.
 
 use std::{
     env, fs,
@@ -7,10 +7,10 @@ use std::{
 
 use hoid::{io::ReadOptions, model::Record};
 
-/// Start of the recordings, s: earlier data are the run-in.
+/// Start of the measurements, s; earlier data belong to the run-in.
 pub const FROM_S: f64 = 8.08;
 
-/// The folder given by `HOID_PILOT_DATA`; a message is printed if it is not set.
+/// Returns the folder given by `HOID_PILOT_DATA`; if the variable is not set, prints a message and returns `None`.
 pub fn folder() -> Option<PathBuf> {
     let folder = env::var_os("HOID_PILOT_DATA").map(PathBuf::from);
     if folder.is_none() {
@@ -19,7 +19,7 @@ pub fn folder() -> Option<PathBuf> {
     folder
 }
 
-/// Names of the recordings of these runs, `1,4` or `all`, in their order.
+/// Returns the names of the recordings of the given runs, such as `1,4` or `all`, in alphabetical order.
 pub fn names(folder: &Path, runs: &str) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(folder)
         .unwrap()
@@ -31,7 +31,7 @@ pub fn names(folder: &Path, runs: &str) -> Vec<String> {
     names
 }
 
-/// A recording, and its first sample from [`FROM_S`] on.
+/// Reads a recording; returns it with the index of its first sample from [`FROM_S`] on.
 pub fn read(folder: &Path, name: &str) -> (Record, usize) {
     let path = folder.join(format!("{name}.parquet"));
     let record = hoid::io::read_record(&path, &ReadOptions::default()).unwrap().record;

@@ -8,10 +8,10 @@ use rayon::prelude::*;
 
 /// End of the start fit, s.
 pub const START_S: f64 = 30.72;
-/// The change, s.
+/// Time of the change, s.
 pub const CHANGE_S: f64 = 40.96;
 
-/// A condition with K_c in the output matrix, as in the thesis.
+/// Scenario of a condition with K_c in the output matrix, as in the thesis.
 pub fn scenario(condition: Condition, remnant_order: usize, level: f64) -> Scenario {
     let mut scenario = Scenario::condition(condition);
     scenario.remnant.order = remnant_order;
@@ -23,7 +23,7 @@ pub fn scenario(condition: Condition, remnant_order: usize, level: f64) -> Scena
     scenario
 }
 
-/// Results of the runs in their order, computed on all cores.
+/// Computes the results of all runs on all cores and returns them in the order of the runs.
 pub fn on_all_cores<T: Send>(runs: usize, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
     (0..runs).into_par_iter().map(|r| one(r as u64)).collect()
 }

@@ -4,10 +4,10 @@ use hoid_track::{Method, StartAt, TrackOptions};
 
 use crate::task::START_S;
 
-/// Delay of the operator of the thesis, samples.
+/// Delay nk of the operator of the thesis, samples.
 const NK: usize = 29;
 
-/// A method with a given delay and a start fit of the first 30.72 s.
+/// Options of a method with a given delay and a start fit to the first 30.72 s.
 pub fn options(method: Method) -> TrackOptions {
     TrackOptions {
         start: StartAt::Span(Some((0.0, START_S))),
@@ -15,7 +15,7 @@ pub fn options(method: Method) -> TrackOptions {
     }
 }
 
-/// RLS or RPEM with the settings of the text.
+/// Options of RLS or RPEM with the settings of the text.
 pub fn of_the_text(method: Method) -> TrackOptions {
     let mut settings = vec![("memory", "256"), ("covariance", "0.1"), ("limit", "inf")];
     settings.extend((method != Method::rls()).then_some(("stable", "noise")));

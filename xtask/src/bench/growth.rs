@@ -1,9 +1,9 @@
-//! Growth of time and memory with samples, parameters, replications and threads.
+//! Growth of time and memory with the numbers of samples, parameters, replications and threads.
 //!
-//! Each point is a process of its own. Our example reports itself what its peak was; of the command
-//! line the largest resident memory is read from `/proc` while it runs (Linux; elsewhere the column
-//! is empty). The slope is that of `log time` over `log N` by least squares, from the third
-//! smallest N on, where what a run costs without data no longer counts: 1 is a straight line.
+//! Each point is measured in its own process. The example of hoid reports its own peak memory. For the command line,
+//! the largest resident memory is read from `/proc` while it runs (on Linux; elsewhere the column is empty). The slope
+//! of `log time` over `log N` is fitted by least squares, starting from the third smallest N because the fixed cost of
+//! a run dominates at smaller N; a slope of 1 means that time is proportional to N.
 
 use std::{
     fmt::Write,
@@ -24,11 +24,11 @@ use crate::process::output;
 struct Point {
     n: usize,
     seconds: f64,
-    /// Additional memory, bytes; none if the system does not report it.
+    /// Additional memory, bytes; `None` if the system does not report it.
     memory: Option<u64>,
 }
 
-/// Interval of the measurements of a child's memory.
+/// Interval between measurements of a child's memory.
 const LOOK: Duration = Duration::from_millis(2);
 
 const PLAN: &str = "name = \"growth\"
@@ -54,10 +54,10 @@ orders.nd = 1
 orders.nk = 29
 ";
 
-/// All tables as Markdown; `quick` omits the largest points.
+/// Measures all points and returns the tables as Markdown; `quick` omits the largest points.
 ///
 /// # Errors
-/// A point that cannot be measured.
+/// The reason, if a point cannot be measured.
 pub fn tables(tasks: &Path, hoid: &Path, work: &Path, quick: bool) -> Result<String, String> {
     let data = work.join("data");
     let largest = if quick { 5 } else { 7 };
@@ -124,7 +124,7 @@ pub fn tables(tasks: &Path, hoid: &Path, work: &Path, quick: bool) -> Result<Str
     Ok(text)
 }
 
-/// A point of the example `tasks`.
+/// Measures a point with the example `tasks`.
 fn of_tasks(tasks: &Path, data: &Path, name: &str, n: usize) -> Result<Point, String> {
     let mut command = Command::new(tasks);
     command
@@ -156,7 +156,7 @@ fn replications(hoid: &Path, plan: &Path, work: &Path, n: usize, threads: usize)
     Ok(Point { n, seconds, memory })
 }
 
-/// `hoid identify` on a Parquet file of n samples (t, e, u).
+/// Measures `hoid identify` on a Parquet file of n samples (t, e, u).
 fn identify(tasks: &Path, hoid: &Path, work: &Path, n: usize) -> Result<String, String> {
     let file = work.join("growth.parquet");
     let mut write = Command::new(tasks);
@@ -165,7 +165,7 @@ fn identify(tasks: &Path, hoid: &Path, work: &Path, n: usize) -> Result<String, 
         .args(["--growth", "arx", &n.to_string()])
         .arg(&file);
     output(&mut write)?;
-    // The file contains t, e and u; its record contains e and u, 8 bytes each.
+    // The file contains t, e and u; the record contains only e and u with 8 bytes each.
     let data = 16 * n as u64;
     let mut text = format!(
         "\n`hoid identify` on a Parquet file of {n} samples (e and u: {}):\n\n| fit | time | peak memory | times e and u |\n|---|---:|---:|---:|\n",
@@ -174,7 +174,7 @@ fn identify(tasks: &Path, hoid: &Path, work: &Path, n: usize) -> Result<String, 
     for (name, structure, options) in [
         ("ARX", "arx", &["--orders", "na=2,nb=2", "--nk", "29"][..]),
         ("Box-Jenkins", "bj", &["--orders", "nb=2,nd=1,nf=2", "--nk", "29"]),
-        // Candidates are fitted on all cores at once.
+        // The candidates are fitted on all cores at once.
         ("Box-Jenkins, orders and delay chosen", "bj", &[]),
     ] {
         eprintln!("identify: {name}");
@@ -215,7 +215,7 @@ fn watched(command: &mut Command) -> Result<(f64, Option<u64>), String> {
     }
 }
 
-/// `VmHWM` of a status file, bytes.
+/// Returns `VmHWM` from the text of a status file, bytes.
 fn high_water(status: &str) -> Option<u64> {
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     line.split_whitespace()
@@ -255,7 +255,7 @@ fn each(seconds: f64) -> String {
     }
 }
 
-/// Slope of `log time` over `log N`.
+/// Returns the slope of `log time` over `log N`.
 fn slope(points: &[Point]) -> f64 {
     let logs: Vec<(f64, f64)> = points.iter().map(|p| ((p.n as f64).ln(), p.seconds.ln())).collect();
     let count = logs.len() as f64;

@@ -1,10 +1,10 @@
-//! Limit of the number of instructions of a task.
+//! Limit on the number of instructions of a task.
 //!
-//! Times of a shared machine carry little information; the number of instructions of a program is
-//! the same to a few in a thousand whatever else runs. Callgrind (Valgrind) counts those of one run
-//! of the example `tasks` and of three: half of the difference belongs to one run of the task. The
-//! numbers that are kept are in [`KEPT`] with the compiler that gave them. More than [`ALLOWED`]
-//! above them fails; with another compiler it is only reported.
+//! Times measured on a shared machine carry little information. The number of instructions of a program is reproducible
+//! to a few parts in a thousand, regardless of what else runs. Callgrind (Valgrind) counts the instructions for one run
+//! and for three runs of a task in the example `tasks`; half of the difference is the number for one run. The stored
+//! numbers are in [`KEPT`] with the version of the compiler. The check fails if a number exceeds its stored value by
+//! more than [`ALLOWED`]; with a different compiler version the excess is only reported.
 
 use std::{
     collections::BTreeMap,
@@ -18,15 +18,14 @@ use serde_json::{Value, json};
 const KEPT: &str = "crates/hoid/benches/instructions.json";
 /// Permitted increase relative to the stored number.
 const ALLOWED: f64 = 0.05;
-/// Tasks on one thread and one record. Valgrind uses AVX2 if the processor has it and no AVX-512:
-/// the sums of `arx` and `bj` use the same registers on all but old processors, which need more
-/// instructions.
+/// Tasks with one thread and one record. Valgrind uses AVX2 if the processor has it, but not AVX-512. The sums of `arx`
+/// and `bj` therefore use the same registers on all but old processors, which need more instructions.
 const TASKS: [&str; 6] = ["arx", "bj", "rls", "rpem", "loop", "loop with noise"];
 
-/// Counts, compares, and with `keep` stores the numbers.
+/// Counts the instructions and compares them with the stored numbers; `keep` stores the new numbers.
 ///
 /// # Errors
-/// If a task takes more instructions than permitted, or Valgrind fails.
+/// The reason, if a task needs more instructions than permitted or Valgrind fails.
 pub fn gate(program: &Path, data: &Path, keep: bool) -> Result<(), String> {
     if Command::new("valgrind")
         .arg("--version")
@@ -83,7 +82,7 @@ fn read() -> Option<Kept> {
     })
 }
 
-/// A line for each task, and whether one exceeds the limit.
+/// Returns a line for each task, and whether any task exceeds the limit.
 fn compare(found: &BTreeMap<String, u64>, kept: &BTreeMap<String, u64>) -> (String, bool) {
     let mut over = false;
     let mut lines = vec![format!(
@@ -116,7 +115,7 @@ fn count(program: &Path, data: &Path, task: &str, times: usize) -> Result<u64, S
     collected(&said).ok_or_else(|| format!("valgrind did not count {task}:\n{said}"))
 }
 
-/// The number after `Collected :`.
+/// Returns the number after `Collected :`.
 fn collected(said: &str) -> Option<u64> {
     let line = said.lines().find(|line| line.contains("Collected :"))?;
     line.rsplit(' ').next()?.parse().ok()

@@ -1,4 +1,4 @@
-//! The lines of JSON that tasks and peers print.
+//! The lines of JSON printed by hoid's tasks and by the peers.
 
 use serde_json::Value;
 
@@ -18,7 +18,7 @@ pub enum Outcome {
         /// Reason why the result differs by design.
         differs: Option<String>,
     },
-    /// Not installed, or failed: the reason.
+    /// The peer is not installed or failed, for this reason.
     Skipped(String),
 }
 
@@ -46,18 +46,18 @@ impl Line {
         })
     }
 
-    /// True for a line of ours.
+    /// True for a line of hoid.
     pub fn is_ours(&self) -> bool {
         self.peer.starts_with("hoid ")
     }
 }
 
-/// The lines in the printed output; libraries print other text as well.
+/// Extracts the lines from the printed output; libraries print other text as well.
 pub fn of(printed: &str) -> Vec<Line> {
     printed.lines().filter_map(Line::read).collect()
 }
 
-/// One line for each task and peer, the fastest of the rounds, in the order of appearance.
+/// Returns one line for each task and peer, the fastest of all rounds, in the order of appearance.
 pub fn best(lines: Vec<Line>) -> Vec<Line> {
     let mut kept: Vec<Line> = Vec::new();
     for line in lines {
@@ -76,7 +76,7 @@ pub fn best(lines: Vec<Line>) -> Vec<Line> {
     kept
 }
 
-/// Largest relative difference of two results; none if they cannot be compared.
+/// Returns the largest relative difference between two results; `None` if they cannot be compared.
 pub fn difference(a: &[f64], b: &[f64]) -> Option<f64> {
     let comparable = !a.is_empty() && a.len() == b.len();
     let relative = |(x, y): (&f64, &f64)| (x - y).abs() / x.abs().max(y.abs()).max(f64::MIN_POSITIVE);

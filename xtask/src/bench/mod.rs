@@ -1,9 +1,9 @@
-//! `cargo xtask bench`: our tasks and those of the peers in one session, and the growth of cost.
+//! `cargo xtask bench`: speed of hoid and its peers in the same session, and growth of the cost.
 //!
-//! Ours are the example `tasks` of the crate `hoid`, the peers the scripts in
-//! `crates/hoid/benches/peers`. Both print one line of JSON a task ([`lines`]). They take turns,
-//! and of the medians of the rounds the smallest counts, so that what else the machine does falls
-//! on both. The tables go between the markers of `research/notes/speed-peers.md` ([`crate::page`]).
+//! The tasks of hoid are in the example `tasks` of the crate `hoid`; the peers are the scripts in
+//! `crates/hoid/benches/peers`. Each prints one line of JSON per task ([`lines`]). They run in turn, and the smallest
+//! of the medians of the rounds is used, so that other load on the machine affects all of them. The tables are written
+//! between the markers of `research/notes/speed-peers.md` ([`crate::page`]).
 
 mod growth;
 mod instructions;

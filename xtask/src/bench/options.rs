@@ -2,7 +2,7 @@
 
 pub const USAGE: &str = "cargo xtask bench [--only TASK,...] [--peers none|installed|install] [--rounds N] [--reproduce M] [--growth [--quick]] [--instructions [--keep]] [--dry]";
 
-/// Peers to run.
+/// Which peers are run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Peers {
     None,
@@ -10,7 +10,7 @@ pub enum Peers {
     Install,
 }
 
-/// The quantities to measure.
+/// Options that select the measurements.
 #[derive(Debug, PartialEq)]
 pub struct Options {
     pub only: Vec<String>,
@@ -67,7 +67,7 @@ impl Options {
         Ok(options)
     }
 
-    /// True for a selected task.
+    /// True if the task is selected.
     pub fn chooses(&self, task: &str) -> bool {
         self.only.is_empty() || self.only.iter().any(|name| name == task)
     }

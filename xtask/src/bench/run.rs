@@ -1,4 +1,4 @@
-//! The run: our tasks, the peers in turn, and the tables.
+//! The benchmark run: hoid's tasks and the peers in turn, and the tables.
 
 use std::{
     env, fs,
@@ -20,19 +20,18 @@ use crate::{
 const PAGE: &str = "../../research/notes/speed-peers.md";
 
 const PEERS: &str = "crates/hoid/benches/peers";
-/// Belongs to the example `evidence` and prints no lines.
+/// A script that belongs to the example `evidence` and prints no lines.
 const OF_EVIDENCE: &str = "scipy_bj.py";
 const WORK: &str = "target/bench";
 
 /// Runs the benchmark.
 ///
 /// # Errors
-/// Build, run and write errors, as text.
+/// The reason, if building, running or writing fails.
 pub fn bench(arguments: &[String]) -> Result<(), String> {
     let options = Options::read(arguments)?;
     if options.instructions {
-        // For the whole workspace, as for the tests: with other features the same crates would be
-        // built twice.
+        // The whole workspace is built, as for the tests: with other features the same crates would be built twice.
         let ours = build(&["--workspace", "--example", "tasks"], "examples/tasks", Profile::Tests)?;
         return instructions::gate(&ours, &data(), options.keep);
     }
@@ -61,7 +60,7 @@ pub fn bench(arguments: &[String]) -> Result<(), String> {
     lines.retain(|line| options.chooses(&line.task));
     let text = table::ratios(&lines::best(lines), &machine());
     println!("\n{text}");
-    // Some of the tasks are only shown, not written to the page.
+    // If only some tasks are selected, the table is printed but not written to the page.
     page::write(PAGE, "ratios", &text, options.dry || !options.only.is_empty())
 }
 
@@ -69,7 +68,7 @@ pub fn bench(arguments: &[String]) -> Result<(), String> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Profile {
     Release,
-    /// That of the tests, which have already been compiled.
+    /// Profile of the tests, which are already compiled.
     Tests,
 }
 
@@ -98,7 +97,7 @@ fn run_ours(program: &Path, options: &Options, first: bool) -> Result<Vec<Line>,
         command.args(["--task", &options.only.join(",")]);
     }
     let mut lines = lines::of(&output(&mut command)?);
-    // On all cores, and only once: it takes minutes.
+    // The reproduction runs on all cores, and only once because it takes minutes.
     if let (true, Some(replications)) = (first, options.reproduce) {
         let mut command = Command::new(program);
         command
@@ -112,7 +111,7 @@ fn run_ours(program: &Path, options: &Options, first: bool) -> Result<Vec<Line>,
     Ok(lines)
 }
 
-/// Runs a peer; a failure is a line that reports it.
+/// Runs a peer; if the program cannot be started, the result is a line that reports it.
 fn run_peer(script: &Path, python: &str, options: &Options) -> Vec<Line> {
     let record = data().join("record.csv");
     let (program, before, behind): (&str, &[&str], &[&str]) = match script.extension().and_then(|e| e.to_str()) {
@@ -145,7 +144,7 @@ fn data() -> PathBuf {
     Path::new(WORK).join("data")
 }
 
-/// Peers: scripts whose names start with a letter.
+/// Returns the peers: scripts in the folder whose names do not start with an underscore.
 fn scripts() -> Result<Vec<PathBuf>, String> {
     let entries = fs::read_dir(PEERS).map_err(|e| format!("{PEERS}: {e}"))?;
     let mut found: Vec<PathBuf> = entries
@@ -159,8 +158,8 @@ fn scripts() -> Result<Vec<PathBuf>, String> {
     Ok(found)
 }
 
-/// The interpreter for the peers: that of the environment in `target/bench`, which
-/// `--peers install` creates, otherwise `python3`.
+/// Returns the Python interpreter for the peers: the one in the environment `target/bench/venv`, which `--peers
+/// install` creates, otherwise `python3`.
 fn interpreter(peers: Peers) -> Result<String, String> {
     let environment = Path::new(WORK).join("venv");
     let folder = if cfg!(windows) { "Scripts" } else { "bin" };
@@ -178,7 +177,7 @@ fn interpreter(peers: Peers) -> Result<String, String> {
     Ok(found.to_string_lossy().into_owned())
 }
 
-/// The processor, its cores and the system.
+/// Describes the processor, its cores and the operating system.
 fn machine() -> String {
     let model = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = model

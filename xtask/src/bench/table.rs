@@ -1,13 +1,13 @@
-//! The table of ratios.
+//! The table of speed ratios.
 
 use std::fmt::Write;
 
 use super::lines::{Line, Outcome, difference};
 
-/// Results closer than this are equal.
+/// Relative difference up to which results count as equal.
 const SAME: f64 = 1e-6;
 
-/// Limits on the speed of the project: smallest ratio to a peer whose name contains all the words.
+/// Limits on the speed of hoid: task, words in the name of the peer, and smallest permitted ratio.
 const LIMITS: [(&str, &str, f64); 16] = [
     ("arx", "normal equations", 10.0),
     ("arx", "numba", 2.0),
@@ -27,7 +27,7 @@ const LIMITS: [(&str, &str, f64); 16] = [
     ("reproduce, M = 100", "", 0.0),
 ];
 
-/// One row per task and peer, ours first, with versions and machine below.
+/// Returns a table with one row per task and peer, followed by the versions and the machine.
 pub fn ratios(lines: &[Line], machine: &str) -> String {
     let mut text = String::from(
         "| task | hoid | peer | its time | ratio | at least | answers |\n|---|---:|---|---:|---:|---:|---|\n",
@@ -36,7 +36,7 @@ pub fn ratios(lines: &[Line], machine: &str) -> String {
     for line in lines {
         if let Outcome::Skipped(reason) = &line.outcome {
             let of = if line.task.is_empty() { "all" } else { &line.task };
-            // A list of Markdown on one line each.
+            // Each item of a Markdown list must be on one line.
             let _ = writeln!(skipped, "- {}, {of}: {}", line.peer, reason.replace(['\n', '|'], " "));
         }
     }
@@ -97,7 +97,7 @@ fn answers(ours: &[f64], theirs: &[f64], differs: Option<&str>) -> String {
     }
 }
 
-/// Seconds with a unit and three digits.
+/// Formats a time with a unit and about three digits.
 pub fn time(seconds: f64) -> String {
     let (value, unit) = match seconds {
         s if s < 1e-3 => (s * 1e6, "us"),
@@ -107,7 +107,7 @@ pub fn time(seconds: f64) -> String {
     format!("{} {unit}", plain(value))
 }
 
-/// Formats about three digits.
+/// Formats a number with about three digits.
 pub fn plain(value: f64) -> String {
     match value.abs() {
         v if v >= 100.0 => format!("{value:.0}"),

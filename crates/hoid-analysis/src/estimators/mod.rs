@@ -1,12 +1,11 @@
-//! Estimators for recordings: the estimator, the trend that is removed from the data for it, and the verdict on its
-//! fit.
+//! Batch estimators for recordings: each fits a model, removes the trend of the data if necessary, and judges its fit.
 //!
-//! | file | the estimator |
+//! | file | estimator |
 //! |---|---|
-//! | `operator` | the operator of a person, its form by evidence |
-//! | `remnant` | an operator with a gain and a lead, and its remnant of order m |
-//! | `sigmoid` | an operator whose gains change once |
-//! | `polynomials`, `polynomial_options` | a polynomial structure, its orders given or searched; prediction error or instruments |
+//! | `operator` | operator of a person, whose form the evidence determines |
+//! | `remnant` | operator with a gain and a lead, and a remnant of order m |
+//! | `sigmoid` | operator whose gains change once |
+//! | `polynomials`, `polynomial_options` | polynomial structure with given or searched orders, fitted by the prediction error method or by instrumental variables |
 
 mod operator;
 mod polynomial_options;
@@ -25,77 +24,78 @@ use crate::{
     quality::Of, recordings::Recordings, settings::Setting,
 };
 
-/// A batch estimator as [`Identification`] runs it.
+/// A batch estimator that [`Identification`] can run.
 pub trait BatchEstimator: Sized + 'static {
-    /// Its result.
+    /// Type of the fit.
     type Fit: Answers;
-    /// Kind of system whose records it judges: for a person, who responds to an error within a second, a missing
+    /// Kind of system whose records are judged. For a person, who responds to an error within a second, a missing
     /// response is reported.
     const OF: Of = Of::Person;
 
-    /// Its entries in the registry: one, or one for each of its methods.
+    /// Returns the entries of the estimator in the registry: one entry, or one per method.
     fn specs() -> Vec<MethodSpec>;
 
-    /// Its options and those of the analysis that apply to it, in the order in which they are set and printed.
+    /// Returns the options of the estimator and the applicable options of the analysis, in the order in which they are
+    /// set and printed.
     fn options_of_analysis() -> Vec<AnalysisOption<Self>>;
 
-    /// True if orders and delay count samples, so that a high rate is kept.
+    /// True if orders and delay are numbers of samples, so that a high sampling rate is kept.
     fn counts_samples(&self) -> bool {
         false
     }
 
-    /// Method and limits of its search.
+    /// Returns the method and the limits of the search.
     fn search(&self) -> &SearchOptions;
 
-    /// Returns the name of its treatment of initial states.
+    /// Returns the name of the treatment of initial states.
     fn initial_state(&self) -> &'static str;
 
-    /// Returns the same estimator with its defaults.
+    /// Returns an estimator of the same kind with default options.
     fn by_default(&self) -> Self;
 
-    /// Its name among the printed settings.
+    /// Returns the name of the estimator as a printed setting.
     fn structure(&self) -> Setting {
         Setting::new("structure", OPERATOR)
     }
 
-    /// A printed setting that is not set by an option.
+    /// Returns a printed setting that no option sets.
     fn beside_options(&self) -> Option<Setting> {
         None
     }
 
-    /// Fits recordings that have been repaired and decimated; removes their means or level if the fit is made without
-    /// them.
+    /// Fits recordings that have been repaired and decimated; removes means or level from them if the fit is made
+    /// without these.
     ///
     /// # Errors
-    /// [`AnalysisError`] if there is no fit.
+    /// [`AnalysisError`] if the fit fails.
     fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<Self::Fit>, AnalysisError>;
 
-    /// Stores the final verdict, for a fit that contains one.
+    /// Stores the final verdict in a fit that contains a verdict.
     fn judged(_fit: &mut Self::Fit, _verdict: &Verdict) {}
 }
 
-/// A fit, before the findings of the recordings.
+/// A fit before the findings on the recordings are added to its verdict.
 #[derive(Debug, Clone)]
 pub struct Fitted<F> {
     /// The fit.
     pub fit: F,
-    /// Its own verdict, with that of a second opinion.
+    /// Verdict on the fit itself, including the findings of the second fit.
     pub verdict: Verdict,
-    /// The describing function that accompanies it.
+    /// The describing function that accompanies the fit, if there is one.
     pub described: Option<Description>,
     /// Trend that was removed from e and u.
     pub taken_out: Detrend,
-    /// The settings of the estimator that were used.
+    /// Settings of the estimator used in the fit.
     pub used: Vec<Setting>,
-    /// Values that were found for open settings.
+    /// Values determined for settings that were left open.
     pub found: Vec<Setting>,
 }
 
 impl<E: BatchEstimator> Identification<E> {
-    /// Sets an option of the registry by its name; false for an option of another estimator.
+    /// Sets an option by its name in the registry; returns false for an option of another estimator.
     ///
     /// # Errors
-    /// [`AnalysisError`] for a text that is not a valid value, or a value out of its bounds.
+    /// [`AnalysisError`] if the text is not a valid value or the value is out of bounds.
     pub fn set(&mut self, name: &str, text: &str) -> Result<bool, AnalysisError> {
         let option = E::options_of_analysis()
             .into_iter()
@@ -113,7 +113,7 @@ impl<E: BatchEstimator> Identification<E> {
     }
 }
 
-/// Returns the settings of options.
+/// Returns the registry settings of options.
 fn known<E: 'static>(options: Vec<AnalysisOption<E>>) -> Vec<hoid_ident::settings::Setting> {
     options.into_iter().map(|option| option.setting).collect()
 }

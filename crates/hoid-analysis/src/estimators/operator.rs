@@ -1,5 +1,5 @@
-//! The operator of a person, its form by evidence, with the lines of a recorded excitation, and with the loop in its
-//! verdict.
+//! Operator of a person, whose form the evidence determines. The fit also uses the lines of a recorded excitation, and
+//! the verdict includes the loop.
 
 use hoid_ident::{
     SearchOptions,
@@ -41,7 +41,7 @@ impl BatchEstimator for FamilyEstimator {
         all
     }
 
-    /// A first-order hold applies between the samples as recorded.
+    /// With a first-order hold between recorded samples the sampling rate must be kept.
     fn counts_samples(&self) -> bool {
         self.intersample == Intersample::Foh
     }
@@ -63,21 +63,21 @@ impl BatchEstimator for FamilyEstimator {
     }
 
     fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<FamilyFit>, AnalysisError> {
-        // A line of an excitation has one ratio of u and e, which more than one input may have caused.
+        // At a line of an excitation there is only one ratio of u to e, to which several inputs may contribute.
         let alone = with.estimator.channels.is_empty();
         let described = match alone {
             true => data.described(&with.excitation, with.period_s, with.faults),
             false => Ok(None),
         };
         let channel = match &described {
-            // The channel that was found or named: instruments need no lines.
+            // Instruments need no lines, so a channel named by the user is used even if it has none.
             Ok(Some(found)) => found.channel.clone(),
             _ => with.excitation.named().filter(|_| alone).map(str::to_owned),
         };
         let estimator = Self {
             excitation: channel,
             period_s: with.period_s,
-            // The detrending requested in reading has been done.
+            // If detrending was requested, it has been applied in reading.
             detrend: if data.were_detrended() {
                 Detrend::None
             } else {

@@ -1,4 +1,4 @@
-//! Options of a polynomial structure: the fields of [`Polynomials`], and the names under which texts set them. An
+//! Options of a polynomial structure: the fields of [`Polynomials`], and the names by which they are set from text. An
 //! option is declared only here.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
@@ -11,31 +11,32 @@ use hoid_ident::{
 };
 use hoid_model::{Orders, SampleTime, Structure};
 
-/// Default limit of a robust loss, in standard deviations, beyond which it is linear: 95 % efficient for normal noise
-/// (Huber 1981).
+/// Default limit of a robust loss in standard deviations, beyond which the loss is linear; the efficiency for normal
+/// noise is 95 % (Huber 1981).
 const HUBER: f64 = 1.345;
 
-/// A polynomial structure and its estimation.
+/// A polynomial structure and the options of its estimation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polynomials {
-    /// Structure, initial states, search, constraints, loss, focus. Orders and start are those below.
+    /// Structure, initial states, search, constraints, loss and focus. Its orders and start are replaced by the fields
+    /// below.
     pub template: Estimator,
-    /// Orders that are given, or searched in a range, by name; all other orders are those of the operator.
+    /// Orders by name, given or as a range for a search; all other orders are those of the operator.
     pub orders: NamedOrders,
-    /// Shortest and longest dead time in s, in place of an order nk.
+    /// Shortest and longest dead time in s; replaces the order nk.
     pub delay_s: Option<(f64, f64)>,
-    /// Criterion that chooses between candidates.
+    /// Criterion that selects among candidates.
     pub criterion: Criterion,
-    /// Start of the search: all coefficients, by name.
+    /// Start of the search: values of all coefficients by name.
     pub start: Option<BTreeMap<String, f64>>,
-    /// Instrumental variables in place of the prediction error method, for orders chosen by the latter.
+    /// Instrumental-variable method that replaces the prediction error method; the latter still selects the orders.
     pub method: Option<IvMethod>,
-    /// Components of the instruments; by default the forcing function, if it is recorded.
+    /// Components of the instruments; by default the forcing function, if it was recorded.
     pub instruments: Option<Instruments>,
 }
 
 impl Polynomials {
-    /// Returns the defaults: the operator's orders, by the prediction error method.
+    /// Returns the defaults: orders of the operator, fitted by the prediction error method.
     pub fn new(structure: Structure) -> Self {
         Self {
             template: Estimator::new(structure, Orders::default()),
@@ -51,14 +52,15 @@ impl Polynomials {
     fn order(&mut self, option: &Setting, name: String, range: RangeInclusive<usize>) -> Result<(), IdentError> {
         check_order(&name, &range)?;
         if self.orders.contains_key(&name) {
-            return Err(option.error(format!("{name} is given twice; drop one")));
+            return Err(option.error(format!("{name} is given twice; drop one of the two")));
         }
         self.orders.insert(name, range);
         Ok(())
     }
 }
 
-/// Names of the options that only the prediction error method has, and of those that only instrumental variables have.
+/// Names of the options that only the prediction error method has, and of the options that only instrumental variables
+/// have.
 pub(super) fn names_of_methods() -> [Vec<&'static str>; 2] {
     [by_prediction(), by_instruments()].map(|options| options.iter().map(|option| option.setting.name).collect())
 }
@@ -74,7 +76,7 @@ impl BatchOptions for Polynomials {
     }
 }
 
-/// Orders and delay.
+/// Returns the options for orders and delay.
 fn searched() -> Vec<BatchOption<Polynomials>> {
     let default = "the operator's: bj nb=2,nd=1..4,nf=2; arx na=2,nb=2";
     let nk = "Delay of b0 in samples (29) or dead time in s (0.28s), or a range (20..40, 0.1s..0.4s) to search";
@@ -112,7 +114,7 @@ fn searched() -> Vec<BatchOption<Polynomials>> {
         .printed("criterion", |how, _| Some(how.criterion.to_string())),
         BatchOption::new(shared::delay(""), |how: &mut Polynomials, option, text| {
             if how.delay_s.is_some() || how.orders.contains_key("nk") {
-                return Err(option.error("it is nk in s in place of samples; give only one of them"));
+                return Err(option.error("delay in s and nk in samples are the same quantity; give only one of them"));
             }
             let OneOrSpan(low, high) = option.read(text)?;
             how.delay_s = Some((low, high));
@@ -125,7 +127,7 @@ fn searched() -> Vec<BatchOption<Polynomials>> {
     ]
 }
 
-/// Options that only the prediction error method has.
+/// Returns the options that only the prediction error method has.
 fn by_prediction() -> Vec<BatchOption<Polynomials>> {
     let focus = "Purpose of the model: one-step prediction, or simulation from the input alone";
     let start = "Start of the search, all coefficients, such as f1=-1.9,f2=.92,b0=.04,...";
@@ -208,7 +210,7 @@ fn by_prediction() -> Vec<BatchOption<Polynomials>> {
     all
 }
 
-/// Options that only instrumental variables have.
+/// Returns the options that only instrumental variables have.
 fn by_instruments() -> Vec<BatchOption<Polynomials>> {
     let help = "Instruments: a channel independent of the noise, or `simulated` from the input (for an open loop)";
     let setting =

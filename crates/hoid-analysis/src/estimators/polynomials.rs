@@ -1,5 +1,5 @@
-//! A polynomial structure by the prediction error method or by instrumental variables, with orders and delay given or
-//! searched.
+//! Polynomial structures, fitted by the prediction error method or by instrumental variables; orders and delay are
+//! given or searched.
 
 use hoid_ident::{
     Choice, Estimator, Fit, IdentError, InitialState, InstrumentalVariable, Instruments, IvMethod, Loss, SearchOptions,
@@ -27,12 +27,12 @@ use crate::{
     settings::Setting,
 };
 
-/// A polynomial model, and the table of candidates if something was searched.
+/// A polynomial model, and the table of candidates if orders were searched.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct PolynomialFit {
-    /// The model.
+    /// The fitted model.
     pub fit: Fit,
-    /// The candidates.
+    /// The table of candidates.
     pub choice: Option<Choice>,
 }
 
@@ -43,10 +43,10 @@ impl Answers for PolynomialFit {
 }
 
 impl Polynomials {
-    /// Returns the search ranges at a sample time.
+    /// Returns the ranges in which orders and delay are searched, for a sample time.
     ///
     /// # Errors
-    /// [`AnalysisError`] for orders that the structure does not have, or that are too many.
+    /// [`AnalysisError`] if the structure does not have an order, or if there are too many combinations.
     pub fn ranges(&self, sample_time: SampleTime) -> Result<OrderRanges, AnalysisError> {
         let mut orders = self.orders.clone();
         if let Some((low, high)) = self.delay_s {
@@ -57,7 +57,7 @@ impl Polynomials {
             }
             if !(0.0 <= low && low <= high && high.is_finite()) {
                 return Err(AnalysisError::Options {
-                    reason: format!("delay is {low} to {high} s, expected 0 s or more, the shorter one first"),
+                    reason: format!("delay is {low} to {high} s, expected 0 s or more, the shorter delay first"),
                 });
             }
             orders.insert("nk".to_owned(), sample_time.nk(low)..=sample_time.nk(high));
@@ -145,18 +145,18 @@ impl BatchEstimator for Polynomials {
     }
 
     fn structure(&self) -> Setting {
-        // The default is not a polynomial structure: this one was requested.
+        // The default estimator is not a polynomial structure, so the user requested this one.
         Setting::new("structure", self.template.structure.name()).given(true)
     }
 
     fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<PolynomialFit>, AnalysisError> {
         let how = &with.estimator;
-        let mut level = Level::taken_out(data, how.template.structure.has_input(), with.faults);
+        let mut level = Level::remove(data, how.template.structure.has_input(), with.faults);
         let records = &data.records;
         let sample_time = records[0].sample_time();
         let ranges = how.ranges(sample_time)?;
         let combinations = ranges.combinations()?;
-        // With instrumental variables the means are removed, and no level is estimated.
+        // Methods with instrumental variables work without means, and no level is estimated.
         let mut estimator = Estimator {
             level: !level.is_kept() && how.method.is_none(),
             ..how.estimator(&combinations)?
@@ -166,7 +166,7 @@ impl BatchEstimator for Polynomials {
         let told = progress::counter("candidates", combinations.len());
         let search = |estimator: &Estimator| fit_or_choose(estimator, &ranges, how.criterion, records, &told);
         let (mut fit, choice) = match search(&estimator) {
-            // If a regressor cannot be distinguished from a level, as for a constant e, the means are removed and no
+            // If a regressor cannot be distinguished from a level, such as a constant e, the means are removed and no
             // level is estimated.
             Err(IdentError::SingularRegressors { .. }) if estimator.level => {
                 estimator.level = false;
@@ -197,22 +197,22 @@ impl BatchEstimator for Polynomials {
         let mut verdict = fit.verdict(records, choice.as_ref())?;
         let steps = records.iter().all(steps_from_level_to_level);
         if steps {
-            // Such data determine only the response after the steps.
+            // Such data determine only the response after the steps, so this finding does not apply.
             let others = verdict.findings().iter().filter(|finding| finding.kind != "stretch");
             verdict = Verdict::of(others.cloned().collect());
         }
-        // The second fit is by the prediction error method with a squared loss.
+        // The second fit uses the prediction error method with a squared loss.
         let is_asked_again =
             how.method.is_none() && estimator.loss == Loss::Quadratic && !steps && fit.rounding().is_none();
         if with.faults != FaultHandling::Keep && is_asked_again {
             let element = with.controlled_element.as_ref();
             verdict = verdict.append(second_opinion::of_polynomials(&estimator, &fit, records, element));
-            // A level that is not estimated may matter.
+            // If no level was estimated, its effect on the result is checked.
             if level.is_kept() && !data.were_detrended() {
                 verdict = verdict.append(second_opinion::of_level(&estimator, &fit, records));
             }
         }
-        found.extend(level.told(data, |_, record| fit.level(record)));
+        found.extend(level.report(data, |_, record| fit.level(record)));
         Ok(Fitted {
             fit: PolynomialFit { fit, choice },
             verdict,

@@ -1,4 +1,4 @@
-//! An operator with a gain and a lead, and its remnant of order m, in physical parameters.
+//! Operator with a gain and a lead, and a remnant of order m, in physical parameters.
 
 use hoid_ident::{GreyBox, GreyBoxFit, SearchOptions, diagnostics::second_opinion, settings::MethodSpec};
 use hoid_model::{FaultHandling, Structure};
@@ -46,14 +46,14 @@ impl BatchEstimator for GreyBox {
 
     fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<GreyBoxFit>, AnalysisError> {
         let estimator = &with.estimator;
-        let level = Level::taken_out(data, true, with.faults);
+        let level = Level::remove(data, true, with.faults);
         let fit = estimator.fit(&data.records)?;
         let mut verdict = fit.verdict(&data.records)?;
         if with.faults != FaultHandling::Keep {
             let element = with.controlled_element.as_ref();
             verdict = verdict.append(second_opinion::of_grey_box(estimator, &fit, &data.records, element));
         }
-        let found = level.told(data, |k, record| fit.polynomial_fit(k).level(record));
+        let found = level.report(data, |k, record| fit.polynomial_fit(k).level(record));
         Ok(Fitted {
             fit,
             verdict,

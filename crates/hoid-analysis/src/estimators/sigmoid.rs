@@ -1,5 +1,5 @@
-//! An operator whose gains change once, by a sigmoid. The level of u is one of its unknowns, because the mean of e
-//! depends on two operators.
+//! Operator whose gains change once, as a sigmoid function of time. The level of u is one of the unknowns, because the
+//! mean of e is filtered by two different operators.
 
 use hoid_ident::{
     InitialState, SearchOptions, SigmoidChange, SigmoidFit, diagnostics::second_opinion, settings::MethodSpec,
@@ -23,7 +23,7 @@ impl BatchEstimator for SigmoidChange {
     fn specs() -> Vec<MethodSpec> {
         vec![MethodSpec {
             name: CHANGE,
-            help: "the operator's gains change once, by a sigmoid; any form",
+            help: "the operator's gains change once, along a sigmoid; any form",
             source: "Zaal 2016; the thesis, section II",
             structures: &[Structure::BoxJenkins],
             settings: known(Self::options_of_analysis()),

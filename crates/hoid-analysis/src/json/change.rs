@@ -1,4 +1,4 @@
-//! An operator whose gains change once, as JSON.
+//! JSON form of an operator whose gains change once.
 
 use hoid_ident::{ChangedOperator, SigmoidFit, validation::whiteness};
 use serde_json::{Map, Value, json};

@@ -1,4 +1,4 @@
-//! A describing function as JSON.
+//! JSON form of a describing function.
 
 use hoid_ident::{MarginEstimates, frequency::Realisation};
 use serde_json::{Map, Value, json};
@@ -7,7 +7,7 @@ use super::{envelope, estimate, margin_estimates, number, optional};
 use crate::describing::Described;
 
 impl Described {
-    /// Returns crossover and margins with the controlled element.
+    /// Returns crossover and margins with the controlled element; `None` if the controlled element is unknown.
     pub fn margins(&self) -> Option<MarginEstimates> {
         self.found.margins.as_ref().map(|m| MarginEstimates {
             crossover_rad_s: m.crossover_rad_s,

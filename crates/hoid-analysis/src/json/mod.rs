@@ -1,17 +1,17 @@
-//! Results as JSON objects, the interface to other programs, and back.
+//! Conversion of results to JSON objects, the interface to other programs, and back.
 //!
-//! Every result has the same envelope: `hoid` (the version), `kind`, `records`, `data` (the processing of the
-//! records), `settings` (each with its value, given or not) and `verdict`; the rest depends on the kind. The complete
-//! numbers of a batch fit, with which it can predict again without its recordings, are in `state` ([`state`]). Values
-//! are those of `serde_json`, which keeps the order of keys.
+//! All results have the same envelope: `hoid` (the version), `kind`, `records`, `data` (faults and warnings of the
+//! records), `settings` (each with its value, whether given by the user or not) and `verdict`; the other keys depend on
+//! the kind. The complete numbers of a batch fit, with which it can predict again without its recordings, are in
+//! `state` ([`state`]). The objects are values of `serde_json`, which keep the order of keys.
 //!
 //! | file | kind |
 //! |---|---|
-//! | `operator` | `operator`: of a person, its form by evidence |
-//! | `change` | `operator` whose gains change once |
-//! | `description` | `description`: the describing function |
-//! | `polynomials` | `polynomial`; `operator` with its remnant of order m, which is written by its polynomials |
-//! | `trace` | `trace`: a recursion over a recording |
+//! | `operator` | `operator`: operator of a person in the form that the evidence supports |
+//! | `change` | `operator`: operator whose gains change once |
+//! | `description` | `description`: describing function |
+//! | `polynomials` | `polynomial`; `operator` with a remnant of order m, which is written by means of its polynomials |
+//! | `trace` | `trace`: estimates of a recursion over a recording |
 //! | `result` | the parts common to all kinds; conversion to text and back |
 
 mod change;
@@ -42,7 +42,7 @@ pub use trace::{change, open_loop, responses, track_fault, tracked_operator};
 
 use crate::{found::FoundFault, recordings::Account, settings::Setting};
 
-/// Returns the envelope of a result: version, kind, records, their processing, settings, verdict.
+/// Returns the envelope of a result: version, kind, verdict, records, their faults and warnings, settings.
 pub fn envelope(
     kind: &str,
     files: &[String],
@@ -61,26 +61,26 @@ pub fn envelope(
         "data",
         json!({"faults": faults(files, accounts), "warnings": warnings(files, accounts)}),
     );
-    // Earlier names, kept for one release.
+    // Earlier keys, kept for one release.
     set("warnings", warnings(files, accounts));
     set("faults", faults(files, accounts));
     set("settings", settings(settings_of));
     map
 }
 
-/// Returns the settings, each with its value, and whether it was given.
+/// Returns the settings, each with its value and whether the user gave it.
 pub fn settings(all: &[Setting]) -> Value {
     all.iter()
         .map(|one| json!({"name": one.name, "value": one.value, "given": one.given}))
         .collect()
 }
 
-/// Returns a number, or null if it is not finite: JSON has no NaN.
+/// Returns a number, or null for a number that is not finite, since JSON has no NaN or infinity.
 pub fn number(value: f64) -> Value {
     serde_json::Number::from_f64(value).map_or(Value::Null, Value::Number)
 }
 
-/// Returns a number, or null.
+/// Returns a number, or null for `None`.
 pub fn optional(value: Option<f64>) -> Value {
     value.map_or(Value::Null, number)
 }
@@ -90,7 +90,7 @@ pub fn estimate(e: &Estimate) -> Value {
     json!({"value": number(e.value), "standard_error": optional(e.standard_error)})
 }
 
-/// Returns an estimate with its standard error and its 95 % interval, null if there is none.
+/// Returns an estimate with its standard error and its 95 % interval, which is null if there is none.
 pub fn estimate_within(e: &Estimate, interval: Option<(f64, f64)>) -> Value {
     json!({
         "value": number(e.value),
@@ -99,8 +99,8 @@ pub fn estimate_within(e: &Estimate, interval: Option<(f64, f64)>) -> Value {
     })
 }
 
-/// Returns the verdict on a result: the level, the findings against it, the notes, and all findings with their names
-/// for programs.
+/// Returns the verdict on a result: the level, the findings against the result, the notes, and all findings with names
+/// for use by programs.
 pub fn verdict(v: &Verdict) -> Value {
     json!({
         "level": v.level.name(),
@@ -110,7 +110,7 @@ pub fn verdict(v: &Verdict) -> Value {
     })
 }
 
-/// Returns the verdict on each answer, by its name.
+/// Returns the verdict on each answer, with the name of the answer as key.
 pub fn answers(all: &[(String, Verdict)]) -> Map<String, Value> {
     let one = |v: &Verdict| {
         let reasons = v.findings().iter().filter(|finding| finding.severity > Severity::Note);
@@ -119,17 +119,17 @@ pub fn answers(all: &[(String, Verdict)]) -> Map<String, Value> {
     all.iter().map(|(name, verdict)| (name.clone(), one(verdict))).collect()
 }
 
-/// Returns a finding: a reason for doubt, or a note.
+/// Returns a finding, which is a warning or a note.
 pub fn finding(f: &Finding) -> Value {
     json!({"kind": f.kind, "severity": f.severity.name(), "message": f.message, "words": f.message})
 }
 
-/// Returns orders by name.
+/// Returns the model orders with their names.
 pub fn orders(o: &Orders) -> Value {
     json!({"na": o.na, "nb": o.nb, "nc": o.nc, "nd": o.nd, "nf": o.nf, "nk": o.nk})
 }
 
-/// Returns the operator, or the reason why there is none.
+/// Returns the operator, or the reason why the model represents none.
 pub fn operator(found: &Result<OperatorEstimate, NotConvertible>) -> Value {
     match found {
         Ok(o) => {
@@ -141,7 +141,7 @@ pub fn operator(found: &Result<OperatorEstimate, NotConvertible>) -> Value {
             }
             Value::Object(map)
         }
-        // A model of other orders does not represent an operator at all.
+        // A model of other orders does not represent an operator.
         Err(NotConvertible::OtherOrders { .. } | NotConvertible::PolesInBoth { .. }) => Value::Null,
         Err(reason) => json!({"convertible": false, "reason": reason.to_string()}),
     }
@@ -161,7 +161,7 @@ pub fn margins(all: &Crossings) -> Map<String, Value> {
     map
 }
 
-/// Returns every crossing of an estimated loop, the phase margin nearest to zero, the gain margin, and whether the
+/// Returns all crossings of an estimated loop, the phase margin closest to zero, the gain margin, and whether the
 /// closed loop is stable.
 pub fn loop_shape(shape: &LoopShape) -> Map<String, Value> {
     let crossing = |(omega, margin): &(Estimate, Estimate)| json!({"crossover_rad_s": estimate(omega), "phase_margin_deg": estimate(margin)});
@@ -194,7 +194,7 @@ pub fn margin_estimates(m: &MarginEstimates) -> Value {
     })
 }
 
-/// Returns a test of whiteness.
+/// Returns a whiteness test.
 pub fn ljung_box(test: Option<&LjungBox>) -> Value {
     test.map_or(Value::Null, |t| {
         json!({
@@ -205,7 +205,7 @@ pub fn ljung_box(test: Option<&LjungBox>) -> Value {
     })
 }
 
-/// Returns the goodness of fit on the records that were fitted, or on others.
+/// Returns the goodness of fit on the fitted records or on other records.
 pub fn goodness(q: &GoodnessOfFit) -> Map<String, Value> {
     let rows = [
         ("vaf_simulation", q.vaf_simulation),
@@ -224,7 +224,7 @@ pub fn validation(file: &str, q: &GoodnessOfFit) -> Value {
     Value::Object(file.chain(goodness(q)).collect())
 }
 
-/// Returns how a search ended.
+/// Returns the reason why a search ended.
 pub fn termination(t: &Termination) -> Value {
     json!({
         "reason": t.reason.to_string(),
@@ -238,7 +238,7 @@ pub fn named(name: &str, e: &Estimate) -> Value {
     json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)})
 }
 
-/// Returns files and sampling of the records, and their processing.
+/// Returns files, sampling and processing of the records.
 pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> Value {
     let record = |((file, r), account): ((&String, &Record), &Account)| {
         let mut one = json!({
@@ -260,7 +260,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> Va
     files.iter().zip(records).zip(accounts).map(record).collect()
 }
 
-/// Returns the problems of the sampling, as text.
+/// Returns the problems of the files as text.
 pub fn warnings(files: &[String], accounts: &[Account]) -> Value {
     let all = files.iter().zip(accounts);
     all.flat_map(|(file, account)| {
@@ -272,14 +272,14 @@ pub fn warnings(files: &[String], accounts: &[Account]) -> Value {
     .collect()
 }
 
-/// Returns all faults of the records, and the problems of their files, one object each.
+/// Returns all faults of the records and all problems of their files, one object each.
 pub fn faults(files: &[String], accounts: &[Account]) -> Value {
     let all = files.iter().zip(accounts);
     all.flat_map(|(file, account)| account.found().into_iter().map(move |found| fault(file, &found)))
         .collect()
 }
 
-/// Returns one fault as an object.
+/// Returns a fault as an object.
 pub fn fault(record: &str, found: &FoundFault) -> Value {
     let mut object = json!(found);
     object["record"] = json!(record);
@@ -288,6 +288,6 @@ pub fn fault(record: &str, found: &FoundFault) -> Value {
 
 /// Returns a list of serialised items, one object each.
 pub fn list<T: Serialize>(items: &[T]) -> Value {
-    // Numbers that JSON does not have become null; no other failure is possible.
+    // Numbers that JSON cannot represent become null; serialisation cannot fail in any other way.
     serde_json::to_value(items).unwrap_or(Value::Null)
 }

@@ -1,4 +1,4 @@
-//! The operator of a person as JSON: form, parameters with intervals, the other methods, covariance.
+//! JSON form of the operator of a person: form, parameters with intervals, results of other methods, covariance.
 
 use hoid_ident::{
     ResponsePoint,
@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{AnalysisError, identified::Identified, registry};
 
-/// Frequencies of the responses to several inputs, rad/s.
+/// Frequencies in rad/s at which the responses to several inputs are given.
 const CHANNEL_FREQUENCIES: [f64; 16] = [
     0.3, 0.4, 0.5, 0.7, 1.0, 1.4, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 13.0, 16.0,
 ];
@@ -110,7 +110,7 @@ impl BatchAnswer for FamilyFit {
     }
 }
 
-/// Returns the responses to all inputs, that to the error first.
+/// Returns the responses to all inputs, the response to the error first.
 fn channels(found: &Identified) -> Value {
     let fit = &found.fit;
     let sampling = (fit.sample_time, fit.intersample);
@@ -144,7 +144,7 @@ fn channels(found: &Identified) -> Value {
     std::iter::once(feedback).chain(further).collect()
 }
 
-/// Returns gain and phase with their errors, in the form of the lines of a describing function.
+/// Returns gain and phase with their errors, in the format of the lines of a describing function.
 pub(crate) fn response(points: &[ResponsePoint]) -> Value {
     let one = |p: &ResponsePoint| {
         json!({
@@ -226,12 +226,12 @@ fn agreement(found: &Identified) -> Value {
     })
 }
 
-/// Returns the reason why a method gave nothing, if there is one.
+/// Returns the reason why a method gave no result, or null.
 fn why_not(reason: Option<&String>) -> Value {
     reason.map_or(Value::Null, |why| json!({"reason": why}))
 }
 
-/// Returns estimates in the order of the form, each with its name.
+/// Returns named estimates in the order of the parameters of the form.
 fn all_named(parameters: &[(&'static str, Estimate)]) -> Value {
     parameters.iter().map(|(name, e)| named(name, e)).collect()
 }
@@ -250,7 +250,7 @@ fn parameter(p: &Parameter) -> Value {
     })
 }
 
-/// Returns the operator by the names of its parameters.
+/// Returns the operator with the names of its parameters as keys.
 fn operator(of: &OperatorOfRecord) -> Value {
     let mut map = Map::new();
     map.insert("convertible".to_owned(), json!(true));
@@ -292,7 +292,7 @@ fn form_figures(f: &FormFigures) -> Value {
     })
 }
 
-/// Returns coordinates with their names and the rows of their covariance.
+/// Returns the coordinates with their names and the rows of their covariance matrix.
 fn covariance(operator: &FamilyOperator, covariance: Option<&[f64]>) -> Value {
     let coordinates = operator.form().coordinates(operator.has_neuromuscular());
     let p = coordinates.len();

@@ -1,4 +1,4 @@
-//! A fit of polynomials as JSON, by itself or of an operator with its remnant of order m.
+//! JSON form of a fit of polynomials, or of an operator with a remnant of order m.
 
 use hoid_ident::{
     Candidate, Choice, Fit, GreyBoxFit, MarginEstimates, Root,
@@ -61,39 +61,39 @@ fn quality(q: &GoodnessOfFit, fit: &Fit) -> Value {
     Value::Object(map)
 }
 
-/// A fit of polynomials, and the quantities that follow from it and its records.
+/// A fit of polynomials, and the quantities that follow from the fit and its records.
 pub struct PolynomialAnswer<'a> {
-    /// The verdict on it.
+    /// Verdict on the fit.
     pub verdict: &'a Verdict,
-    /// Names of the records.
+    /// Names of the fitted records.
     pub files: &'a [String],
-    /// The records that were fitted.
+    /// The fitted records.
     pub records: &'a [Record],
-    /// The processing of each.
+    /// Processing of each record.
     pub accounts: &'a [Account],
-    /// The settings that were used.
+    /// Settings used in the fit.
     pub settings: &'a [Setting],
-    /// The model.
+    /// The fitted polynomial model.
     pub fit: &'a Fit,
-    /// The table of candidates.
+    /// The table of candidate orders, if orders were searched.
     pub choice: Option<&'a Choice>,
-    /// The fit in physical parameters from which the polynomials were computed.
+    /// The fit in physical parameters from which the polynomials were computed, if there is one.
     pub grey_box: Option<&'a GreyBoxFit>,
     /// VAF and NRMSE over all records.
     pub quality: GoodnessOfFit,
-    /// Its parameters as an operator with a gain and a lead.
+    /// Parameters of the model as an operator with a gain and a lead.
     pub operator: Result<OperatorEstimate, NotConvertible>,
-    /// For polynomials of other orders: the operator of the family that they represent.
+    /// For polynomials of other orders: the operator of the family that the polynomials represent.
     pub family: Option<Result<FamilyConversion, NotConvertible>>,
-    /// Its noise model as a remnant filter.
+    /// The noise model as a remnant filter.
     pub remnant: Option<Result<RemnantEstimate, NotConvertible>>,
-    /// The loop, if the controlled element is given.
+    /// Crossover and margins of the loop, if the controlled element is given.
     pub margins: Option<MarginEstimates>,
-    /// Residual tests on each record.
+    /// Residual tests, one per record.
     pub validations: Vec<Validation>,
     /// Horizon in samples, VAF and NRMSE of the prediction.
     pub ahead: Option<(usize, f64, f64)>,
-    /// Goodness of fit on another file.
+    /// Name of another file and goodness of fit on it.
     pub validation: Option<(&'a str, GoodnessOfFit)>,
 }
 
@@ -101,13 +101,13 @@ impl<'a> PolynomialAnswer<'a> {
     /// Collects the quantities that follow from an identified model.
     ///
     /// # Errors
-    /// The errors of a prediction of the records.
+    /// The errors of predicting the records.
     pub fn of<F>(found: &'a Identified<F>, fit: &'a Fit) -> Result<Self, AnalysisError> {
         let (data, with_input) = (&found.data, fit.model().structure().has_input());
         let validations = data.records.iter().map(|record| fit.validate(record));
         let validations = validations.collect::<Result<Vec<_>, _>>()?;
         let operator = fit.operator();
-        // Three poles, or one, do not represent a gain with a lead, but may represent another form.
+        // A model with one or three poles does not represent a gain with a lead, but may represent another form.
         let family = match &operator {
             Err(NotConvertible::OtherOrders { poles: 1..=3, .. }) if with_input => Some(fit.family_operator(None)),
             _ => None,
@@ -135,7 +135,7 @@ impl<'a> PolynomialAnswer<'a> {
         })
     }
 
-    /// True if the parameters of an operator were found, of a gain with a lead or of another form.
+    /// True if the parameters of an operator (a gain with a lead, or another form) were found.
     pub fn has_operator(&self) -> bool {
         let of_family = self.family.as_ref().map(Result::is_ok);
         of_family.unwrap_or(self.operator.is_ok()) && self.fit.model().structure().has_input()
@@ -178,7 +178,7 @@ impl<'a> PolynomialAnswer<'a> {
         }
         let ts = fit.model().sample_time().s();
         set("roots", fit.roots().iter().map(|r| root(r, ts)).collect());
-        // Residuals at the level of rounding errors carry no information.
+        // Residuals at the level of rounding errors contain no information.
         let tested = if fit.covariance().is_some() {
             self.validations.as_slice()
         } else {
@@ -235,15 +235,15 @@ impl BatchAnswer for GreyBoxFit {
     }
 }
 
-/// Crossover and margins in the range of manual control, below half the sampling frequency: the sampled model carries
-/// no information above it.
+/// Returns crossover and margins in the frequency range of manual control, limited to half the sampling frequency: the
+/// sampled model contains no information above it.
 fn loop_margins(fit: &Fit, element: &ContinuousTransferFunction) -> MarginEstimates {
     let (low, high) = MANUAL_CONTROL_RANGE_RAD_S;
     let high = high.min(fit.model().sample_time().nyquist_rad_s());
     fit.margins(|omega| element.response(omega), (low, high))
 }
 
-/// Orders m of the remnant that a grey box tried.
+/// Returns the remnant orders m that the grey-box fit tried.
 fn remnant_orders(grey_box: &GreyBoxFit) -> Value {
     let row = |c: &OrderCandidate| match &c.outcome {
         Ok(f) => json!({
@@ -289,7 +289,7 @@ fn remnant(found: &Result<RemnantEstimate, NotConvertible>) -> Value {
     }
 }
 
-/// Returns the operator of the family that polynomials represent: form, parameters by name, the meaning of the real
+/// Returns the operator of the family that the polynomials represent: form, parameters by name, the meaning of the real
 /// poles, and the misfit.
 pub fn of_family(found: &Result<FamilyConversion, NotConvertible>) -> Value {
     let found = match found {

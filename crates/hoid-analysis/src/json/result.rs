@@ -1,4 +1,4 @@
-//! A result as JSON and back.
+//! Conversion of a result to JSON and back.
 
 use hoid_ident::{GreyBoxFit, SigmoidFit};
 use hoid_io::{QualityIssue, QualityIssueKind, RowSpan};
@@ -17,9 +17,9 @@ use crate::{
     settings::Setting,
 };
 
-/// Kind of an operator.
+/// Value of `kind` for an operator.
 pub(super) const OPERATOR: &str = "operator";
-/// Kind of a polynomial model.
+/// Value of `kind` for a polynomial model.
 pub(super) const POLYNOMIAL: &str = "polynomial";
 
 /// A fit that can be written as JSON.
@@ -30,18 +30,18 @@ pub trait BatchAnswer: Answers + Serialize + DeserializeOwned {
     /// Returns the JSON object, without the state.
     ///
     /// # Errors
-    /// The errors of a prediction of its records.
+    /// The errors of predicting the records.
     fn object(found: &Identified<Self>) -> Result<Map<String, Value>, AnalysisError>;
 }
 
-/// Any result of a batch fit.
+/// The result of any batch fit.
 #[derive(Debug, Clone)]
-// A result is read once, and not kept in numbers.
+// Variants may differ much in size, since a result is read once and not stored in large numbers.
 #[allow(clippy::large_enum_variant)]
 pub enum BatchResult {
-    /// The operator of a person, its form by evidence.
+    /// Operator of a person in the form that the evidence supports.
     Operator(Identified),
-    /// A gain with a lead, and its remnant of order m.
+    /// Operator with a gain and a lead, and a remnant of order m.
     Remnant(Identified<GreyBoxFit>),
     /// An operator whose gains change once.
     Change(Identified<SigmoidFit>),
@@ -50,10 +50,10 @@ pub enum BatchResult {
 }
 
 impl BatchResult {
-    /// Reads a result that [`Identified::to_json`] wrote.
+    /// Reads a result written by [`Identified::to_json`].
     ///
     /// # Errors
-    /// [`AnalysisError::NotAResult`] for a text that is invalid, damaged, or of another version.
+    /// [`AnalysisError::NotAResult`] if the text is invalid, damaged, or from another version.
     pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
         let object = parsed(text)?;
         let estimator = object.get("estimator").and_then(Value::as_str).unwrap_or_default();
@@ -76,7 +76,7 @@ struct FoundIn {
     level: Option<Estimate>,
 }
 
-/// A quality issue with all its fields; the printed form is shorter.
+/// A quality issue with all its fields; the printed form contains fewer.
 #[derive(Serialize, Deserialize)]
 struct Issue(#[serde(with = "IssueFields")] QualityIssue);
 
@@ -144,10 +144,10 @@ impl FoundIn {
 }
 
 impl<F: BatchAnswer> Identified<F> {
-    /// Returns the result as an object: the interface to other programs, and its state.
+    /// Returns the JSON object of the result, including the state from which the result can be restored.
     ///
     /// # Errors
-    /// The errors of a prediction of its records.
+    /// The errors of predicting the records.
     pub fn json(&self) -> Result<Map<String, Value>, AnalysisError> {
         if let Some(written) = &self.written {
             return Ok(written.clone());
@@ -159,7 +159,7 @@ impl<F: BatchAnswer> Identified<F> {
         Ok(self.with_state(map))
     }
 
-    /// Adds to an object of this result the state from which the result can be restored.
+    /// Adds to a JSON object of this result the state from which the result can be restored.
     pub fn with_state(&self, mut map: Map<String, Value>) -> Map<String, Value> {
         map.insert("estimator".to_owned(), json!(F::ESTIMATOR));
         let state = Written {
@@ -180,7 +180,7 @@ impl<F: BatchAnswer> Identified<F> {
         map
     }
 
-    /// Returns the object as indented text.
+    /// Returns the JSON object as indented text.
     ///
     /// # Errors
     /// As [`Self::json`].
@@ -188,17 +188,17 @@ impl<F: BatchAnswer> Identified<F> {
         Ok(format!("{:#}", Value::Object(self.json()?)))
     }
 
-    /// Reads the output of [`Self::to_json`]: everything except the samples of its recordings. The model predicts,
-    /// simulates and validates as before, on records that are given to it.
+    /// Reads the output of [`Self::to_json`], which contains everything except the samples of the recordings. The
+    /// restored model predicts, simulates and validates as before, on records supplied by the caller.
     ///
     /// # Errors
-    /// [`AnalysisError::NotAResult`] for a text that is invalid, damaged, or of another version or estimator.
+    /// [`AnalysisError::NotAResult`] if the text is invalid, damaged, or from another version or estimator.
     pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
         restored(parsed(text)?)
     }
 }
 
-/// Results are equal if their written forms are.
+/// Two results are equal if their serialised forms are equal.
 impl<F: BatchAnswer> PartialEq for Identified<F> {
     fn eq(&self, other: &Self) -> bool {
         matches!((self.json(), other.json()), (Ok(one), Ok(two)) if one == two)

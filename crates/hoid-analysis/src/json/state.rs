@@ -1,10 +1,11 @@
-//! Complete state of a result, as text: a restored result is identical and can predict again.
+//! Complete state of a result as text: a restored result is identical to the original and can predict again.
 //!
-//! The numbers of the JSON object are for people and other programs; a model has more (covariances of numbers that are
-//! not printed, states, fixed parameters). All of it is written as TOML, which has infinite numbers and NaN where JSON
-//! has neither, and is one text in JSON; floats are written with as many digits as restore every bit. The first eight
-//! bytes of its SHA-256 precede it: a text that was cut or changed by hand is refused. They protect against damage,
-//! not against deliberate forgery.
+//! The other numbers in the JSON object are meant for people and other programs; a model contains more (covariances of
+//! quantities that are not printed, states, fixed parameters). The complete state is written as TOML, which can
+//! represent infinity and NaN, whereas JSON cannot, and is stored as one text in the JSON object; floating-point
+//! numbers are written with enough digits to restore every bit. The first eight bytes of the SHA-256 hash precede the
+//! text: a text that was truncated or edited by hand is refused. The hash protects against damage, not against
+//! deliberate forgery.
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
@@ -12,29 +13,29 @@ use sha2::{Digest, Sha256};
 
 use crate::AnalysisError;
 
-/// Digits of the checksum.
+/// Number of hexadecimal digits of the checksum.
 const DIGITS: usize = 16;
 
-/// A value of any type as a table.
+/// Wrapper that makes a value of any type a TOML table.
 #[derive(Serialize, Deserialize)]
 struct Table<T> {
     value: T,
 }
 
-/// Returns a value as text; `None` if it cannot be written.
+/// Serialises a value to text; `None` if this is not possible.
 pub fn written<T: Serialize>(value: &T) -> Option<String> {
     let text = toml::to_string(&Table { value }).ok()?;
     Some(format!("{}{text}", sum(&text)))
 }
 
-/// Returns the value of a text, or the reason why there is none.
+/// Restores the value from a text written by [`written`].
 ///
 /// # Errors
-/// For a text that was cut or changed, or is of another version.
+/// A message if the text was truncated or changed, or comes from another version.
 pub fn read<T: DeserializeOwned>(text: &str) -> Result<T, String> {
     let (stated, text) = text.split_at_checked(DIGITS).ok_or("its state is truncated")?;
     if stated != sum(text) {
-        return Err("its state is not the one that was written: it was truncated or changed".to_owned());
+        return Err("its state differs from the state that was written: it was truncated or changed".to_owned());
     }
     let version = env!("CARGO_PKG_VERSION");
     let table: Table<T> = toml::from_str(text)
@@ -42,10 +43,10 @@ pub fn read<T: DeserializeOwned>(text: &str) -> Result<T, String> {
     Ok(table.value)
 }
 
-/// Returns the value in the `state` of the JSON of a result of this kind.
+/// Restores the value in the key `state` of the JSON object of a result of the given kind.
 ///
 /// # Errors
-/// [`AnalysisError::NotAResult`] if the text is invalid or damaged, of another kind, or of another version.
+/// [`AnalysisError::NotAResult`] if the text is invalid or damaged, or belongs to another kind or version.
 pub fn of_kind<T: DeserializeOwned>(text: &str, kind: &str) -> Result<T, AnalysisError> {
     let none = |found: String| AnalysisError::NotAResult { found };
     let object: Value = serde_json::from_str(text).map_err(|error| none(format!("it is not JSON: {error}")))?;

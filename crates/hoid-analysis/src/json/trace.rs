@@ -1,4 +1,4 @@
-//! A trace as JSON, and the report of a tracker at one moment.
+//! JSON form of a trace, and of the state of a tracker at one time.
 
 use hoid_ident::Fit;
 use hoid_model::{
@@ -13,7 +13,7 @@ use super::{PolynomialAnswer, envelope, estimate, loop_shape, number, operator, 
 use crate::{AnalysisError, settings::Setting, tracking::Tracked};
 
 impl Tracked {
-    /// Returns the object as text.
+    /// Returns the JSON object as text.
     ///
     /// # Errors
     /// As [`Tracked::json`].
@@ -24,7 +24,7 @@ impl Tracked {
     /// Returns the JSON object.
     ///
     /// # Errors
-    /// The errors of the quality of the start fit.
+    /// The errors of computing the goodness of fit of the start fit.
     pub fn json(&self) -> Result<Map<String, Value>, AnalysisError> {
         let trace = &self.trace;
         let counts = trace.counts();
@@ -92,7 +92,7 @@ impl Tracked {
         Ok(map)
     }
 
-    /// Returns the start fit as `identify` writes it.
+    /// Returns the start fit in the JSON form of `identify`.
     fn start_json(&self, fit: &Fit, span: &Record) -> Result<Value, AnalysisError> {
         let records = std::slice::from_ref(span);
         let validation = fit.validate(span)?;
@@ -149,7 +149,7 @@ impl Tracked {
     }
 }
 
-/// Returns gain and phase at frequencies in rad/s, wherever there is an estimate.
+/// Returns gain and phase at frequencies in rad/s in each row that has an estimate.
 pub fn responses(at_rad_s: &[f64], of: impl Fn(usize, f64) -> Option<Response>) -> Value {
     let each = at_rad_s.iter().enumerate().map(|(place, omega)| {
         let response = of(place, *omega);
@@ -162,7 +162,7 @@ pub fn responses(at_rad_s: &[f64], of: impl Fn(usize, f64) -> Option<Response>) 
     Value::Array(each.collect())
 }
 
-/// Returns crossover and phase margin of a recursion, or the reason why there are none.
+/// Returns the crossover and the phase margin of a recursion, or the reason why they do not exist.
 pub fn open_loop(found: &Result<OpenLoop, NoCrossover>) -> Value {
     match found {
         Ok(found) => json!({
@@ -173,7 +173,7 @@ pub fn open_loop(found: &Result<OpenLoop, NoCrossover>) -> Value {
     }
 }
 
-/// Returns the operator of a recursion, with the information for each parameter whether the data determine it.
+/// Returns the operator of a recursion; for each parameter it includes whether the data determine the parameter.
 pub fn tracked_operator(
     found: &Result<OperatorEstimate, NotConvertible>,
     determined: impl Fn(&OperatorEstimate) -> Vec<Determined>,
@@ -185,7 +185,7 @@ pub fn tracked_operator(
     whole
 }
 
-/// Returns a span that the guard of a recursion found.
+/// Returns a fault span that the guard of a recursion found.
 pub fn track_fault(fault: &TrackFault) -> Value {
     json!({
         "kind": fault.kind.name(),
@@ -197,7 +197,7 @@ pub fn track_fault(fault: &TrackFault) -> Value {
     })
 }
 
-/// Returns a change of the person, declared at a time in s.
+/// Returns a change of the person, with the time in s at which it was declared.
 pub fn change(declared_at: Option<f64>, c: &Change) -> Value {
     let before_and_after = |pair: &[Estimate; 2]| json!({"before": estimate(&pair[0]), "after": estimate(&pair[1])});
     let numbers = |pair: &[f64; 2]| json!({"before": number(pair[0]), "after": number(pair[1])});

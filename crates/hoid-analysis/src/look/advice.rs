@@ -1,26 +1,26 @@
-//! Advice on how to read a file, and the command to type: as text, since nothing is chosen silently.
+//! Advice on how to read a file, and the command to type. Both are shown as text, since nothing is chosen silently.
 
 use hoid_ident::frequency::COMMON_EXCITATIONS;
 use hoid_io::{TimeChoice, TrialChoice};
 
 use super::{columns::Role, file::Look};
 
-/// Advice on how to read a file: the differences from the defaults.
+/// Advice on how to read a file: the options that differ from the defaults.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Advice {
-    /// Column of the input, or a difference.
+    /// Column of the input, or a difference of two columns.
     pub input: Option<String>,
     /// Column of the output.
     pub output: Option<String>,
-    /// The column of the time, and its unit.
+    /// Time column and its unit.
     pub time: Option<TimeChoice>,
-    /// The trials of the file.
+    /// Trials of the file.
     pub trial: Option<TrialChoice>,
     /// Sampling frequency, Hz.
     pub sampling_hz: Option<f64>,
     /// Start of the span of whole periods, s.
     pub from_s: Option<f64>,
-    /// Its end, s.
+    /// End of the span of whole periods, s.
     pub to_s: Option<f64>,
     /// Number of samples by which the output was recorded late.
     pub late_samples: Option<f64>,
@@ -31,13 +31,13 @@ pub struct Advice {
 }
 
 impl Look {
-    /// Returns the advice; `None` if it is not certain which columns are error and control. If the file does not make
-    /// a record yet, only the columns are known.
+    /// Returns the advice; `None` if it is not certain which columns are error and control. If the columns do not form
+    /// a record yet, the advice contains only the columns.
     pub fn advice(&self) -> Option<Advice> {
         if !self.roles.are_certain() {
             return None;
         }
-        // Both, if one is not the default: a command with both is easier to read.
+        // If one of them differs from its default, both are given: the command is then easier to read.
         let (input, output) = (&self.roles.input, &self.roles.output);
         let default = input.column == "e" && output.column == "u";
         let named = |role: &Role| (!default).then(|| role.column.clone());
@@ -73,7 +73,7 @@ impl Look {
 }
 
 impl Advice {
-    /// Returns the options of the command line.
+    /// Returns the advice as command-line options.
     pub fn arguments(&self) -> Vec<String> {
         let number = |value: Option<f64>| value.map(|value| value.to_string());
         let all = [
@@ -94,7 +94,7 @@ impl Advice {
             .collect()
     }
 
-    /// Returns the command that reads the file in this way.
+    /// Returns the command that reads the file according to the advice.
     pub fn command(&self, verb: &str, file: &str) -> String {
         let mut words = vec!["hoid".to_owned(), verb.to_owned(), file.to_owned()];
         words.extend(self.arguments());
@@ -102,7 +102,7 @@ impl Advice {
     }
 }
 
-/// Joins words as they are typed in a shell.
+/// Joins words as typed in a shell.
 pub fn typed(words: &[String]) -> String {
     let plain = |word: &str| {
         let is_plain = |c: char| c.is_alphanumeric() || "-_./=:,+%@".contains(c);

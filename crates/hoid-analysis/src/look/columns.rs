@@ -1,4 +1,4 @@
-//! Error and control by their common names.
+//! Recognition of error and control by their common column names.
 
 use hoid_io::{control_among, error_among};
 
@@ -7,23 +7,23 @@ const TARGETS: [&str; 7] = ["r", "ref", "reference", "target", "track", "setpoin
 /// Common names of the controlled variables.
 const OUTPUTS: [&str; 7] = ["y", "output", "position", "state", "cursor", "response", "x"];
 
-/// The column of a signal, and the reason for the choice.
+/// The column of a signal, and the reason why it was chosen.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Role {
-    /// The column, or a difference of two.
+    /// Name of the column, or a difference of two columns.
     pub column: String,
-    /// Reason for the choice.
+    /// Reason why the column was chosen.
     pub why: String,
     /// True if no other column is equally likely.
     pub certain: bool,
 }
 
-/// Error and control among the columns of a file.
+/// Columns of error and control in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Roles {
-    /// The tracking error.
+    /// Column of the tracking error.
     pub input: Role,
-    /// The control.
+    /// Column of the control.
     pub output: Role,
 }
 
@@ -38,8 +38,8 @@ impl Role {
 }
 
 impl Roles {
-    /// Finds input and output among the columns; requested columns are kept. For a signal that is not found, the common
-    /// name (`e` or `u`) is returned as uncertain, for the user to replace.
+    /// Finds input and output among the columns; columns requested by the user are kept. For a signal that is not
+    /// found, the default name (`e` or `u`) is returned as uncertain, for the user to replace.
     pub fn of(columns: &[&str], input: Option<&str>, output: Option<&str>) -> Self {
         let known = |names: &[&str]| -> Vec<&str> {
             let all = names.iter();
@@ -75,7 +75,7 @@ impl Roles {
         Self { input, output }
     }
 
-    /// True if both are certain.
+    /// True if both columns are certain.
     pub fn are_certain(&self) -> bool {
         self.input.certain && self.output.certain
     }

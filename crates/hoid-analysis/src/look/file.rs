@@ -1,4 +1,4 @@
-//! Contents of a file, and what was recognised in it.
+//! Contents of a file, and the signals and properties recognised in it.
 
 use std::path::Path;
 
@@ -15,11 +15,11 @@ use super::{
 /// Result of the examination of a file.
 #[derive(Debug)]
 pub struct Look {
-    /// Its columns, sampling and problems.
+    /// Columns, sampling and problems of the file.
     pub survey: FileSurvey,
-    /// Error and control.
+    /// Columns of error and control.
     pub roles: Roles,
-    /// Contents of these columns, or the reason why they make no record.
+    /// Summary of the record of these columns, or the reason why they do not form a record.
     pub seen: Result<RecordSummary, IoError>,
     pub(super) known: LookOptions,
 }
@@ -27,12 +27,12 @@ pub struct Look {
 /// Summary of the record of a file.
 #[derive(Debug)]
 pub struct RecordSummary {
-    /// The record, as recorded.
+    /// The record without preparation.
     pub record: Record,
-    /// The excitation and its span of whole periods, or the reason why there is none.
+    /// The excitation and its span of whole periods, or the reason why none was found.
     pub periods: Result<Periods, String>,
-    /// Number of samples by which the control was recorded late, or the reason why it is unknown; `None` if no
-    /// controlled element is known, or the lag is given.
+    /// Number of samples by which the control was recorded late, or the reason why this is unknown; `None` if no
+    /// controlled element is given, or if the user gave the lag.
     pub lag: Option<Result<Lag, String>>,
 }
 
@@ -40,7 +40,7 @@ impl Look {
     /// Examines a file.
     ///
     /// # Errors
-    /// The errors of [`survey`], where the file cannot be read at all.
+    /// The errors of [`survey`] if the file cannot be read.
     pub fn at(path: &Path, known: &LookOptions) -> Result<Self, IoError> {
         let found = survey(path)?;
         let roles = Roles::of(&names(&found), known.input.as_deref(), known.output.as_deref());
@@ -52,7 +52,7 @@ impl Look {
         })
     }
 
-    /// Returns the columns with a unit, and the unit: next to the name, or in it as in `Stick [V]`.
+    /// Returns the columns that have a unit, with the unit from the file or from the name, as in `Stick [V]`.
     pub fn units(&self) -> Vec<(&str, &str)> {
         let all = self.survey.columns.iter();
         all.filter_map(|column| Some((column.path.as_str(), unit_of(column)?)))
@@ -60,12 +60,12 @@ impl Look {
     }
 }
 
-/// Names of the columns.
+/// Returns the names of the columns.
 pub(super) fn names(found: &FileSurvey) -> Vec<&str> {
     found.columns.iter().map(|column| column.path.as_str()).collect()
 }
 
-/// Unit of a column, next to its name or at its end in brackets.
+/// Returns the unit of a column from the file, or from brackets at the end of its name.
 fn unit_of(column: &ColumnSurvey) -> Option<&str> {
     let beside = Some(column.unit.as_str()).filter(|unit| !unit.is_empty());
     beside.or_else(|| {
@@ -86,7 +86,7 @@ fn seen(path: &Path, roles: &Roles, known: &LookOptions) -> Result<RecordSummary
         sampling_hz: known.sampling_hz,
         ..ReadOptions::default()
     };
-    // If there are several trials, the first is examined.
+    // If the file contains several trials, the first one is examined.
     let record = match read_record(path, &options) {
         Err(IoError::SeveralTrials { by, trials, .. }) => {
             let first = trials.first().map_or("", String::as_str);

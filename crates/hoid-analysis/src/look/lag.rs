@@ -1,5 +1,5 @@
-//! Number of samples by which the control was recorded later than the error, from the controlled element: the delay with
-//! which e returns from u in the recorded loop ([`recorded_element`]).
+//! Number of samples by which the control was recorded later than the error. With a known controlled element it follows
+//! from the delay between u and e in the recorded loop ([`recorded_element`]).
 
 use hoid_ident::diagnostics::recorded_element;
 use hoid_model::{ContinuousTransferFunction, Record};
@@ -7,16 +7,16 @@ use hoid_model::{ContinuousTransferFunction, Record};
 /// Lag of the recorded control.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lag {
-    /// In samples.
+    /// Lag in samples.
     pub samples: f64,
-    /// In s.
+    /// Lag in s.
     pub seconds: f64,
-    /// Description of how it was found.
+    /// Description of the evidence.
     pub words: String,
 }
 
 /// Returns the lag of the control, or the reason why it is unknown: a signal of the loop was not recorded, or the loop
-/// has another element.
+/// contains another controlled element.
 pub(super) fn of_control(
     record: &Record,
     excitation: Option<&str>,
@@ -35,7 +35,7 @@ pub(super) fn of_control(
             .map_or_else(String::new, |finding| finding.message));
     }
     let ts_s = record.sample_time().s();
-    // Zero without a sign.
+    // Adding 0.0 turns -0.0 into 0.0.
     let samples = (-found.delay_s / ts_s).round() + 0.0;
     let plural = if samples == 1.0 { "" } else { "s" };
     Ok(Lag {

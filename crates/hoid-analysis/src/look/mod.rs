@@ -1,16 +1,16 @@
 //! Examination of a file: the meaning of its columns, the excitation of the loop and its span of whole periods, and
 //! the lag of the recorded control.
 //!
-//! Command line, groups and Python all use this module, and nothing is chosen silently: the findings are shown, with
-//! the evidence, in the form of [`Advice`] on how to read the file. Requested values are not searched for.
+//! The command line, the analysis of groups and Python use this module. Nothing is chosen silently: the findings and
+//! their evidence are shown as [`Advice`] on how to read the file. Values given by the user are not searched for.
 //!
 //! | file | contents |
 //! |---|---|
-//! | `options` | prior knowledge of the file |
+//! | `options` | information about the file given by the user |
 //! | `columns` | error and control, recognised by their common names |
 //! | `periods` | the excitation, its period and lines, and the longest span of whole periods |
-//! | `lag` | by how many samples the control was recorded later than the error, from the controlled element |
-//! | `file` | all of these findings for one file: [`Look`] |
+//! | `lag` | number of samples by which the control was recorded later than the error, for a known controlled element |
+//! | `file` | [`Look`]: all these findings for one file |
 //! | `other_columns` | error message for a file without the columns that were requested |
 //! | `advice` | advice on how to read the file, and the command to type |
 

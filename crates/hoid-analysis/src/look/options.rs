@@ -1,29 +1,29 @@
-//! Prior knowledge of a file before it is examined.
+//! Information about a file that the user gives before the file is examined.
 
 use hoid_io::{TimeChoice, TrialChoice};
 use hoid_model::ContinuousTransferFunction;
 
-/// Options given by the user, which are therefore not searched for.
+/// Options given by the user; the given values are not searched for.
 #[derive(Debug, Clone, Default)]
 pub struct LookOptions {
-    /// Column of the input, or a difference.
+    /// Column of the input, or a difference of two columns.
     pub input: Option<String>,
     /// Column of the output.
     pub output: Option<String>,
     /// Column of the excitation; `none` if there is none.
     pub excitation: Option<String>,
-    /// The controlled element, as typed and as parsed.
+    /// Controlled element, as typed and as parsed.
     pub controlled_element: Option<(String, ContinuousTransferFunction)>,
-    /// The column of the time and its unit; found automatically if not given.
+    /// Time column and its unit; found automatically if `None`.
     pub time: Option<TimeChoice>,
-    /// The trials of a file; found from a time that restarts if not given.
+    /// Trials of the file; determined from a time that restarts if `None`.
     pub trial: Option<TrialChoice>,
-    /// Sampling frequency, Hz; that of the column t if not given.
+    /// Sampling frequency, Hz; determined from the column t if `None`.
     pub sampling_hz: Option<f64>,
-    /// Start of the span that is used, s.
+    /// Start of the span to use, s.
     pub from_s: Option<f64>,
-    /// End of the span that is used, s.
+    /// End of the span to use, s.
     pub to_s: Option<f64>,
-    /// Number of samples by which the output is recorded later than the input that causes it.
+    /// Number of samples by which the output was recorded later than the input.
     pub offset_samples: Option<f64>,
 }

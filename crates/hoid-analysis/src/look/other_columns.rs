@@ -1,5 +1,5 @@
-//! A file without the requested columns in which error and control are nevertheless recognised: nothing is chosen
-//! silently, the user is shown which columns to request.
+//! Error for a file in which the requested columns are missing but error and control are recognised under other names.
+//! Nothing is chosen silently: the message shows which columns to request.
 
 use std::path::Path;
 
@@ -8,24 +8,24 @@ use thiserror::Error;
 
 use super::{advice::typed, columns::Roles, file::names};
 
-/// A file without the requested columns in which error and control are nevertheless recognised.
+/// A file without the requested columns, in which error and control are recognised under other names.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error("{}: {}", self.found(), self.as_keys())]
 pub struct OtherColumns {
-    /// The file.
+    /// Name of the file.
     pub file: String,
-    /// The requested column that is missing.
+    /// Requested column that is missing.
     pub missing: String,
-    /// The existing columns.
+    /// Names of the existing columns.
     pub available: String,
-    /// The error; `None` if none is wanted.
+    /// Column of the error; `None` if no input is requested.
     pub input: Option<String>,
-    /// The control.
+    /// Column of the control.
     pub output: String,
 }
 
 impl OtherColumns {
-    /// Describes the request, the existing columns, and the recognised ones.
+    /// Describes the request, the existing columns, and the recognised columns.
     pub fn found(&self) -> String {
         let Self {
             file,
@@ -40,14 +40,14 @@ impl OtherColumns {
         format!("there is no column {missing} in {file} (columns: {available}). It looks like {error}u = {output}")
     }
 
-    /// Returns the remedy as keys and values, as in a manifest and in Python.
+    /// Returns the remedy as keys and values, in the form used in a manifest and in Python.
     pub fn as_keys(&self) -> String {
         let input = self.input.as_ref().map(|input| format!("input=\"{input}\""));
         let all = input.into_iter().chain([format!("output=\"{}\"", self.output)]);
         all.collect::<Vec<_>>().join(", ")
     }
 
-    /// Returns the remedy as a command line: the typed arguments, with the column options replaced by these.
+    /// Returns the remedy as a command line: the typed arguments with corrected column options.
     pub fn command(&self, typed_words: impl IntoIterator<Item = String>) -> String {
         let mut words = vec!["hoid".to_owned()];
         let mut all = typed_words.into_iter();
@@ -69,7 +69,8 @@ impl OtherColumns {
     }
 }
 
-/// Returns the columns that a file has instead of e and u; `None` for another error, or if they are not certain.
+/// Returns the columns of error and control if `error` reports that e or u is missing; `None` for another error, or if
+/// the columns are not certain.
 pub fn other_columns(error: &IoError, path: &Path, options: &ReadOptions) -> Option<OtherColumns> {
     let IoError::NoSuchColumn {
         file,
@@ -82,7 +83,7 @@ pub fn other_columns(error: &IoError, path: &Path, options: &ReadOptions) -> Opt
     };
     let found = survey(path).ok()?;
     let names = names(&found);
-    // Only the common names are replaced; any other name was typed deliberately.
+    // Only default names are replaced; the user typed any other name deliberately.
     let of = |column: &ColumnExpression, default: &str| {
         let found = column.is_among(&names).then(|| column.to_string());
         (found.is_some() || column.to_string() == default).then_some(found)

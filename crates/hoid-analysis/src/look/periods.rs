@@ -1,10 +1,9 @@
-//! The excitation of a run: the channel whose power is in single lines over a span of whole periods,
-//! and the longest such span.
+//! Search for the excitation of a run: the channel whose power is in single lines over a span of whole periods, and the
+//! longest such span.
 //!
-//! Over a whole number of periods `T` a periodic signal has its power in the bins `n / T` of its
-//! Fourier transform, and in no other; over any other span it leaks into all bins. The spans between
-//! whole seconds are tried, from the longest down, until nearly all the power is in single bins
-//! ([`Excitation::found_in`]).
+//! Over a whole number of periods `T` the power of a periodic signal lies in the bins of its discrete Fourier transform
+//! at the frequencies `n / T`, and in no others; over any other span it leaks into all bins. The spans between whole
+//! seconds are tried, the longest first, until nearly all the power lies in single bins ([`Excitation::found_in`]).
 
 use hoid_ident::frequency::{COMMON_EXCITATIONS, Excitation, LineSearch};
 use hoid_model::Record;
@@ -12,39 +11,40 @@ use hoid_numerics::statistics::variance;
 
 use super::options::LookOptions;
 
-/// Longest part that a span may leave out at either end of a record, s, and as a share of the record.
+/// Maximum part of a record, in s and as a fraction, that a span may leave out at either end.
 const MOST_CUT_S: f64 = 20.0;
 const MOST_CUT_SHARE: f64 = 0.4;
-/// Least number of lines of an excitation: people predict a sine.
+/// Minimum number of lines of an excitation, since people can predict a single sine.
 const FEWEST_LINES: usize = 3;
-/// Largest ratio of two leaked shares of the power that count as equal.
+/// Largest ratio of two leaked fractions of the power that count as equal.
 const LEAKS_ALIKE: f64 = 3.0;
-/// Share of the power outside the lines that rounding to about five digits may cause.
+/// Fraction of the power outside the lines that may be due to rounding to about five digits.
 const ROUNDING: f64 = 1e-9;
 
 /// The excitation of a run.
 #[derive(Debug, Clone)]
 pub struct Periods {
-    /// Its channel.
+    /// Name of the channel.
     pub channel: String,
-    /// Its period, s.
+    /// Period of the excitation, s.
     pub period_s: f64,
     /// The longest span of whole periods, s.
     pub span_s: (f64, f64),
-    /// Its lines.
+    /// Lines of the excitation.
     pub excitation: Excitation,
-    /// All of this as text.
+    /// Description of the excitation in words.
     pub words: String,
 }
 
-/// Finds the excitation in the named channel, else in the first of the common ones that has lines, else in any other.
+/// Finds the excitation in the channel named by the user, or else in the first channel that has lines: channels with a
+/// common name are tried before all others.
 pub(super) fn search(record: &Record, known: &LookOptions) -> Result<Periods, String> {
     let channels: Vec<&str> = record.channels().map(|channel| channel.name.as_str()).collect();
     let candidates: Vec<&str> = match known.excitation.as_deref() {
         Some("none") => return Err("as requested".to_owned()),
         Some(name) => vec![name],
         None => {
-            // Error, control and output follow the excitation: they contain its lines, and more.
+            // Error, control and output respond to the excitation: they contain its lines and other power.
             let answers = channels.iter().take(2).copied().chain(["y", "x", "n", "e", "u"]);
             let answers: Vec<&str> = answers.collect();
             let default = COMMON_EXCITATIONS.into_iter().filter(|name| channels.contains(name));
@@ -71,8 +71,9 @@ pub(super) fn search(record: &Record, known: &LookOptions) -> Result<Periods, St
     })
 }
 
-/// Finds the longest span of whole periods of a channel. A span that is some samples too long leaks little, and would
-/// pass: among the spans that are shorter by less than a second, the one with the least leakage is chosen.
+/// Finds the longest span of whole periods of a channel. A span that is a few samples too long leaks little and would
+/// be accepted; therefore the spans that are shorter by less than a second are compared, and the one with the least
+/// leakage is chosen.
 fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Periods> {
     let all = spans(record, known);
     let longest = all.iter().position(|span| lines_in(record, channel, *span).is_some())?;
@@ -83,7 +84,7 @@ fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Per
         .filter_map(|span| lines_in(record, channel, *span).map(|(excitation, leak)| (*span, excitation, leak)))
         .collect();
     let least = near.iter().map(|(.., leak)| *leak).fold(f64::INFINITY, f64::min);
-    // Among spans with equal leakage the first, which is the longest.
+    // Of spans with equal leakage the first one, which is the longest, is chosen.
     let limit = LEAKS_ALIKE * least.max(ROUNDING);
     let ((from_s, to_s), excitation, _) = near.into_iter().find(|(.., leak)| *leak <= limit)?;
     let (omega, period_s) = (excitation.omega_rad_s(), excitation.period_s());
@@ -102,7 +103,7 @@ fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Per
     })
 }
 
-/// Returns the lines of a channel over a span, if they contain nearly all of its power, and the share of the power
+/// Returns the lines of a channel over a span if they contain nearly all of its power, and the fraction of the power
 /// outside them.
 fn lines_in(record: &Record, channel: &str, (from_s, to_s): (f64, f64)) -> Option<(Excitation, f64)> {
     let span = record.span(from_s, to_s).ok()?;
@@ -126,7 +127,7 @@ fn lines_in(record: &Record, channel: &str, (from_s, to_s): (f64, f64)) -> Optio
     Some((excitation, (1.0 - of_lines / power).max(0.0)))
 }
 
-/// Spans that are tried: the longest first and, among spans of equal length, the latest first, since a person needs
+/// Returns the spans to try: the longest first and, among spans of equal length, the latest first, since a person needs
 /// time to settle.
 fn spans(record: &Record, known: &LookOptions) -> Vec<(f64, f64)> {
     let (begin, end) = (record.time_s(0), record.time_s(record.len()));

@@ -1,11 +1,11 @@
-//! Errors of a trace against the truth in its record.
+//! Errors of a trace relative to the true values in its record.
 
 use hoid_model::{NotConvertible, Record, uncertainty::OperatorEstimate};
 use hoid_numerics::statistics::mean;
 use hoid_track::{Trace, value_of};
 
-/// Returns the root mean square of the relative error, over the rows from `first` on that have an operator, for each
-/// parameter whose true value the record contains.
+/// Returns, for each parameter whose true value is in the record, the root mean square of the relative error over all
+/// rows from `first` on that have an operator.
 pub fn relative_errors(
     record: &Record,
     trace: &Trace,

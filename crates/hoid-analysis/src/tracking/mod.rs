@@ -1,12 +1,13 @@
-//! From a recording to a trace and its verdict: the steps in their order.
+//! Tracking: the processing steps from a recording to a trace and its verdict.
 //!
 //! ```text
 //! file -- Reading --> Recordings -- Tracking { options }.run --> Tracked { trace, verdict, data, settings }
 //! ```
 //!
-//! A high rate is lowered; open orders are searched on the start span; the recursion processes the record, with a
-//! second run that chooses its covariance if one is given; the verdict is that of the trace together with the findings
-//! of the recording. Faults are handled by the guard, sample by sample: a recording is not repaired beforehand.
+//! A high sampling rate is reduced. Orders that are not given are searched on the span of the start fit. The recursion
+//! then processes the record; if a second run is given, it determines the covariance of the recursion. The verdict
+//! combines the verdict on the trace and the findings on the recording. The guard handles faults sample by sample, so
+//! that a recording is not repaired beforehand.
 
 mod errors;
 mod run;

@@ -1,4 +1,4 @@
-//! The run: from a recording to a trace and its verdict.
+//! Execution of a recursion, from a recording to a trace and its verdict.
 
 use hoid_ident::IdentError;
 use hoid_model::{Decimation, Record, SampleTime};
@@ -17,22 +17,22 @@ use crate::{
     recordings::Recordings,
 };
 
-/// A requested recursion over a recording.
+/// Request for a recursion over a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tracking {
-    /// The recursion.
+    /// The requested recursion.
     pub recursion: TrackRequest,
-    /// Span of the start fit, s; `None` for the first third.
+    /// Span of the start fit, s; `None` for the first third of the record.
     pub start_span_s: Option<(f64, f64)>,
     /// Time from which the estimate is updated, s.
     pub update_from_s: Option<f64>,
     /// Length of the moving average of the trace, s.
     pub moving_average_s: Option<f64>,
-    /// Number of samples of the recording per row.
+    /// Number of samples of the recording per row of the trace.
     pub every: usize,
-    /// Treatment of a high sample rate.
+    /// Treatment of a high sampling rate.
     pub rate: Decimation,
-    /// True if the second run reduces P during the run, instead of choosing it at the start.
+    /// True if the second run controls reductions of P during the run; false if it determines only the initial P.
     pub update_covariance: bool,
 }
 
@@ -43,7 +43,7 @@ impl Default for Tracking {
 }
 
 impl Tracking {
-    /// Requests a recursion, with defaults for everything else.
+    /// Requests a recursion with defaults for all other options.
     pub fn of(recursion: TrackRequest) -> Self {
         Self {
             recursion,
@@ -56,7 +56,7 @@ impl Tracking {
         }
     }
 
-    /// Returns the plan for a recording, at the rate at which it is tracked.
+    /// Returns the plan of the recursion for a recording, at the sampling rate at which the recording is tracked.
     ///
     /// # Errors
     /// [`AnalysisError::Options`] for contradictory options.
@@ -67,15 +67,15 @@ impl Tracking {
             .ok_or(AnalysisError::NoRecordings)?
             .sample_time();
         let rate = match self.recursion.counts_samples() {
-            _ if recordings.settles_the_rate() => Decimation::Off,
+            _ if recordings.has_fixed_rate() => Decimation::Off,
             true => self.rate.when_named(),
             false => self.rate,
         };
         plan_of(&self.recursion, SampleTime::new(rate.factor(read) as f64 * read.s())?)
     }
 
-    /// Tracks the recording; `validation` is a second run of the same person, `each` is called after every candidate
-    /// of a search.
+    /// Tracks the recording. `validation` is a second run of the same person; `each` is called after every candidate of
+    /// a search.
     ///
     /// # Errors
     /// [`AnalysisError`] if there is no trace. A doubtful trace is not an error: see [`Tracked::verdict`].
@@ -91,12 +91,12 @@ impl Tracking {
             .first()
             .ok_or(AnalysisError::NoRecordings)?
             .sample_time();
-        let named_rate = recordings.settles_the_rate();
+        let named_rate = recordings.has_fixed_rate();
         let data = recordings.at_rate(self.rate, counts_samples)?;
         let (record, account) = (&data.records[0], &data.accounts[0]);
         let every = match named_rate {
             true => self.every,
-            // The time between rows is that between the requested samples of the file.
+            // The requested number counts samples of the file; it is converted to samples at the reduced rate.
             false => (self.every as f64 * read_ts.s() / record.sample_time().s()).round() as usize,
         }
         .max(1);
@@ -169,24 +169,26 @@ impl Tracking {
         let method = &plan.options().method;
         if self.start_span_s.is_some() && matches!(self.recursion.start, RequestedStart::Coefficients(_)) {
             return Err(options(
-                "--start-span is the span of the start fit, and --start gives the start itself; drop one".to_owned(),
+                "--start-span is the span of the start fit, and --start gives the start itself; drop one of the \
+                 two".to_owned(),
             ));
         }
         if self.start_span_s.is_some() && method.starts_itself() {
             return Err(options(format!(
-                "--start-span is the span of a start fit, and {method} has none; drop it, or name --method physical"
+                "--start-span is the span of a start fit, and {method} has none; drop --start-span, or use --method \
+                 physical"
             )));
         }
         let end = record.time_s(record.len());
         match self.update_from_s {
             Some(t) if t.is_nan() || t >= end => Err(options(format!(
-                "--update-from {t}: the record ends at {end:.4} s; give a time before"
+                "--update-from {t}: the record ends at {end:.4} s; give an earlier time"
             ))),
             _ => Ok(()),
         }
     }
 
-    /// Length of the moving average in rows.
+    /// Returns the length of the moving average in rows.
     fn averaged_rows(&self, every: usize, record: &Record) -> Result<usize, AnalysisError> {
         let Some(length) = self.moving_average_s else {
             return Ok(1);
@@ -201,12 +203,12 @@ impl Tracking {
     }
 }
 
-/// Returns the plan of a recursion; its errors are reported as errors of its options.
+/// Returns the plan of a recursion; its errors are reported as errors of the options.
 fn plan_of(asked: &TrackRequest, sample_time: SampleTime) -> Result<TrackPlan, AnalysisError> {
     asked.plan(sample_time).map_err(options_of_recursion)
 }
 
-/// Reports an error of a requested recursion as one of its options.
+/// Converts an error of a requested recursion to an error of its options.
 pub fn options_of_recursion(error: IdentError) -> AnalysisError {
     match error {
         IdentError::BadStart { reason } => options(format!("--start: {reason}")),

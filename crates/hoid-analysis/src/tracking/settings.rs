@@ -1,4 +1,4 @@
-//! The settings of a recursion, as printed.
+//! Settings of a recursion as printed.
 
 use hoid_ident::{Choice, settings::DelayRange};
 use hoid_model::Decimation;
@@ -7,7 +7,7 @@ use hoid_track::{Method, StartAt, Trace, TrackOptions, TrackPlan, TrackRequest};
 use super::tracked::Covariance;
 use crate::{recordings::Recordings, settings::Setting};
 
-/// Every option of a recursion, defaults included, with units.
+/// Returns all options of a recursion with units, including defaults.
 pub fn settings_of_recursion(
     asked: &TrackRequest,
     plan: &TrackPlan,
@@ -37,7 +37,7 @@ pub fn settings_of_recursion(
     }
     list.push(Setting::new("memory", options.memory_as_text(plan.sample_time())).given(memory_given));
     for one in &listed {
-        // The memory is printed above, with the defaults of all parameters.
+        // The memory lengths, including the defaults of all parameters, have been added above.
         if let Some(text) = value(one.name) {
             let given = text != one.default;
             list.push(Setting::new(one.name.replace('_', " "), text).given(given));
@@ -61,7 +61,7 @@ pub fn settings_of_recursion(
     list
 }
 
-/// Settings other than those of the recursion: the second run, the start, the rows.
+/// Settings that do not belong to the recursion: second run, start and rows of the trace.
 pub(super) struct OwnSettings<'a> {
     pub trace: &'a Trace,
     pub options: &'a TrackOptions,
@@ -70,13 +70,13 @@ pub(super) struct OwnSettings<'a> {
     pub update_given: bool,
     /// Length of the moving average in rows.
     pub rows: usize,
-    /// Number of samples per row, and whether it was given.
+    /// Number of samples per row, and whether the user gave it.
     pub every: (usize, bool),
     pub rate: Decimation,
 }
 
 impl OwnSettings<'_> {
-    /// Returns these settings, and how the file was read.
+    /// Returns these settings, and the options with which the file was read.
     pub fn list(&self, data: &Recordings) -> Vec<Setting> {
         let Self {
             trace,

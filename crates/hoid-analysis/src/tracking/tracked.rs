@@ -1,4 +1,4 @@
-//! Result of a recursion over a record, and the trace as a table.
+//! Result of a recursion over a record, and its trace as a table.
 
 use std::collections::BTreeMap;
 
@@ -13,62 +13,62 @@ use crate::{
     settings::Setting,
 };
 
-/// Covariance from a second run, and the label of that run.
+/// Use of a second run for the covariance, with the label of that run.
 #[derive(Debug, Clone)]
 pub enum Covariance {
-    /// The covariance at the start.
+    /// The second run determined the initial covariance.
     Chosen(String, CovarianceChoice),
-    /// The covariance during the run.
+    /// The second run controlled the covariance during the run.
     Updated(String),
 }
 
 /// Result of a recursion over a record.
 #[derive(Debug, Clone)]
 pub struct Tracked {
-    /// The estimate over the record.
+    /// Estimates over the record.
     pub trace: Trace,
-    /// The final verdict on it.
+    /// Final verdict on the trace.
     pub verdict: Verdict,
-    /// The recording that was tracked, and its processing.
+    /// The tracked recording and its processing.
     pub data: Recordings,
-    /// The span of the start fit, if there was one.
+    /// Record over the span of the start fit, if there was a start fit.
     pub span: Option<Record>,
     /// The operator in each row.
     pub operators: Vec<Result<OperatorEstimate, NotConvertible>>,
-    /// The search for the orders, if there was one.
+    /// Result of the search for the orders, if there was one.
     pub choice: Option<Choice>,
-    /// Result of a second run.
+    /// Covariance obtained from a second run, if there was one.
     pub covariance: Option<Covariance>,
-    /// The settings that were used.
+    /// Settings used in the recursion.
     pub settings: Vec<Setting>,
 }
 
-/// Rows without an operator and their most frequent reason.
+/// Number of rows without an operator, and the most frequent reason.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NotConverted {
-    /// Their number.
+    /// Number of rows without an operator.
     pub rows: usize,
-    /// Most frequent reason.
+    /// Most frequent reason; `None` if all rows have an operator.
     pub reason: Option<String>,
 }
 
 impl Tracked {
-    /// Returns the record that was tracked.
+    /// Returns the tracked record.
     pub fn record(&self) -> &Record {
         &self.data.records[0]
     }
 
-    /// Returns its processing.
+    /// Returns the processing of the record.
     pub fn account(&self) -> &Account {
         &self.data.accounts[0]
     }
 
-    /// Returns its name.
+    /// Returns the name of the recording.
     pub fn name(&self) -> &str {
         &self.data.names[0]
     }
 
-    /// Returns the start covariance that a second run chose, and the label of that run.
+    /// Returns the initial covariance determined by a second run, and the label of that run.
     pub fn chosen_covariance(&self) -> Option<(&str, &CovarianceChoice)> {
         match &self.covariance {
             Some(Covariance::Chosen(file, choice)) => Some((file, choice)),
@@ -140,7 +140,7 @@ impl Tracked {
 
     /// Returns the first row in which the estimate has been updated.
     pub fn first_moved_row(&self) -> usize {
-        // Half a sample is added, so that rounding of the times has no effect.
+        // Half a sample of tolerance removes the effect of rounding in the times.
         let from = self.trace.updated_from_s() - self.record().sample_time().s() / 2.0;
         let first = self.trace.times_s().partition_point(|t| *t < from);
         let first = first
@@ -150,7 +150,7 @@ impl Tracked {
         first.min(self.trace.len().saturating_sub(1))
     }
 
-    /// Returns the rows without an operator.
+    /// Returns the number of rows without an operator, and the most frequent reason.
     pub fn not_converted(&self) -> NotConverted {
         let mut kinds: BTreeMap<&'static str, (usize, String)> = BTreeMap::new();
         let rows = self.operators.iter().enumerate();
@@ -177,8 +177,8 @@ impl Tracked {
         }
     }
 
-    /// Returns the number of rows without a crossover and their most frequent reason; `None` without a controlled
-    /// element.
+    /// Returns the number of rows without a crossover and the most frequent reason; `None` if the controlled element is
+    /// unknown.
     pub fn without_crossover(&self) -> Option<(usize, Option<NoCrossover>)> {
         self.trace.options().controlled_element.as_ref()?;
         let mut kinds: BTreeMap<NoCrossover, usize> = BTreeMap::new();

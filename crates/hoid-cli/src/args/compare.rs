@@ -13,7 +13,7 @@ pub struct CompareArgs {
     /// `hoid group DIR --out`, or the output of `hoid group --json`
     #[arg(value_name = "DIR|MANIFEST|RESULTS.json")]
     pub results: PathBuf,
-    /// Factor to compare, as NAME:LEVEL=A,B;LEVEL=C with conditions or people of the group; repeat for several factors
+    /// Factor to compare: NAME:LEVEL=A,B;LEVEL=C, with conditions or people of the group; repeat for several factors
     /// and their interactions [default: factor condition, with each condition as a level]
     #[arg(long, value_name = "FACTOR")]
     pub factor: Vec<Factor>,
@@ -39,10 +39,10 @@ pub struct CompareArgs {
     #[arg(long, value_name = "METHOD", default_value = "penalised", value_parser = choice_of(&Weights::ALL))]
     pub weights: Weights,
     /// Directory for all results: comparison.json, differences.csv, .md and .tex, people.svg, sentences.txt, and the
-    /// results of recordings, which are not analysed again
+    /// results of recordings, which are then not analysed again
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Threads for recordings. Default: one a core
+    /// Threads for the analysis of recordings [default: one per core]
     #[arg(long, value_name = "J", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
     #[command(flatten)]

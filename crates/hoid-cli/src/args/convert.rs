@@ -49,7 +49,8 @@ pub struct ConvertArgs {
     /// Operator parameters: K_e=.09,T_L=.4,omega_nm=11.25,zeta_nm=.35,tau_e=.28 (K_e_dot may replace T_L)
     #[arg(long, value_name = "LIST", value_parser = parse_numbers, allow_hyphen_values = true)]
     pub operator: Option<std::vec::Vec<(String, f64)>>,
-    /// Transfer function to discretise, as (s+2)/(s^2+3s+4), or NUM/DEN in descending powers of s, as 1,2/1,3,4
+    /// Transfer function to discretise, such as (s+2)/(s^2+3s+4), or NUM/DEN in descending powers of s, such as
+    /// 1,2/1,3,4
     #[arg(long, value_name = "H", allow_hyphen_values = true)]
     pub transfer_function: Option<ContinuousTransferFunction>,
     /// Discretisation of the transfer function

@@ -16,7 +16,7 @@ use super::{
 #[derive(Debug, Args)]
 pub struct DescribeArgs {
     #[arg(required = true, value_name = "RECORD", help = format!(
-        "Record files: {}; several are runs of one person in one task",
+        "Record files: {}; several files are runs of one person in one task",
         readable_endings()
     ))]
     pub records: Vec<PathBuf>,
@@ -32,14 +32,14 @@ pub struct DescribeArgs {
         COMMON_EXCITATIONS.join(", ")
     ))]
     pub excitation: Option<String>,
-    /// Excitation lines in rad/s, as 0.63,1.57,2.2; requires --period [default: the lines found]
+    /// Excitation lines in rad/s, such as 0.63,1.57,2.2; requires --period [default: the lines found]
     #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "period")]
     pub lines: Option<Vec<f64>>,
     /// Period of the excitation in s [default: shortest common period of the lines found]
     #[arg(long, value_name = "S")]
     pub period: Option<f64>,
-    /// Controlled element in s, as 90/(s(s+6)), or NUM/DEN in descending powers of s, as 90/1,6,0: adds crossover
-    /// frequency and margins
+    /// Controlled element in s, such as 90/(s(s+6)), or NUM/DEN in descending powers of s, such as 90/1,6,0: adds
+    /// crossover frequency and margins
     #[arg(long, value_name = "ELEMENT", allow_hyphen_values = true)]
     pub controlled_element: Option<ContinuousTransferFunction>,
     #[command(flatten)]

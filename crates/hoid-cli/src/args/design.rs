@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use hoid::design::experiment::{ALPHA, Against, Between, POWER, People, RUN_TO_RUN, Remnant, Sought, Wanted};
+use hoid::design::experiment::{ALPHA, Against, Between, POWER, People, RUN_TO_RUN, Remnant, TargetDifference, RequestedQuantity};
 use hoid::model::{ContinuousTransferFunction, Form, family_scenario::Display};
 
 use super::{choices::choice_of, figure::FigureArgs, parse::parse_span, show::ShowArgs};
@@ -15,23 +15,23 @@ pub struct DesignArgs {
     /// several people, the errors of the typical and the worst person are reported
     #[arg(long, value_name = "population|FILE|DIR", default_value = "population")]
     pub people: People,
-    /// Condition, for a group with several
+    /// Condition, for a group with several conditions
     #[arg(long, value_name = "NAME")]
     pub condition: Option<String>,
     /// Form of the population's operator [default: the form that people use with the element]
     #[arg(long, value_name = "FORM", value_parser = choice_of(&Form::OF_ERROR))]
     pub form: Option<Form>,
-    /// Controlled element, as 90/(s(s+6)) or 90/1,6,0 [default: that of the scenario or group]
+    /// Controlled element, such as 90/(s(s+6)) or 90/1,6,0 [default: that of the scenario or group]
     #[arg(long, value_name = "TF")]
     pub controlled_element: Option<ContinuousTransferFunction>,
     /// Quantities with their accepted standard errors: crossover=3%,tau_e=5%,phase_margin=2 (deg), tau_f=0.02 (s)
     /// [default: all parameters equally]
     #[arg(long = "for", value_name = "LIST", value_delimiter = ',')]
-    pub wanted: Vec<Wanted>,
+    pub wanted: Vec<RequestedQuantity>,
     /// Apply the forcing function as a disturbance at the input of the controlled element, not as a target
     #[arg(long)]
     pub disturbance: bool,
-    /// Share of the remnant in the variance of u
+    /// Share of the variance of u due to the remnant
     #[arg(long, value_name = "P", default_value_t = Remnant::default().share)]
     pub remnant_share: f64,
     /// Time constant of the first-order remnant in s; 0 for white
@@ -52,8 +52,8 @@ pub struct DesignArgs {
     /// Lowest and highest frequency of the lines, rad/s
     #[arg(long, value_name = "LO..HI", default_value = "0.2..18", value_parser = parse_span)]
     pub band: (f64, f64),
-    /// Largest amplitude of a line above the crossover, as a fraction of the mean of those below: with more, people
-    /// lower their crossover
+    /// Largest amplitude of a line above the crossover, as a fraction of the mean amplitude below it; above this
+    /// fraction, people lower their crossover
     #[arg(long, value_name = "PART", default_value_t = 0.2)]
     pub shelf: f64,
     /// Largest rms of the error; without this and --max-u, the forcing function has an rms of 1
@@ -69,7 +69,7 @@ pub struct DesignArgs {
     /// Difference to detect between two conditions, with each person in both: crossover=.5 (rad/s), phase_margin=5
     /// (deg), tau_e=10% (of its value). Reports the number of people, and of runs in each condition
     #[arg(long, value_name = "NAME=SIZE")]
-    pub difference: Option<Sought>,
+    pub difference: Option<TargetDifference>,
     /// Power: probability of detecting the difference
     #[arg(long, value_name = "P", default_value_t = POWER, requires = "difference")]
     pub power: f64,
@@ -77,11 +77,11 @@ pub struct DesignArgs {
     #[arg(long, value_name = "P", default_value_t = ALPHA, requires = "difference")]
     pub alpha: f64,
     /// Standard deviation of the difference between people, as a fraction of the quantity (phase margin: as caused by
-    /// this spread of the gain), or a file with it: output of `hoid compare --json`, the result of a group with several
-    /// conditions, or a population.json [default: from --people if available, else .1]
+    /// this spread of the gain), or a file that contains it: output of `hoid compare --json`, the result of a group
+    /// with several conditions, or a population.json [default: from --people if available, else .1]
     #[arg(long, value_name = "PART|FILE", requires = "difference")]
     pub between_people: Option<Between>,
-    /// Standard deviation of a person from run to run, as a fraction in the same way
+    /// Standard deviation from run to run of the same person, as a fraction in the same way
     #[arg(long, value_name = "PART", default_value_t = RUN_TO_RUN, requires = "difference")]
     pub run_to_run: f64,
     /// Display of the task: compensatory (error only), pursuit (target and output), preview (also the future target).

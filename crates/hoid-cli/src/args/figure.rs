@@ -11,7 +11,7 @@ pub struct FigureArgs {
     /// Draw the result (.svg; .pdf and .png if built with --features pdf-png)
     #[arg(long, value_name = "FILE")]
     pub figure: Option<PathBuf>,
-    /// Figure width, as 85mm, 17cm or 3.3in [default: 420 pixels]
+    /// Figure width, such as 85mm, 17cm or 3.3in [default: 420 pixels]
     #[arg(long, value_name = "WIDTH", value_parser = parse_width, requires = "figure")]
     pub width: Option<f64>,
 }

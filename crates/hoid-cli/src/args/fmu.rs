@@ -36,7 +36,7 @@ pub struct FmuArgs {
     /// which becomes part of the unit [default: population]
     #[arg(long, value_name = "PRIOR", conflicts_with = "operator")]
     pub prior: Option<String>,
-    /// Controlled element in s, as 90/(s(s+6)): adds crossover and phase margin
+    /// Controlled element in s, such as 90/(s(s+6)): adds crossover and phase margin
     #[arg(
         long,
         value_name = "ELEMENT",

@@ -35,13 +35,13 @@ pub struct GroupRunArgs {
     /// Threads [default: one per core]
     #[arg(long, value_name = "J", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
-    /// Resume a stopped group
+    /// Resume a stopped analysis
     #[arg(long)]
     pub resume: bool,
     /// Write CSV as well as Parquet
     #[arg(long)]
     pub csv: bool,
-    /// Also estimate each person with the data of all: pooled.csv, and population.json (population-NAME.json for
+    /// Also estimate each person with the data of all people: pooled.csv, and population.json (population-NAME.json for
     /// several conditions), which --prior reads
     #[arg(long)]
     pub pool: bool,
@@ -165,5 +165,5 @@ fn parse_trouble(text: &str) -> Result<SamplingDefect, String> {
     SamplingDefect::ALL
         .into_iter()
         .find(|trouble| trouble.name() == text.trim())
-        .ok_or_else(|| format!("{text:?} is not a trouble, expected some of {}", names()))
+        .ok_or_else(|| format!("{text:?} is not a recording problem; expected some of {}", names()))
 }

@@ -26,22 +26,22 @@ use super::{
 #[derive(Debug, Args)]
 pub struct IdentifyArgs {
     #[arg(required = true, value_name = "RECORD", help = format!(
-        "Record files: {}; several share one model, each with its own initial states",
+        "Record files: {}; several files share one model, each with its own initial states",
         readable_endings()
     ))]
     pub records: Vec<PathBuf>,
     #[command(flatten)]
     pub read: ReadArgs,
-    /// Error and control of an axis, as ex,ux, or with its recorded excitation, as ex,ux,rx. Repeat for each axis: each
-    /// has its own operator, and the coupling between axes is tested
+    /// Error and control of an axis, such as ex,ux, or with its recorded excitation, such as ex,ux,rx. Repeat for each
+    /// axis: each has its own operator, and the coupling between axes is tested
     #[arg(long, value_name = "INPUT,OUTPUT[,EXCITATION]", conflicts_with_all = ["input", "output"], allow_hyphen_values = true)]
     pub pair: Vec<AxisPair>,
     #[command(flatten)]
     pub mask: MaskArgs,
     #[command(flatten)]
     pub faults: FaultArgs,
-    /// Model to fit: operator (human operator) or a polynomial structure [default: operator; that of --method; bj with
-    /// options that only polynomials have, as --nk]
+    /// Model to fit: operator (human operator) or a polynomial structure [default: operator; the structure of --method;
+    /// bj with options that only polynomials have, such as --nk]
     #[arg(long, value_name = "NAME", value_parser = structures(), ignore_case = true)]
     pub structure: Option<String>,
     /// Fitting method for polynomials: pem (prediction error), or instrumental variables: iv4 (for arx), sriv (for oe),
@@ -51,7 +51,7 @@ pub struct IdentifyArgs {
     #[command(flatten)]
     pub options: SettingArgs<Batch>,
     #[arg(long, value_name = "FILE", help = format!(
-        "With --change sigmoid: write K_e, T_L, K_e_dot (K, T_L of other forms) over time to this file: {}",
+        "With --change sigmoid: write K_e, T_L, K_e_dot (K, T_L for other forms) over time to this file: {}",
         writable_endings()
     ))]
     pub trace: Option<PathBuf>,

@@ -19,7 +19,7 @@ pub struct LabArgs {
     /// Open the page in the browser
     #[arg(long)]
     pub open: bool,
-    /// Verify and replay the session in this folder, as hoid-lab/sub-P01/ses-01
+    /// Verify and replay the session in this folder, such as hoid-lab/sub-P01/ses-01
     #[arg(long, value_name = "DIR", conflicts_with_all = ["config", "calibrate"])]
     pub replay: Option<PathBuf>,
     /// Measure the delay added by page, frames and events, with a simulated operator

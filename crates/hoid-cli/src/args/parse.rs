@@ -9,7 +9,7 @@ pub fn parse_span(text: &str) -> Result<(f64, f64), String> {
     match ends {
         Some((low, high)) if low <= high => Ok((low, high)),
         _ => Err(format!(
-            "{text:?} is not a span; write LO..HI with LO <= HI, as 0.05..0.6"
+            "{text:?} is not a span; write LO..HI with LO <= HI, such as 0.05..0.6"
         )),
     }
 }
@@ -22,7 +22,9 @@ pub fn parse_width(text: &str) -> Result<f64, String> {
         .into_iter()
         .find_map(of)
         .filter(|mm| (10.0..=2000.0).contains(mm))
-        .ok_or_else(|| format!("{text:?} is not a width; write one from 10mm to 2000mm, as 85mm, 17cm or 3.3in"))
+        .ok_or_else(|| {
+            format!("{text:?} is not a width; write a width from 10mm to 2000mm, such as 85mm, 17cm or 3.3in")
+        })
 }
 
 /// Most samples ahead of a prediction that is judged.

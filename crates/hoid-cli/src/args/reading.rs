@@ -25,8 +25,8 @@ pub struct ReadArgs {
     /// [default: t, or a column recognised as time]
     #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
     pub time: Option<TimeChoice>,
-    /// Column that numbers the trials, each a separate record (t: where time restarts), or one trial, as trial=3
-    /// [default: where t restarts]
+    /// Column that numbers the trials; each trial becomes a separate record (t: a trial starts where time restarts).
+    /// COLUMN=VALUE, such as trial=3, reads one trial [default: where t restarts]
     #[arg(long, value_name = "COLUMN[=VALUE]", value_parser = parse_trial)]
     pub trial: Option<TrialChoice>,
     /// Sampling frequency in Hz [default: from column t, in s]
@@ -48,7 +48,7 @@ pub struct ReadArgs {
     /// those rows. May be repeated
     #[arg(long, value_name = "COLUMN=hold|linear|drop", value_parser = parse_sparse, value_delimiter = ',', allow_hyphen_values = true)]
     pub sparse: Vec<(String, Sparse)>,
-    /// Columns to keep besides input, output and time, as f_t,r or none; saves time and memory for long CSV files
+    /// Columns to keep besides input, output and time, such as f_t,r, or none; saves time and memory for long CSV files
     /// [default: all]
     #[arg(long, value_name = "COLUMN,...", value_delimiter = ',')]
     pub columns: Option<Vec<String>>,
@@ -83,7 +83,7 @@ impl ReadArgs {
 /// Treatment of a record before it is used, in this order.
 #[derive(Debug, Clone, Args)]
 pub struct PrepareArgs {
-    /// Units that the file lacks, as e=deg,u=deg; only declared units are printed
+    /// Units that the file lacks, such as e=deg,u=deg; only declared units are printed
     #[arg(long, value_name = "CHANNEL=UNIT", value_parser = parse_unit, value_delimiter = ',')]
     pub unit: Vec<(String, String)>,
     /// Drop duplicate rows (time included)
@@ -142,7 +142,8 @@ pub struct MaskArgs {
 #[derive(Debug, Clone, Copy, Args)]
 pub struct FaultArgs {
     /// Recording faults (spikes, dropouts, frozen and idle stretches, wraps, steps): bridge faults up to 0.1 s and cut
-    /// the record at longer ones, cut at all, only report, or keep (no search)
+    /// the record at longer faults (bridge), cut at every fault (cut), only report faults (report), or do not search
+    /// for them (keep)
     #[arg(long, value_name = "WHAT", default_value = "bridge", value_parser = choice_of(&FaultHandling::ALL))]
     pub faults: FaultHandling,
 }
@@ -178,7 +179,7 @@ fn parse_sparse(text: &str) -> Result<(String, Sparse), String> {
 fn parse_unit(text: &str) -> Result<(String, String), String> {
     let (name, unit) = pair(text)?;
     match unit.trim() {
-        "" => Err(format!("{text:?} names no unit; write CHANNEL=UNIT, as e=deg")),
+        "" => Err(format!("{text:?} names no unit; write CHANNEL=UNIT, such as e=deg")),
         unit => Ok((name, unit.to_owned())),
     }
 }

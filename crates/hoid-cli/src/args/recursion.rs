@@ -30,7 +30,7 @@ pub struct RecursionArgs {
     /// Polynomial structure [default: arx for rls, else bj]
     #[arg(long, value_name = "NAME", value_parser = choice_of(&Structure::ALL))]
     pub structure: Option<Structure>,
-    /// Orders, or ranges to search on the start span, as nb=2,nc=0,nd=1..4,nf=2 [default: the operator's: bj
+    /// Orders, or ranges to search on the start span, such as nb=2,nc=0,nd=1..4,nf=2 [default: the operator's: bj
     /// nb=2,nd=1..4,nf=2, for adaptive nd=16, for multiple-model nd=6; arx na=2,nb=2]
     #[arg(long, value_name = "LIST")]
     pub orders: Option<String>,
@@ -44,8 +44,8 @@ pub struct RecursionArgs {
     /// Criterion that selects among searched candidates
     #[arg(long, value_name = "NAME", default_value = "bic", value_parser = choice_of(&Criterion::ALL))]
     pub criterion: Criterion,
-    /// Start of the recursion: all coefficients, as f1=-1.9,f2=.92,b0=.04,..., or `nothing` [default: a batch fit of
-    /// the start span or warm-up; adaptive starts from --prior]
+    /// Start of the recursion: all coefficients, such as f1=-1.9,f2=.92,b0=.04,..., or `nothing` [default: a batch fit
+    /// of the start span or warm-up; adaptive starts from --prior]
     #[arg(long, value_name = "LIST|nothing", allow_hyphen_values = true)]
     pub start: Option<String>,
     #[command(flatten)]
@@ -53,11 +53,11 @@ pub struct RecursionArgs {
     /// Magnitude of e or u above which a sample is skipped as faulty
     #[arg(long, value_name = "X", default_value = "1e6")]
     pub largest: f64,
-    /// Report gain and phase, with errors, at these frequencies in rad/s, as 0.5,1,2.5
+    /// Report gain and phase, with errors, at these frequencies in rad/s, such as 0.5,1,2.5
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub at: Vec<f64>,
-    /// Controlled element in s, as 90/(s(s+6)), or NUM/DEN in descending powers of s, as 90/1,6,0: adds crossover
-    /// frequency and phase margin, with errors
+    /// Controlled element in s, such as 90/(s(s+6)), or NUM/DEN in descending powers of s, such as 90/1,6,0: adds
+    /// crossover frequency and phase margin, with errors
     #[arg(long, value_name = "ELEMENT", allow_hyphen_values = true)]
     pub controlled_element: Option<ContinuousTransferFunction>,
 }
@@ -74,7 +74,7 @@ pub struct TrackArgs {
     pub methods: bool,
     #[command(flatten)]
     pub recursion: RecursionArgs,
-    /// Span of the start fit, s, for methods with one [default: the first third of the record]
+    /// Span of the start fit, s, for methods with a start fit [default: the first third of the record]
     #[arg(long, value_name = "S..S", value_parser = parse_span, allow_hyphen_values = true)]
     pub start_span: Option<(f64, f64)>,
     /// Time from which the estimate is updated, s; before it, only the filters run [default: the end of the start span;
@@ -82,7 +82,7 @@ pub struct TrackArgs {
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub update_from: Option<f64>,
     /// Second run of the same person in the same task: selects the start covariance (--covariance) whose trace explains
-    /// most of it (VAF) [for methods with --covariance]
+    /// this run best (VAF) [for methods with --covariance]
     #[arg(long, value_name = "FILE")]
     pub validate: Option<PathBuf>,
     /// With --validate: instead of selecting P at the start, reduce it after every half second in which the estimate
@@ -105,8 +105,8 @@ pub struct TrackArgs {
     pub report: Option<PathBuf>,
     #[command(flatten)]
     pub picture: FigureArgs,
-    /// Spans in s, as 0..30.72,51.2..81.92, whose batch fits are dashed lines in the report [default: the start span
-    /// and the last third]
+    /// Spans in s, such as 0..30.72,51.2..81.92, whose batch fits are dashed lines in the report [default: the start
+    /// span and the last third]
     #[arg(long, value_name = "S..S", value_parser = parse_span, value_delimiter = ',', allow_hyphen_values = true)]
     pub batch: Vec<(f64, f64)>,
     #[command(flatten)]
@@ -123,7 +123,7 @@ pub struct StreamArgs {
     pub rate: DecimateArgs,
     #[command(flatten)]
     pub recursion: RecursionArgs,
-    /// Seconds to collect before the start fit, for methods with one [default: 20; none with --start]
+    /// Seconds to collect before the start fit, for methods with a start fit [default: 20; none with --start]
     #[arg(long, value_name = "S", conflicts_with = "start")]
     pub warm_up: Option<f64>,
     /// Print a line only for every N-th sample
@@ -136,8 +136,8 @@ pub struct StreamArgs {
     #[arg(long, value_name = "NAME", default_value = "u")]
     pub output: String,
     /// Use UDP datagrams instead of standard input and output: a line of text, a JSON object as {"t": 0.01, "e": 0.5,
-    /// "u": -1}, or a C struct, each answered in kind (text by JSON). Ports on 127.0.0.1, or addresses and ports, as
-    /// 0.0.0.0:5005:192.168.1.7:5006
+    /// "u": -1}, or a C struct, each answered in kind (text by JSON). Ports on 127.0.0.1, or addresses and ports, such
+    /// as 0.0.0.0:5005:192.168.1.7:5006
     #[arg(long, value_name = "IN:OUT")]
     pub udp: Option<UdpPlaces>,
     /// Stream of LabStreamingLayer: in Python, by pyhoid.lsl
@@ -160,7 +160,7 @@ fn method_help() -> String {
         .map(Method::name)
         .collect();
     format!(
-        "Recursive method. Also for comparison: {}; hoid track --methods lists all",
+        "Recursive method. Further methods, for comparison: {}; hoid track --methods lists all methods",
         others.join(", ")
     )
 }
@@ -191,7 +191,7 @@ fn parse_frequency(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(hz) if hz > 0.0 && hz.is_finite() => Ok(hz),
         _ => Err(format!(
-            "{text:?} is not a frequency; write a positive number in Hz, as 100"
+            "{text:?} is not a frequency; write a positive number in Hz, such as 100"
         )),
     }
 }

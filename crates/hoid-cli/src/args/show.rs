@@ -12,7 +12,7 @@ pub struct ShowArgs {
     /// Print one JSON object instead of tables
     #[arg(long)]
     pub json: bool,
-    /// Write a table of estimates, errors, intervals for a paper: .tex (booktabs), .md, .csv, .parquet ...
+    /// Write a table of estimates, errors and intervals for a paper: .tex (booktabs), .md, .csv, .parquet ...
     #[arg(long, value_name = "FILE")]
     pub table: Option<PathBuf>,
 }

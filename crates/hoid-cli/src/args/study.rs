@@ -79,15 +79,15 @@ pub struct StudyPlansArgs {
 
 #[derive(Debug, Args)]
 pub struct ReproduceArgs {
-    /// Tables, figures, appendices, studies, the experiment or the claims, comma-separated, as
+    /// Tables, figures, appendices, studies, the experiment or the claims, comma-separated, such as
     /// fig-5,table-2,H,recursive,experiment,claims [default: all]
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub only: Vec<String>,
     /// Replications of each cell; 10 for a quick look
     #[arg(long, value_name = "M", default_value_t = 100)]
     pub replications: u64,
-    /// With --only experiment: recorded people instead of virtual ones, as a manifest (see `hoid group init`) or a
-    /// directory with one
+    /// With --only experiment: recorded people instead of virtual people, given by a manifest (see `hoid group init`)
+    /// or a directory with a manifest
     #[arg(long, value_name = "DIR|MANIFEST")]
     pub recordings: Option<PathBuf>,
     /// Directory for tables, figures, their data and the index page; existing studies are not rerun

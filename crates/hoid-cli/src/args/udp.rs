@@ -43,7 +43,7 @@ impl FromStr for UdpPlaces {
         };
         if output.port() == 0 {
             return Err(format!(
-                "{text:?}: no one listens on port 0; name the port of the answers"
+                "{text:?}: nothing can listen on port 0; give the port for the answers"
             ));
         }
         // Code that listens on 0.0.0.0 listens on every address of this computer, and 0.0.0.0 leads there too.

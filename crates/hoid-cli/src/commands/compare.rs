@@ -11,7 +11,7 @@ use hoid::study::{RunOptions, group::Manifest};
 use super::{figure, group::analysed, output_paths, paper_table};
 use crate::{args::CompareArgs, error::CliError, json, output, table::Rows, text};
 
-/// The files of `--out`: tables, the figure, the sentences.
+/// Tables that `--out` writes, in addition to the figure and the sentences.
 const TABLES: [&str; 3] = ["differences.csv", "differences.md", "differences.tex"];
 const FIGURE: &str = "people.svg";
 const SENTENCES: &str = "sentences.txt";
@@ -35,7 +35,7 @@ pub fn run(args: &CompareArgs) -> Result<(), CliError> {
     let comparing = Comparing {
         factors: args.factor.clone(),
         variation,
-        of: args.of.clone(),
+        quantities: args.of.clone(),
         covariate: args.covariate,
         adjustment: args.adjust,
         weights: args.weights,
@@ -60,18 +60,18 @@ pub fn run(args: &CompareArgs) -> Result<(), CliError> {
     CliError::of_verdict(&found.verdict)
 }
 
-/// Analyses recordings below the directory of the results, or in one that is removed again.
+/// Analyses recordings in a subdirectory of the results, or in a temporary directory that is removed afterwards.
 fn of_recordings(comparing: &Comparing, path: &Path, args: &CompareArgs) -> Result<GroupEstimates, CliError> {
     let manifest = Manifest::read(path)?;
     let removed;
     let directory = match &args.out {
         Some(out) => out.as_path(),
         None => {
-            removed = tempfile::tempdir().map_err(no_room)?;
+            removed = tempfile::tempdir().map_err(no_temporary_directory)?;
             removed.path()
         }
     };
-    // With --out the runs that were analysed for another comparison stay.
+    // With --out, runs that were already analysed for another comparison are reused.
     let options = RunOptions {
         jobs: args.jobs.map(usize::from),
         resume: true,
@@ -79,9 +79,9 @@ fn of_recordings(comparing: &Comparing, path: &Path, args: &CompareArgs) -> Resu
     };
     comparing.estimates_of(&manifest, directory, |manifest, place| {
         match analysed(manifest, path, place, &options) {
-            // There is no --resume here: what was analysed stays with --out, and is removed without it.
+            // This command has no --resume: with --out, runs already analysed are kept; otherwise they are removed.
             Err(CliError::Stopped(_)) => Err(CliError::Stopped(
-                "the comparison was stopped; with --out the same command continues with the runs that were analysed"
+                "the comparison was stopped; with --out, the same command continues and keeps the runs already analysed"
                     .to_owned(),
             )),
             outcome => outcome.map(|_| ()),
@@ -89,9 +89,9 @@ fn of_recordings(comparing: &Comparing, path: &Path, args: &CompareArgs) -> Resu
     })
 }
 
-fn no_room(error: std::io::Error) -> CliError {
+fn no_temporary_directory(error: std::io::Error) -> CliError {
     CliError::Stream(format!(
-        "the recordings cannot be analysed, since no temporary directory can be made ({error}): name a directory with --out"
+        "no temporary directory can be created for the analysis ({error}): name a directory with --out"
     ))
 }
 
@@ -122,8 +122,8 @@ fn page(found: &Comparison, verbose: bool) -> String {
         differences(found, verbose)
     );
     page.push_str(
-        "Mean over people ± standard error; people are weighted by their errors and the variance between them; intervals of 95 % \
-         by Hartung and Knapp.\n",
+        "Mean over people ± standard error; people are weighted by their errors and the variance between them; 95 % \
+         intervals by Hartung and Knapp.\n",
     );
     if !found.learning.is_empty() {
         page.push_str(&format!("\nChange a run\n{}\n", learning(found)));
@@ -150,7 +150,7 @@ fn differences(found: &Comparison, verbose: bool) -> Rows {
         .iter()
         .filter_map(|d| Some(d.effect_size.as_ref()?.name.as_str()))
         .collect();
-    // If the sizes are equal, the header gives them.
+    // If all rows have the same kind of effect size, the header names it.
     let size = sizes.first().filter(|name| sizes.iter().all(|other| other == *name));
     let mut header = vec!["quantity"];
     header.extend(several.then_some("factor"));

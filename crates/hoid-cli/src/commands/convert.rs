@@ -1,4 +1,4 @@
-//! `hoid convert`: discrete coefficients to operator parameters, back, and any transfer function to
+//! `hoid convert`: conversion of discrete coefficients to operator parameters and back, and of any transfer function to
 //! discrete time.
 
 use hoid::ident::family::family_of_polynomials;
@@ -93,7 +93,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Polynomials with orders other than those of a gain with a lead: the operator of the family.
+/// Converts polynomials to an operator of the family if their orders are not those of a gain with a lead.
 fn to_family(args: &ConvertArgs, f: &[f64], b: &[f64], sample_time: SampleTime) -> Result<(), CliError> {
     let orders = Orders {
         nb: b.len(),
@@ -126,7 +126,7 @@ fn discretised(args: &ConvertArgs, h: &ContinuousTransferFunction, sample_time: 
     }
     let row = |c: &[f64]| c.iter().map(|v| format!("{v:.10}")).collect::<Vec<_>>().join(", ");
     output::show(&format!(
-        "By ascending powers of q^-1, Ts = {} s:\nnumerator    {}\ndenominator  {}\n",
+        "In ascending powers of q^-1, Ts = {} s:\nnumerator    {}\ndenominator  {}\n",
         sample_time.s(),
         row(discrete.num()),
         row(discrete.den())

@@ -17,7 +17,7 @@ use hoid::track::{Method, OPERATOR_COLUMNS, StartAt, Trace, TrackOptions, track}
 
 use crate::{args::DemoArgs, commands::output_paths, error::CliError, output, text};
 
-/// Spans of the thesis (V.B) completely before and after the change, s.
+/// Spans of the thesis (V.B) that are entirely before or after the change, s.
 const SPANS: [(&str, f64, f64); 2] = [("before", 0.0, 30.72), ("after", 51.2, 81.92)];
 
 struct Stage {
@@ -63,8 +63,8 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Traces of the whole run: the default method, without prior information, and the two methods of the text, starting
-/// from the batch fit before the change.
+/// Computes traces of the whole run: of the default method without prior information, and of the two methods of the
+/// thesis, which start from the batch fit before the change.
 fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, CliError> {
     let (_, from, to) = SPANS[0];
     let nk = stages[0].choice.fit.orders().nk;
@@ -87,7 +87,7 @@ fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, Cl
         .collect()
 }
 
-/// RMS relative error of each trace from the first update of the estimate on.
+/// Returns the RMS relative error of each trace, from the first update of the estimate on.
 fn errors_over_time(record: &Record, traces: &[(String, Trace)]) -> String {
     let mut rows = text::table(&[
         "tracked by",
@@ -162,7 +162,7 @@ fn report_of_traces(
     Ok(write_report(&args.out.join("tracking"), &report.to_html()?)?)
 }
 
-/// Box-Jenkins with nk and nd selected as by `hoid identify` by default, and ARX with the same
+/// Fits a Box-Jenkins model with nk and nd selected as by default in `hoid identify`, and an ARX model with the same
 /// delay.
 fn identify(name: &'static str, record: Record) -> Result<Stage, CliError> {
     let structure = Structure::BoxJenkins;

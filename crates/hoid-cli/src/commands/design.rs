@@ -12,7 +12,7 @@ use serde_json::Value;
 use super::{figure, output_paths, paper_table};
 use crate::{args::DesignArgs, error::CliError, json, output, table::Rows, text};
 
-/// The files of `--out` with the estimates as tables, and the scenario.
+/// Tables with the estimates that `--out` writes, in addition to the scenario.
 const TABLES: [&str; 2] = ["design.csv", "design.md"];
 const SCENARIO: &str = "scenario.toml";
 
@@ -95,7 +95,7 @@ fn write_all(found: &ExperimentDesign, out: &Path) -> Result<(), CliError> {
         Some(lab) => write("lab.toml", &lab)?,
         None => output::notice(
             "",
-            "lab.toml: none is written, because runs of the lab last whole hundredths of a second; choose --length \
+            "lab.toml is not written, because runs of the lab last whole hundredths of a second; choose --length \
              accordingly"
                 .to_owned(),
         ),
@@ -153,7 +153,7 @@ fn page(found: &ExperimentDesign, verbose: bool) -> String {
     page
 }
 
-/// Crossover, margin and parameters with their units.
+/// Returns crossover, margin and parameters with their units.
 fn quantities(e: &Expected) -> Vec<(String, &'static str, Estimate)> {
     let mut all = vec![
         ("crossover (rad/s)".to_owned(), "crossover", e.crossover_rad_s),
@@ -213,25 +213,25 @@ fn sizes(found: &ExperimentDesign) -> String {
     format!("rms of e {e}, of u {u}{other}.\n")
 }
 
-/// The number of runs that the requested quantities need.
+/// Returns a sentence with the number of runs that the requested quantities need.
 fn needed(found: &ExperimentDesign) -> String {
     if found.wanted.is_empty() {
         return String::new();
     }
     let mut needed = format!(
-        "The requested errors take {}.\n",
+        "The requested errors require {}.\n",
         text::counted(found.runs_needed as u64, "run")
     );
     if let Some(worst) = &found.worst {
-        needed.push_str(&format!("Of {} it takes {}.\n", worst.name, worst.runs_needed));
+        needed.push_str(&format!("For {} they require {}.\n", worst.name, worst.runs_needed));
     }
     if let Some(other) = &found.against {
-        needed.push_str(&format!("With {} it takes {}.\n", other.name, other.runs_needed));
+        needed.push_str(&format!("With {} they require {}.\n", other.name, other.runs_needed));
     }
     needed
 }
 
-/// People and runs for a difference, and the table of the power.
+/// Formats the number of people and runs needed for a difference, and the table of the power.
 fn difference(plan: &DifferencePlan) -> String {
     let sought = &plan.request.sought.name;
     let unit = match sought.as_str() {
@@ -244,8 +244,8 @@ fn difference(plan: &DifferencePlan) -> String {
         Some(row) => {
             let runs = text::counted(row.runs as u64, "run");
             match row.people {
-                Some(people) => format!("{people} people, {runs} of each in each condition"),
-                None => format!("more than 1000 people with {runs} of each"),
+                Some(people) => format!("{people} people, each with {runs} per condition"),
+                None => format!("more than 1000 people, each with {runs} per condition"),
             }
         }
         None => String::new(),
@@ -261,7 +261,7 @@ fn difference(plan: &DifferencePlan) -> String {
         rows.add_row(cells);
     }
     format!(
-        "\nA difference in {size} between two conditions takes {answer} (power {}, alpha {}).\n{rows}\n\
+        "\nDetecting a difference in {size} between two conditions requires {answer} (power {}, alpha {}).\n{rows}\n\
          Power of the paired t test of n people. A person's difference: {} between people ({}), {} from run to run, {} expected error of a run.\n",
         plan.request.power,
         plan.request.alpha,

@@ -1,4 +1,4 @@
-//! Figures as files: formats and writing.
+//! Writing of figures to files in several formats.
 
 use std::path::Path;
 
@@ -7,10 +7,10 @@ use hoid::report::figures::{FigureFormat, with_width_mm};
 
 use crate::{error::CliError, output};
 
-/// Checks that a figure can be written in the format given by its name, before anything is read.
+/// Checks, before anything is read, that a figure can be written in the format given by the name of its file.
 ///
 /// # Errors
-/// [`CliError::Usage`].
+/// [`CliError::Usage`] if the format is not supported.
 pub fn check(path: &Path) -> Result<(), CliError> {
     format_of(path).map(|_| ())
 }
@@ -21,17 +21,17 @@ fn format_of(path: &Path) -> Result<FigureFormat, CliError> {
         .ok_or_else(|| refused("figures are written as .svg, .pdf or .png; name the file accordingly"))?;
     if !format.is_built() {
         return Err(refused(
-            "this hoid was built without PDF and PNG; name the file .svg, or build it with them: \
-             cargo build --release -p hoid-cli --features pdf-png",
+            "this hoid was built without PDF and PNG; name the file .svg, or build hoid with both: cargo build \
+             --release -p hoid-cli --features pdf-png",
         ));
     }
     Ok(format)
 }
 
-/// Writes a figure, with a width on paper if one was given.
+/// Writes a figure, with the given width on paper, if any.
 ///
 /// # Errors
-/// Errors of the format and of writing.
+/// Errors of the conversion to the format and of writing.
 pub fn write(path: &Path, svg: &str, width_mm: Option<f64>) -> Result<(), CliError> {
     let sized = width_mm.map(|mm| with_width_mm(svg, mm));
     let bytes = format_of(path)?.bytes(sized.as_deref().unwrap_or(svg))?;

@@ -1,4 +1,4 @@
-//! `hoid fmu`: a unit for simulators, with the installed library.
+//! `hoid fmu`: writes a unit for simulators (FMU) that contains the installed library.
 
 use std::{
     env,
@@ -23,7 +23,7 @@ use crate::{
 
 pub fn run(args: &FmuArgs) -> Result<(), CliError> {
     let libraries = match args.libraries.as_slice() {
-        [] => vec![beside_this_program()?],
+        [] => vec![library_path()?],
         named => named.to_vec(),
     };
     let (settings, read, step_s) = match &args.operator {
@@ -51,7 +51,7 @@ pub fn run(args: &FmuArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Settings of a unit, the files read for it, its sample time in s.
+/// Settings of a unit, the files read for it, and its sample time in s.
 type Unit = (FmuSettings, Vec<PathBuf>, f64);
 
 fn of_tracker(args: &FmuArgs) -> Result<Unit, CliError> {
@@ -66,7 +66,7 @@ fn of_tracker(args: &FmuArgs) -> Result<Unit, CliError> {
         None => {}
         Some(file) if is_fit_file(file) => {
             let text = read_settings(Path::new(file))?;
-            // A unit that cannot start is reported here, not in a simulator.
+            // A unit that could not start in a simulator is reported here.
             let fit = parse_fit(&text, file)?.operator()?;
             method.start_from(fit).map_err(|error| wrong(file, &error))?;
             settings = (settings.with_fit(text)).with("prior", FmuStart::Text("fit".to_owned()));
@@ -92,7 +92,7 @@ fn of_operator(operator: &OperatorChoice, seed: i32) -> Result<Unit, CliError> {
         ),
         OperatorChoice::File(file) => (read_settings(file)?, file.display().to_string(), vec![file.clone()]),
     };
-    // A unit that cannot start is reported here, not in a simulator.
+    // A unit that could not start in a simulator is reported here.
     let step_s = match parse_any_scenario(&text, &source, &source)? {
         AnyScenario::Reference(scenario) => {
             Simulator::new(&scenario)?;
@@ -109,8 +109,8 @@ fn of_operator(operator: &OperatorChoice, seed: i32) -> Result<Unit, CliError> {
     Ok((settings, read, step_s))
 }
 
-/// The library in the directory of this program, as installed or as built.
-fn beside_this_program() -> Result<PathBuf, CliError> {
+/// Returns the path of the library in the directory of this program, under its installed or its build name.
+fn library_path() -> Result<PathBuf, CliError> {
     let program = env::current_exe().unwrap_or_default();
     let folder = program.parent().unwrap_or(Path::new("."));
     let (prefix, suffix) = (env::consts::DLL_PREFIX, env::consts::DLL_SUFFIX);

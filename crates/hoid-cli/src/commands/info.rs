@@ -34,18 +34,18 @@ pub fn run(args: &InfoArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// The faults of error and control, if the file has both and they form a record.
+/// Returns the faults of e and u, if the file contains both and they form a record.
 fn faults_of(look: &Look) -> Vec<Fault> {
     let seen = look.seen.as_ref().ok();
     let repaired = seen.and_then(|seen| repair(&seen.record, FaultHandling::Report).ok());
     repaired.map_or_else(Vec::new, |repaired| repaired.faults)
 }
 
-/// Layout of the file, and the next command.
+/// Returns the layout of the file and the next command to use.
 fn looks_like(look: &Look, file: &str) -> String {
     let role = |role: &Role| format!("{} ({})", role.column, role.why);
     let mut rows = vec![("input", role(&look.roles.input)), ("output", role(&look.roles.output))];
-    // The others are in the table above.
+    // The table above already gives the units of the columns that it lists.
     let beside = |path: &str| look.survey.columns.iter().any(|c| c.path == path && !c.unit.is_empty());
     let units: Vec<String> = look
         .units()
@@ -68,7 +68,7 @@ fn looks_like(look: &Look, file: &str) -> String {
         }
         Err(reason) => rows.push(("no record", reason.to_string())),
     }
-    let mut text = "\nWhat it looks like:\n".to_owned();
+    let mut text = "\nWhat the record looks like:\n".to_owned();
     for (name, words) in rows {
         text.push_str(&format!("  {name:10}  {words}\n"));
     }
@@ -88,7 +88,7 @@ fn looks_like(look: &Look, file: &str) -> String {
     text
 }
 
-/// The survey as JSON.
+/// Returns the survey as a JSON object.
 fn looked(look: &Look, file: &str) -> Value {
     let role = |role: &Role| json!({"column": role.column, "why": role.why, "certain": role.certain});
     let seen = look.seen.as_ref().ok();
@@ -125,7 +125,7 @@ fn words(file: &str, found: &FileSurvey) -> String {
     for sampling in &found.samplings {
         text.push_str(&sampled(sampling));
     }
-    // Most files give no units, and an empty column makes a table too wide for a screen.
+    // Most files give no units, and an empty column would make the table too wide for a screen.
     let has_units = found.columns.iter().any(|column| !column.unit.is_empty());
     let mut headings = vec!["column", "unit", "type", "rows", "min", "max", "mean", "deviation"];
     headings.retain(|heading| has_units || *heading != "unit");
@@ -194,13 +194,13 @@ fn sampled(s: &SamplingSurvey) -> String {
         line.push_str(&format!(", t does not increase in {} rows", s.not_increasing));
     }
     if s.repeated > 0 {
-        line.push_str(&format!(", {} rows repeat the one before", s.repeated));
+        line.push_str(&format!(", {} rows repeat the row before", s.repeated));
     }
     line.push('\n');
     line
 }
 
-/// Suspicious values in a column.
+/// Describes suspicious values in a column.
 fn remarks(v: &ValueSurvey) -> String {
     let mut remarks = Vec::new();
     if v.missing > 0 {

@@ -1,4 +1,4 @@
-//! `hoid lab`: a tracking experiment in the browser. It is part of the program with the feature `lab`.
+//! `hoid lab`: a tracking experiment in the browser, compiled only with the feature `lab`.
 
 use crate::{args::LabArgs, error::CliError};
 

@@ -17,7 +17,7 @@ use crate::{
     json, output, text,
 };
 
-/// K_n for one order and level, or the reason why there is none.
+/// K_n for one order and noise level, or the reason why there is none.
 struct Gain {
     order: usize,
     level: f64,
@@ -47,7 +47,7 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
             k_n: scenario.remnant_gain_for(&state, order, level, definition),
         })
         .collect();
-    // A level that cannot be reached is a row of the table; any other error concerns all of them.
+    // A noise level that cannot be reached is a row of the table; any other error concerns all noise levels.
     for g in &gains {
         if let Err(error) = &g.k_n
             && !matches!(error, ModelError::UnreachableNoiseLevel { .. })
@@ -97,7 +97,7 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// An operator of the family: the margins of its loop, and the gains of the parts of its remnant.
+/// Prints the margins of the loop for an operator of the family, and the gains of the parts of its remnant.
 fn of_family(scenario: &FamilyScenario, args: &MarginsArgs) -> Result<(), CliError> {
     let (state, which) = match args.state {
         StateName::Initial => (&scenario.initial, 0),

@@ -1,4 +1,4 @@
-//! One file per command. A command parses its arguments once, calls the library, and prints.
+//! One file per command. A command converts its arguments, calls the library, and prints the result.
 
 pub mod compare;
 pub mod convert;

@@ -1,5 +1,5 @@
-//! Checks of the output paths before the work of a command: no input is overwritten, and an
-//! unwritable path is detected at once.
+//! Checks of the output paths before a command does any work: inputs are never overwritten, and a path that cannot be
+//! written is reported at once.
 
 use std::path::Path;
 
@@ -13,8 +13,7 @@ const PAGE: &str = "report.html";
 /// Checks the files and the report directories that a command with these inputs writes.
 ///
 /// # Errors
-/// [`CliError::Io`] for an output that is also an input, possibly through a link, and for a path
-/// that cannot be written.
+/// [`CliError::Io`] if an output is also an input, possibly through a link, or if a path cannot be written.
 pub fn check(inputs: &[&Path], files: &[Option<&Path>], reports: &[Option<&Path>]) -> Result<(), CliError> {
     for file in files.iter().flatten().filter(|file| file.as_os_str() != "-") {
         check_output(file, inputs)?;

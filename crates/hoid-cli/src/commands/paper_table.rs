@@ -1,4 +1,4 @@
-//! A result as a table for a paper.
+//! Writing of a result as a table for a paper.
 
 use hoid::io::writable_endings;
 use hoid::report::PaperTable;
@@ -6,10 +6,10 @@ use serde_json::{Map, Value};
 
 use crate::{args::ShowArgs, error::CliError, output};
 
-/// Checks that the table can be written, before anything is read.
+/// Checks, before anything is read, that the table can be written.
 ///
 /// # Errors
-/// [`CliError::Usage`] for a name that does not correspond to any format.
+/// [`CliError::Usage`] if the name of the file does not correspond to any format.
 pub fn check(show: &ShowArgs) -> Result<(), CliError> {
     let Some(path) = &show.table else { return Ok(()) };
     PaperTable::check(path).map_err(|_| {
@@ -21,10 +21,10 @@ pub fn check(show: &ShowArgs) -> Result<(), CliError> {
     })
 }
 
-/// Writes the table if requested, from the JSON object of the result.
+/// Writes the table, if requested, from the JSON object of the result.
 ///
 /// # Errors
-/// Errors of the object and of writing.
+/// Errors of `object` and of writing.
 pub fn write(show: &ShowArgs, object: impl FnOnce() -> Result<Map<String, Value>, CliError>) -> Result<(), CliError> {
     let Some(path) = &show.table else { return Ok(()) };
     match PaperTable::of(&object()?) {
@@ -32,10 +32,7 @@ pub fn write(show: &ShowArgs, object: impl FnOnce() -> Result<Map<String, Value>
             table.write(path)?;
             output::notice("", format!("table: {}", path.display()));
         }
-        None => output::notice(
-            "",
-            "table: none is written, there is no estimate in the result".to_owned(),
-        ),
+        None => output::notice("", "no table is written: the result has no estimate".to_owned()),
     }
     Ok(())
 }

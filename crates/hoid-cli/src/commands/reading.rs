@@ -1,4 +1,4 @@
-//! From the reading options to recordings, and notes for the user about the files.
+//! Reads recordings according to the reading options, and prints notes about the files.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -11,7 +11,7 @@ use crate::{
     output,
 };
 
-/// Reading options of the arguments.
+/// Converts the reading options of the command line.
 pub fn of(args: &ReadArgs, mask: Option<&MaskArgs>, with_input: bool) -> Result<Reading, CliError> {
     let default = Reading::default();
     Ok(Reading {
@@ -23,7 +23,7 @@ pub fn of(args: &ReadArgs, mask: Option<&MaskArgs>, with_input: bool) -> Result<
 }
 
 /// Reports the omitted parts of a file and its problems.
-pub fn told(path: &Path, read: &ReadRecord) {
+pub fn report_problems(path: &Path, read: &ReadRecord) {
     let file = path.display().to_string();
     for note in &read.notes {
         output::notice(&file, note.to_string());
@@ -33,8 +33,8 @@ pub fn told(path: &Path, read: &ReadRecord) {
     }
 }
 
-/// Reports that a high rate was kept, if it was.
-pub fn say_kept(words: Option<String>) {
+/// Reports that a high sampling frequency was kept, if it was.
+pub fn report_kept_rate(words: Option<String>) {
     if let Some(words) = words {
         output::notice("", words);
     }
@@ -48,7 +48,7 @@ fn options(args: &ReadArgs, with_input: bool) -> Result<ReadOptions, CliError> {
             [_] => None,
             _ => {
                 return Err(CliError::Usage(
-                    "only one --input is read here: several are for hoid identify with the structure operator"
+                    "only one --input is read here; several inputs are for hoid identify with the structure operator"
                         .to_owned(),
                 ));
             }
@@ -73,7 +73,7 @@ fn preparation(args: &ReadArgs) -> Result<Preparation, CliError> {
         units: by_channel("--unit", &prepare.unit)?,
         scale: by_channel("--scale", &prepare.scale)?,
         offset: by_channel("--offset", &prepare.offset)?,
-        // Decimation follows the search for faults, which a filter would hide.
+        // Decimation follows the search for faults, since its filter would hide them.
         rate: prepare.new_fs.map_or(NewRate::Kept, NewRate::Hz),
         run_in_s: prepare.run_in.unwrap_or(0.0),
         detrend: args.detrend,
@@ -81,7 +81,7 @@ fn preparation(args: &ReadArgs) -> Result<Preparation, CliError> {
     })
 }
 
-/// The argument for each channel; a duplicate channel is an error.
+/// Returns the argument for each channel; a channel that is given twice is an error.
 pub fn by_channel<T: Clone>(option: &str, typed: &[(String, T)]) -> Result<BTreeMap<String, T>, CliError> {
     let mut all = BTreeMap::new();
     for (name, value) in typed {

@@ -15,7 +15,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
         let items = items().into_iter().map(|item| (item.name, item.title));
         let claims = (
             CLAIMS.to_owned(),
-            "Statements of the text, and the evidence of the data on them".to_owned(),
+            "Statements of the thesis and the evidence from the data".to_owned(),
         );
         let lines = items
             .chain([claims])
@@ -58,7 +58,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
     })?;
     let Some(found) = found else {
         return Err(CliError::Stopped(format!(
-            "the reproduction was stopped; completed parts are in {}, the same command continues with it",
+            "the reproduction was stopped; completed parts are in {}; the same command resumes it",
             args.out.display()
         )));
     };
@@ -70,7 +70,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
     }
     let (simulated_s, drawn_s) = (found.simulated_s, found.drawn_s);
     output::print(&format!(
-        "{} tables and figures in {:.1} s: {simulated_s:.1} s for the studies, {drawn_s:.1} s for the drawing\n  {}\n",
+        "{} tables and figures in {:.1} s: {simulated_s:.1} s for the studies, {drawn_s:.1} s for drawing\n  {}\n",
         found.items,
         simulated_s + drawn_s,
         found.index.display()

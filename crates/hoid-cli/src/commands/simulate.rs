@@ -30,7 +30,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
     let piped = args.out.as_os_str() == "-";
     if piped {
         write_out(&record)?;
-        if output::reader_left() {
+        if output::pipe_closed() {
             return Ok(());
         }
     } else {
@@ -90,7 +90,7 @@ fn with_changes(mut scenario: Scenario, args: &SimulateArgs) -> Result<Scenario,
     Ok(scenario)
 }
 
-/// The remnant of an operator of the family is defined in its file.
+/// Rejects remnant options, since the remnant of an operator of the family is defined in its file.
 fn of_family(mut scenario: FamilyScenario, args: &SimulateArgs) -> Result<FamilyScenario, CliError> {
     let remnant = [
         ("--remnant-order", args.remnant_order.is_some()),
@@ -100,7 +100,8 @@ fn of_family(mut scenario: FamilyScenario, args: &SimulateArgs) -> Result<Family
     ];
     if let Some((option, _)) = remnant.iter().find(|(_, given)| *given) {
         return Err(CliError::Usage(format!(
-            "{option} is for the thesis's remnant: in a scenario with a form the tables [[remnant]] specify it"
+            "{option} is for the remnant of the thesis; in a scenario with a form, the tables [[remnant]] specify the \
+             remnant"
         )));
     }
     if let Some(ts) = args.sample_time {

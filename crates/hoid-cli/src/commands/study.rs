@@ -1,4 +1,4 @@
-//! `hoid study`: plans, runs, shards.
+//! `hoid study`: runs plans and merges shards.
 
 use std::{
     path::Path,
@@ -24,7 +24,7 @@ pub fn run_command(command: &StudyCommand) -> Result<(), CliError> {
         StudyCommand::Run(args) => run_plan(args),
         StudyCommand::Merge(args) => merge_shards(args),
         StudyCommand::Check(args) => {
-            output::show(&description(&plan_of(&args.plan)?))?;
+            output::show(&description(&read_plan(&args.plan)?))?;
             Ok(())
         }
         StudyCommand::Plans(args) => list(args.name.as_deref()),
@@ -35,8 +35,8 @@ pub fn run_command(command: &StudyCommand) -> Result<(), CliError> {
     }
 }
 
-/// A plan from its file, otherwise by its name.
-fn plan_of(path: &Path) -> Result<Plan, CliError> {
+/// Reads a plan from a file or, if there is no such file, finds it by name.
+fn read_plan(path: &Path) -> Result<Plan, CliError> {
     if !path.exists()
         && let Some(named) = path.to_str().and_then(find_plan)
     {
@@ -46,7 +46,7 @@ fn plan_of(path: &Path) -> Result<Plan, CliError> {
 }
 
 fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
-    let mut plan = plan_of(&args.plan)?;
+    let mut plan = read_plan(&args.plan)?;
     if let Some(replications) = args.replications {
         plan = plan.with_replications(replications)?;
     }
@@ -60,8 +60,8 @@ fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
         csv: args.csv,
     };
     let estimates = usize::try_from(plan.estimates()).unwrap_or(usize::MAX);
-    let outcome = with_progress(&plan.name, &args.out, (estimates, "estimates"), |progress, go_on| {
-        run(&plan, &args.out, &options, progress, go_on)
+    let outcome = with_progress(&plan.name, &args.out, (estimates, "estimates"), |progress, should_continue| {
+        run(&plan, &args.out, &options, progress, should_continue)
     })?;
     if args.json {
         output::print(&format!("{:#}\n", outcome_json(&plan, &outcome)))?;
@@ -81,8 +81,8 @@ fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Runs a named plan or group in a directory with a progress bar of the given number of units; an
-/// interrupt stops it so that it can be resumed.
+/// Runs a plan or a group in a directory, with a progress bar for the given number of units. An interrupt stops it so
+/// that it can be resumed.
 pub fn with_progress(
     name: &str,
     directory: &Path,
@@ -100,7 +100,7 @@ pub fn with_progress(
     );
     bar.finish_and_clear();
     let outcome = outcome?;
-    say(directory, &outcome.notes);
+    print_warnings(directory, &outcome.notes);
     if outcome.finished {
         Ok(outcome)
     } else {
@@ -111,15 +111,15 @@ pub fn with_progress(
     }
 }
 
-/// Reports the notes on a directory as warnings.
-fn say(directory: &Path, notes: &[String]) {
+/// Prints the notes on a directory as warnings.
+fn print_warnings(directory: &Path, notes: &[String]) {
     for note in notes {
         output::warning(&directory.display().to_string(), note);
     }
 }
 
-/// A flag set by an interrupt; a second interrupt ends the program at once, and only the blocks in
-/// progress are lost.
+/// Returns a flag that an interrupt sets. A second interrupt ends the program at once; only the blocks in progress are
+/// lost.
 pub fn stop_at_interrupt() -> Arc<AtomicBool> {
     let stopped = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stopped);
@@ -133,7 +133,7 @@ pub fn stop_at_interrupt() -> Arc<AtomicBool> {
 
 fn merge_shards(args: &StudyMergeArgs) -> Result<(), CliError> {
     let outcome = merge(&args.shards, &args.out, args.csv)?;
-    say(&args.out, &outcome.notes);
+    print_warnings(&args.out, &outcome.notes);
     if args.json {
         let tables: Vec<String> = outcome.tables.iter().map(|t| t.display().to_string()).collect();
         output::print(&format!(

@@ -1,8 +1,8 @@
-//! Summary of a study: relative bias of the operator's parameters, as a table that fits on one screen.
+//! Summary of a study: relative bias of the operator's parameters, as a table that fits onto one screen.
 //!
-//! Each row is an estimator in a cell: the share of estimates that are an operator, and for each parameter the median
-//! of `100 (estimate - true) / true` with its Monte Carlo error. The median is used because single estimates of a poor
-//! model may have arbitrary errors.
+//! Each row is an estimator in a cell: the share of estimates that could be converted to an operator, and for each
+//! parameter the median of `100 (estimate - true) / true` with its Monte Carlo error. The median is used because single
+//! estimates of a poor model may have arbitrarily large errors.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use hoid::report::numbers;
 
 use crate::{error::CliError, text};
 
-/// Parameters in order of preference; the first that the table has are shown.
+/// Parameters in order of preference; the first ones that the table contains are shown.
 const PARAMETERS: [&str; 10] = [
     "K_e",
     "K_over_T_I",
@@ -24,12 +24,12 @@ const PARAMETERS: [&str; 10] = [
     "T_L2",
     "t_M",
 ];
-/// Number of parameter columns on a screen of 80 columns.
+/// Maximum number of parameters on a screen of 80 columns.
 const MOST_PARAMETERS: usize = 3;
 /// Maximum number of rows on a screen.
 const MOST_ROWS: usize = 24;
 
-/// The summary of the tables of a study; empty if they have no bias of a parameter.
+/// Returns the summary of the tables of a study; empty if they contain no bias of a parameter.
 pub fn answer(tables: &[PathBuf]) -> Result<String, CliError> {
     let is_summary = |path: &&PathBuf| path.file_stem().is_some_and(|stem| stem == "summary");
     let Some(summary) = tables.iter().find(is_summary) else {
@@ -43,14 +43,14 @@ pub fn answer(tables: &[PathBuf]) -> Result<String, CliError> {
 struct Row {
     cell: String,
     estimator: String,
-    /// Number of all estimates.
+    /// Number of estimates.
     all: f64,
-    /// Share of estimates that are not an operator.
+    /// Share of estimates that failed or could not be converted to an operator.
     failed: f64,
     not_convertible: f64,
-    /// Share of estimates with a trustworthy verdict, if there are verdicts.
+    /// Share of estimates with a trustworthy verdict; `None` if the estimator gives no verdict.
     trustworthy: Option<f64>,
-    /// One for each parameter, empty if there is none.
+    /// Bias of each parameter as text; empty if there is none.
     biases: Vec<String>,
 }
 
@@ -120,7 +120,7 @@ fn words(summary: &OutputTable) -> String {
     };
     format!(
         "{table}\n{more}Relative bias in %: median over the fits that give an operator (of all), and its Monte Carlo \
-         error. Other parameters and their spread: table summary. Cells by number: hoid study check.\n"
+         error. Other parameters and their spread: table summary. hoid study check lists the cells by number.\n"
     )
 }
 

@@ -1,8 +1,8 @@
-//! The responses of `s^i omega^2/((s + a)(s^2 + 2 zeta omega s + omega^2)) e^{-tau s}`, i = 0, 1, 2, with `a = 1/T_I`,
-//! and their derivatives with respect to omega, zeta and tau, to an error that is linear between samples.
+//! Responses of `s^i omega^2/((s + a)(s^2 + 2 zeta omega s + omega^2)) e^{-tau s}`, i = 0, 1, 2, with `a = 1/T_I`, to
+//! an error that is interpolated linearly between samples, and their derivatives with respect to omega, zeta and tau.
 //!
-//! With `Q = s^2 + 2 zeta omega s + omega^2` and the signals `z_i` of `s^i/((s + a) Q^2) e^{-tau s}`,
-//! i = 0 to 5,
+//! Let `Q = s^2 + 2 zeta omega s + omega^2`, and let z_i be the response of `s^i/((s + a) Q^2) e^{-tau s}`, i = 0 to 5.
+//! Then
 //!
 //! `r_i = omega^2 (z_{i+2} + 2 zeta omega z_{i+1} + omega^2 z_i)`,
 //! `dr_i/domega = 2 r_i/omega - 2 omega^2 (zeta z_{i+1} + omega z_i)`,
@@ -10,10 +10,9 @@
 //! `dr_i/dtau = -omega^2 (z_{i+3} + 2 zeta omega z_{i+2} + omega^2 z_{i+1})`.
 //!
 //! `z_0 .. z_4` are the states of one filter in controllable canonical form, `z' = A z + B e(t - tau)`, and z_5 is the
-//! derivative of the last. With `tau = l Ts + delta`, `0 <= delta < Ts`, the delayed error is linear in two pieces over
-//! a sample, before and after delta. With `G(h) = int e^{A(h-s)} B ds` and `R(h) = int e^{A(h-s)} B s ds`, both columns
-//! of the exponential of
-//! `[A B 0; 0 0 1; 0 0 0] h`,
+//! derivative of z_4. With `tau = l Ts + delta`, `0 <= delta < Ts`, the delayed error consists of two linear pieces
+//! within a sample, before and after delta. With `G(h) = int e^{A(h-s)} B ds` and `R(h) = int e^{A(h-s)} B s ds`, both
+//! columns of the exponential of `[A B 0; 0 0 1; 0 0 0] h`,
 //!
 //! `z(k+1) = Phi z(k) + T_0 e(k-l+1) + T_1 e(k-l) + T_2 e(k-l-1)`,
 //! `T_0 = R(h)/Ts`,
@@ -21,11 +20,11 @@
 //! `T_2 = Phi(h) (G(delta) delta/Ts - R(delta)/Ts)`, `h = Ts - delta`
 //!
 //! (K. J. Åström and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 3.2; the triangle hold of G. F.
-//! Franklin, J. D. Powell and M. Workman, *Digital Control of Dynamic Systems*, 1998, section 6.3). Exact for a
-//! piecewise linear error and any delay. The response to a sampled sine is the operator's times that of the hold,
-//! `(sin(omega Ts/2)/(omega Ts/2))^2`, except for aliases.
+//! Franklin, J. D. Powell and M. Workman, *Digital Control of Dynamic Systems*, 1998, section 6.3). The recursion is
+//! exact for a piecewise linear error and any delay. Except for aliases, the response to a sampled sine is the
+//! operator's response multiplied by that of the hold, `(sin(omega Ts/2)/(omega Ts/2))^2`.
 //!
-//! Each r_i is divided by its gain at [`REFERENCE`], so that all gains are in units of |Y| there.
+//! Each r_i is divided by its gain at [`REFERENCE`], so that all gains are in units of |Y| at that frequency.
 
 use super::{
     f64x2::F64x2,
@@ -33,38 +32,37 @@ use super::{
     sizes::{DYNAMICS, GAINS, LINEAR, SIGNALS, STATES},
 };
 
-/// Frequency at which each response has a gain of one, rad/s.
+/// Frequency in rad/s at which each response is scaled to a gain of one.
 pub const REFERENCE: f64 = 2.0;
 
-/// States of the filter.
+/// Number of filter states.
 const N: usize = SIGNALS - 1;
-/// Size of the exponential: the states, a step, a ramp.
+/// Size of the matrix exponential: filter states, a step and a ramp.
 const M: usize = N + 2;
 type Square = [[f64; M]; M];
 
-/// A complex number: real and imaginary part.
+/// Complex number as real and imaginary part.
 pub type Complex = [f64; 2];
-/// `z_0 .. z_5`.
+/// Signals `z_0 .. z_5` of the basis.
 pub type Signals = [f64; SIGNALS];
 
-/// The dynamics of a person: delay in s, natural frequency in rad/s and damping of the
-/// neuromuscular system, lag in s.
+/// Dynamics of a person: delay, natural frequency and damping ratio of the neuromuscular system, and lag.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
-    /// Delay, s.
+    /// Delay in s.
     pub tau: f64,
-    /// Natural frequency, rad/s.
+    /// Natural frequency in rad/s.
     pub omega: f64,
     /// Damping ratio.
     pub zeta: f64,
-    /// Lag T_I, s.
+    /// Lag T_I in s.
     pub lag: f64,
 }
 
 crate::state!([] Point { tau, omega, zeta, lag });
 
 impl Point {
-    /// Returns the point plus corrections of omega, zeta and tau.
+    /// Returns the point with corrections of omega, zeta and tau added.
     pub fn moved(self, [omega, zeta, tau]: [f64; DYNAMICS]) -> Self {
         Self {
             tau: self.tau + tau,
@@ -75,21 +73,21 @@ impl Point {
     }
 }
 
-/// The responses of a sample, and their derivatives with respect to omega, zeta and tau.
+/// Responses r_i at one sample, with their derivatives with respect to omega, zeta and tau.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Regressors {
-    /// r_i.
+    /// Responses r_i.
     pub x: [f64; GAINS],
-    /// Derivatives.
+    /// Derivatives of the r_i with respect to omega, zeta and tau.
     pub by: [[f64; GAINS]; DYNAMICS],
 }
 
-/// The filter of a point.
+/// Filter that generates the responses for one [`Point`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Basis {
     point: Point,
     sample_time: f64,
-    /// Columns of Phi, and T_0 to T_2, each followed by a zero to the length of the signals.
+    /// Columns of Phi, and T_0 to T_2, each padded with a zero to the number of signals.
     columns: [Paired; N],
     taps: [Paired; 3],
     monic: [f64; N],
@@ -102,8 +100,8 @@ pub struct Basis {
 crate::state!([] Basis { point, columns, taps, monic, delay, part, scale, z });
 
 impl Basis {
-    /// Builds the filter at rest. Ts in s. `None` for numbers that are not positive (the delay: negative) or not
-    /// finite, and for poles so fast that their response vanishes.
+    /// Builds the filter at rest, with Ts in s. Returns `None` if a number is not finite or not positive (the delay may
+    /// be zero), or if the poles are so fast that their response vanishes.
     pub fn new(point: Point, sample_time: f64) -> Option<Self> {
         let positive = |x: f64| x > 0.0 && x < 1e6;
         let Point { tau, omega, zeta, lag } = point;
@@ -139,7 +137,7 @@ impl Basis {
         let whole = libm::floor(tau / ts + 1e-9);
         let delta = (tau - whole * ts).max(0.0);
         let (a, p, q) = (1.0 / lag, 2.0 * zeta * omega, omega * omega);
-        // Q^2, without its s^4.
+        // Coefficients of Q^2 without the leading s^4.
         let square = [q * q, 2.0 * p * q, p * p + 2.0 * q, 2.0 * p];
         self.monic = [
             a * square[0],
@@ -179,8 +177,8 @@ impl Basis {
         (self.delay, self.part) = (whole as usize, part);
     }
 
-    /// Returns the filter at another point with the same lag and scale, which continues the slow mode:
-    /// `g = 1/(s + a) e` is `Q^2 z_0` in the states of both. The fast modes start at rest and settle within some
+    /// Returns a filter at another point, with the same lag and scale, that continues the slow mode: in the states of
+    /// either filter, `g = 1/(s + a) e` is `Q^2 z_0`. The fast modes start at rest and settle within a few multiples of
     /// `1/(zeta omega)`. `error` is the current delayed error.
     pub fn moved(&self, point: Point, error: f64) -> Option<Self> {
         let sound = point.omega > 0.0 && point.zeta > 0.0 && point.tau >= 0.0 && point.lag == self.point.lag;
@@ -213,29 +211,30 @@ impl Basis {
             .then_some(other)
     }
 
-    /// Returns the point.
+    /// Returns the point at which the filter was built.
     pub fn point(&self) -> Point {
         self.point
     }
 
-    /// Returns the whole samples of the delay: the signals of a sample need the error `delay` samples ago and the two
-    /// before it.
+    /// Returns the delay in whole samples. [`Basis::step`] needs the errors of `delay`, `delay + 1` and `delay + 2`
+    /// samples ago.
     pub fn delay(&self) -> usize {
         self.delay
     }
 
-    /// Returns the factor of each response, one over its gain at [`REFERENCE`].
+    /// Returns the scale factor of each response: the reciprocal of its unscaled gain at [`REFERENCE`].
     pub fn scale(&self) -> [f64; GAINS] {
         self.scale
     }
 
-    /// Returns the delayed error, from those of `delay` and `delay + 1` samples ago.
+    /// Returns the delayed error, interpolated between the errors of `delay` and `delay + 1` samples ago.
     #[inline(always)]
     pub fn delayed(&self, [now, before]: [f64; 2]) -> f64 {
         now * (1.0 - self.part) + before * self.part
     }
 
-    /// Returns the signals of a sample from the errors of `delay`, `delay + 1` and `delay + 2` samples ago.
+    /// Advances the filter by one sample and returns its signals. `errors` are the errors of `delay`, `delay + 1` and
+    /// `delay + 2` samples ago.
     #[inline(always)]
     pub fn step(&mut self, errors: [f64; 3]) -> Signals {
         let mut sums = [F64x2::ZERO; SIGNALS / 2];
@@ -257,7 +256,7 @@ impl Basis {
         signals
     }
 
-    /// Returns the responses and their derivatives from the signals.
+    /// Returns the responses and their derivatives, computed from the signals.
     #[inline(always)]
     pub fn regressors(&self, z: &Signals) -> Regressors {
         let Point { omega, zeta, .. } = self.point;
@@ -277,7 +276,8 @@ impl Basis {
         r
     }
 
-    /// Returns the weights of the signals in `sum_i theta_i (r_i + sum_j c_j dr_i/dj)`, theta and c in a state.
+    /// Returns the weights of the signals in `sum_i theta_i (r_i + sum_j c_j dr_i/dj)`, where `state` contains the
+    /// gains theta and the corrections c.
     pub fn weights(&self, state: &[f64; STATES]) -> Signals {
         let Point { omega, zeta, .. } = self.point;
         let (p, q) = (2.0 * zeta * omega, omega * omega);
@@ -294,13 +294,13 @@ impl Basis {
         weights
     }
 
-    /// Returns the factors that convert the gains to the units of another basis.
+    /// Returns the factors that convert gains from the units of this basis to those of `to`.
     pub(super) fn units_of(&self, to: &Self) -> [f64; GAINS] {
         core::array::from_fn(|i| self.scale[i] / to.scale[i])
     }
 
-    /// Converts a state to the coordinates of another basis: the same gains in its units, and corrections from its
-    /// point.
+    /// Converts a state to the coordinates of the basis `to`: the gains are converted to its units, and the corrections
+    /// are taken relative to its point.
     pub(super) fn carried(&self, to: &Self, state: &[f64; STATES]) -> [f64; STATES] {
         let mut carried = *state;
         for (s, unit) in carried.iter_mut().zip(self.units_of(to)) {
@@ -314,12 +314,13 @@ impl Basis {
         carried
     }
 
-    /// Resets the filter.
+    /// Resets the filter to rest.
     pub fn reset(&mut self) {
         self.z = [0.0; N];
     }
 
-    /// Returns the frequency response of each r_i at a frequency in rad/s, for the point `at`.
+    /// Returns the frequency response of each r_i at a frequency in rad/s, with natural frequency, damping and delay of
+    /// `at`.
     pub fn response(&self, omega_rad_s: f64, at: Point) -> [Complex; GAINS] {
         let w = omega_rad_s;
         let square = at.omega * at.omega;
@@ -340,8 +341,9 @@ impl Basis {
         })
     }
 
-    /// Returns K_e and K_e_dot of the gain and lead that are nearest to `N(s)/(s + a)` at some frequencies in rad/s,
-    /// by least squares in `K_e + K_e_dot j omega`: linear in the gains and independent of poles and delay.
+    /// Returns the matrix that maps the gains to K_e and K_e_dot of the gain and lead nearest to `N(s)/(s + a)` at the
+    /// given frequencies in rad/s. The fit is by least squares in `K_e + K_e_dot j omega`; it is linear in the gains
+    /// and independent of poles and delay.
     pub fn gain_and_lead(&self, at_rad_s: &[f64]) -> [[f64; GAINS]; 2] {
         let (a, count) = (1.0 / self.point.lag, at_rad_s.len() as f64);
         let squares: f64 = at_rad_s.iter().map(|w| w * w).sum();
@@ -359,7 +361,7 @@ impl Basis {
     }
 }
 
-/// Products `Q z_i` that the responses and their derivatives with respect to the delay need.
+/// Number of products `Q z_i` in the responses and their derivatives with respect to the delay.
 const LINKS: usize = SIGNALS - 2;
 
 pub(super) fn times(a: Complex, b: Complex) -> Complex {
@@ -376,8 +378,8 @@ fn product(a: &Square, b: &Square) -> Square {
     core::array::from_fn(|i| core::array::from_fn(|j| (0..M).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
-/// Matrix exponential by scaling to a norm below 1/4, the Taylor series to order 14, and squaring:
-/// the truncation error is below 1e-20 (C. Moler and C. Van Loan, *SIAM Review* 45 (2003) 3-49).
+/// Returns the matrix exponential, computed by scaling to a norm below 1/4, the Taylor series to order 14, and
+/// squaring. The truncation error is below 1e-20 (C. Moler and C. Van Loan, *SIAM Review* 45 (2003) 3-49).
 fn exponential(m: &Square) -> Square {
     let norm = m
         .iter()

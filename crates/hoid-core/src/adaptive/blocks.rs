@@ -1,44 +1,47 @@
-//! Normal equations over blocks of half a second, for the detector.
+//! Normal equations over blocks of half a second, used by the change detector.
 //!
-//! After the whitening filter, with the regressors r of gains and level, those of the dynamics
-//! `q_j = sum_i theta_i dr_i/dj`, both at the estimate of that sample, and the corrections p of that sample, to first order
+//! After the whitening filter, with the regressors r of gains and level, the regressors of the dynamics
+//! `q_j = sum_i theta_i dr_i/dj`, both at the current estimate, and the corrections p of the dynamics at that sample,
+//! to first order
+//! dynamics, to first order
 //!
-//! `y + q' p = r' x + q' p' + eps`.
+//! `y + q' p = r' x + q' p_1 + eps`,
 //!
-//! Each sample is weighted by one over the variance of eps, so that the sums are in its units, and is limited to a number of
-//! standard deviations about its prediction. The dynamics have a weak prior at their current value, the same for all spans:
-//! without information about them, two spans do not differ.
+//! where x are the unknown gains and level, and p_1 the unknown corrections. Each sample is weighted by the reciprocal
+//! of the variance of eps, so the sums are in units of that variance. Each output is limited to a number of standard
+//! deviations about its prediction. The dynamics have a weak prior at their current value, the same for all spans: two
+//! spans without information about the dynamics then do not differ.
 
 use hoid_numerics::{cholesky, products::dot};
 
 use super::sizes::{DYNAMICS, LINEAR, STATES};
 
-/// Number of products in the upper triangle.
+/// Number of products in the upper triangle of the normal equations.
 const PRODUCTS: usize = STATES * (STATES + 1) / 2;
-/// Ridge, as a share of the diagonal.
+/// Ridge that is added to the diagonal, relative to the diagonal and divided by the number of samples.
 const RIDGE: f64 = 1e-3;
 
-/// The row of a sample.
+/// Row of one sample in the normal equations.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
-    /// Regressors of gains and level, then of the dynamics.
+    /// Regressors of gains and level, followed by those of the dynamics.
     pub x: [f64; STATES],
-    /// Limited output, with `q' p`.
+    /// Limited output plus `q' p`.
     pub y: f64,
-    /// Innovation, not limited.
+    /// Innovation without the limit.
     pub innovation: f64,
     /// Variance of eps.
     pub variance: f64,
 }
 
-/// Sums of a block: the normal equations of its samples.
+/// Sums over one block that form its normal equations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Block {
     products: [f64; PRODUCTS],
     with_output: [f64; STATES],
     square: f64,
     pub samples: f64,
-    /// Sum of the squares of the innovations, not limited.
+    /// Sum of the squares of the innovations without the limit.
     power: f64,
 }
 
@@ -52,18 +55,18 @@ pub(super) const EMPTY: Block = Block {
     power: 0.0,
 };
 
-/// The solution of the normal equations `A x = b`.
+/// Solution of the normal equations `A x = b`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Solution {
     pub state: [f64; STATES],
     /// `A^-1`.
     pub inverse: [[f64; STATES]; STATES],
-    /// Residual sum of squares, including that of the prior.
-    pub left: f64,
+    /// Residual sum of squares, including the contribution of the prior.
+    pub residual_squares: f64,
 }
 
 impl Block {
-    /// Takes a sample.
+    /// Adds one sample.
     #[inline(always)]
     pub fn add(&mut self, row: &Row) {
         let Row { x, y, .. } = row;
@@ -98,13 +101,13 @@ impl Block {
         })
     }
 
-    /// Adds a prior of the dynamics with this mean and these standard deviations.
+    /// Adds a normal prior of the dynamics with the given mean and standard deviations.
     pub fn with_prior(mut self, mean: [f64; DYNAMICS], deviations: [f64; DYNAMICS]) -> Self {
         let mut diagonal = 0;
         for i in 0..STATES {
             if let Some(j) = i.checked_sub(LINEAR) {
-                // The sums are in units of the variance of eps, so that the weight of the prior is
-                // one over its variance.
+                // The sums are in units of the variance of eps, so the weight of the prior is the reciprocal of its
+                // variance.
                 let weight = 1.0 / (deviations[j] * deviations[j]);
                 self.products[diagonal] += weight;
                 self.with_output[i] += weight * mean[j];
@@ -115,12 +118,12 @@ impl Block {
         self
     }
 
-    /// Mean square of the innovations, not limited.
+    /// Mean square of the innovations without the limit.
     pub fn innovation_variance(&self) -> f64 {
         self.power / self.samples.max(1.0)
     }
 
-    /// A.
+    /// Matrix A of the normal equations.
     pub fn matrix(&self) -> [[f64; STATES]; STATES] {
         let mut matrix = [[0.0; STATES]; STATES];
         let mut k = 0;
@@ -133,7 +136,7 @@ impl Block {
         matrix
     }
 
-    /// Least squares; `None` if the equations are singular or there are too few samples.
+    /// Least-squares solution; `None` if the equations are singular or there are too few samples.
     pub fn solved(&self) -> Option<Solution> {
         if self.samples <= STATES as f64 {
             return None;
@@ -148,11 +151,11 @@ impl Block {
         let mut state = self.with_output;
         cholesky::solve(&factor, STATES, &mut state);
         let inverse = cholesky::scaled_inverse(&factor, STATES, 1.0);
-        let left = (self.square - dot(&state, &self.with_output)).max(self.samples * 1e-12);
-        Some(Solution { state, inverse, left })
+        let residual_squares = (self.square - dot(&state, &self.with_output)).max(self.samples * 1e-12);
+        Some(Solution { state, inverse, residual_squares })
     }
 
-    /// The score of a state, `b - A x`: its mean is zero at the true state.
+    /// Score `b - A x` of a state x. Its expected value is zero at the true state.
     pub fn score(&self, state: &[f64; STATES]) -> [f64; STATES] {
         let matrix = self.matrix();
         core::array::from_fn(|i| self.with_output[i] - dot(&matrix[i], state))

@@ -1,17 +1,17 @@
-//! One pass over the data: a basis, a noise model, and the mixture of hypotheses about the gains.
+//! Candidate: one pass over the data with a fixed basis, a noise model, and the mixture of hypotheses about the gains.
 //!
-//! A candidate processes samples in order. Its whitening filter D and its basis stay fixed, so that the candidate is
-//! the prediction error method for given D and a given linearisation (L. Ljung, *System Identification*, 1999, section
-//! 7.2). It estimates for the next candidate a better point of the basis (the corrections), a better noise model
-//! (`noise`, from the residuals) and how unevenly the innovations are distributed (`volatility`). [`super::filter`]
-//! runs one candidate after the other over the data.
+//! A candidate processes samples in order. Its whitening filter D and its basis stay fixed, so the candidate is the
+//! prediction-error method for a given D and a given linearisation (L. Ljung, *System Identification*, 1999, section
+//! 7.2). For the next candidate it estimates a better point of the basis (the corrections), a better noise model
+//! (`noise`, from the residuals) and how unevenly the power of the innovations is distributed in time (`volatility`).
+//! [`super::filter`] runs one candidate after another over the data.
 //!
-//! `evidence` is the sum of the logarithms of the predictive densities of the blocks (A. P. Dawid, *J. Royal
-//! Statistical Society* A 147 (1984) 278-292); it is the criterion by which candidates of the same data are compared.
-//! Each block is predicted from earlier blocks only, so that additional parameters give no advantage. The density is
-//! Student's with the variance of the last few seconds and as many degrees of freedom as the block has samples, so that
-//! an unpredicted change does not dominate. Old evidence is forgotten, so that it measures the quality of the estimate
-//! and not the speed of its start.
+//! `evidence` is the sum of the log predictive densities of the blocks (A. P. Dawid, *J. Royal Statistical Society* A
+//! 147 (1984) 278-292). It is the criterion by which candidates are compared over the same data. Each block is
+//! predicted from earlier blocks only, so additional parameters give no advantage. The density is Student's, with a
+//! running innovation variance and as many degrees of freedom as the block has samples, so that an unpredicted change
+//! does not dominate. Old evidence is forgotten, so that the evidence measures the quality of the current estimate
+//! rather than the speed of initial convergence.
 
 use super::{
     basis::{Basis, Complex, Point, Regressors},
@@ -27,32 +27,32 @@ use super::{
 };
 use crate::state::{State, visit_all};
 
-/// Magnitude beyond which the filters are reset.
+/// Magnitude of a signal beyond which the filters are reset.
 pub(super) const LARGEST: f64 = 1e100;
-/// Range of the basis point (omega in rad/s, zeta, tau in s), and its largest step (relative for omega and zeta, in s
-/// for tau).
+/// `RANGE` limits the basis point (omega in rad/s, zeta, tau in s), and `LARGEST_STEP` limits its change in one step
+/// (relative for omega and zeta, in s for tau).
 const RANGE: [[f64; 2]; DYNAMICS] = [[3.0, 35.0], [0.05, 1.4], [0.01, 0.85]];
-const FAR: [[f64; 2]; DYNAMICS] = [[-0.3, 0.4], [-0.4, 0.6], [-0.05, 0.05]];
-/// Longest delay, s.
-pub(super) const LATEST_S: f64 = 0.9;
-/// Frequencies at which K_e and K_e_dot are fitted to the numerator, rad/s.
+const LARGEST_STEP: [[f64; 2]; DYNAMICS] = [[-0.3, 0.4], [-0.4, 0.6], [-0.05, 0.05]];
+/// Longest delay in s.
+pub(super) const LONGEST_DELAY_S: f64 = 0.9;
+/// Frequencies in rad/s at which K_e and K_e_dot are fitted to the numerator.
 pub(super) const NEAR_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
-/// Time before which blocks do not count as evidence, s.
+/// Initial time in s during which blocks do not count as evidence.
 const UNSETTLED_S: f64 = 2.0;
-/// Time over which [`Volatility`] sums one energy, s.
+/// Time in s over which [`Volatility`] sums each energy.
 const BURST_S: f64 = 1.28;
-/// Memory of the variance in the predictive density of the evidence, s.
+/// Longest memory, in s, of the variance in the predictive density of the evidence.
 const LEVEL_S: f64 = 20.0;
-/// Time constant with which evidence is forgotten, s.
+/// Time constant in s with which evidence is forgotten.
 const EVIDENCE_S: f64 = 20.0;
-/// Time between two solutions of the noise model without replays, s.
-const RENEWED_S: f64 = 1.28;
-/// Upper limit of a squared innovation in the noise model, in innovation variances.
+/// Interval in s at which the noise model is solved if there are no replays.
+const NOISE_UPDATE_S: f64 = 1.28;
+/// Squared innovation, in innovation variances, above which the weight of a sample in the noise model is reduced.
 const CLIP_VARIANCES: f64 = 100.0;
-/// Lower limit of the variance, as a share of the power of u.
+/// Lower limit of the innovation variance relative to the power of u.
 const LEAST: f64 = 1e-24;
 
-/// A sample after the whitening filter.
+/// Sample after the whitening filter.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Whitened {
     pub y: f64,
@@ -60,7 +60,7 @@ pub(super) struct Whitened {
     pub level: f64,
 }
 
-/// The candidate.
+/// One pass over the data; see the module documentation.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Candidate {
     basis: Basis,
@@ -69,7 +69,7 @@ pub(super) struct Candidate {
     outputs: [f64; LARGEST_ORDER],
     d: [f64; LARGEST_ORDER],
     pub noise: NoiseModel,
-    /// Sums of the current block: of its first p samples (p the order of D), and of the rest.
+    /// Sums over the first p samples of the current block (p is the order of D), and over its other samples.
     early: Moments,
     late: Moments,
     block: u64,
@@ -78,13 +78,13 @@ pub(super) struct Candidate {
     guide: Segments,
     skipped: u64,
     volatility: Volatility,
-    level: [f64; 2],
+    predictive_variance: [f64; 2],
     pub evidence: f64,
     samples: u64,
-    /// Samples until the filter D contains no predicted output.
+    /// Number of samples until the filter D no longer contains a predicted output.
     predicted: u64,
     pub blocks: LastBlocks,
-    /// Sample of the record at which the candidate started.
+    /// Index of the sample at which the candidate started.
     pub start: u64,
 }
 
@@ -105,7 +105,7 @@ impl State for Candidate {
                 &mut self.guide,
                 &mut self.skipped,
                 &mut self.volatility,
-                &mut self.level,
+                &mut self.predictive_variance,
                 &mut self.evidence,
                 &mut self.samples,
                 &mut self.predicted,
@@ -118,7 +118,7 @@ impl State for Candidate {
 }
 
 impl Candidate {
-    /// A candidate at rest. `d` is the solved initial noise model.
+    /// Builds a candidate at rest. `d` is the initial noise model, already solved.
     pub fn new(
         basis: Basis,
         d: &NoiseModel,
@@ -146,7 +146,7 @@ impl Candidate {
             guide: Segments::NONE,
             skipped: 0,
             volatility: Volatility::new(libm::round(BURST_S / (block * scales.sample_time)).max(1.0) as u64),
-            level: [scales.innovations, 20.0],
+            predictive_variance: [scales.innovations, 20.0],
             evidence: 0.0,
             samples: 0,
             predicted: 0,
@@ -155,20 +155,21 @@ impl Candidate {
         }
     }
 
-    /// Computes the residuals of the noise model with these segments in place of the mean of the
-    /// mixture.
+    /// Makes the candidate compute the residuals of the noise model with the states of these segments instead of the
+    /// mean of the mixture.
     pub fn with_guide(mut self, guide: Segments) -> Self {
         self.guide = guide;
         self
     }
 
-    /// Skips the update for a number of samples: the filters start at rest, the signals do not.
+    /// Makes the first `samples` samples advance the filters without an update: the filters start at rest, but the
+    /// recorded signals do not.
     pub fn with_skipped(mut self, samples: u64) -> Self {
         self.skipped = samples;
         self
     }
 
-    /// Continues without a guide.
+    /// Makes the candidate continue without the guide.
     pub fn clear_guide(&mut self) {
         self.guide = Segments::NONE;
     }
@@ -181,24 +182,24 @@ impl Candidate {
         self.block
     }
 
-    /// Number of samples that count as one independent sample, from the innovations so far.
+    /// Number of samples that count as one independent sample, estimated from the innovations so far.
     pub fn dispersion(&self) -> f64 {
         self.volatility.dispersion()
     }
 
-    /// Advances the basis by a sample; `error(age)` is the error `age` samples ago.
+    /// Advances the basis by one sample; `error(age)` is the error `age` samples ago.
     #[inline(always)]
-    pub fn respond(&mut self, error: impl Fn(usize) -> f64) {
+    pub fn advance_basis(&mut self, error: impl Fn(usize) -> f64) {
         let l = self.basis.delay();
         self.now = self.basis.step([error(l), error(l + 1), error(l + 2)]);
     }
 
-    /// Step 2: `y = D u`, D times the signals, and `D(1)`, the factor of the level.
+    /// Step 2: returns `y = D u`, the signals filtered by D, and `D(1)`, the factor of the level.
     #[inline(always)]
     pub fn whitened(&self, u: f64) -> Whitened {
         let (mut y, mut z, mut level) = (u, paired(&self.now), 1.0);
         let order = self.noise.order().next_multiple_of(4).min(LARGEST_ORDER);
-        // The bank of hypotheses is linear in the signals, so that filtering the signals once by D serves all of them.
+        // All hypotheses are linear in the signals, so filtering the signals once by D serves every hypothesis.
         for ((d, u), before) in self.d[..order].iter().zip(&self.outputs).zip(self.past.newest_first()) {
             y += d * u;
             level += d;
@@ -213,7 +214,7 @@ impl Candidate {
         }
     }
 
-    /// Step 3: `nu = y - H x^`, the innovation of a whitened sample for the mean of the mixture.
+    /// Step 3: returns `nu = y - H x^`, the innovation of a whitened sample for the mean of the mixture.
     #[inline(always)]
     pub fn innovation(&self, white: &Whitened) -> f64 {
         let state = self.mixture.mean();
@@ -221,8 +222,8 @@ impl Candidate {
         white.y - state[GAINS] * white.level - (0..SIGNALS).map(|k| w[k] * white.signals[k]).sum::<f64>()
     }
 
-    /// Adds a sample to the sums of the block, to the noise model and to the detector, and ends the
-    /// block; false if a number has overflowed.
+    /// Adds a sample to the sums of the block, to the noise model and to the detector, and completes the block if it is
+    /// full. Returns false if a number has overflowed.
     #[inline(always)]
     pub fn update(&mut self, white: &Whitened, u: f64, prior: &ChangePrior) -> bool {
         let sound = |x: &f64| x.abs() < LARGEST;
@@ -230,8 +231,8 @@ impl Candidate {
             return false;
         }
         if self.predicted > 0 {
-            // D filters p past outputs. A predicted output lacks the noise v, so that until it has left the filter the
-            // innovation has the variance of v instead of that of eps. These samples are not used.
+            // D filters the last p outputs. A predicted output lacks the noise v. Until that output has left the
+            // filter, the innovation has the variance of v instead of that of eps, so these samples are not used.
             self.predicted -= 1;
             self.blocks.pass_over();
             return true;
@@ -258,18 +259,17 @@ impl Candidate {
         true
     }
 
-    /// The output with its innovation limited to a number of standard deviations (P. J. Huber,
-    /// *Robust Statistics*, 1981).
+    /// Output with its innovation limited to a number of standard deviations (P. J. Huber, *Robust Statistics*, 1981).
     #[inline(always)]
     fn limited(&self, y: f64, innovation: f64, limit: f64) -> f64 {
-        let most = limit * libm::sqrt(self.level[0]);
+        let most = limit * libm::sqrt(self.predictive_variance[0]);
         if most == f64::INFINITY {
             return y;
         }
         y - innovation + innovation.max(-most).min(most)
     }
 
-    /// The row of the sample in the normal equations of the detector.
+    /// Row of the sample in the normal equations of the detector.
     #[inline(always)]
     fn row(&self, white: &Whitened, innovation: f64, limit: f64) -> Row {
         let Regressors { x, by } = self.basis.regressors(&white.signals);
@@ -292,12 +292,12 @@ impl Candidate {
             x: row,
             y: self.limited(white.y, innovation, limit) + shift,
             innovation,
-            variance: self.level[0],
+            variance: self.predictive_variance[0],
         }
     }
 
-    /// Step 10: updates the noise model with `v = u - level - w' z` and its lags, for the gains of
-    /// the guide or the current ones.
+    /// Step 10: updates the noise model with `v = u - level - w' z` at the current and the preceding samples, for the
+    /// gains of the guide or, without a guide, the current gains.
     #[inline(always)]
     fn take_residual(&mut self, u: f64) {
         let order = self.noise.order();
@@ -317,9 +317,9 @@ impl Candidate {
             *v = left(*u, z);
         }
         // After a change, v contains the unmodelled part of the response. The weight `min(1, c sigma^2/eps^2)` limits
-        // its share in the sums of D to that of a large innovation.
+        // the contribution of such a sample to the sums of D.
         let eps = v[0] + self.d.iter().zip(&v[1..]).map(|(d, v)| d * v).sum::<f64>();
-        let excess = eps * eps / (CLIP_VARIANCES * self.level[0]);
+        let excess = eps * eps / (CLIP_VARIANCES * self.predictive_variance[0]);
         self.noise.update(&v, eps, 1.0 / excess.max(1.0));
     }
 
@@ -330,24 +330,27 @@ impl Candidate {
         let least = LEAST * self.scales.size * self.scales.size;
         let energy = moments.energy(&self.basis, self.mixture.mean()).max(n * least);
         let settled = self.samples as f64 * ts > UNSETTLED_S;
-        let [level, rests_on] = &mut self.level;
+        let [predictive_variance, rests_on] = &mut self.predictive_variance;
         if settled {
-            // Student's density with n degrees of freedom (constants cancel in differences between candidates).
-            let density = -0.5 * n * (libm::log(*level) + 2.0 * libm::log1p(energy / (n * *level)));
+            // Student's density with n degrees of freedom, without constants that cancel in differences between
+            // candidates.
+            let density = -0.5 * n * (libm::log(*predictive_variance) + 2.0 * libm::log1p(energy / (n * *predictive_variance)));
             self.evidence = density + libm::exp(-n * ts / EVIDENCE_S) * self.evidence;
         }
         *rests_on = (*rests_on + n).min(LEVEL_S / ts).max(n);
-        *level = (*level + n / *rests_on * (energy / n - *level)).max(least);
-        // The variance of the level follows the block energies with a growing memory, at most LEVEL_S.
+        *predictive_variance = (*predictive_variance + n / *rests_on * (energy / n - *predictive_variance)).max(least);
+        // The variance in the predictive density follows the block energies with a memory that grows to at most
+        // LEVEL_S.
         let left = self.mixture.update([&early, &late], &self.basis, prior, &self.scales);
         if settled {
             self.volatility.take(left, n);
         }
     }
 
-    /// Uses its own noise model from here on: without replays there is no next candidate that would use it.
-    pub fn renew(&mut self) {
-        let every = (libm::round(RENEWED_S / self.scales.sample_time).max(1.0)) as u64;
+    /// Replaces D by the candidate's own noise model at regular intervals. Without replays there is no next candidate
+    /// that could use this noise model.
+    pub fn update_whitening(&mut self) {
+        let every = (libm::round(NOISE_UPDATE_S / self.scales.sample_time).max(1.0)) as u64;
         if self.samples.is_multiple_of(every) {
             self.noise.solve();
             let order = self.noise.order();
@@ -356,32 +359,33 @@ impl Candidate {
         }
     }
 
-    /// Ends a sample.
+    /// Stores the output and the signals of a sample for the whitening filter.
     #[inline(always)]
-    pub fn remember(&mut self, u: f64) {
+    pub fn store(&mut self, u: f64) {
         self.outputs.copy_within(0..LARGEST_ORDER - 1, 1);
         self.outputs[0] = u;
         self.past.push(&self.now);
     }
 
-    /// Ends a sample whose output is a prediction or a limit of the stick.
-    pub fn remember_prediction(&mut self, u: f64) {
-        // The number of consecutive predictions, at most the order of D.
+    /// Stores a sample whose output is a prediction or a value at a limit of the stick.
+    pub fn store_prediction(&mut self, u: f64) {
+        // Counts consecutive predictions, up to the order of D.
         self.predicted = (self.predicted + 1).min(self.noise.order() as u64);
-        self.remember(u);
+        self.store(u);
     }
 
-    /// Coefficients of the whitening filter D after the 1.
+    /// Coefficients of the whitening filter D after the leading 1.
     pub fn d(&self) -> &[f64] {
         &self.d[..self.noise.order()]
     }
 
-    /// The basis point plus the corrections of a state, limited to the range of the basis.
+    /// Basis point plus the corrections of a state; each correction is limited to the largest step, and the result to
+    /// the range of the basis.
     pub fn corrected(&self, state: &[f64; STATES]) -> Point {
         let at = self.basis.point();
         let of = [at.omega, at.zeta, 1.0];
         let [omega, zeta, tau] = core::array::from_fn(|j| {
-            let [down, up] = FAR[j].map(|far| far * of[j]);
+            let [down, up] = LARGEST_STEP[j].map(|far| far * of[j]);
             let [low, high] = RANGE[j];
             let from = [at.omega, at.zeta, at.tau][j];
             (from + state[LINEAR + j].max(down).min(up)).max(low).min(high)
@@ -389,12 +393,12 @@ impl Candidate {
         Point { omega, zeta, tau, ..at }
     }
 
-    /// The basis point plus the current corrections.
+    /// Basis point plus the current corrections.
     pub fn point(&self) -> Point {
         self.corrected(self.mixture.mean())
     }
 
-    /// K_e, K_e_dot, omega, zeta and tau.
+    /// Estimates of K_e, K_e_dot, omega, zeta and tau.
     pub fn operator(&self) -> [f64; PARAMETERS] {
         let (map, state) = (self.basis.gain_and_lead(&NEAR_RAD_S), self.mixture.mean());
         let Point { omega, zeta, tau, .. } = self.point();
@@ -402,19 +406,19 @@ impl Candidate {
         [gain(0), gain(1), omega, zeta, tau]
     }
 
-    /// The response of each gain at a frequency in rad/s, at the current point.
+    /// Frequency response that belongs to each gain, at a frequency in rad/s and at the current point.
     pub fn responses(&self, omega_rad_s: f64) -> [Complex; GAINS] {
         self.basis.response(omega_rad_s, self.point())
     }
 
-    /// Y at a frequency in rad/s.
+    /// Frequency response Y of the operator at a frequency in rad/s.
     pub fn response(&self, omega_rad_s: f64) -> Complex {
         let (state, h) = (self.mixture.mean(), self.responses(omega_rad_s));
         [0, 1].map(|part| (0..GAINS).map(|i| state[i] * h[i][part]).sum())
     }
 
-    /// As [`Candidate::response`], with the derivatives of its real and its imaginary part by gains, level
-    /// and corrections: exact for the gains, finite differences for the corrections.
+    /// As [`Candidate::response`], with the derivatives of the real and imaginary parts with respect to gains, level
+    /// and corrections. The derivatives are exact for the gains and finite differences for the corrections.
     pub fn response_with_derivatives(&self, omega_rad_s: f64) -> (Complex, [[f64; STATES]; 2]) {
         let (state, point) = (self.mixture.mean(), self.point());
         let h = self.basis.response(omega_rad_s, point);
@@ -440,7 +444,8 @@ impl Candidate {
         (of(&h), by)
     }
 
-    /// A state in the coordinates of another basis; without corrections if the point of that basis is not near.
+    /// Returns a state in the coordinates of another basis, with corrections of zero if the points of the two bases are
+    /// far apart.
     pub fn carried(&self, to: &Basis, state: &[f64; STATES]) -> [f64; STATES] {
         let mut carried = self.basis.carried(to, state);
         let [omega, _, tau] = [carried[LINEAR], carried[LINEAR + 1], carried[LINEAR + 2]];

@@ -1,22 +1,23 @@
-//! The difference between two spans: two least-squares solutions with a covariance from their scores.
+//! Difference between two spans of data: two least-squares solutions, with a covariance estimated from their scores.
 //!
-//! The noise model whitens, but its spectrum in the band of control is estimated from few data: 16 lags at 100 Hz cover
-//! 0.16 s, and people act within seconds. Where that spectrum is wrong by a factor, `sigma^2 A^-1` is wrong by the same
-//! factor. The covariance of the score `g = b - A x` is therefore estimated as well (the sandwich of P. J. Huber,
-//! *Proc. Fifth Berkeley Symposium* 1 (1967) 221-233; H. White, *Econometrica* 48 (1980) 817-838). With the scores
-//! `g_k` of stretches of one second, which are nearly independent (W. K. Newey and K. D. West, *Econometrica* 55 (1987)
-//! 703-708),
+//! The noise model whitens, but it estimates the spectrum in the frequency band of manual control from few data: 16
+//! lags at 100 Hz cover 0.16 s, whereas people act within seconds. Where that spectrum is wrong by a factor,
+//! `sigma^2 A^-1` is wrong by the same factor. The covariance of the score `g = b - A x` is therefore estimated as well
+//! (the sandwich of P. J. Huber, *Proc. Fifth Berkeley Symposium* 1 (1967) 221-233; H. White, *Econometrica* 48 (1980)
+//! 817-838). With the scores `g_k` of stretches of one second, which are nearly independent (W. K. Newey and K. D.
+//! West, *Econometrica* 55 (1987) 703-708),
 //!
 //! `S = sum_k g_k g_k' / (1 - (N + 3)/K)`, `W_i = w n_i/n S + (1 - w) sigma^2 A_i`,
 //!
-//! for K stretches of both spans, N unknowns, and `n_i` of the n samples in span i. The divisor corrects the two degrees of
-//! freedom of the solutions and the mean `K/(K - N - 1)` of an inverse Wishart matrix. With few stretches S is uncertain,
-//! and the part of the model keeps it positive definite; w is `EMPIRICAL_SHARE`. Then
+//! for K stretches in both spans together, N unknowns, and `n_i` of the n samples in span i. The divisor corrects for
+//! two lost degrees of freedom, since the scores of each span sum to zero, and for the mean `K/(K - N - 1)` of an
+//! inverse Wishart matrix. With few stretches S is uncertain; the term with `sigma^2` keeps the covariance positive
+//! definite. The weight w is `EMPIRICAL_SHARE`. Then
 //!
 //! `d = x_1 - x_0`, `C = A_0^-1 W_0 A_0^-1 + A_1^-1 W_1 A_1^-1`.
 //!
-//! sigma^2 and S are common to both spans: with a variance for each span, a calm second or a louder remnant would count as
-//! a change of the operator.
+//! sigma^2 and S are common to both spans. With a separate variance for each span, a quiet second or a stronger remnant
+//! would count as a change of the operator.
 
 use hoid_numerics::{cholesky, products::dot};
 
@@ -24,38 +25,38 @@ use super::{blocks::Block, sizes::STATES};
 
 type Matrix = [[f64; STATES]; STATES];
 
-/// Blocks per score.
+/// Number of blocks per score.
 const BLOCKS_PER_SCORE: usize = 2;
-/// Share w of the empirical covariance of the scores, and its value for the covariance of the noise
-/// model alone.
+/// Weight w of the empirical covariance of the scores. `MODEL_ONLY` is the weight for the covariance of the noise model
+/// alone.
 pub(super) const EMPIRICAL_SHARE: f64 = 2.0 / 3.0;
 pub(super) const MODEL_ONLY: f64 = 0.0;
-/// Lower limit of the share of the remaining degrees of freedom.
+/// Lower limit of the divisor of S.
 const LEAST_FREE: f64 = 0.3;
 
-/// A difference between present and past: gains, level, natural frequency, damping, delay.
+/// Difference between present and past in gains, level, natural frequency, damping and delay.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Contrast {
-    /// Present minus past.
+    /// State of the present minus state of the past.
     pub difference: [f64; STATES],
-    /// Its covariance.
+    /// Covariance of the difference.
     pub covariance: Matrix,
-    /// The past state, relative to the basis.
+    /// State of the past, relative to the basis.
     pub before: [f64; STATES],
-    /// Its covariance.
+    /// Covariance of the state of the past.
     pub covariance_before: Matrix,
-    /// Residual sum of squares of both spans.
-    pub left: f64,
-    /// Number of samples of past and present.
+    /// Residual sum of squares over both spans.
+    pub residual_squares: f64,
+    /// Numbers of samples in the past and in the present.
     pub samples: [f64; 2],
 }
 
-crate::state!([] Contrast { difference, covariance, before, covariance_before, left, samples });
+crate::state!([] Contrast { difference, covariance, before, covariance_before, residual_squares, samples });
 
 impl Contrast {
-    /// The difference between two spans of blocks. `with_prior` adds a prior to the sums of each; `shown` is w. `None`
-    /// if a span determines nothing.
-    pub(super) fn between(sides: [&[Block]; 2], shown: f64, with_prior: impl Fn(Block) -> Block) -> Option<Self> {
+    /// Computes the difference between two spans of blocks. `with_prior` adds a prior to the sums of each span;
+    /// `empirical_share` is w. Returns `None` if the data of a span do not determine a state.
+    pub(super) fn between(sides: [&[Block]; 2], empirical_share: f64, with_prior: impl Fn(Block) -> Block) -> Option<Self> {
         let sums = sides.map(|blocks| with_prior(Block::of(blocks)));
         let [Some(before), Some(now)] = sums.each_ref().map(Block::solved) else {
             return None;
@@ -74,12 +75,12 @@ impl Contrast {
         let free = (1.0 - (STATES + 3) as f64 / stretches).max(LEAST_FREE);
         let samples = sums.map(|s| s.samples);
         let all = samples[0] + samples[1];
-        let left = before.left + now.left;
-        let variance = left / (all - 2.0 * STATES as f64).max(1.0);
+        let residual_squares = before.residual_squares + now.residual_squares;
+        let variance = residual_squares / (all - 2.0 * STATES as f64).max(1.0);
         let [covariance_before, covariance_now] = core::array::from_fn(|side| {
             let (matrix, inverse) = (sums[side].matrix(), &solutions[side].inverse);
-            let share = shown * samples[side] / (all * free);
-            let model = (1.0 - shown) * variance;
+            let share = empirical_share * samples[side] / (all * free);
+            let model = (1.0 - empirical_share) * variance;
             let of_score = each(|i, j| share * squares[i][j] + model * matrix[i][j]);
             product(&product(inverse, &of_score), inverse)
         });
@@ -88,13 +89,13 @@ impl Contrast {
             covariance: each(|i, j| covariance_before[i][j] + covariance_now[i][j]),
             before: before.state,
             covariance_before,
-            left,
+            residual_squares,
             samples,
         })
     }
 
-    /// Returns the mean ratio of the covariance to another, `tr(C_other^-1 C)/N`. `None` if the other is not positive
-    /// definite.
+    /// Returns the mean ratio of this covariance to that of another contrast, `tr(C_other^-1 C)/N`, or `None` if the
+    /// covariance of the other contrast is not positive definite.
     pub(super) fn dispersion(&self, other: &Self) -> Option<f64> {
         let mut factor = other.covariance;
         if !cholesky::factor(&mut factor, STATES) {
@@ -109,7 +110,7 @@ impl Contrast {
         Some(trace / STATES as f64)
     }
 
-    /// Returns the same with both covariances times a factor.
+    /// Returns the same contrast with both covariances multiplied by a factor.
     pub(super) fn times(&self, factor: f64) -> Self {
         Self {
             covariance: self.covariance.map(|row| row.map(|c| factor * c)),
@@ -118,7 +119,8 @@ impl Contrast {
         }
     }
 
-    /// Returns the Wald statistic `d' C^-1 d` of some components; `None` if their C is not positive definite.
+    /// Returns the Wald statistic `d' C^-1 d` of the selected components, or `None` if their covariance C is not
+    /// positive definite.
     pub(super) fn wald_statistic<const N: usize>(&self, places: [usize; N]) -> Option<f64> {
         let d = places.map(|i| self.difference[i]);
         let mut factor = places.map(|i| places.map(|j| self.covariance[i][j]));

@@ -1,30 +1,32 @@
-//! Detector of changes of the operator: a Wald test of the last few seconds against the time before, over blocks of
-//! half a second (`blocks`).
+//! Detector of changes of the operator: a Wald test that compares the last few seconds with the preceding data, over
+//! blocks of half a second (`blocks`).
 //!
-//! Least squares over the last blocks and over the earlier blocks, with gains, natural frequency, damping, delay and
-//! level free in both, give a difference d with the covariance C of the scores (`contrast`). For gains, natural
-//! frequency, damping and delay, but not for the level,
+//! Least squares over the latest blocks (the present) and over the preceding blocks (the past), with gains, natural
+//! frequency, damping, delay and level free in both, gives a difference d. The covariance C of d is estimated from the
+//! scores (`contrast`). For gains, natural frequency, damping and delay, but not for the level,
 //!
 //! `T = d' C^-1 d`
 //!
-//! is chi-square with `nu = 6` degrees of freedom without a change (G. C. Chow, *Econometrica* 28 (1960) 591-605). It is
-//! computed for a short and for a long present: small changes need more data than large ones. One second between past and
-//! present is left out, since a change need not be at the border of a block.
+//! has a chi-square distribution with `nu = 6` degrees of freedom if there is no change (G. C. Chow, *Econometrica* 28
+//! (1960) 591-605). It is computed for a short and for a long present, since small changes need more data than large
+//! changes. One second between past and present is left out, since a change need not coincide with the border of a
+//! block.
 //!
-//! **Normalisation.** Operators vary to different degrees. T is therefore divided by the root of its level c without a
-//! change, from the mean of `ln T`, whose expectation for a chi-square is `ln 2 + psi(nu/2)`; c is at least one, and its
-//! prior counts as half a minute of blocks. The statistic is reported as its log significance in nats, with `x = T/2 sqrt c`
+//! **Normalisation.** Some operators vary more than others. T is therefore divided by the square root of c, its level
+//! relative to a chi-square without a change. c is estimated from the mean of `ln T`, whose expected value for a
+//! chi-square is `ln 2 + psi(nu/2)`; c is at least one, and its prior counts as half a minute of blocks. The statistic
+//! is reported as its log significance in nats, with `x = T/(2 sqrt c)`
 //!
 //! `-ln P(chi^2 > 2x) = x - ln (1 + x + .. + x^(nu/2-1)/(nu/2-1)!)`
 //!
 //! (M. Abramowitz and I. A. Stegun, 1964, eq. 6.3.3, 6.3.4, 26.4.5).
 //!
-//! **Declaration.** A change is declared if one of the statistics exceeds the threshold. Its time is the border of blocks
-//! with the least residual sum of squares when all parameters are free before and after it (R. E. Quandt, *J. American
-//! Statistical Association* 53 (1958) 873-880).
+//! **Declaration.** A change is declared if one of the two statistics exceeds the threshold. The time of the change is
+//! the block border that gives the smallest residual sum of squares when all parameters are free before and after it
+//! (R. E. Quandt, *J. American Statistical Association* 53 (1958) 873-880).
 //!
-//! The blocks belong to the live candidate (`last_blocks`), with its noise model and basis. From three seconds
-//! after a gap on, the time after it is compared with the time before it.
+//! The blocks are those of the live candidate (`last_blocks`), with its noise model and basis. From four seconds after
+//! a gap, the data after the gap are compared with those before it.
 
 use super::{
     blocks::Block,
@@ -34,43 +36,43 @@ use super::{
     sizes::{DYNAMICS, GAINS, LINEAR},
 };
 
-/// Expectation of the logarithm of a chi-square with one pair of degrees of freedom, `ln 2 - gamma`.
+/// Expected value of the logarithm of a chi-square with one pair of degrees of freedom, `ln 2 - gamma`.
 const MEAN_LOG: f64 = 0.115_931_515_658_412_45;
-/// Number of parameters that are tested: gains and dynamics.
+/// Number of tested parameters: gains and dynamics.
 const OPERATOR: usize = GAINS + DYNAMICS;
-/// Their indices in the state: all except the level.
+/// Indices of the tested parameters in the state: all states except the level.
 const OPERATOR_STATES: [usize; OPERATOR] = [0, 1, 2, LINEAR, LINEAR + 1, LINEAR + 2];
-/// Pairs of degrees of freedom.
+/// Number of pairs of degrees of freedom.
 const PAIRS: u32 = OPERATOR as u32 / 2;
-/// Blocks between past and present.
+/// Number of blocks left out between past and present.
 const GUARD_BLOCKS: usize = 2;
-/// Least number of blocks of a present after a gap.
+/// Minimum number of blocks in a present after a gap.
 const LEAST_AFTER_GAP: usize = 4;
-/// Number of blocks that the prior of the level, that of a chi-square, counts as.
+/// Weight, in blocks, of the prior of the level of a statistic; the prior is the level of a chi-square.
 const PRIOR_BLOCKS: f64 = 60.0;
-/// Largest number of blocks in the mean of the level.
+/// Maximum number of blocks, in addition to the prior, in the mean that estimates the level of a statistic.
 const LEVEL_MEMORY: f64 = 240.0;
-/// Largest contribution of one logarithm to the level: a change must not count as variation.
+/// Largest amount by which one logarithm may exceed the level, so that a change does not count as normal variation.
 const LARGEST_LOG_STEP: f64 = 3.0;
 
-/// Settings of the detector.
+/// Settings of the change detector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Detection {
-    /// Number of blocks of the short and of the long present.
+    /// Numbers of blocks in the short and in the long present.
     pub recent: [usize; 2],
-    /// Least number of blocks of the past.
+    /// Minimum number of blocks in the past.
     pub least: usize,
-    /// Largest number of blocks of the past.
+    /// Maximum number of blocks in the past.
     pub most: usize,
-    /// Log significance at which a change is declared, nats.
+    /// Log significance in nats above which a change is declared.
     pub threshold: f64,
-    /// Prior standard deviations of the dynamics, in their units.
+    /// Prior standard deviations of natural frequency (rad/s), damping ratio and delay (s).
     pub dynamics: [f64; DYNAMICS],
-    /// Number of blocks after a declared change in which no other is declared.
+    /// Number of blocks after a declared change in which no other change is declared.
     pub refractory: u64,
 }
 
-/// A statistic and its level without a change.
+/// Statistic and its level without a change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Statistic {
     level: f64,
@@ -89,13 +91,13 @@ impl Statistic {
         }
     }
 
-    /// Ratio of the statistic to a chi-square so far, at least one.
+    /// Ratio of the statistic so far to a chi-square, at least one.
     fn scale(&self) -> f64 {
         libm::exp(self.level - mean_log(PAIRS)).max(1.0)
     }
 
     fn take(&mut self, t: f64) {
-        // The test uses the level before this block, so that a change does not reduce its own significance.
+        // The test uses the level estimated before this block, so that a change does not reduce its own significance.
         self.log_significance = log_significance(t / libm::sqrt(self.scale()), PAIRS);
         self.levels = (self.levels + 1.0).min(PRIOR_BLOCKS + LEVEL_MEMORY);
         let log = libm::log(t.max(0.05)).min(self.level + LARGEST_LOG_STEP);
@@ -103,12 +105,12 @@ impl Statistic {
     }
 }
 
-/// Expectation of the logarithm of a chi-square with a given number of pairs of degrees of freedom.
+/// Returns the expected value of the logarithm of a chi-square with the given number of pairs of degrees of freedom.
 fn mean_log(pairs: u32) -> f64 {
     MEAN_LOG + (1..pairs).map(|k| 1.0 / f64::from(k)).sum::<f64>()
 }
 
-/// `-ln P(chi^2 > x)` for a chi-square with a given number of pairs of degrees of freedom.
+/// Returns `-ln P(chi^2 > x)` for a chi-square with the given number of pairs of degrees of freedom.
 fn log_significance(x: f64, pairs: u32) -> f64 {
     let half = 0.5 * x;
     let (mut term, mut sum) = (1.0, 1.0);
@@ -119,13 +121,13 @@ fn log_significance(x: f64, pairs: u32) -> f64 {
     half - libm::log(sum)
 }
 
-/// The detector.
+/// Detector of changes of the operator.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detector {
     settings: Detection,
-    /// For the short and for the long present.
+    /// Statistics for the short and for the long present.
     statistics: [Statistic; 2],
-    /// Blocks since the last change was declared.
+    /// Number of blocks since the last change was declared.
     since: u64,
     declared: bool,
     declared_contrast: Contrast,
@@ -137,7 +139,7 @@ pub struct Detector {
 crate::state!([] Detector { statistics, since, declared, declared_contrast, innovation_variances, difference, ago });
 
 impl Detector {
-    /// Builds the detector before the first block. `None` if the capacity for blocks is too small.
+    /// Builds the detector. Returns `None` if the settings are not valid or need more blocks than can be stored.
     pub fn new(settings: Detection) -> Option<Self> {
         let [short, long] = settings.recent;
         let present = short > 0 && short <= long;
@@ -155,12 +157,12 @@ impl Detector {
         })
     }
 
-    /// Tests blocks of which the last is new. `dynamics` are the current corrections, relative to the basis of the
-    /// blocks.
+    /// Tests the stored blocks, of which the last one is new. `dynamics` are the current corrections of natural
+    /// frequency, damping and delay, relative to the basis of the blocks.
     pub(super) fn test(&mut self, last: &LastBlocks, dynamics: [f64; DYNAMICS]) {
         self.declared = false;
         self.since += 1;
-        // Blocks before the last declared change belong to another operator and are not used.
+        // Blocks from before the last declared change belong to another operator and are not used.
         let known = last
             .all()
             .len()
@@ -180,7 +182,7 @@ impl Detector {
         }
     }
 
-    /// T for a present; `None` if there are too few blocks.
+    /// Statistic T for a present; `None` if there are too few blocks.
     fn wald_statistic(&self, blocks: &[Block], fresh: usize, dynamics: [f64; DYNAMICS], present: usize) -> Option<f64> {
         let Detection {
             recent, least, most, ..
@@ -196,10 +198,11 @@ impl Detector {
             .wald_statistic(OPERATOR_STATES)
     }
 
-    /// Locates the change at the border of blocks with the least residual sum of squares. The difference is reported
-    /// with the covariance of the noise model times a dispersion: the mean ratio of the covariance of the scores to
-    /// that of the model between the halves of the past. The covariance of the scores alone is too uncertain to
-    /// distinguish gains from a delay, and scores of the present contain the change.
+    /// Locates the change at the block border with the smallest residual sum of squares. The difference is reported
+    /// with the covariance given by the noise model, multiplied by a dispersion. The dispersion is the mean ratio of
+    /// the covariance estimated from the scores to that of the noise model, for the difference between the two halves
+    /// of the past. The covariance from the scores alone is too uncertain to distinguish gains from a delay, and the
+    /// scores of the present contain the change.
     fn locate_change(&mut self, blocks: &[Block], dynamics: [f64; DYNAMICS], recent: usize) {
         let mut best: Option<Contrast> = None;
         self.ago = recent.min(blocks.len().saturating_sub(1));
@@ -208,7 +211,7 @@ impl Detector {
             let Some(contrast) = self.compare([past, present], MODEL_ONLY, dynamics) else {
                 continue;
             };
-            if best.is_none_or(|best| contrast.left < best.left) {
+            if best.is_none_or(|best| contrast.residual_squares < best.residual_squares) {
                 (best, self.ago) = (Some(contrast), after);
             }
         }
@@ -221,34 +224,35 @@ impl Detector {
         self.difference = Difference::of(&self.declared_contrast).unwrap_or_default();
     }
 
-    /// The difference of all states between two spans.
-    fn compare(&self, sides: [&[Block]; 2], shown: f64, dynamics: [f64; DYNAMICS]) -> Option<Contrast> {
+    /// Computes the difference of all states between two spans.
+    fn compare(&self, sides: [&[Block]; 2], empirical_share: f64, dynamics: [f64; DYNAMICS]) -> Option<Contrast> {
         let deviations = self.settings.dynamics;
-        Contrast::between(sides, shown, |sum| sum.with_prior(dynamics, deviations))
+        Contrast::between(sides, empirical_share, |sum| sum.with_prior(dynamics, deviations))
     }
 
-    /// Returns the time from the last declared change to its declaration, s.
+    /// Returns the time in s from the last declared change to its declaration.
     pub fn ago_s(&self) -> f64 {
         self.ago as f64 * BLOCK_S
     }
 
-    /// Returns the log significance at the last block, nats: the larger of both statistics; zero while there are too
-    /// few blocks.
+    /// Returns the log significance in nats at the last block: the larger of the two statistics, or zero while there
+    /// are too few blocks.
     pub fn log_significance(&self) -> f64 {
         self.statistics.iter().fold(0.0, |most, s| s.log_significance.max(most))
     }
 
-    /// Returns the ratio of T to a chi-square without a change: the larger of both statistics.
+    /// Returns the typical ratio of T to a chi-square in the absence of a change: the larger of the ratios for the two
+    /// statistics.
     pub fn typical_level(&self) -> f64 {
         self.statistics.iter().fold(1.0, |most, s| s.scale().max(most))
     }
 
-    /// Returns the difference at the last declared change.
+    /// Returns the difference between present and past at the last declared change, with all parameters free.
     pub fn contrast(&self) -> &Contrast {
         &self.declared_contrast
     }
 
-    /// Returns the mean square of the innovations before and after the last declared change.
+    /// Returns the mean squares of the innovations before and after the last declared change.
     pub fn innovation_variances(&self) -> [f64; 2] {
         self.innovation_variances
     }
@@ -258,12 +262,12 @@ impl Detector {
         self.declared
     }
 
-    /// Returns the parameters that changed at the last declared change.
+    /// Returns the parameters that changed at the last declared change, and the sizes of their changes.
     pub fn difference(&self) -> &Difference {
         &self.difference
     }
 
-    /// No block ended at this sample: no change is declared at it.
+    /// Records that no block was completed at this sample, so no change is declared at it.
     pub(super) fn pass_over(&mut self) {
         self.declared = false;
     }

@@ -1,15 +1,16 @@
-//! Selection of the changed parameters: the difference between present and past, by groups of parameters.
+//! Selection of the parameters that changed, in groups, from the difference between present and past.
 //!
-//! Gains, level and dynamics differ by d with the covariance C (`contrast`), `W = C^-1`. Not all components can be
-//! distinguished: a longer delay resembles a turned gain vector, and seconds of data hardly separate them. Each group (the
-//! gains; natural frequency and damping; the delay) therefore either changed or did not; the level always did. For the set
-//! S of the components that changed,
+//! Between past and present, gains, level and dynamics differ by d, with the covariance C (`contrast`) and `W = C^-1`.
+//! The data do not distinguish all components: a longer delay has nearly the same effect as a combined change of the
+//! gains, and a few seconds of data hardly separate the two. Each group (the gains; natural frequency and damping; the
+//! delay) is therefore treated as either changed or unchanged; the level always counts as changed. For the set S of the
+//! components that changed,
 //!
 //! `d_S = (W_SS)^-1 (W d)_S`, with the covariance `(W_SS)^-1`,
 //!
-//! and `chi_S^2 = d' W d - d_S' (W d)_S` is the statistic of the hypothesis that the others did not change. The set with
-//! the least `chi_S^2 + 4 |S|` is reported. The penalty lies between the 2 of Akaike and the logarithm of the number of
-//! samples of Schwarz (*Annals of Statistics* 6 (1978) 461-464).
+//! and `chi_S^2 = d' W d - d_S' (W d)_S` is the statistic of the hypothesis that the other components did not change.
+//! The set with the smallest `chi_S^2 + 4 |S|` is reported. The penalty of 4 per parameter lies between that of Akaike,
+//! 2, and that of Schwarz, the logarithm of the number of samples (*Annals of Statistics* 6 (1978) 461-464).
 
 use hoid_numerics::{cholesky, products::dot};
 
@@ -19,28 +20,28 @@ use super::{
 };
 
 /// Penalty per parameter.
-const PRICE: f64 = 4.0;
-/// Number of sets of the groups (gains, neuromuscular system, delay), each a bit.
+const PENALTY: f64 = 4.0;
+/// Number of sets of the groups (gains, neuromuscular system, delay); each group is one bit.
 const SETS: usize = 8;
 const GAINS_BIT: usize = 1;
 const SYSTEM_BIT: usize = 2;
 const DELAY_BIT: usize = 4;
 
-/// The parameters that changed, and by how much.
+/// Parameters that changed, with the sizes of their changes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Difference {
-    /// Gains, level, natural frequency, damping, delay: zero for parameters that did not change.
+    /// Changes of gains, level, natural frequency, damping and delay; zero for parameters that did not change.
     pub value: [f64; STATES],
-    /// Its covariance.
+    /// Covariance of `value`.
     pub covariance: [[f64; STATES]; STATES],
-    /// Whether the gains changed, natural frequency and damping, and the delay.
+    /// Whether the gains, the neuromuscular system (natural frequency and damping) and the delay changed.
     pub changed: [bool; 3],
 }
 
 crate::state!([] Difference { value, covariance, changed });
 
 impl Difference {
-    /// `None` if the contrast does not determine it.
+    /// Selects the parameters that changed. Returns `None` if the covariance of the contrast is not positive definite.
     pub(super) fn of(contrast: &Contrast) -> Option<Self> {
         let (d, mut factor) = (contrast.difference, contrast.covariance);
         if !cholesky::factor(&mut factor, STATES) {
@@ -75,7 +76,7 @@ impl Difference {
             }
             let mut of_set = of_d;
             cholesky::solve(&own, n, &mut of_set);
-            let cost = PRICE * n as f64 - dot(&of_set[..n], &of_d);
+            let cost = PENALTY * n as f64 - dot(&of_set[..n], &of_d);
             if cost < least {
                 least = cost;
                 let mut difference = Self {

@@ -1,11 +1,11 @@
-//! Two numbers for one vector register.
+//! Pair of f64 numbers for one vector register.
 //!
-//! Every processor with vector registers operates on two f64 at a multiple of 16 bytes. The operations are those of scalar
-//! numbers: the digits are the same on every machine.
+//! Every processor with vector registers can operate on two f64 numbers at an address that is a multiple of 16 bytes.
+//! The operations are those on scalars, so the results are bit-identical on every machine.
 
 use core::ops::{Add, AddAssign, Div, Mul, Sub, SubAssign};
 
-/// Two numbers.
+/// Pair of numbers, aligned to 16 bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(16))]
 pub(super) struct F64x2(pub [f64; 2]);
@@ -19,7 +19,7 @@ impl crate::state::State for F64x2 {
 impl F64x2 {
     pub const ZERO: Self = Self::both(0.0);
 
-    /// One number twice.
+    /// Returns a pair with the same number twice.
     #[inline(always)]
     pub const fn both(x: f64) -> Self {
         Self([x; 2])
@@ -30,7 +30,7 @@ impl F64x2 {
         Self(core::array::from_fn(|i| of(self.0[i], other.0[i])))
     }
 
-    /// Their sum.
+    /// Returns the sum of the two numbers.
     #[inline(always)]
     pub fn sum(self) -> f64 {
         self.0.iter().sum()

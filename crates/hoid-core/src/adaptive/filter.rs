@@ -1,7 +1,7 @@
-//! The recursion: one sample in, one estimate out.
+//! Adaptive recursion: takes one sample and updates the estimate.
 //!
 //! The live candidate ([`super::candidate`]) processes each sample on arrival. This module decides which samples update
-//! the estimate and which only advance the filters, and stores the decision for the replays (`replay`). The detector
+//! the estimate and which only advance the filters, and stores this decision for the replays (`replay`). The detector
 //! tests the blocks of the live candidate.
 
 mod replay;
@@ -11,7 +11,7 @@ pub use replay::REPLAYED;
 use super::{
     alternatives::Alternatives,
     basis::{Basis, Complex, Point},
-    candidate::{Candidate, LARGEST, LATEST_S},
+    candidate::{Candidate, LARGEST, LONGEST_DELAY_S},
     detector::Detector,
     history::{History, Use},
     initial_estimate::InitialEstimate,
@@ -26,16 +26,17 @@ use crate::{
     state::{State, visit_all},
 };
 
-/// Trust region of the corrections in a replay: shares of omega and zeta, and s.
-const NEAR: [f64; DYNAMICS] = [0.15, 0.3, 0.03];
-/// Time that a replay skips at its start, s: its filters start at rest, the signals do not.
+/// Trust region of the corrections in a replay, as standard deviations: relative for omega and zeta, in s for tau.
+const TRUST_DEVIATIONS: [f64; DYNAMICS] = [0.15, 0.3, 0.03];
+/// Initial part of a replay, in s, that does not update the estimate: the filters start at rest, but the recorded
+/// signals do not.
 const AT_REST_S: f64 = 2.0;
-/// Time after which constant signals no longer update the estimate, s.
+/// Time in s after which constant signals no longer update the estimate.
 const STILL_S: f64 = 0.1;
-/// Time after a constant span until the filters have settled, s.
+/// Time in s that the filters need to settle after a span of constant signals.
 const SETTLING_S: f64 = 2.0;
 
-/// The recursion. E is the memory of past samples.
+/// Adaptive recursion. E is the memory for past samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdaptiveFilter<E> {
     prior: AdaptivePrior,
@@ -45,26 +46,25 @@ pub struct AdaptiveFilter<E> {
     live: Candidate,
     started: bool,
     trial: Candidate,
-    /// 0: no replay; 1: a replay from the estimate; 2 and more: a replay from another starting
-    /// point.
-    stage: u64,
-    /// The next sample of the replay.
-    at: u64,
+    /// 0: no replay; 1: replay from the estimate; 2 or more: replay from another starting point.
+    replay_stage: u64,
+    /// Index of the next sample of the replay.
+    next_sample: u64,
     replays: u64,
     alternatives: Alternatives,
     detector: Detector,
     history: History<E>,
     saturation: Saturation,
-    /// Sums of the squares of e, of u, and of `D u` for the prior D: the last bounds the innovation variance from
-    /// above, since it is that of a response of zero.
+    /// Sums of the squares of e, of u, and of `D u` with the prior D. The last sum gives an upper bound for the
+    /// innovation variance: the variance for an operator that does not respond to e.
     powers: [f64; 3],
     restarts: u64,
     age: u64,
-    /// Number of samples in which neither signal has changed.
-    still: u64,
-    /// Number of samples since the last of these.
+    /// Number of samples in the current or last span of constant signals.
+    constant_samples: u64,
+    /// Number of samples since the end of that span.
     settling: u64,
-    /// Number of samples that only advanced the filters.
+    /// Number of samples that advanced the filters without updating the estimate.
     passed: u64,
 }
 
@@ -76,8 +76,8 @@ impl<E: AsMut<[f64]>> State for AdaptiveFilter<E> {
                 &mut self.live,
                 &mut self.started,
                 &mut self.trial,
-                &mut self.stage,
-                &mut self.at,
+                &mut self.replay_stage,
+                &mut self.next_sample,
                 &mut self.replays,
                 &mut self.alternatives,
                 &mut self.detector,
@@ -85,7 +85,7 @@ impl<E: AsMut<[f64]>> State for AdaptiveFilter<E> {
                 &mut self.powers,
                 &mut self.restarts,
                 &mut self.age,
-                &mut self.still,
+                &mut self.constant_samples,
                 &mut self.settling,
                 &mut self.passed,
             ],
@@ -95,11 +95,12 @@ impl<E: AsMut<[f64]>> State for AdaptiveFilter<E> {
 }
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
-    /// Builds the recursion at rest. `memory` holds [`memory_needed`] numbers, or fewer for no replays, at least
-    /// [`least_memory`]. `None` for invalid numbers or too little memory.
+    /// Builds the recursion at rest. `memory` holds [`memory_needed`] numbers for full replays. With fewer numbers the
+    /// replays are shorter, and with [`least_memory`], the minimum, there are none. Returns `None` for invalid numbers
+    /// or too little memory.
     pub fn new(prior: AdaptivePrior, memory: E) -> Option<Self> {
         let ts = prior.sample_time;
-        if !prior.is_sound() || prior.person.tau > LATEST_S || memory.as_ref().len() < least_memory(ts) {
+        if !prior.is_valid() || prior.person.tau > LONGEST_DELAY_S || memory.as_ref().len() < least_memory(ts) {
             return None;
         }
         let basis = Basis::new(prior.person, ts)?;
@@ -130,8 +131,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             trial: live.clone(),
             live,
             started: false,
-            stage: 0,
-            at: 0,
+            replay_stage: 0,
+            next_sample: 0,
             replays: 0,
             alternatives: Alternatives::NONE,
             detector,
@@ -140,15 +141,16 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             powers: [0.0; 3],
             restarts: 0,
             age: 0,
-            still: 0,
+            constant_samples: 0,
             settling: 0,
             passed: 0,
         })
     }
 
-    /// Starts immediately from an earlier estimate of the person. `None` for invalid numbers.
+    /// Makes the recursion start immediately from an earlier estimate of the person. Returns `None` for invalid
+    /// numbers.
     pub fn with_initial_estimate(mut self, known: &InitialEstimate) -> Option<Self> {
-        if !known.is_sound() || !known.apply_to_noise(&mut self.prior_noise, self.prior.sample_time) {
+        if !known.is_valid() || !known.apply_to_noise(&mut self.prior_noise, self.prior.sample_time) {
             return None;
         }
         self.initial = Some(*known);
@@ -157,12 +159,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         Some(self)
     }
 
-    /// Scales of the signals from the data so far.
+    /// Scales of the signals, from the data so far.
     fn scales(&self, dispersion: f64) -> NoiseScales {
         let [e, u, y] = self.powers;
         let samples = self.history.samples().max(1) as f64;
         let measured = NoiseScales {
-            // |Y| is about sqrt(power of u/power of e): the scale of the prior of the gains.
+            // |Y| is about sqrt(power of u/power of e), the scale of the prior of the gains.
             unit: libm::sqrt(u / e),
             size: libm::sqrt(u / samples),
             innovations: match (self.started, &self.initial) {
@@ -183,7 +185,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// A candidate that starts at the oldest sample that a replay reads.
+    /// Builds a candidate that starts at the oldest sample of a replay.
     fn candidate(&self, point: Point, d: &NoiseModel, dispersion: f64) -> Option<Candidate> {
         let (ts, changes) = (self.prior.sample_time, &self.prior.changes);
         let basis = Basis::new(point, ts)?;
@@ -202,10 +204,10 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
                 Mixture::at(changes, state, covariance, known.variance)
             }
             None => {
-                // With replays, the basis moves from one replay to the next, and each replay has a trust region about
-                // its point; without replays, the corrections have the whole prior of people.
+                // With replays, the basis changes from one replay to the next, and each replay has a trust region about
+                // its point. Without replays, the corrections have the full prior for people.
                 let dynamics = match self.replays_anything() {
-                    true => trusted(point),
+                    true => trust_region(point),
                     false => variances(&self.prior),
                 };
                 Mixture::new(changes, &basis, &scales, dynamics)
@@ -218,25 +220,25 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         Some(Candidate::new(basis, d, empty, mixture, scales, changes, start).with_skipped(skipped))
     }
 
-    /// Samples that a replay reads.
+    /// Maximum number of samples that a replay reads.
     pub(super) fn window(&self) -> u64 {
         let delay = errors_needed(self.prior.sample_time);
-        self.history.room().saturating_sub(2 * delay) as u64
+        self.history.capacity().saturating_sub(2 * delay) as u64
     }
 
     fn replays_anything(&self) -> bool {
         self.window() > 0
     }
 
-    /// Takes a sample. Both must be finite.
+    /// Takes a sample. e and u must be finite.
     pub fn step(&mut self, e: f64, u: f64) -> Step {
-        self.respond(e);
+        self.advance_basis(e);
         let end = self.saturation.end(u).filter(|_| self.started);
-        self.saturation.remember(u);
+        self.saturation.update(u);
         self.detector.pass_over();
         if let Some(end) = end {
-            // The previous sample was at the limit as well, which is known only now. The next
-            // replay uses it.
+            // When a limit is first recognised, the previous sample was already at this limit. The correction takes
+            // effect in the next replay.
             self.history.revise_previous(end);
             return self.pass(u, end);
         }
@@ -246,7 +248,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.powers[0] += e * e;
         self.powers[1] += u * u;
         if !self.started {
-            // Before, the whitening filter does not have all its outputs.
+            // For earlier samples the whitening filter does not yet contain enough outputs.
             if self.history.samples() > self.prior.order as u64 {
                 let y = self.live.whitened(u).y;
                 self.powers[2] += y * y;
@@ -271,7 +273,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.keep(u);
         match self.replays_anything() {
             true => self.replay(),
-            false => self.live.renew(),
+            false => self.live.update_whitening(),
         }
         if self.live.blocks.closed() {
             self.test_for_change();
@@ -282,8 +284,9 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// True while neither signal changes. There is then no update: the recorder has stopped or the person rests, and
-    /// the innovation variance would go to zero.
+    /// True while neither signal has changed for longer than `STILL_S`, and afterwards until the filters have settled.
+    /// The estimate is then not updated: the recorder has stopped or the person is resting, and the innovation variance
+    /// would tend to zero.
     #[inline(always)]
     fn is_stationary(&mut self, u: f64) -> bool {
         let samples = self.history.samples();
@@ -293,24 +296,24 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         };
         let seconds = |samples: u64| samples as f64 * self.prior.sample_time;
         if !moved {
-            self.still += 1;
-        } else if seconds(self.still) > STILL_S && seconds(self.settling) < SETTLING_S {
-            // The filters lack the signals of the constant span and need time to settle.
+            self.constant_samples += 1;
+        } else if seconds(self.constant_samples) > STILL_S && seconds(self.settling) < SETTLING_S {
+            // The filters contain constant signals and need time to settle.
             self.settling += 1;
         } else {
-            (self.still, self.settling) = (0, 0);
+            (self.constant_samples, self.settling) = (0, 0);
         }
-        seconds(self.still) > STILL_S
+        seconds(self.constant_samples) > STILL_S
     }
 
-    /// A sample without update.
-    fn pass(&mut self, u: f64, use_of_it: Use) -> Step {
+    /// Processes a sample without an update of the estimate.
+    fn pass(&mut self, u: f64, sample_use: Use) -> Step {
         let innovation = self.live.innovation(&self.live.whitened(u));
-        let through = through_filters(&self.saturation, use_of_it, u, u - innovation);
+        let through = through_filters(&self.saturation, sample_use, u, u - innovation);
         if innovation.abs() < LARGEST && through.abs() < LARGEST {
-            self.history.complete(u, use_of_it);
+            self.history.complete(u, sample_use);
             self.passed += 1;
-            remember(&mut self.live, use_of_it, through);
+            store(&mut self.live, sample_use, through);
             return Step {
                 innovation,
                 shortened: false,
@@ -323,32 +326,33 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// As [`AdaptiveFilter::step`], but the estimate stays constant: only the filters are advanced.
+    /// As [`AdaptiveFilter::step`], but the estimate stays constant and only the filters are advanced.
     pub fn step_without_update(&mut self, e: f64, u: f64) -> Step {
-        self.respond(e);
+        self.advance_basis(e);
         self.detector.pass_over();
         self.pass(u, Use::FilterOnly)
     }
 
-    /// As [`AdaptiveFilter::step_without_update`] for a missing output, which the one-step prediction replaces.
+    /// As [`AdaptiveFilter::step_without_update`], for a sample without u; the one-step prediction replaces the missing
+    /// output.
     pub fn bridge(&mut self, e: f64) {
-        self.respond(e);
+        self.advance_basis(e);
         self.detector.pass_over();
         self.pass(0.0, Use::Missing);
     }
 
-    /// Advances the basis by a sample.
+    /// Advances the basis by one sample.
     #[inline(always)]
-    fn respond(&mut self, e: f64) {
+    fn advance_basis(&mut self, e: f64) {
         self.history.push(e);
         let newest = self.history.samples() - 1;
         let history = &self.history;
-        self.live.respond(|age| history.error(newest, age));
+        self.live.advance_basis(|age| history.error(newest, age));
     }
 
     fn keep(&mut self, u: f64) {
         self.history.complete(u, Use::Update);
-        self.live.remember(u);
+        self.live.store(u);
     }
 
     /// Step 12: tests the last blocks for a change.
@@ -357,12 +361,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.detector.test(&self.live.blocks, dynamics);
     }
 
-    /// Restarts after an overflow of a signal.
+    /// Restarts the recursion after an overflow of a signal.
     fn restart(&mut self) {
         self.history.clear();
         self.detector.pass_over();
         self.saturation = Saturation::new();
-        (self.powers, self.stage, self.age, self.replays, self.passed) = ([0.0; 3], 0, 0, 0, 0);
+        (self.powers, self.replay_stage, self.age, self.replays, self.passed) = ([0.0; 3], 0, 0, 0, 0);
         self.alternatives = Alternatives::NONE;
         self.restarts += 1;
         self.started = false;
@@ -382,17 +386,17 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.age
     }
 
-    /// True if the estimate started at an earlier fit of the person.
+    /// True if the recursion started from an earlier fit of the person.
     pub fn has_initial_estimate(&self) -> bool {
         self.initial.is_some()
     }
 
-    /// Returns the sample time, s.
+    /// Returns the sample time in s.
     pub fn sample_time(&self) -> f64 {
         self.prior.sample_time
     }
 
-    /// Returns the basis.
+    /// Returns the basis of the live candidate.
     pub fn basis(&self) -> &Basis {
         self.live.basis()
     }
@@ -401,9 +405,9 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         &self.alternatives
     }
 
-    /// Number of samples of the record that updated the estimate: samples without information do
-    /// not age old results.
-    pub(super) fn read(&self) -> u64 {
+    /// Number of samples of the record, excluding those that did not update the estimate. Samples without information
+    /// do not make old results obsolete.
+    pub(super) fn informative_samples(&self) -> u64 {
         self.history.samples().saturating_sub(self.passed)
     }
 
@@ -411,33 +415,33 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         &self.live
     }
 
-    /// Returns the current basis point with its corrections, limited to the range of the basis.
+    /// Returns the current basis point plus its corrections, limited to the range of the basis.
     pub fn dynamics(&self) -> Point {
         self.live.point()
     }
 
-    /// Returns the response of each gain at a frequency in rad/s, at the current point.
+    /// Returns the frequency response that belongs to each gain, at a frequency in rad/s and at the current point.
     pub fn responses(&self, omega_rad_s: f64) -> [Complex; GAINS] {
         self.live.responses(omega_rad_s)
     }
 
-    /// Returns Y at a frequency in rad/s.
+    /// Returns the frequency response Y of the operator at a frequency in rad/s.
     pub fn response(&self, omega_rad_s: f64) -> Complex {
         self.live.response(omega_rad_s)
     }
 
-    /// Returns Y at a frequency in rad/s, with the derivatives of its real and its imaginary part with respect to
-    /// gains, level and corrections: exact for the gains, finite differences for the corrections.
+    /// Returns Y at a frequency in rad/s, with the derivatives of its real and imaginary parts with respect to gains,
+    /// level and corrections. The derivatives are exact for the gains and finite differences for the corrections.
     pub fn response_with_derivatives(&self, omega_rad_s: f64) -> (Complex, [[f64; STATES]; 2]) {
         self.live.response_with_derivatives(omega_rad_s)
     }
 
-    /// Returns the detector.
+    /// Returns the change detector.
     pub fn detector(&self) -> &Detector {
         &self.detector
     }
 
-    /// Returns the coefficients of D after the 1.
+    /// Returns the coefficients of the whitening filter D after the leading 1.
     pub fn d(&self) -> &[f64] {
         self.live.d()
     }
@@ -447,7 +451,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         &self.live.noise
     }
 
-    /// Returns the variance of eps.
+    /// Returns the innovation variance.
     pub fn variance(&self) -> f64 {
         self.live.mixture.variance()
     }
@@ -458,52 +462,52 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 }
 
-fn remember(candidate: &mut Candidate, use_of_it: Use, u: f64) {
-    match use_of_it {
+fn store(candidate: &mut Candidate, sample_use: Use, u: f64) {
+    match sample_use {
         Use::Update => {}
         Use::FilterOnly | Use::Missing => candidate.blocks.skip(),
         Use::AtUpperLimit | Use::AtLowerLimit => candidate.blocks.pass_over(),
     }
-    match use_of_it {
-        Use::Update | Use::FilterOnly => candidate.remember(u),
-        _ => candidate.remember_prediction(u),
+    match sample_use {
+        Use::Update | Use::FilterOnly => candidate.store(u),
+        _ => candidate.store_prediction(u),
     }
 }
 
-/// The output that enters the filters.
-fn through_filters(saturation: &Saturation, use_of_it: Use, u: f64, predicted: f64) -> f64 {
-    match use_of_it {
+/// Output with which the filters are advanced.
+fn through_filters(saturation: &Saturation, sample_use: Use, u: f64, predicted: f64) -> f64 {
+    match sample_use {
         Use::Missing => predicted,
-        _ => saturation.beyond(use_of_it, u, predicted),
+        _ => saturation.beyond(sample_use, u, predicted),
     }
 }
 
-/// Prior variances of the corrections.
+/// Prior variances of the corrections of omega, zeta and tau.
 fn variances(prior: &AdaptivePrior) -> [f64; DYNAMICS] {
     let [omega, zeta, tau] = prior.spread;
     [omega * prior.person.omega, zeta * prior.person.zeta, tau].map(|s| s * s)
 }
 
-/// Variances of the trust region of a replay.
-fn trusted(point: Point) -> [f64; DYNAMICS] {
-    let [omega, zeta, tau] = NEAR;
+/// Variances of the corrections in the trust region of a replay.
+fn trust_region(point: Point) -> [f64; DYNAMICS] {
+    let [omega, zeta, tau] = TRUST_DEVIATIONS;
     [omega * point.omega, zeta * point.zeta, tau].map(|s| s * s)
 }
 
-/// Returns the number of past errors for the longest delay, for a sample time in s.
+/// Returns the number of past errors that must be stored for the longest delay, with the sample time in s.
 pub fn errors_needed(sample_time: f64) -> usize {
-    libm::ceil(LATEST_S / sample_time) as usize + 4
+    libm::ceil(LONGEST_DELAY_S / sample_time) as usize + 4
 }
 
-/// Returns the least number of memory entries, for a sample time in s.
+/// Returns the minimum length of the memory, with the sample time in s.
 pub fn least_memory(sample_time: f64) -> usize {
     3 * errors_needed(sample_time)
 }
 
-/// Largest number of samples of a replay.
+/// Maximum number of samples in a replay.
 const MOST_REPLAYED: f64 = 12_000.0;
 
-/// Returns the number of memory entries for replays over `seconds`, for a sample time in s.
+/// Returns the length of the memory for replays over `seconds`, with the sample time in s.
 pub fn memory_needed(sample_time: f64, seconds: f64) -> usize {
     let samples = (seconds / sample_time).clamp(0.0, MOST_REPLAYED);
     3 * (2 * errors_needed(sample_time) + libm::ceil(samples) as usize)

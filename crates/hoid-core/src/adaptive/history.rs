@@ -1,6 +1,6 @@
-//! The last samples of the record, in the caller's memory.
+//! Ring buffer of the last samples of the record, in the memory of the caller.
 //!
-//! Errors, outputs, and the use of each sample, in three rings of the same length.
+//! The memory is divided into three rings of equal length: errors, outputs, and the use of each sample.
 
 use crate::state::State;
 
@@ -9,18 +9,18 @@ const ERRORS: usize = 0;
 const OUTPUTS: usize = 1;
 const USES: usize = 2;
 
-/// Use of a sample.
+/// Use of a sample by the recursion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Use {
     /// The sample updates the estimate.
     Update,
     /// The sample only advances the filters.
     FilterOnly,
-    /// The output is missing: its prediction enters the filters.
+    /// The output is missing; its prediction enters the filters.
     Missing,
-    /// The stick is at its upper limit: the intended output is at least as large.
+    /// The stick is at its upper limit, so the intended output is at least as large as the measured output.
     AtUpperLimit,
-    /// The stick is at its lower limit.
+    /// The stick is at its lower limit, so the intended output is at most as large as the measured output.
     AtLowerLimit,
 }
 
@@ -42,7 +42,7 @@ impl Use {
     }
 }
 
-/// The rings.
+/// Rings of errors, outputs and uses.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct History<E> {
     memory: E,
@@ -62,21 +62,21 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
         Self { memory, samples: 0 }
     }
 
-    /// Capacity, in samples.
-    pub fn room(&self) -> usize {
+    /// Capacity in samples.
+    pub fn capacity(&self) -> usize {
         self.memory.as_ref().len() / 3
     }
 
-    /// Number of samples so far.
+    /// Number of samples stored so far, including those already overwritten.
     pub fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// Index of a sample in one of the rings.
+    /// Index of a sample of a ring in the memory; `None` if there is no memory.
     #[inline(always)]
     fn place(&self, ring: usize, sample: u64) -> Option<usize> {
-        let room = self.room();
-        (room > 0).then(|| ring * room + (sample % room as u64) as usize)
+        let capacity = self.capacity();
+        (capacity > 0).then(|| ring * capacity + (sample % capacity as u64) as usize)
     }
 
     #[inline(always)]
@@ -92,37 +92,37 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
             .map_or(0.0, |place| self.memory.as_ref()[place])
     }
 
-    /// Stores the error of a sample; [`History::complete`] stores the rest.
+    /// Stores the error of a new sample; [`History::complete`] adds its output and its use.
     #[inline(always)]
     pub fn push(&mut self, error: f64) {
         self.put(ERRORS, self.samples, error);
         self.samples += 1;
     }
 
-    /// Stores the output of the newest sample, and its use.
+    /// Stores the output and the use of the newest sample.
     #[inline(always)]
-    pub fn complete(&mut self, output: f64, use_of_it: Use) {
+    pub fn complete(&mut self, output: f64, sample_use: Use) {
         let newest = self.samples.saturating_sub(1);
         self.put(OUTPUTS, newest, output);
-        self.put(USES, newest, use_of_it.number());
+        self.put(USES, newest, sample_use.number());
     }
 
-    /// Changes the use of the sample before the newest, which had updated the estimate.
-    pub fn revise_previous(&mut self, use_of_it: Use) {
+    /// Changes the use of the last sample but one if it updated the estimate.
+    pub fn revise_previous(&mut self, sample_use: Use) {
         if let Some(previous) = self.samples.checked_sub(2)
             && self.output(previous).1 == Use::Update
         {
-            self.put(USES, previous, use_of_it.number());
+            self.put(USES, previous, sample_use.number());
         }
     }
 
-    /// The error `age` samples before a sample; zero before the record.
+    /// Error `age` samples before the given sample; zero before the start of the record.
     #[inline(always)]
     pub fn error(&self, sample: u64, age: usize) -> f64 {
         sample.checked_sub(age as u64).map_or(0.0, |at| self.get(ERRORS, at))
     }
 
-    /// The output of a sample, and its use.
+    /// Output and use of a sample.
     #[inline(always)]
     pub fn output(&self, sample: u64) -> (f64, Use) {
         (self.get(OUTPUTS, sample), Use::of(self.get(USES, sample)))
@@ -146,7 +146,7 @@ mod tests {
             history.push(f64::from(k));
             history.complete(-f64::from(k), Use::ALL[k as usize % 5]);
         }
-        assert_eq!((history.room(), history.samples()), (10, 25));
+        assert_eq!((history.capacity(), history.samples()), (10, 25));
         for k in 15..25_u64 {
             assert_eq!(history.error(24, (24 - k) as usize), k as f64);
             assert_eq!(history.output(k), (-(k as f64), Use::ALL[k as usize % 5]));

@@ -1,17 +1,18 @@
-//! A hypothesis: the operator last changed at its birth and has drifted slowly, or not at all, since.
+//! Hypothesis: the operator last changed when the hypothesis was born, and has since drifted slowly or not at all.
 //!
-//! Each hypothesis is an extended Kalman filter of `x = [gains, level, corrections]` that processes one block of samples at
-//! a time ([`super::moments`]). With x^ and P before the block, and the innovation variance `sigma^2`,
+//! Each hypothesis is an extended Kalman filter for `x = [gains, level, corrections]` that processes one block of
+//! samples at a time ([`super::moments`]). With x^ and P before the block, and the innovation variance `sigma^2`,
 //!
 //! `P+ = (I + P A/sigma^2)^-1 P`, `x+ = x^ + P+ b/sigma^2`,
-//! `ln Lambda = -1/2 ln det(I + P A/sigma^2) - (E - b' P+ b/sigma^2)/2 sigma^2 + ..`
+//! `ln Lambda = -1/2 ln det(I + P A/sigma^2) - (E - b' P+ b/sigma^2)/(2 sigma^2) + ..`
 //!
-//! (Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001, section
-//! 7.2, information form). `(I + P A)^-1 P` needs no inverse of P, which is singular for a gain with a lead in three gains.
+//! (Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001,
+//! section 7.2, information form). `(I + P A/sigma^2)^-1 P` needs no inverse of P, which is singular if the three gains
+//! are restricted to a gain with a lead.
 //!
-//! Each hypothesis has its own innovation variance, so that a change of the remnant is part of a change. The variance is
-//! estimated: the part of the block energy that all hypotheses share has a Student density with the degrees of freedom of
-//! the variance (A. Zellner, *An Introduction to Bayesian Inference in Econometrics*, 1971, section 3.2).
+//! Each hypothesis has its own innovation variance, so that a change of the remnant can be part of a change. Since this
+//! variance is estimated, the part of the block energy common to all hypotheses has a Student density with the degrees
+//! of freedom of the variance (A. Zellner, *An Introduction to Bayesian Inference in Econometrics*, 1971, section 3.2).
 
 use hoid_numerics::elimination;
 
@@ -23,7 +24,7 @@ use super::{
 
 pub(super) type Covariance = [[f64; STATES]; STATES];
 
-/// A segment before a change: its last block, and the state at its end.
+/// Segment before a change: its last block, and the state at its end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Segment {
     pub until: u64,
@@ -32,16 +33,16 @@ pub(super) struct Segment {
 
 crate::state!([] Segment { until, state });
 
-/// A hypothesis.
+/// Hypothesis about the last change of the operator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Hypothesis {
     pub state: [f64; STATES],
     pub covariance: Covariance,
-    /// Innovation variance, and its degrees of freedom.
+    /// Innovation variance, followed by its degrees of freedom.
     pub variance: f64,
     pub residuals: f64,
     pub log_weight: f64,
-    /// Block of its birth; zero for the hypotheses of the start.
+    /// Block at which the hypothesis was born; zero for the initial hypotheses.
     pub born: u64,
     pub class: usize,
     segments: [Segment; SEGMENTS],
@@ -53,10 +54,10 @@ crate::state!([] Hypothesis { state, covariance, variance, residuals, log_weight
 /// Residual of a block.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BlockResidual {
-    /// `E - b' P+ b/sigma^2`: the squares of the innovations, whitened by their covariance
-    /// `S = H P H' + sigma^2`, times sigma^2.
+    /// `E - b' P+ b/sigma^2`: the sum of the squared innovations, whitened by their covariance `S = H P H' + sigma^2`,
+    /// times sigma^2.
     pub energy: f64,
-    /// Number of skipped samples of the block, and the energy that is charged for them.
+    /// Number of skipped samples of the block, and the residual energy charged for them.
     pub passed: [f64; 2],
     /// `ln det(I + P A/sigma^2)`.
     log_determinant: f64,
@@ -92,12 +93,12 @@ impl Hypothesis {
         libm::exp(self.log_weight)
     }
 
-    /// The segments before the last change, the oldest first.
+    /// Segments before the last change, the oldest first.
     pub fn segments(&self) -> &[Segment] {
         &self.segments[..self.changes.min(SEGMENTS)]
     }
 
-    /// A child, which assumes that the operator changes after this block.
+    /// Child hypothesis, which assumes that the operator changed in the given block.
     pub fn child(&self, block: u64) -> Self {
         let mut child = *self;
         let changes = self.changes.min(SEGMENTS);
@@ -113,9 +114,9 @@ impl Hypothesis {
         child
     }
 
-    /// Step 6: gain and update for a block, each of whose samples counts as `1/dispersion` of one.
+    /// Step 6: gain and update for a block, where each sample counts as `1/dispersion` of an independent sample.
     pub fn update(&mut self, moments: &Moments, basis: &Basis, dispersion: f64) -> BlockResidual {
-        // Linearised about the predicted state; the response is bilinear in gains and corrections.
+        // The block is linearised about the predicted state, since the response is bilinear in gains and corrections.
         let about = moments.about(basis, &self.state);
         let per = 1.0 / (self.variance * dispersion);
         let mut matrix: Covariance = core::array::from_fn(|i| {
@@ -127,10 +128,11 @@ impl Hypothesis {
             })
         });
         (0..STATES).for_each(|i| matrix[i][i] += 1.0);
-        // Solving (I + P A/sigma^2) P+ = P also gives its determinant, that of S over sigma^2.
+        // Solving (I + P A/sigma^2) P+ = P also gives the determinant of this matrix, which is that of S/sigma^2.
         let mut after = self.covariance;
         let log_determinant = elimination::solve_any(&mut matrix, &mut after);
-        // Rounding makes P+ slightly asymmetric, and the asymmetry would grow from block to block.
+        // Rounding makes P+ slightly asymmetric, and without this correction the asymmetry would grow from block to
+        // block.
         for i in 0..STATES {
             for j in 0..i {
                 let mean = 0.5 * (after[i][j] + after[j][i]);
@@ -144,7 +146,7 @@ impl Hypothesis {
                 ..BlockResidual::ZERO
             };
         }
-        // x+ - x^ = P+ b/sigma^2 is the sum of W_k nu_k over the samples of the block.
+        // The step x+ - x^ = P+ b/sigma^2 is the sum of W_k nu_k over the samples of the block.
         let mut explained = 0.0;
         for i in 0..STATES {
             let step: f64 = (0..STATES).map(|k| after[i][k] * about.score[k]).sum();
@@ -159,24 +161,26 @@ impl Hypothesis {
         }
     }
 
-    /// Step 7: adds `ln Lambda` to the log probability and updates the variance; `common` is the least residual energy
-    /// of all hypotheses.
-    pub fn weigh(&mut self, left: &BlockResidual, samples: f64, common: f64, dispersion: f64, memory: f64) {
-        // n samples count as n/c (overdispersion). nu: degrees of freedom of sigma^2. The energy `common` to all
-        // hypotheses enters through Student's density, and the excess of a hypothesis over it through the normal
-        // density: a block that no hypothesis predicts (an outlier) then does not decide between them.
+    /// Step 7: adds `ln Lambda` to the log probability and updates the innovation variance. `common` is the smallest
+    /// residual energy among all hypotheses.
+    pub fn weigh(&mut self, residual: &BlockResidual, samples: f64, common: f64, dispersion: f64, memory: f64) {
+        // n samples count as n/c, where c is the dispersion; nu is the number of degrees of freedom of sigma^2. The
+        // energy `common` to all hypotheses enters through Student's density, and the excess of a hypothesis through
+        // the normal density. A block that no hypothesis predicts (an outlier) then does not decide between the
+        // hypotheses.
         let (n, nu) = (samples / dispersion, self.residuals);
         let over = common / (self.variance * dispersion);
         self.log_weight += libm::lgamma(0.5 * (nu + n))
             - libm::lgamma(0.5 * nu)
             - 0.5 * n * libm::log(nu * self.variance)
             - 0.5 * (nu + n) * libm::log1p(over / nu)
-            - 0.5 * left.log_determinant
-            - 0.5 * (left.energy - common) / (self.variance * dispersion);
-        // Posterior mean of sigma^2 with nu degrees of freedom, limited by the memory; skipped samples do not count.
-        let [passed, of_them] = left.passed;
+            - 0.5 * residual.log_determinant
+            - 0.5 * (residual.energy - common) / (self.variance * dispersion);
+        // Posterior mean of sigma^2 with nu degrees of freedom, where nu is limited by the memory. Skipped samples do
+        // not count.
+        let [passed, of_them] = residual.passed;
         let n = n - passed / dispersion;
-        self.variance = (nu * self.variance + (left.energy - of_them) / dispersion) / (nu + n);
+        self.variance = (nu * self.variance + (residual.energy - of_them) / dispersion) / (nu + n);
         self.residuals = (nu + n).min(memory / dispersion);
     }
 }

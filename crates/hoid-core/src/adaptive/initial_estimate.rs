@@ -1,33 +1,33 @@
-//! An initial estimate from an earlier fit of the person: the recursion starts at it, with its covariance.
+//! Initial estimate from an earlier fit of the person, with its covariance.
 //!
-//! Gains and corrections start at the fitted values with their covariance and are updated from the first sample on. The
-//! noise model starts with the products of a span with the remnant of the fit, so that it need not be estimated in the
-//! first seconds.
+//! Gains and corrections start at the fitted values with their covariance and are updated from the first sample. The
+//! noise model starts as if it had already been estimated from a span of the remnant of the fit, so that it need not be
+//! estimated in the first seconds.
 
 use super::{
     noise::{Lags, NoiseModel},
     sizes::{GAINS, STATES},
 };
 
-/// An estimate before the first sample.
+/// Estimate before the first sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InitialEstimate {
-    /// Gains, level, and corrections of the basis.
+    /// Gains, level, and corrections of the basis point.
     pub state: [f64; STATES],
-    /// Their covariance.
+    /// Covariance of the state.
     pub covariance: [[f64; STATES]; STATES],
-    /// Variance of eps.
+    /// Innovation variance.
     pub variance: f64,
     /// |Y| at the reference frequency.
     pub unit: f64,
-    /// Remnant of the fit, if there is one: its autocovariances relative to the variance of eps, from lag zero on, and
-    /// the time that they count as, s.
+    /// Remnant of the fit, if known: its autocovariances from lag zero, relative to the innovation variance, and the
+    /// duration in s of the data that they represent.
     pub remnant: Option<(Lags, f64)>,
 }
 
 impl InitialEstimate {
-    /// True for valid numbers.
-    pub(super) fn is_sound(&self) -> bool {
+    /// True if all numbers are valid.
+    pub(super) fn is_valid(&self) -> bool {
         let finite = |x: &f64| x.is_finite();
         self.state.iter().all(finite)
             && self.covariance.iter().flatten().all(finite)
@@ -39,7 +39,7 @@ impl InitialEstimate {
             && self.unit.is_finite()
     }
 
-    /// Sets a noise model to the remnant; false for invalid numbers.
+    /// Sets a noise model to the remnant of the fit, if known; returns false if its numbers are not valid.
     pub(super) fn apply_to_noise(&self, noise: &mut NoiseModel, sample_time: f64) -> bool {
         match &self.remnant {
             Some((lags, seconds)) => noise.set_prior(lags, self.variance, seconds / sample_time),

@@ -1,36 +1,37 @@
-//! The last blocks of a candidate, with one noise model and in one basis: the data of the detector.
+//! Last blocks of a candidate, with one noise model and in one basis: the data used by the change detector.
 //!
-//! If samples are not used for longer than a quarter of a second, or the signals do not change, the blocks next to that gap
-//! are dropped: samples before it may belong to the same fault, and after it the filters have to settle.
+//! If samples are unused for a quarter of a second or longer (for example, because the signals do not change), the
+//! incomplete block and the block before it are dropped, since samples just before such a gap may already be faulty.
+//! The samples in the two seconds after the gap are skipped, because the filters have to settle.
 
 use super::blocks::{Block, EMPTY, Row};
 
-/// Capacity, in blocks.
+/// Maximum number of blocks.
 pub const BLOCKS: usize = 96;
-/// Length of a block, s.
+/// Length of a block in s.
 pub const BLOCK_S: f64 = 0.5;
-/// Time from which unused samples are a gap, and time that is skipped after one, s.
+/// Time in s from which unused samples count as a gap, and (`SKIPPED_S`) the time that is skipped after a gap.
 const GAP_S: f64 = 0.25;
-const BEHIND_S: f64 = 2.0;
+const SKIPPED_S: f64 = 2.0;
 
-/// The blocks, the oldest first.
+/// Last blocks, the oldest first.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LastBlocks {
     samples_of_block: u64,
     open: Block,
     blocks: [Block; BLOCKS],
     count: usize,
-    /// Number of consecutive unused samples, and number of samples that are still to be skipped.
+    /// Number of consecutive unused samples, and number of samples that still have to be skipped.
     gap: u64,
-    behind: u64,
+    to_skip: u64,
     fresh: usize,
     closed: bool,
 }
 
-crate::state!([] LastBlocks { open, blocks, count, gap, behind, fresh, closed });
+crate::state!([] LastBlocks { open, blocks, count, gap, to_skip, fresh, closed });
 
 impl LastBlocks {
-    /// Without blocks, for a sample time in s.
+    /// Returns an empty list of blocks, with the sample time in s.
     pub fn new(ts: f64) -> Self {
         Self {
             samples_of_block: libm::round(BLOCK_S / ts).max(1.0) as u64,
@@ -38,18 +39,18 @@ impl LastBlocks {
             blocks: [EMPTY; BLOCKS],
             count: 0,
             gap: 0,
-            behind: 0,
+            to_skip: 0,
             fresh: BLOCKS,
             closed: false,
         }
     }
 
-    /// Takes a sample.
+    /// Adds a sample to the current block, unless it follows a gap and has to be skipped.
     #[inline(always)]
     pub fn take(&mut self, row: &Row) {
         (self.gap, self.closed) = (0, false);
-        if self.behind > 0 {
-            self.behind -= 1;
+        if self.to_skip > 0 {
+            self.to_skip -= 1;
             return;
         }
         self.open.add(row);
@@ -69,39 +70,39 @@ impl LastBlocks {
         self.closed = true;
     }
 
-    /// A sample without information that is not a fault.
+    /// Passes over a sample without information that is not faulty.
     pub fn pass_over(&mut self) {
         self.closed = false;
     }
 
-    /// A sample that is not used.
+    /// Counts an unused sample.
     pub fn skip(&mut self) {
         self.pass_over();
         self.gap += 1;
         let samples = |seconds: f64| (seconds / BLOCK_S * self.samples_of_block as f64) as u64;
-        let (long, behind) = (samples(GAP_S).max(1), samples(BEHIND_S));
+        let (long, to_skip) = (samples(GAP_S).max(1), samples(SKIPPED_S));
         if self.gap == long {
-            // Drops the open block and the one before it.
+            // Drops the incomplete block and the one before it.
             self.open = EMPTY;
             self.count = self.count.saturating_sub(1);
             self.fresh = 0;
         }
         if self.gap >= long {
-            self.behind = behind;
+            self.to_skip = to_skip;
         }
     }
 
-    /// The blocks.
+    /// All stored blocks, the oldest first.
     pub fn all(&self) -> &[Block] {
         &self.blocks[..self.count.min(BLOCKS)]
     }
 
-    /// Blocks since the last gap.
+    /// Number of blocks completed since the last gap.
     pub fn fresh(&self) -> usize {
         self.fresh
     }
 
-    /// True if the last sample ended a block.
+    /// True if the last sample completed a block.
     pub fn closed(&self) -> bool {
         self.closed
     }

@@ -1,25 +1,27 @@
-//! A mixture of hypotheses about the time of the last change of the operator.
+//! Mixture of hypotheses about the time of the last change of the operator.
 //!
-//! After each block the likeliest hypotheses have children: a child assumes that the operator changed in this block. It has
-//! the estimate of its parent before the block, with the covariance of a jump added to that of the gains (A. S. Willsky and
-//! H. L. Jones, *IEEE Trans. Automatic Control* 21 (1976) 108-112). It starts with the probability of its parent times the
-//! hazard, the prior probability of a change since the last birth, and is then weighted by its likelihood like all others
-//! (R. P. Adams and D. J. C. MacKay, *Bayesian online changepoint detection*, 2007, algorithm 1; P. Andersson,
-//! *International Journal of Control* 42 (1985) 1175-1193). If there is no free slot, the least likely of the hypotheses
-//! that are old enough is pruned. Between changes the estimate therefore uses all data since the last change.
+//! After each block the likeliest hypothesis of each class has a child, which assumes that the operator changed in this
+//! block. The child has the estimate of its parent before the block, with the covariance of a jump added to that of the
+//! gains (A. S. Willsky and H. L. Jones, *IEEE Trans. Automatic Control* 21 (1976) 108-112). It starts with the
+//! probability of the class times the hazard, the prior probability of a change since the last birth, and is then
+//! weighted by its likelihood like all other hypotheses (R. P. Adams and D. J. C. MacKay, *Bayesian online changepoint
+//! detection*, 2007, algorithm 1; P. Andersson, *International Journal of Control* 42 (1985) 1175-1193). If there is no
+//! free slot, the least likely of the hypotheses that are old enough is pruned. Between changes the estimate therefore
+//! uses all data since the last change.
 //!
-//! **Samples that a child skips.** Up to p samples after a change, a whitening filter D of order p computes
-//! `D (theta r)` with gains theta that differ within its window, and the model has theta `D r`. With a steep remnant the
-//! difference is hundreds of innovations, which no gains explain. A child therefore skips the block of its birth and the
-//! first p samples of the next one.
+//! **Samples that a child skips.** For up to p samples after a change, a whitening filter D of order p computes
+//! `D (theta r)` with gains theta that differ within its window, whereas the model computes theta `D r`. With a steep
+//! remnant the difference amounts to hundreds of innovations, which no gains explain. A child therefore skips the block
+//! of its birth and the first p samples of the next block.
 //!
-//! **Classes.** The numerator is free, or that of a gain with a lead, `(K_e + K_e_dot s)(s + a)`: the same filter with a
-//! covariance that has no other direction of the gains. In each form the gains drift slowly between changes, or they
-//! wander. A child has the class of its parent; a gain with a lead also has children with a free numerator. The best of
-//! each class is never pruned.
+//! **Classes.** The numerator is either free or restricted to a gain with a lead, `(K_e + K_e_dot s)(s + a)`: the same
+//! filter, with a covariance that allows no other direction of the gains. For both forms the gains drift either slowly
+//! (steady) or fast (wandering) between changes. A child has the class of its parent, except that a hypothesis with a
+//! gain and a lead may also have a child with a free numerator. The best hypothesis of each class is never pruned.
 //!
-//! **Estimate.** Mean and covariance of the mixture, with the spread of the means (Y. Bar-Shalom, X. R. Li and T.
-//! Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001, section 1.4.16).
+//! **Estimate.** The estimate is the mean of the mixture. Its covariance includes the spread of the means of the
+//! hypotheses (Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking and Navigation*,
+//! 2001, section 1.4.16).
 
 use hoid_numerics::elimination;
 
@@ -30,76 +32,78 @@ use super::{
     sizes::{CLASSES, DYNAMICS, GAINS, HYPOTHESES, LINEAR, SEGMENTS, STATES},
 };
 
-/// Prior of changes. Gains are in units of |Y| at the reference frequency.
+/// Prior of the changes of the operator. Gains are in units of |Y| at the reference frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChangePrior {
-    /// Length of a block, s.
+    /// Length of a block in s.
     pub block: f64,
-    /// Mean time between changes, s.
-    pub between: f64,
-    /// Standard deviations of a change: of the gain, and of the part of the lead at 2 rad/s.
-    pub jump: [f64; 2],
-    /// Drift of the gains in one second: of steady and of wandering hypotheses.
+    /// Mean time between changes in s.
+    pub mean_interval_s: f64,
+    /// Standard deviations of a change of the gain and of a change of the lead term at 2 rad/s.
+    pub change_deviation: [f64; 2],
+    /// Standard deviation of the drift of the gains over one second, for steady and for wandering hypotheses.
     pub drift: [f64; 2],
-    /// The drift just after a change, and its time constant, s.
+    /// Standard deviation of the additional drift over one second just after a change, and the time constant in s with
+    /// which it decays.
     pub settling: [f64; 2],
-    /// Drift of the level of u in one second, relative to the root mean square of u.
+    /// Standard deviation of the drift of the level of u over one second, relative to the root mean square of u.
     pub level: f64,
-    /// Memory of the innovation variance, s, and the memory of a newborn hypothesis.
+    /// Longest and shortest memory of the innovation variance in s; a newborn hypothesis has the shortest memory.
     pub variance: [f64; 2],
-    /// Prior probability of steady gains.
+    /// Prior probability that the gains are steady.
     pub steady: f64,
-    /// Prior probability of a free numerator.
-    pub any: f64,
-    /// Blocks for which a newborn hypothesis is not pruned.
-    pub protected: u64,
+    /// Prior probability that the numerator is free.
+    pub free_numerator: f64,
+    /// Number of blocks for which a newborn hypothesis is not pruned.
+    pub protected_blocks: u64,
     /// Limit of an innovation, in standard deviations.
     pub limit: f64,
-    /// Limit of an innovation in the detector, in standard deviations.
+    /// Limit of an innovation in the change detector, in standard deviations.
     pub detector_limit: f64,
 }
 
 impl ChangePrior {
-    pub(super) fn is_sound(&self) -> bool {
+    pub(super) fn is_valid(&self) -> bool {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         let share = |x: f64| (0.0..=1.0).contains(&x);
-        [self.block, self.between, self.settling[1]].into_iter().all(positive)
+        [self.block, self.mean_interval_s, self.settling[1]].into_iter().all(positive)
             && self.variance.into_iter().all(positive)
-            && self.jump.into_iter().chain(self.drift).all(|x| x >= 0.0)
+            && self.change_deviation.into_iter().chain(self.drift).all(|x| x >= 0.0)
             && self.settling[0] >= 0.0
             && self.level >= 0.0
             && self.limit > 0.0
             && self.detector_limit > 0.0
             && share(self.steady)
-            && share(self.any)
+            && share(self.free_numerator)
     }
 }
 
-/// Time before which there are no births, s: the start has not settled.
+/// Time in s before which no hypothesis is born, since the start has not settled.
 const FIRST_BIRTH_S: f64 = 3.0;
-/// Share of the probability of a gain with a lead with which its child has a free numerator.
+/// Factor that multiplies the probability of a class with gain and lead if its best hypothesis has a child with a free
+/// numerator.
 const FORM_SWITCH: f64 = 0.3;
 /// Lower limit of a log probability.
 const LEAST_LOG_WEIGHT: f64 = -60.0;
-/// Prior standard deviation of the gains, in units of the ratio of u to e.
+/// Prior standard deviation of the gains relative to the ratio of u to e.
 const INITIAL_GAIN_DEVIATION: f64 = 2.0;
 
-/// Scales of the signals.
+/// Scales of the signals and of the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct NoiseScales {
-    /// Ratio of u to e, and the root mean square of u.
+    /// Ratio of u to e, followed by the root mean square of u.
     pub unit: f64,
     pub size: f64,
     /// Initial innovation variance.
     pub innovations: f64,
     pub sample_time: f64,
-    /// Number of samples that count as one.
+    /// Number of samples that count as one independent sample.
     pub dispersion: f64,
 }
 
 crate::state!([] NoiseScales { unit, size, innovations, sample_time, dispersion });
 
-/// The hypotheses.
+/// Mixture of hypotheses.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Mixture {
     hypotheses: [Hypothesis; HYPOTHESES],
@@ -111,7 +115,8 @@ pub(super) struct Mixture {
 crate::state!([] Mixture { hypotheses, count, blocks, mean });
 
 impl Mixture {
-    /// One hypothesis of each class at the prior. `dynamics` are the variances of the corrections.
+    /// Returns a mixture with one hypothesis of each class at the prior. `dynamics` are the prior variances of the
+    /// corrections.
     pub fn new(prior: &ChangePrior, basis: &Basis, scales: &NoiseScales, dynamics: [f64; DYNAMICS]) -> Self {
         let mut p = [[0.0; STATES]; STATES];
         p[GAINS][GAINS] = scales.size * scales.size;
@@ -125,14 +130,14 @@ impl Mixture {
         })
     }
 
-    /// One hypothesis of each class at a known estimate.
+    /// Returns a mixture with one hypothesis of each class at a known estimate.
     pub fn at(prior: &ChangePrior, state: [f64; STATES], covariance: Covariance, variance: f64) -> Self {
         Self::of(prior, |_| (state, covariance, variance))
     }
 
     fn of(prior: &ChangePrior, start: impl Fn(usize) -> ([f64; STATES], Covariance, f64)) -> Self {
         let share =
-            |class: usize| [prior.steady, 1.0 - prior.steady][class % 2] * [1.0 - prior.any, prior.any][class / 2];
+            |class: usize| [prior.steady, 1.0 - prior.steady][class % 2] * [1.0 - prior.free_numerator, prior.free_numerator][class / 2];
         let mut mixture = Self {
             hypotheses: [Hypothesis::new([0.0; STATES], [[0.0; STATES]; STATES], 0.0, 0, LEAST_LOG_WEIGHT); HYPOTHESES],
             count: 0,
@@ -157,8 +162,8 @@ impl Mixture {
         &mut self.hypotheses[..self.count.min(HYPOTHESES)]
     }
 
-    /// Steps 5 to 9 for a block, given the sums of its first p samples and of the rest. Returns the least residual
-    /// energy of all hypotheses.
+    /// Performs steps 5 to 9 for a block, given the sums over its first p samples and over its other samples. Returns
+    /// the smallest residual energy among all hypotheses.
     pub fn update(
         &mut self,
         [early, late]: [&Moments; 2],
@@ -174,7 +179,8 @@ impl Mixture {
         let mut left = [BlockResidual::ZERO; HYPOTHESES];
         let (mut common, mut best) = (f64::INFINITY, self.mean);
         for (h, left) in self.all_mut().iter_mut().zip(&mut left) {
-            // Step 5, P_j + Q_j: a random walk of the gains, faster just after a change, when people still settle.
+            // Step 5, P_j + Q_j: a random walk of the gains, which is faster just after a change, while people are
+            // still settling.
             let age = (blocks - h.born.min(blocks)) as f64 * seconds;
             let mut drift = prior.drift[h.class % 2] * prior.drift[h.class % 2];
             if h.born > 0 {
@@ -194,20 +200,20 @@ impl Mixture {
                 (common, best) = (left.energy, h.state);
             }
         }
-        // A newborn skips its early samples. It is charged the residual energy of the best
-        // hypothesis for them, so that skipping them is neither an advantage nor a disadvantage.
+        // A newborn hypothesis skips its early samples. It is charged the residual energy of the best hypothesis for
+        // them, so that skipping gives it neither an advantage nor a disadvantage.
         let of_early = early.energy(basis, &best);
         for (_, left) in self.all().iter().zip(&mut left).filter(|(h, _)| newborn(h)) {
             left.passed = [early.samples, of_early];
             left.energy += of_early;
             common = common.min(left.energy);
         }
-        // Memory of half the time since the start: the large residuals of the start are forgotten.
+        // The memory is half the time since the start, so that the large residuals of the start are forgotten.
         let [longest, shortest] = prior.variance.map(|seconds| seconds / scales.sample_time);
         let memory = longest.min((0.5 * blocks as f64 * moments.samples).max(shortest));
-        // A perfect prediction must leave a positive variance.
+        // The variance must stay positive even if the prediction is perfect.
         let least = 1e-24 * scales.size * scales.size;
-        // Step 7.
+        // Step 7: weights of the hypotheses.
         for (h, left) in self.all_mut().iter_mut().zip(&left) {
             h.weigh(left, moments.samples, common, scales.dispersion, memory);
             h.variance = h.variance.max(least);
@@ -232,7 +238,7 @@ impl Mixture {
             self.all_mut().iter_mut().for_each(|h| h.log_weight = even);
             return;
         }
-        // mu_j = exp(l_j - max)/sum: the maximum is subtracted against underflow.
+        // mu_j = exp(l_j - max)/sum, where the maximum is subtracted to avoid underflow.
         let sum: f64 = (self.all().iter())
             .map(|h| libm::exp(finite(h.log_weight) - best))
             .sum();
@@ -276,7 +282,8 @@ impl Mixture {
         core::array::from_fn(|class| self.likeliest(|h| h.class == class))
     }
 
-    /// Step 9: the children of a block, from the parents before it. Wandering classes have children every second block.
+    /// Step 9: adds the children of a block, with the hypotheses before the block as parents. Wandering classes have
+    /// children in every second block only.
     fn births(
         &mut self,
         parents: &[Option<Hypothesis>; CLASSES],
@@ -299,23 +306,25 @@ impl Mixture {
             };
             let (parent, share) = match &parents[class] {
                 Some(parent) if own >= other => (Some(parent), own),
-                _ if any && prior.any > 0.0 => (parents[class - 2].as_ref(), other),
+                _ if any && prior.free_numerator > 0.0 => (parents[class - 2].as_ref(), other),
                 found => (found.as_ref(), own),
             };
             let Some(parent) = parent else { continue };
-            // The parents are those before the block: a child must not contain the data of a change that it explains.
+            // The parents are the hypotheses before the block, since a child must not contain the data of the change
+            // that it explains.
             let mut child = parent.child(self.blocks);
             let every = if wanders { 2.0 } else { 1.0 };
             child.class = class;
-            // mu of the class times the hazard H = seconds/between (AM, equation 5, for a geometric run length).
-            child.log_weight = libm::log(share.max(1e-12) * (every * seconds / prior.between).min(0.5));
+            // The probability mu of the class times the hazard H = seconds/between (AM, equation 5, for a geometric run
+            // length).
+            child.log_weight = libm::log(share.max(1e-12) * (every * seconds / prior.mean_interval_s).min(0.5));
             inflate_gains(
                 &mut child.covariance,
                 basis,
                 class,
-                prior.jump.map(|jump| jump * scales.unit),
+                prior.change_deviation.map(|jump| jump * scales.unit),
             );
-            // A change may change the remnant too: the variance of a child follows its own data sooner.
+            // A change may also change the remnant, so the variance of a child adapts faster to its own data.
             let youth = prior.variance[1] / scales.sample_time / scales.dispersion;
             child.residuals = child.residuals.min(youth);
             let Some(place) = self.free_slot(prior) else {
@@ -326,7 +335,7 @@ impl Mixture {
         self.normalise();
     }
 
-    /// A free slot, or that of the least likely hypothesis that is old enough and not the best of
+    /// Free slot or, if there is none, the slot of the least likely hypothesis that is old enough and not the best of
     /// its class.
     fn free_slot(&mut self, prior: &ChangePrior) -> Option<usize> {
         if self.count < HYPOTHESES {
@@ -334,7 +343,7 @@ impl Mixture {
             return Some(self.count - 1);
         }
         let best = self.best_of_classes();
-        let old = |i: &usize| self.blocks >= self.hypotheses[*i].born + prior.protected;
+        let old = |i: &usize| self.blocks >= self.hypotheses[*i].born + prior.protected_blocks;
         (0..HYPOTHESES)
             .filter(|i| old(i) && !best.contains(&Some(*i)))
             .min_by(|a, b| {
@@ -349,7 +358,7 @@ impl Mixture {
         &self.mean
     }
 
-    /// Returns `P = sum_j mu_j (P_j + (x^_j - x^)(x^_j - x^)')`: the second term is the spread of the means.
+    /// Returns `P = sum_j mu_j (P_j + (x^_j - x^)(x^_j - x^)')`. The second term is the spread of the means.
     pub fn covariance(&self) -> Covariance {
         let mut c = [[0.0; STATES]; STATES];
         for h in self.all() {
@@ -364,7 +373,7 @@ impl Mixture {
         c
     }
 
-    /// Returns the mean of a function of state and covariance over the hypotheses.
+    /// Returns the weighted mean, over the hypotheses, of a function of state and covariance.
     pub fn mean_of(&self, what: impl Fn(&[f64; STATES], &Covariance) -> f64) -> f64 {
         self.all()
             .iter()
@@ -372,13 +381,13 @@ impl Mixture {
             .sum()
     }
 
-    /// Returns the innovation variance.
+    /// Returns the innovation variance, averaged over the hypotheses.
     pub fn variance(&self) -> f64 {
         self.all().iter().map(|h| h.weight() * h.variance).sum()
     }
 
-    /// Returns the segments of the likeliest hypothesis: the states before its changes, the oldest first, and the
-    /// current one.
+    /// Returns the segments of the likeliest hypothesis: the states before each of its changes, the oldest first,
+    /// followed by the current state.
     pub fn segments(&self) -> Segments {
         let mut segments = Segments::NONE;
         if let Some(best) = self.likeliest(|_| true) {
@@ -393,9 +402,9 @@ impl Mixture {
         segments
     }
 
-    /// Replaces the prior of the corrections, normal with mean zero and variances `was`, by the prior of people, normal
-    /// with `mean` and variances `is`: `P' = (I + P D)^-1 P`, `D = 1/is - 1/was`, `x' = x + P' (mean/is - D x)`. In
-    /// information form one prior is subtracted and the other added.
+    /// Replaces the prior of the corrections. The old prior is normal with mean zero and variances `was`, the new one,
+    /// that of people, is normal with `mean` and variances `is`: `P' = (I + P D)^-1 P`, `D = 1/is - 1/was`, `x' = x +
+    /// P' (mean/is - D x)`. In information form this subtracts the old prior and adds the new one.
     pub fn replace_prior(&mut self, was: [f64; DYNAMICS], is: [f64; DYNAMICS], mean: [f64; DYNAMICS]) {
         for h in self.all_mut() {
             let mut matrix: Covariance = [[0.0; STATES]; STATES];
@@ -428,7 +437,7 @@ impl Mixture {
     }
 }
 
-/// The states of successive segments, each with its last block.
+/// States of successive segments, each with the last block of its segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Segments {
     all: [Segment; SEGMENTS + 1],
@@ -453,7 +462,7 @@ impl Segments {
         }
     }
 
-    /// Returns the segments with another first block and in other coordinates.
+    /// Returns the segments for a start that is `later` blocks later, with the states converted by `to`.
     pub fn carried(mut self, later: u64, to: impl Fn(&[f64; STATES]) -> [f64; STATES]) -> Self {
         for segment in &mut self.all {
             *segment = Segment {
@@ -464,7 +473,7 @@ impl Segments {
         self
     }
 
-    /// Returns the state of a block.
+    /// Returns the state of the segment that contains a block.
     pub fn at(&self, block: u64) -> Option<&[f64; STATES]> {
         let all = &self.all[..self.count.min(SEGMENTS + 1)];
         all.iter()
@@ -473,8 +482,8 @@ impl Segments {
     }
 }
 
-/// Directions of a gain and of a lead in the space of the gains, `n_0 = K a`, `n_1 = K + K_dot a`,
-/// `n_2 = K_dot`, each response over its scale; K_dot in units of K at 2 rad/s.
+/// Directions of a gain K and of a lead K_dot in the space of the gains: `n_0 = K a`, `n_1 = K + K_dot a`, `n_2 =
+/// K_dot`, each divided by the scale of its response. K_dot is in units of K at 2 rad/s.
 fn gain_and_lead(basis: &Basis) -> [[f64; GAINS]; 2] {
     let (a, [s0, s1, s2]) = (1.0 / basis.point().lag, basis.scale());
     [
@@ -483,8 +492,8 @@ fn gain_and_lead(basis: &Basis) -> [[f64; GAINS]; 2] {
     ]
 }
 
-/// Adds a variance to the gains (`Q_j`, the jump of a child, or the prior), along gain and lead or in all directions by
-/// the class.
+/// Adds a variance to the gains (`Q_j`, the jump of a child, or the prior): along gain and lead, or in all directions
+/// if the class has a free numerator.
 fn inflate_gains(p: &mut Covariance, basis: &Basis, class: usize, [gain, lead]: [f64; 2]) {
     if class >= 2 {
         for (i, size) in [gain, lead, lead].into_iter().enumerate() {

@@ -1,52 +1,60 @@
-//! Tracks a human operator sample by sample: a bank of Kalman filters in a physical basis, with change detection.
+//! Sample-by-sample tracking of a human operator: a bank of Kalman filters in a physical basis, with change detection.
 //!
-//! Symbols follow Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking and Navigation*,
-//! 2001 (BLK); for changes R. P. Adams and D. J. C. MacKay, *Bayesian online changepoint detection*, 2007 (AM), and A. S.
-//! Willsky and H. L. Jones, *IEEE Trans. Automatic Control* 21 (1976) 108-112 (WJ). In the order of the code:
+//! Symbols follow Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking and
+//! Navigation*, 2001 (BLK). Changes follow R. P. Adams and D. J. C. MacKay, *Bayesian online changepoint detection*,
+//! 2007 (AM), and A. S. Willsky and H. L. Jones, *IEEE Trans. Automatic Control* 21 (1976) 108-112 (WJ). The steps, in
+//! the order of the code:
 //!
 //! 1. **Model** ([`basis`]; D. T. McRuer and H. R. Jex, *IEEE Trans. Human Factors in Electronics* 8 (1967) 231-249).
-//!    `Y(s) = (n_0 + n_1 s + n_2 s^2)/((T_I s + 1)(s^2/omega^2 + 2 zeta s/omega + 1)) e^{-tau s}`. With the responses z_i
-//!    of `s^i/(..)` to the error, `u = sum_i theta_i z_i(omega, zeta, tau) + level + v`, `D(q^-1) v = eps`. The state is
-//!    `x = [theta (3), level, d omega, d zeta, d tau]`: gains change; omega, zeta and tau have small corrections; T_I is
-//!    fixed. Seconds of data determine the numerator, a minute also omega, zeta and tau.
-//! 2. **Whitening** (`candidate`). `y = D u`, `H = D [dz/dx]`: measurement and its row, free of the coloured noise v.
-//! 3. **Innovation** (`candidate`). `nu = y - H x^`, with the mean x^ of step 8 before the sample. It updates D and sigma^2.
+//!    `Y(s) = (n_0 + n_1 s + n_2 s^2)/((T_I s + 1)(s^2/omega^2 + 2 zeta s/omega + 1)) e^{-tau s}`. With the responses
+//!    z_i of `s^i/(..)` to the error, `u = sum_i theta_i z_i(omega, zeta, tau) + level + v`, `D(q^-1) v = eps`. The
+//!    state is `x = [theta (3), level, d omega, d zeta, d tau]`: the gains may change, omega, zeta and tau have small
+//!    corrections, and T_I is fixed. A few seconds of data determine the numerator; a minute also determines omega,
+//!    zeta and tau.
+//! 2. **Whitening** (`candidate`). `y = D u` is the measurement and `H = D [dz/dx]` its row; filtering by D turns the
+//!    coloured noise v into white noise.
+//! 3. **Innovation** (`candidate`). `nu = y - H x^`, with the mean x^ of step 8 before the sample. The innovation
+//!    updates D and sigma^2.
 //! 4. **Measurement sums** (`moments`). Over a block of 0.32 s, `A = sum H' H`, `b = sum H' nu`, `E = sum nu^2`.
-//! 5. **Prediction** ([`mixture`], `hypothesis`). Hypothesis j: no change since its birth, `P_j <- P_j + Q_j`.
+//! 5. **Prediction** ([`mixture`], `hypothesis`). Hypothesis j assumes no change since its birth: `P_j <- P_j + Q_j`.
 //! 6. **Gain and update** (`hypothesis`; BLK section 7.2, information form). `P_j <- (I + P_j A/sigma_j^2)^-1 P_j`,
 //!    `x^_j <- x^_j + P_j b/sigma_j^2`, with the new P_j. `W_j = P_j H'/sigma_j^2` is the gain of a sample.
-//! 7. **Probability** (`hypothesis`; BLK section 11.6). `mu_j <- Lambda_j mu_j/sum_i Lambda_i mu_i`, Lambda_j the density
-//!    of the block: `ln Lambda_j = -1/2 ln det(I + P_j A/sigma_j^2) - (E - b' P_j b/sigma_j^2)/2 sigma_j^2 + ..`
+//! 7. **Probability** (`hypothesis`; BLK section 11.6). `mu_j <- Lambda_j mu_j/sum_i Lambda_i mu_i`, where Lambda_j is
+//!    the density of the block:
+//!    `ln Lambda_j = -1/2 ln det(I + P_j A/sigma_j^2) - (E - b' P_j b/sigma_j^2)/(2 sigma_j^2) + ..`
 //! 8. **Mixture** ([`mixture`]; BLK section 1.4.16). `x^ = sum_j mu_j x^_j`,
 //!    `P = sum_j mu_j (P_j + (x^_j - x^)(x^_j - x^)')`.
-//! 9. **Births and pruning** ([`mixture`]; AM algorithm 1, WJ). The best hypothesis of each class has a child with the
-//!    probability `mu_j H`, hazard `H = block/mean time between changes`, and the covariance of a jump added to P_j.
-//! 10. **Noise** ([`noise`], `volatility`). D is an autoregression of the residuals by least squares; the spread of the
-//!     block energies gives the number of samples that count as one independent sample.
-//! 11. **Replay** (`filter`). A second candidate reads the record again with the new basis point and D, and replaces the
-//!     first one when it has caught up: a batch prediction error fit, repeated at a bounded cost per sample.
-//! 12. **Change test** ([`detector`], [`contrast`], [`difference`]). Least squares before and after, `T = d' C^-1 d` (Wald;
-//!     G. C. Chow, *Econometrica* 28 (1960) 591-605; H. White, *Econometrica* 48 (1980) 817-838).
+//! 9. **Births and pruning** ([`mixture`]; AM algorithm 1, WJ). The best hypothesis of each class has a child. Its
+//!    probability is that of the class times the hazard `H = block/mean time between changes`, and the covariance of a
+//!    jump is added to P_j.
+//! 10. **Noise** ([`noise`], `volatility`). D is an autoregression of the residuals, fitted by least squares. The
+//!    spread of the block energies gives the number of samples that count as one independent sample.
+//! 11. **Replay** (`filter`). A second candidate reads the record again with the new basis point and D, and replaces
+//!    the first candidate when it has caught up. This amounts to a batch prediction-error fit, repeated at a bounded
+//!    cost per sample.
+//! 12. **Change test** ([`detector`], [`contrast`], [`difference`]). Least-squares fits before and after a possible
+//!    change give `T = d' C^-1 d` (Wald; G. C. Chow, *Econometrica* 28 (1960) 591-605; H. White, *Econometrica* 48
+//!    (1980) 817-838).
 //!
-//! | here | BLK | filterpy `IMMEstimator` | difference |
+//! | this module | BLK | filterpy `IMMEstimator` | difference |
 //! |---|---|---|---|
-//! | `Hypothesis` | mode-matched filter M_j | `filters[j]` | information form, a block per update |
+//! | `Hypothesis` | mode-matched filter M_j | `filters[j]` | information form, one update per block |
 //! | `state`, `covariance` | `x^_j`, `P_j` | `filters[j].x`, `.P` | P may be singular (a gain with a lead) |
-//! | `inflate_gains` | `Q_j` | `filters[j].Q` | drift decays after a birth |
-//! | `log_weight`, `weigh` | `mu_j`, `Lambda_j` | `mu[j]`, `likelihood` | Student density: sigma_j^2 is estimated |
-//! | `mean`, `covariance` | `x^`, `P` | `x`, `P` | the same |
-//! | `child`, `births` | transition p_ij | `M` | run-length births (AM) from the parent's P plus a jump (WJ) |
-//! | `free_slot` | merging | mixing | the least likely is pruned; nothing is merged |
+//! | `inflate_gains` | `Q_j` | `filters[j].Q` | the drift decays after a birth |
+//! | `log_weight`, `weigh` | `mu_j`, `Lambda_j` | `mu[j]`, `likelihood` | Student density, since sigma_j^2 is estimated |
+//! | `mean`, `covariance` | `x^`, `P` | `x`, `P` | none |
+//! | `child`, `births` | transition p_ij | `M` | births by run length (AM), with P of the parent plus a jump (WJ) |
+//! | `free_slot` | merging | mixing | the least likely hypothesis is pruned; no hypotheses are merged |
 //!
-//! **Time of a step.** No step reads more than [`REPLAYED`] samples again: the number of operations is bounded. The
-//! longest step of two minutes at 50 to 200 Hz takes 77 us without replays, at the end of a block, and 193 to 339 us with
-//! those of
-//! 100 s (mean 1 to 2 and 28 to 80 us; one core of a shared server: `cargo xtask slow step-time`).
+//! **Time per step.** No step reads more than [`REPLAYED`] stored samples, so the number of operations is bounded. For
+//! two minutes of data at 50 to 200 Hz, the longest step takes 77 us without replays, at the end of a block. With
+//! replays over 100 s it takes 193 to 339 us. The mean is 1 to 2 us without and 28 to 80 us with replays (one core of a
+//! shared server: `cargo xtask slow step-time`).
 //!
-//! Outputs at a limit of the stick are censored samples (`saturation`). Other poles and delays that predict u as well
-//! widen the reported errors (`alternatives`). The estimate starts after one second, whose ratio of output to error scales
-//! the prior of the gains, or at an earlier fit ([`initial_estimate`]). [`AdaptiveFilter`] needs no operating system;
-//! its memory is an array that the caller owns.
+//! Outputs at a limit of the stick are censored samples (`saturation`). Other poles and delays that predict u about as
+//! well widen the reported errors (`alternatives`). The estimate starts either after one second, during which the ratio
+//! of output to error sets the scale of the prior of the gains, or from an earlier fit ([`initial_estimate`]).
+//! [`AdaptiveFilter`] needs no operating system; its memory is an array that the caller owns.
 //! ```
 //! use hoid_core::adaptive::{AdaptiveFilter, least_memory, defaults::DefaultOperator};
 //!

@@ -1,8 +1,8 @@
-//! Step 4: the second moments of a block, which are sufficient for its likelihood.
+//! Step 4: the second moments of a block, which are a sufficient statistic for its likelihood.
 //!
-//! After the whitening filter a sample has the signals of the basis and the level, `z` (seven numbers), and the output y.
-//! The response of a state x (gains, level, corrections) is `w(x)' z`, bilinear in gains and corrections, so that the block
-//! enters the likelihood only through
+//! After the whitening filter, a sample consists of the signals of the basis and the level, `z` (seven numbers), and
+//! the output y. The response in a state x (gains, level, corrections) is `w(x)' z`. It is bilinear in gains and
+//! corrections, so the block enters the likelihood only through
 //!
 //! `sum z z'`, `sum z y`, `sum y^2`.
 //!
@@ -11,7 +11,7 @@
 //!
 //! `A = T' (sum z z') T`, `b = T' sum z nu`, `E = sum nu^2`
 //!
-//! (information, score and energy; each times sigma^2). `H = z' T` is the measurement row of a sample.
+//! (information, score and energy, each multiplied by sigma^2). `H = z' T` is the measurement row of a sample.
 
 use super::{
     basis::Basis,
@@ -20,23 +20,23 @@ use super::{
 
 const ALL: usize = INPUTS + 1;
 
-/// Sums of products over some samples.
+/// Sums of products over a number of samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Moments {
-    /// Upper triangle over signals, level and output.
+    /// Products of the signals, the level and the output; only the upper triangle is used.
     products: [[f64; ALL]; ALL],
     pub samples: f64,
 }
 
 crate::state!([] Moments { products, samples });
 
-/// A block about a state.
+/// Gauss-Newton model of a block about a state.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct About {
-    /// Information and score, times the innovation variance.
+    /// Information, followed by the score, both multiplied by the innovation variance.
     pub information: [[f64; STATES]; STATES],
     pub score: [f64; STATES],
-    /// Sum of the squares of the residuals at the state.
+    /// Sum of the squared residuals at the state.
     pub energy: f64,
 }
 
@@ -52,8 +52,7 @@ impl Moments {
         let mut z = [0.0; ALL];
         z[..SIGNALS].copy_from_slice(signals);
         (z[SIGNALS], z[INPUTS]) = (level, y);
-        // Sums whole rows: entries below the diagonal are not used, but the loop has a known
-        // length.
+        // Whole rows are summed: the entries below the diagonal are not used, but the loop has a constant length.
         for (row, a) in self.products.iter_mut().zip(z) {
             for (sum, b) in row.iter_mut().zip(z) {
                 *sum += a * b;
@@ -62,7 +61,7 @@ impl Moments {
         self.samples += 1.0;
     }
 
-    /// These samples and others.
+    /// Sums over these samples and those of `others`.
     pub fn with(&self, others: &Self) -> Self {
         Self {
             products: core::array::from_fn(|i| core::array::from_fn(|j| self.products[i][j] + others.products[i][j])),
@@ -74,12 +73,12 @@ impl Moments {
         self.products[i.min(j)][i.max(j)]
     }
 
-    /// Sum of the squares of the residuals of a state.
+    /// Sum of the squared residuals at a state.
     pub fn energy(&self, basis: &Basis, state: &[f64; STATES]) -> f64 {
         self.residual(&weights(basis, state)).1
     }
 
-    /// `sum z r` and `sum r^2` for the weights of a response.
+    /// Returns `sum z r` and `sum r^2`, where r are the residuals for the weights w of a response.
     fn residual(&self, w: &[f64; INPUTS]) -> ([f64; INPUTS], f64) {
         let (mut c, mut energy) = ([0.0; INPUTS], self.at(INPUTS, INPUTS));
         for i in 0..INPUTS {
@@ -92,7 +91,7 @@ impl Moments {
         (c, energy.max(0.0))
     }
 
-    /// The Gauss-Newton model about a state.
+    /// Gauss-Newton model of the block about a state.
     pub fn about(&self, basis: &Basis, state: &[f64; STATES]) -> About {
         let w = weights(basis, state);
         let (c, energy) = self.residual(&w);
@@ -114,7 +113,7 @@ impl Moments {
     }
 }
 
-/// Weights of the signals and the level in the response of a state.
+/// Weights of the signals and of the level in the response at a state.
 pub(super) fn weights(basis: &Basis, state: &[f64; STATES]) -> [f64; INPUTS] {
     let mut w = [0.0; INPUTS];
     w[..SIGNALS].copy_from_slice(&basis.weights(state));

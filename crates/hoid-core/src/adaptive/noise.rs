@@ -1,14 +1,15 @@
-//! The noise model: a long autoregression `D v = eps`, by least squares with a slow memory.
+//! Noise model: a long autoregression `D v = eps`, fitted by least squares with a long memory.
 //!
-//! D minimises `sum_k lambda^{t-k} w_k (v(k) + d_1 v(k-1) + .. + d_p v(k-p))^2` with `v = u - theta' r - level` (L. Ljung,
-//! *System Identification*, 1999, section 10.1). The products of `[v(t), .., v(t-p)]`, all lags for the gains of that
-//! sample, are summed at each sample and solved at intervals. The weights w are one, and less for large eps. The memory
-//! grows with the time since the start up to a limit, so that the first seconds, with unknown gains, are forgotten.
+//! D minimises `sum_k lambda^{t-k} w_k (v(k) + d_1 v(k-1) + .. + d_p v(k-p))^2` with `v = u - theta' r - level` (L.
+//! Ljung, *System Identification*, 1999, section 10.1). At each sample the products of `[v(t), .., v(t-p)]`, computed
+//! with the gains at that sample, are added to sums; the normal equations are solved at intervals. The weights w are
+//! one, or less if eps is large. The memory grows with the time since the start up to a limit, so that the first
+//! seconds, with unknown gains, are forgotten.
 //!
-//! The prior of the coefficients is normal about those of a typical remnant with the standard deviation `PRIOR_DEVIATION`,
-//! which adds `sigma^2/PRIOR_DEVIATION^2` to the diagonal of the sums (ridge), sigma^2 the variance of eps. The ridge scales
-//! with eps and not with v: the spectrum of a remnant of more than two poles falls far below a share of its power, and D has
-//! to follow it there.
+//! The prior of the coefficients is normal. Its mean is the model of a typical remnant, and its standard deviation is
+//! `PRIOR_DEVIATION`. This prior adds `sigma^2/PRIOR_DEVIATION^2` to the diagonal of the sums (ridge), where sigma^2 is
+//! the variance of eps. The ridge scales with eps and not with v: the spectrum of a remnant with more than two poles
+//! falls to a very small fraction of its power, and D has to follow it there.
 //!
 //! D is used only as an FIR filter, so its inverse need not be stable.
 
@@ -19,32 +20,32 @@ use super::{defaults::ORDER, f64x2::F64x2, sizes::LARGEST_ORDER};
 const WIDTH: usize = LARGEST_ORDER + 1;
 /// Number of pairs of lags, rounded up.
 const PAIRS: usize = WIDTH.div_ceil(2);
-/// A number for each lag from zero on.
+/// One number for each lag, from lag zero.
 pub type Lags = [f64; WIDTH];
-/// Time constants of the prior remnant, s.
+/// Time constants of the prior remnant in s.
 const DEFAULT_TIME_CONSTANTS_S: [f64; 2] = [0.3, 0.06];
 /// Prior standard deviation of the coefficients.
 const PRIOR_DEVIATION: f64 = 10.0;
 
-/// Lower limit of the ridge, for vanishing residuals.
+/// Lower limit of the ridge, for residuals that vanish.
 const LEAST: f64 = 1e-300;
 
 /// Fading factor below which the sums are rescaled.
 const RESCALE_BELOW: f64 = 0.5;
 
-/// The sums and D.
+/// Noise model: the sums and the coefficients of D.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseModel {
     order: usize,
     prior_d: [f64; 2],
-    /// Longest and shortest memory, in samples.
+    /// Longest and shortest memory in samples.
     longest: f64,
     shortest: f64,
-    /// Upper triangle of the sums divided by `fade`, in pairs of rows and columns: instead of fading all sums at each
-    /// sample, a new sample gets the weight 1/fade.
+    /// Upper triangle of the sums divided by `fade`, in pairs of rows and columns. A new sample gets the weight 1/fade,
+    /// so that the old sums need not be reduced at each sample.
     products: [[[F64x2; PAIRS]; 2]; PAIRS],
     fade: f64,
-    /// The sum of the weights, and the weighted sum of eps^2.
+    /// Sum of the weights, followed by the weighted sum of eps^2.
     weight: f64,
     squares: f64,
     samples: f64,
@@ -54,8 +55,8 @@ pub struct NoiseModel {
 crate::state!([] NoiseModel { products, fade, weight, squares, samples, d });
 
 impl NoiseModel {
-    /// Builds the prior noise model. Ts and memory in s. `None` for an order below 2 or above
-    /// [`LARGEST_ORDER`].
+    /// Builds the prior noise model, with `memory` and `ts` in s. Returns `None` for an order below 2 or above
+    /// [`LARGEST_ORDER`], or a memory that is not positive.
     pub fn new(order: usize, memory: f64, ts: f64) -> Option<Self> {
         if !(2..=LARGEST_ORDER).contains(&order) || memory.is_nan() || memory <= 0.0 {
             return None;
@@ -78,14 +79,14 @@ impl NoiseModel {
         })
     }
 
-    /// Sets the sums to those of a number of samples with this variance of eps and these autocovariances relative to
-    /// it; false for invalid numbers.
+    /// Sets the sums as if they came from `samples` samples with this variance of eps and these autocovariances of v
+    /// relative to it. Returns false for invalid numbers.
     pub(super) fn set_prior(&mut self, lags: &Lags, variance: f64, samples: f64) -> bool {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         if !(positive(variance) && lags[0] > 0.0 && lags.iter().all(|c| c.is_finite()) && positive(samples)) {
             return false;
         }
-        // The memory is half the number of samples.
+        // The memory is half the number of samples, up to the longest memory.
         let weight = samples.min(self.longest);
         self.samples = 2.0 * weight;
         (self.weight, self.squares, self.fade) = (weight, weight * variance, 1.0);
@@ -98,27 +99,27 @@ impl NoiseModel {
         true
     }
 
-    /// Returns the coefficients after the 1.
+    /// Returns the coefficients of D after the leading 1.
     pub fn d(&self) -> &[f64] {
         &self.d[..self.order]
     }
 
-    /// Returns the largest lag.
+    /// Returns the order of D.
     pub fn order(&self) -> usize {
         self.order
     }
 
-    /// Returns D at frequency zero.
+    /// Returns the gain of D at zero frequency.
     pub fn sum(&self) -> f64 {
         1.0 + self.d().iter().sum::<f64>()
     }
 
-    /// Adds v, the newest first, and its eps for the current D, with a weight.
+    /// Adds the last residuals v, the newest first, with a weight; eps is their innovation for the current D.
     #[inline(always)]
     pub fn update(&mut self, v: &[f64; WIDTH], eps: f64, weight: f64) {
         self.samples += 1.0;
         let memory = (0.5 * self.samples).clamp(self.shortest, self.longest.max(self.shortest));
-        // lambda = 1 - 1/memory is an exponential window of this length.
+        // lambda = 1 - 1/memory gives an exponential window of this memory length.
         let lambda = 1.0 - 1.0 / memory;
         self.weight = lambda * self.weight + weight;
         self.squares = lambda * self.squares + weight * eps * eps;
@@ -133,7 +134,7 @@ impl NoiseModel {
             self.fade = 1.0;
         }
         let weight = weight / self.fade;
-        // The default order as a constant gives loops of known length.
+        // The default order is passed as a constant, so that its loops have a constant length.
         match self.order {
             ORDER => self.add(v, weight, ORDER),
             order => self.add(v, weight, order),
@@ -154,12 +155,12 @@ impl NoiseModel {
         }
     }
 
-    /// The sum of the products of two lags, the smaller first.
+    /// Sum of the products of the residuals at two lags, the smaller lag first.
     fn product(&self, i: usize, j: usize) -> f64 {
         self.fade * self.products[i / 2][i % 2][j / 2].0[j % 2]
     }
 
-    /// sigma^2.
+    /// Variance sigma^2 of eps.
     fn variance(&self) -> f64 {
         if self.weight > 0.0 {
             self.squares / self.weight
@@ -168,12 +169,12 @@ impl NoiseModel {
         }
     }
 
-    /// Weight of the prior, in the unit of the sums.
+    /// Weight of the prior in the units of the sums.
     fn ridge(&self) -> f64 {
         self.variance() / (PRIOR_DEVIATION * PRIOR_DEVIATION) + LEAST
     }
 
-    /// The sums over the lags plus the ridge: the upper triangle.
+    /// Upper triangle of the sums over the lags 1 to p, plus the ridge.
     #[inline(always)]
     fn sums<const N: usize>(&self, p: usize) -> [[f64; N]; N] {
         let (mut matrix, ridge) = ([[0.0; N]; N], self.ridge());
@@ -189,10 +190,11 @@ impl NoiseModel {
         matrix
     }
 
-    /// Covariance of d: `sigma^2 S^-1 (sum mu_k^2 w v v') S^-1`, S the sums with the weights `mu_k w` of
-    /// time and level, sigma^2 the variance of eps: that is `sigma^2 S^-1` times the mean of mu,
-    /// .5 for a memory that fades evenly, .6 while it grows as half of the time since the start; .6
-    /// here. `None` before the sums determine it.
+    /// Covariance of d: `sigma^2 S^-1 (sum mu_k^2 w v v') S^-1`. Here mu_k is the weight of a sample by its age, w its
+    /// weight by the size of eps, S the sums with the weights `mu_k w`, and sigma^2 the variance of eps. This
+    /// covariance equals `sigma^2 S^-1` times the mean of mu, which is 0.5 for an exponential memory of constant length
+    /// and 0.6 while the memory grows as half the time since the start; 0.6 is used. Returns `None` until the sums
+    /// determine d.
     pub fn covariance(&self) -> Option<[[f64; LARGEST_ORDER]; LARGEST_ORDER]> {
         let upper = self.sums::<LARGEST_ORDER>(self.order);
         let mut matrix = core::array::from_fn(|i| core::array::from_fn(|j| upper[i.min(j)][i.max(j)]));
@@ -202,7 +204,7 @@ impl NoiseModel {
         Some(cholesky::scaled_inverse(&matrix, self.order, 0.6 * self.variance()))
     }
 
-    /// Solves for D. D stays unchanged if the sums do not determine it.
+    /// Solves the normal equations for D. D stays unchanged if the sums do not determine it.
     pub fn solve(&mut self) {
         match self.order {
             ORDER => self.solve_of::<ORDER>(ORDER),

@@ -1,9 +1,10 @@
-//! The reported operator: parameters and their covariance from gains and corrections.
+//! Reported operator: its parameters and their covariance, computed from gains and corrections.
 //!
-//! K_e and K_e_dot are those of the gain and lead that are nearest to the numerator at [`NEAR_RAD_S`], by least squares in
-//! `K_e + K_e_dot j omega = Y e^{j tau omega} (1 - omega^2/omega_nm^2 + 2 j zeta omega/omega_nm)`; exact for an operator
-//! with a gain and a lead. They are linear in the state, so that their covariance is `M P M'`. P is the covariance of the
-//! mixture ([`super::mixture`]); the scatter of other operators that predict u as well ([`super::alternatives`]) is added.
+//! K_e and K_e_dot belong to the gain and lead nearest to the numerator at [`NEAR_RAD_S`], by least squares in
+//! `K_e + K_e_dot j omega = Y e^{j tau omega} (1 - omega^2/omega_nm^2 + 2 j zeta omega/omega_nm)`; this is exact for an
+//! operator with a gain and a lead. K_e and K_e_dot are linear in the state, so their covariance is `M P M'`, where M
+//! maps the state to them and P is the covariance of the mixture ([`super::mixture`]). The scatter of other operators
+//! that predict u about as well ([`super::alternatives`]) is added.
 
 use super::{
     AdaptiveFilter,
@@ -12,8 +13,8 @@ use super::{
     sizes::{DYNAMICS, GAINS, LINEAR, PARAMETERS, STATES},
 };
 
-/// In the first seconds the noise model is uncertain, and the standard errors are too small: after t seconds they are
-/// multiplied by `1 + SETTLING_S/t`. Set on virtual people of another seed than those of the test
+/// In the first seconds the noise model is uncertain, and the standard errors are too small. After t seconds they are
+/// multiplied by `1 + SETTLING_S/t`. The value was chosen on virtual people with another seed than those of the test
 /// (`tests/first_seconds.rs` of `hoid-track`).
 const SETTLING_S: f64 = 4.0;
 
@@ -21,12 +22,13 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// Returns K_e, K_e_dot, omega_nm in rad/s, zeta_nm, and tau_e in s.
     pub fn operator(&self) -> [f64; PARAMETERS] {
         let [k_e, k_e_dot, omega, zeta, tau] = self.live().operator();
-        // The error of a sample is held: half a sample of the delay belongs to the zero-order hold.
+        // The error is held over each sample; half a sample of the delay belongs to this zero-order hold.
         let hold = 0.5 * self.sample_time();
         [k_e, k_e_dot, omega, zeta, (tau - hold).max(0.0)]
     }
 
-    /// Returns their covariance, with the scatter of other operators that predict u about as well.
+    /// Returns the covariance of [`AdaptiveFilter::operator`], including the scatter of other operators that predict u
+    /// about as well.
     pub fn operator_covariance(&self) -> [[f64; PARAMETERS]; PARAMETERS] {
         let mut rows = [[0.0; STATES]; PARAMETERS];
         for (row, gains) in rows.iter_mut().zip(self.gain_and_lead()) {
@@ -38,14 +40,14 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         let own = through(&rows, &self.state_covariance());
         let scatter = self
             .alternatives()
-            .scatter(&self.live().operator(), self.read(), self.window());
+            .scatter(&self.live().operator(), self.informative_samples(), self.window());
         core::array::from_fn(|i| core::array::from_fn(|j| own[i][j] + scatter[i][j]))
     }
 
-    /// Returns T_L in s and its variance. Each hypothesis has the T with the least `E (K_e_dot - T K_e)^2`; T_L is
-    /// their mean, and its variance that of `K_e_dot - T_L K_e` for the covariance of the mixture. The T of the
-    /// mixture itself would be far too short if unlikely hypotheses, such as those of the last second, leave K_e
-    /// undetermined.
+    /// Returns T_L in s and its variance. Each hypothesis has the lead time T that minimises `E (K_e_dot - T K_e)^2`.
+    /// T_L is the mean of these lead times, and its variance is computed from that of `K_e_dot - T_L K_e` with the
+    /// covariance of the mixture. A single T for the mixture would be far too short if unlikely hypotheses, such as
+    /// those of the last second, leave K_e undetermined.
     pub fn lead_time(&self) -> [f64; 2] {
         let map = self.gain_and_lead();
         let pair = |state: &[f64; STATES]| map.map(|row| (0..GAINS).map(|k| row[k] * state[k]).sum::<f64>());
@@ -67,7 +69,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         [lead, variance.max(0.0) / square]
     }
 
-    /// Returns the matrix from the gains of the basis to K_e and K_e_dot.
+    /// Returns the matrix that maps the gains of the basis to K_e and K_e_dot.
     pub fn gain_and_lead(&self) -> [[f64; GAINS]; 2] {
         self.basis().gain_and_lead(&NEAR_RAD_S)
     }
@@ -84,7 +86,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 }
 
-/// Returns `M C M'`.
+/// Returns `M C M'`, where M has the given rows.
 pub fn through<const K: usize>(rows: &[[f64; STATES]; K], c: &[[f64; STATES]; STATES]) -> [[f64; K]; K] {
     let of = |a: &[f64; STATES], b: &[f64; STATES]| -> f64 {
         let each = (0..STATES).map(|i| a[i] * (0..STATES).map(|j| c[i][j] * b[j]).sum::<f64>());

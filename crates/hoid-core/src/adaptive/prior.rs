@@ -1,4 +1,4 @@
-//! The prior of a person and of the changes of the operator.
+//! Prior for a person and for the changes of the operator.
 
 use super::{
     basis::Point,
@@ -7,35 +7,36 @@ use super::{
     sizes::{DYNAMICS, STARTS},
 };
 
-/// The prior of a person and of the changes of the operator.
+/// Prior for a person and for the changes of the operator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdaptivePrior {
-    /// Point of the basis, and its prior standard deviations: relative for omega and zeta, in s for the delay.
+    /// Delay, natural frequency, damping and lag of the person, the point at which the basis starts.
     pub person: Point,
-    /// Prior standard deviations; see `person`.
+    /// Prior standard deviations of omega and zeta (relative) and of the delay (in s).
     pub spread: [f64; DYNAMICS],
-    /// Ts, s.
+    /// Sample time Ts in s.
     pub sample_time: f64,
     /// Order of the noise model.
     pub order: usize,
-    /// Its memory, s.
+    /// Memory of the noise model in s.
     pub noise_memory: f64,
-    /// Time after which the estimate starts, s: the ratio of u to e in it gives the prior of the gains.
+    /// Time in s after which the estimate starts. The ratio of u to e over this time sets the scale of the prior of the
+    /// gains.
     pub hold: f64,
     /// Prior of the changes of the operator.
     pub changes: ChangePrior,
-    /// Starting points of the first estimate; their lags are that of the person.
+    /// Starting points of the first estimate; each has the lag of the person.
     pub starts: [Point; STARTS],
-    /// The detector.
+    /// Settings of the change detector.
     pub detection: Detection,
 }
 
 impl AdaptivePrior {
-    /// True for valid numbers.
-    pub(super) fn is_sound(&self) -> bool {
+    /// True if all numbers are valid.
+    pub(super) fn is_valid(&self) -> bool {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         [self.sample_time, self.hold].into_iter().all(positive)
             && self.spread.into_iter().all(positive)
-            && self.changes.is_sound()
+            && self.changes.is_valid()
     }
 }

@@ -1,30 +1,30 @@
-//! Outputs at a limit of the stick: censored samples.
+//! Censored samples: outputs at a limit of the stick.
 //!
 //! An output at a limit shows only that the intended output was at least as large. If it were used as measured, it
-//! would bias the gains towards zero, and the following samples would be compared with a wrong noise. These samples
-//! therefore do not update the estimate, and the filters get the predicted output if it lies beyond the limit,
-//! otherwise the limit (J. Tobin, *Econometrica* 26 (1958) 24-36, has the regression with censored outputs).
+//! would bias the gains towards zero and add an error to the residuals with which the following samples are filtered.
+//! Such samples therefore do not update the estimate. The filters receive the predicted output if it lies beyond the
+//! limit, and the limit otherwise (for regression with censored outputs see J. Tobin, *Econometrica* 26 (1958) 24-36).
 //!
-//! The stick is at a limit if two consecutive samples are equal and no output has been farther out; from then on, a
-//! single sample at the limit is enough. The first time, the first of the two samples is known to be at the limit only
-//! in a replay.
+//! The stick is at a limit if two consecutive samples are equal and no output has been larger in that direction. From
+//! then on, a single sample at the limit is enough. When a limit is first reached, the first of the two samples is
+//! recognised as a limit only in a replay.
 
 use super::history::Use;
 
-/// The limits that have been reached.
+/// Limits of the stick that have been reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Saturation {
     lowest: f64,
     highest: f64,
     last: f64,
-    /// Whether the stick has stayed at its lower and at its upper limit.
+    /// Whether the lower and the upper limit of the stick are known, since u has stayed there.
     known: [bool; 2],
 }
 
 crate::state!([] Saturation { lowest, highest, last, known });
 
 impl Saturation {
-    /// No limits are known yet.
+    /// Returns a state in which no limit is known.
     pub const fn new() -> Self {
         Self {
             lowest: 0.0,
@@ -34,7 +34,7 @@ impl Saturation {
         }
     }
 
-    /// The limit at which the stick is, if it is at one.
+    /// Returns the limit at which the stick is, or `None` if it is not at a limit.
     #[inline(always)]
     pub fn end(&self, u: f64) -> Option<Use> {
         let [low, high] = self.known;
@@ -46,7 +46,8 @@ impl Saturation {
         }
     }
 
-    /// The output that replaces one at a limit in the filters, from the prediction; at most one range beyond the limit.
+    /// Returns the output that replaces an output at a limit in the filters: the prediction, but not inside the limit,
+    /// and at most one range of the stick beyond it.
     #[inline(always)]
     pub fn beyond(&self, end: Use, u: f64, predicted: f64) -> f64 {
         let range = self.highest - self.lowest;
@@ -59,7 +60,7 @@ impl Saturation {
 
     /// Updates the limits with a sample.
     #[inline(always)]
-    pub fn remember(&mut self, u: f64) {
+    pub fn update(&mut self, u: f64) {
         let again = u == self.last && self.highest > self.lowest;
         let [low, high] = &mut self.known;
         *low = u >= self.lowest && (*low || again && u == self.lowest);
@@ -76,7 +77,7 @@ mod tests {
 
     fn after(outputs: &[f64]) -> Saturation {
         let mut ends = Saturation::new();
-        outputs.iter().for_each(|u| ends.remember(*u));
+        outputs.iter().for_each(|u| ends.update(*u));
         ends
     }
 

@@ -1,6 +1,6 @@
-//! The last signals of a basis, the newest first, without a copy at each sample.
+//! Last signals of a basis, the newest first, stored without being moved at each sample.
 //!
-//! A ring that is stored twice, one copy after the other: from any start, its numbers are contiguous.
+//! The ring is stored as two consecutive copies, so that its numbers are contiguous from any start.
 
 use super::{
     f64x2::F64x2,
@@ -8,16 +8,16 @@ use super::{
 };
 use crate::state::State;
 
-/// Signals in pairs.
+/// Signals of one sample, in pairs.
 pub(super) type Paired = [F64x2; SIGNALS / 2];
 
-/// Returns the signals in pairs.
+/// Arranges the signals of one sample in pairs.
 #[inline(always)]
 pub(super) fn paired(signals: &[f64; SIGNALS]) -> Paired {
     core::array::from_fn(|i| F64x2([signals[2 * i], signals[2 * i + 1]]))
 }
 
-/// The signals of the last samples.
+/// Signals of the last samples.
 #[derive(Debug, Clone)]
 pub(super) struct SignalHistory {
     twice: [Paired; 2 * LARGEST_ORDER],
@@ -25,13 +25,13 @@ pub(super) struct SignalHistory {
 }
 
 impl SignalHistory {
-    /// All zero.
+    /// Signals of zero at all samples.
     pub const ZERO: Self = Self {
         twice: [[F64x2::ZERO; SIGNALS / 2]; 2 * LARGEST_ORDER],
         newest: 0,
     };
 
-    /// Returns the signals, the newest first.
+    /// Returns the signals of the last samples, the newest first.
     #[inline(always)]
     pub fn newest_first(&self) -> &[Paired] {
         self.twice[self.newest..]
@@ -39,7 +39,7 @@ impl SignalHistory {
             .map_or(&[], |past| past)
     }
 
-    /// Takes the signals of a sample, in place of the oldest.
+    /// Stores the signals of a new sample in place of those of the oldest sample.
     #[inline(always)]
     pub fn push(&mut self, signals: &[f64; SIGNALS]) {
         self.newest = self.newest.checked_sub(1).unwrap_or(LARGEST_ORDER - 1);
@@ -49,14 +49,15 @@ impl SignalHistory {
 }
 
 impl PartialEq for SignalHistory {
-    /// Equality does not depend on where the ring starts.
+    /// Equality does not depend on the position at which the ring starts.
     fn eq(&self, other: &Self) -> bool {
         self.newest_first() == other.newest_first()
     }
 }
 
 impl State for SignalHistory {
-    /// Visits the newest signals first, independent of the start of the ring, which is then rotated to its start.
+    /// Rotates the ring so that it starts at position zero, and then visits the signals, the newest first. The saved
+    /// numbers do not depend on the former position.
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         self.twice[..LARGEST_ORDER].rotate_left(self.newest);
         self.newest = 0;

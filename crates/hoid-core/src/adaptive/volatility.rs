@@ -1,30 +1,31 @@
 //! Dispersion of the power of the innovations in time.
 //!
 //! For a remnant of constant power the block energies are chi-square: the logarithm of the energy of n samples has the
-//! variance 2/n. People who act in pulses have innovations in bursts, with a variance tens of times larger. A likelihood
-//! that treats their samples as independent is too sharp and splits a constant operator into many. Each sample
-//! therefore counts as `1/c` of a sample, the quasi-likelihood of overdispersed data (R. W. M. Wedderburn, *Biometrika*
-//! 61 (1974) 439-447), with `c = v^POWER`, v the ratio of the variance of the log energies to that for constant power.
-//! Differences of successive blocks remove slow drifts of the level:
+//! variance 2/n. People who act in pulses have innovations in bursts, with a variance tens of times larger. A
+//! likelihood that treats their samples as independent is too sharp and splits the data of a constant operator into
+//! many segments. Each sample therefore counts as `1/c` of a sample, the quasi-likelihood of overdispersed data (R. W.
+//! M. Wedderburn, *Biometrika* 61 (1974) 439-447), with `c = v^POWER`, where v is the variance of the log energies
+//! divided by its value for constant power. Differences between successive blocks remove slow drifts of the power:
 //!
 //! `v = (pi/2) (mean |ln E_k - ln E_{k-1}|)^2/(4/n)`,
 //!
-//! and absolute values limit the influence of a change, which is one burst.
+//! Absolute values limit the influence of a change, which acts like a single burst.
 //!
-//! c is not v itself: bursts coincide with the response and are not independent of it. The power is empirical: c is at most
-//! 4.5 for v = 75 (pilots with a dead zone), 1.9 for v = 6 (people with a mouse), and 1 for simulated remnants.
+//! c is smaller than v, because bursts coincide with the response and are not independent of it. The exponent is
+//! empirical. Pilots with a dead zone have a typical v of 75 and c of at most 4.5, people with a mouse a typical v of 6
+//! and c of at most 1.9, and simulated remnants have c = 1.
 
 /// Exponent of the dispersion `c = v^POWER`.
 const POWER: f64 = 0.3;
-/// Number of differences that the prior v = 1 counts as.
+/// Weight of the prior v = 1, in differences of log energies.
 const PRIOR_DIFFERENCES: f64 = 4.0;
-/// Largest v.
+/// Largest value of v.
 const LARGEST: f64 = 1000.0;
 
-/// The running mean of the absolute differences of the log energies, scaled so that a constant power gives 1.
+/// Running mean of the absolute differences of the log energies, scaled to 1 for a constant power.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Volatility {
-    /// Blocks per energy.
+    /// Number of blocks per energy.
     blocks: u64,
     taken: u64,
     energy: f64,
@@ -51,7 +52,7 @@ impl Volatility {
         }
     }
 
-    /// Adds the energy of a block with its number of samples.
+    /// Adds the energy of a block and the number of its samples.
     pub fn take(&mut self, energy: f64, samples: f64) {
         self.energy += energy;
         self.samples += samples;
@@ -62,7 +63,7 @@ impl Volatility {
         let log = libm::log(self.energy);
         if log.is_finite() {
             if self.started {
-                // E|N(0, 2 var)| = sqrt(4 var/pi): the scale makes the mean of the steps sqrt(v) with var = 2/n.
+                // E|N(0, 2 var)| = sqrt(4 var/pi). With var = 2/n and this scale, the mean of the steps is sqrt(v).
                 let step = log - self.last;
                 self.steps += step.abs() * libm::sqrt(0.125 * core::f64::consts::PI * self.samples);
                 self.differences += 1.0;
@@ -72,7 +73,7 @@ impl Volatility {
         (self.taken, self.energy, self.samples) = (0, 0.0, 0.0);
     }
 
-    /// Returns the number of samples that count as one.
+    /// Returns the number of samples that count as one independent sample.
     pub fn dispersion(&self) -> f64 {
         let root = (self.steps + PRIOR_DIFFERENCES) / (self.differences + PRIOR_DIFFERENCES);
         libm::pow((root * root).clamp(1.0, LARGEST), POWER)

@@ -1,93 +1,96 @@
 //! Guard of one signal: limits for its next sample.
 //!
 //! **Prediction.** With `nabla x(t) = x(t) - x(t-1)`, the polynomial of degree j-1 through the last j samples
-//! extrapolates to a value from which x(t) differs by exactly `r_j(t) = nabla^j x(t)` (Newton's backward formula). The
-//! backward differences of order 1 to 4 are therefore the errors of holding the last sample, of a line, of a parabola
-//! and of a cubic, at one subtraction each. The order with the smallest scale is used: 1 for a signal like white noise
-//! after a lag, 3 or 4 for a smooth one.
+//! extrapolates to a value that differs from x(t) by exactly `r_j(t) = nabla^j x(t)` (Newton's backward formula). The
+//! backward differences of order 1 to 4 are therefore the errors of predicting x(t) by the last sample, a line, a
+//! parabola and a cubic, at the cost of one subtraction each. The order with the smallest scale is used: order 1 for a
+//! signal like low-pass filtered white noise, order 3 or 4 for a smooth signal.
 //!
-//! **Scale.** q_j is the 99 % quantile of `|r_j|`, by stochastic approximation in its logarithm (H.
+//! **Scale.** q_j is the 99 % quantile of `|r_j|`, estimated by stochastic approximation on a logarithmic scale (H.
 //! Robbins and S. Monro, *Annals of Mathematical Statistics* 22 (1951) 400-407):
 //!
 //! `q <- q (1 + g (1 - p))` where `|r| > q`, else `q <- q (1 - g p)`, with p = .01, g = .05.
 //!
-//! The size of an outlier does not enter: one sample moves q by at most 5 %, regardless of its size. A quantile in the
-//! tail is used, not a median: a person's u rests and moves in pulses, and the limit must accept the tails of its
+//! The size of an outlier does not matter: one sample changes q by at most 5 %. A quantile in the tail is used instead
+//! of the median, because the u of a person rests and moves in pulses, and the limit must accept the tails of its
 //! distribution. p_j is the 90 % quantile, computed in the same way with g = .02. Samples at which the signal stays
-//! constant carry no information about its motion and enter neither quantile.
+//! constant carry no information about its motion and do not affect the quantiles.
 //!
-//! **Outliers.** A sample is held back where `|r_j| > max(m_j q_j, floor)` with
+//! **Outliers.** A sample is held back if `|r_j| > max(m_j q_j, floor)` with
 //!
 //! `m_j = mean of (q_j/p_j)^2`, at least 2.5 and at most 12,
 //!
-//! the mean over about the last 20 s, since the ratio of two tracked quantiles is noisy. A tail like
-//! `P(|r| > x) = exp(-(x/s)^k)` (W. Weibull, *Journal of Applied Mechanics* 18 (1951) 293-297) has its quantiles
-//! beyond P at `s (-log P)^(1/k)`. Those at .1 and .01 differ by the factor `2^(1/k)`, those at 1e-2 and 1e-8 by
-//! `4^(1/k)`, its square: the limit that one of 1e8 samples exceeds, for a steady hand (k = 2: m = 2, and for a
-//! Gaussian tail 2.45) as for one that moves in bursts (k = 1: m = 4; k = .7: m = 7). With m = 2.5 Gaussian errors are
-//! held back from 6.4 standard deviations on, one of 8e9 samples. The floor is a share of the signal's mean magnitude
-//! below which an outlier has no effect.
+//! averaged over about the last 20 s, since the ratio of two tracked quantiles is noisy. In a tail of the form
+//! `P(|r| > x) = exp(-(x/s)^k)` (W. Weibull, *Journal of Applied Mechanics* 18 (1951) 293-297), the value exceeded with
+//! probability P is `s (-log P)^(1/k)`. The values for .1 and .01 differ by the factor `2^(1/k)`, those for 1e-2 and
+//! 1e-8 by its square, `4^(1/k)`. The limit `m q` is therefore exceeded by one of 1e8 samples, both for a steady hand
+//! (k = 2: m = 2; a Gaussian tail gives 2.45) and for a hand that moves in bursts (k = 1: m = 4; k = .7: m = 7). With m
+//! = 2.5, Gaussian errors are held back above 6.4 standard deviations, which is one of 8e9 samples. The floor is a
+//! fraction of the mean magnitude of the signal, below which an outlier has no effect.
 //!
-//! **While it is held back** the signal continues with its last slope if the order is 2 or more, damped with a time
-//! constant of [`SLOPE_S`], else with its last value. It has returned if its distance from that value is plausible
-//! after h samples: within `max(m q_j, floor) + h q_1` with a slope, and `max(m q_1, floor) sqrt(h + 1)` without one.
+//! **Held-back samples.** While samples are held back, the signal is continued with its last slope, damped with the
+//! time constant [`SLOPE_S`], if the order is 2 or more, and otherwise with its last value. After h samples, the signal
+//! has returned if its distance from the continued value is at most `max(m q_j, floor) + h q_1` with a slope, and
+//! `max(m q_1, floor) sqrt(h + 1)` without a slope.
 
-/// Orders of the differences.
+/// Number of orders of the backward differences.
 pub const ORDERS: usize = 4;
-/// Probability beyond the quantile, and gain of its approximation.
-const BEYOND: f64 = 0.01;
+/// Probability beyond the quantile, and gain of the approximation of the quantile.
+const TAIL_PROBABILITY: f64 = 0.01;
 const GAIN: f64 = 0.05;
-/// Probability beyond the inner quantile, and gain of its approximation.
-const BEYOND_INNER: f64 = 0.1;
+/// Probability beyond the inner quantile, and gain of the approximation of the inner quantile.
+const INNER_TAIL_PROBABILITY: f64 = 0.1;
 const INNER_GAIN: f64 = 0.02;
-/// Least and largest limit in units of the quantile.
+/// Smallest and largest limit, relative to the quantile.
 const LIMIT: f64 = 2.5;
-const HEAVIEST: f64 = 12.0;
-/// Largest mean magnitude, in units of the inner quantile, of a signal with its typical moves: Gaussian errors have
-/// .49 and Laplacian ones .43, and those of a signal five times as large 2.4 and 2.2.
+const LARGEST_TAIL_RATIO: f64 = 12.0;
+/// Largest mean magnitude, relative to the inner quantile, of differences that are typical of the signal. Gaussian
+/// errors have .49 and Laplacian errors .43; errors five times as large have 2.4 and 2.2.
 const TYPICAL: f64 = 1.3;
 /// Number of blocks over which the tails are averaged.
 const AVERAGED: u32 = 20;
-/// Ratio of the inner quantile to the outer one, for Gaussian errors.
+/// Ratio of the inner quantile to the outer quantile for Gaussian errors.
 const GAUSSIAN_INNER: f64 = 1.6449 / 2.5758;
-/// Time constant of the damped slope of a held-back signal, s.
+/// Time constant in s with which the slope of a held-back signal is damped.
 pub const SLOPE_S: f64 = 0.1;
-/// Ratio of quantile to mean magnitude of Gaussian errors, for the first quantiles.
+/// Ratio of the quantile to the mean magnitude for Gaussian errors, used for the initial quantiles.
 const QUANTILE_OVER_MEAN: f64 = 3.228;
 
-/// The guard of one signal.
+/// Guard of one signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChannelGuard {
-    /// The last accepted sample, and its differences of order 1 to 3.
+    /// Last accepted sample, and its backward differences of order 1 to 3.
     last: f64,
     differences: [f64; ORDERS - 1],
-    /// Number of consecutive samples as recorded, up to [`ORDERS`].
+    /// Number of consecutive samples that were not replaced, up to [`ORDERS`].
     known: usize,
-    /// Quantiles; zero for unknown ones.
+    /// 99 % quantiles of the differences; zero if unknown.
     quantiles: [f64; ORDERS],
-    /// The inner quantiles, from which the tail is extrapolated.
+    /// Inner (90 %) quantiles, from which the tail is extrapolated.
     inner: [f64; ORDERS],
-    /// Mean of the squares of the ratios of the two, and the number of averaged blocks.
-    heavy: [f64; ORDERS],
+    /// Mean of the squared ratio of the 99 % quantile to the inner quantile, and number of averaged blocks.
+    tail_ratio: [f64; ORDERS],
     averaged: u32,
-    /// True once outliers are detected.
-    watching: bool,
-    /// First difference up to which the signal counts as constant.
+    /// True once outliers are being detected.
+    detects_outliers: bool,
+    /// Largest first difference with which the signal counts as constant.
     resting: f64,
-    /// Order of the prediction, less one.
+    /// Order of the prediction minus one.
     order: usize,
-    /// Least limit.
+    /// Lower bound of the limit.
     floor: f64,
-    /// Number of held-back samples, the largest error among them, the sample before them, and the slope.
+    /// Number of held-back samples, the largest error among them, the last sample before them, and the slope of the
+    /// signal.
     held: u32,
-    size: f64,
+    largest_error: f64,
     base: f64,
     slope: f64,
     damping: f64,
 }
 
 crate::state!([] ChannelGuard {
-    last, differences, known, quantiles, inner, heavy, averaged, watching, resting, order, floor, held, size, base, slope, damping,
+    last, differences, known, quantiles, inner, tail_ratio, averaged, detects_outliers, resting, order, floor, held,
+    largest_error, base, slope, damping,
 }, bounded);
 
 impl ChannelGuard {
@@ -96,7 +99,8 @@ impl ChannelGuard {
         self.order = self.order.min(ORDERS - 1);
     }
 
-    /// A signal without prior knowledge: all samples pass until [`ChannelGuard::set_quantiles`].
+    /// Builds the guard of a signal without prior knowledge. It accepts all finite samples until
+    /// [`ChannelGuard::set_quantiles`] or [`ChannelGuard::start_detection`].
     pub fn new(sample_time: f64) -> Self {
         Self {
             last: 0.0,
@@ -104,37 +108,38 @@ impl ChannelGuard {
             known: 0,
             quantiles: [0.0; ORDERS],
             inner: [0.0; ORDERS],
-            heavy: [0.0; ORDERS],
+            tail_ratio: [0.0; ORDERS],
             averaged: 0,
-            watching: false,
+            detects_outliers: false,
             resting: 0.0,
             order: 0,
             floor: 0.0,
             held: 0,
-            size: 0.0,
+            largest_error: 0.0,
             base: 0.0,
             slope: 0.0,
             damping: libm::exp(-sample_time / SLOPE_S),
         }
     }
 
-    /// Sets quantiles that are known from the past of the signal, of the differences of order 1 to 4; a quantile of
-    /// zero or less is unknown. The tails are Gaussian until they are learnt.
+    /// Sets the 99 % quantiles of the differences of order 1 to 4, known from the past of the signal, and starts the
+    /// detection of outliers. A quantile of zero or less counts as unknown. The tails are assumed to be Gaussian until
+    /// they are learnt.
     pub fn set_quantiles(&mut self, quantiles: [f64; ORDERS]) {
         self.set_tails(quantiles, quantiles.map(|q| GAUSSIAN_INNER * q));
     }
 
-    /// As [`ChannelGuard::set_quantiles`], with the 90 % quantiles.
+    /// As [`ChannelGuard::set_quantiles`], with `inner` as the 90 % quantiles.
     pub fn set_tails(&mut self, quantiles: [f64; ORDERS], inner: [f64; ORDERS]) {
         (self.quantiles, self.inner) = (quantiles, inner);
         self.averaged = 0;
         self.average_tails();
         self.averaged = AVERAGED;
-        self.watch();
+        self.start_detection();
     }
 
-    /// Sets the initial values of unknown quantiles, from the mean magnitudes of the differences; they are then
-    /// learnt, and nothing is an outlier until [`ChannelGuard::watch`].
+    /// Sets the initial values of unknown quantiles from the mean magnitudes of the differences. The quantiles are then
+    /// learnt; no sample counts as an outlier until [`ChannelGuard::start_detection`].
     pub fn start_learning(&mut self, means: [f64; ORDERS]) {
         for (j, mean) in means.into_iter().enumerate() {
             if self.quantiles[j] <= 0.0 {
@@ -144,20 +149,20 @@ impl ChannelGuard {
         }
     }
 
-    /// Detects outliers from now on, if the quantiles are known.
-    pub fn watch(&mut self) {
-        self.watching = self.quantiles[0] > 0.0;
+    /// Starts the detection of outliers if the quantiles are known.
+    pub fn start_detection(&mut self) {
+        self.detects_outliers = self.quantiles[0] > 0.0;
         self.choose();
     }
 
-    /// True once the quantiles are known and outliers are detected.
+    /// True if the quantiles are known and outliers are detected.
     pub fn is_known(&self) -> bool {
-        self.watching
+        self.detects_outliers
     }
 
-    /// True for consecutive samples, the first of them after a jump, that move as the signal does: the mean magnitude
-    /// of their differences of the order in use is below that of a signal about three times as large.
-    pub fn moves_as_usual(&self, samples: impl Iterator<Item = f64>) -> bool {
+    /// True if consecutive samples, the first of them after a jump, move like the signal: the mean magnitude of their
+    /// differences, of the order in use, is below that of a signal about three times as large.
+    pub fn moves_typically(&self, samples: impl Iterator<Item = f64>) -> bool {
         let (mut past, mut count, mut sum) = ([0.0; ORDERS], 0, 0.0);
         for x in samples {
             let mut difference = x;
@@ -178,22 +183,22 @@ impl ChannelGuard {
         counted > 0.0 && sum <= TYPICAL * self.inner[self.order] * counted
     }
 
-    /// Returns the first difference from which on a sample is a jump.
+    /// Returns the first difference above which a sample counts as a jump.
     pub fn largest_move(&self) -> f64 {
         self.limit(0)
     }
 
-    /// Sets the first difference up to which the signal counts as constant.
+    /// Sets the largest first difference with which the signal counts as constant.
     pub fn set_resting(&mut self, difference: f64) {
         self.resting = difference;
     }
 
-    /// Returns the last sample, or its replacement.
+    /// Returns the last sample or, if it was held back, its replacement.
     pub fn last(&self) -> f64 {
         self.last
     }
 
-    /// Returns the last difference if the order of the prediction is 2 or more, else zero.
+    /// Returns the last first difference if the order of the prediction is 2 or more, otherwise zero.
     pub fn slope(&self) -> f64 {
         if self.order_in_use() > 0 {
             self.differences[0]
@@ -207,12 +212,12 @@ impl ChannelGuard {
         self.order > 0
     }
 
-    /// Sets the least limit.
+    /// Sets the lower bound of the limit.
     pub fn set_floor(&mut self, floor: f64) {
         self.floor = floor;
     }
 
-    /// Returns the backward differences of order 1 to 4 with x as the next sample: the errors of the predictions.
+    /// Returns the prediction errors of x as the next sample: its backward differences of order 1 to 4.
     #[inline(always)]
     pub fn errors(&self, x: f64) -> [f64; ORDERS] {
         let first = x - self.last;
@@ -221,7 +226,7 @@ impl ChannelGuard {
         [first, second, third, third - self.differences[2]]
     }
 
-    /// Order of the prediction in use, less one: only orders that use no replaced samples.
+    /// Order of the prediction in use minus one, limited to orders that need no replaced samples.
     #[inline(always)]
     fn order_in_use(&self) -> usize {
         let most = self.known.saturating_sub(1);
@@ -230,43 +235,43 @@ impl ChannelGuard {
 
     #[inline(always)]
     fn limit(&self, order: usize) -> f64 {
-        let limit = self.heavy[order].max(LIMIT) * self.quantiles[order];
+        let limit = self.tail_ratio[order].max(LIMIT) * self.quantiles[order];
         if limit > self.floor { limit } else { self.floor }
     }
 
-    /// True for an error beyond the limit once the quantiles and a preceding sample are known, and always for a sample
-    /// that is not finite.
+    /// True if the error exceeds the limit, provided that outliers are detected and a preceding sample is known; always
+    /// true for a sample that is not finite.
     #[inline(always)]
     pub fn is_outlier(&self, errors: &[f64; ORDERS]) -> bool {
         let order = self.order_in_use();
-        // False for NaN.
+        // The comparison is false for NaN.
         let within = errors[order].abs() <= self.limit(order);
-        !within && (self.watching && self.known > 0 || !errors[0].is_finite())
+        !within && (self.detects_outliers && self.known > 0 || !errors[0].is_finite())
     }
 
-    /// Takes an accepted sample into the prediction, and its errors into the quantiles.
+    /// Accepts a sample: updates the prediction with the sample and the quantiles with its errors.
     #[inline(always)]
     pub fn accept(&mut self, x: f64, errors: &[f64; ORDERS]) {
         if errors[0].abs() > self.resting {
             for (q, r) in self.quantiles.iter_mut().zip(errors) {
                 *q *= if r.abs() > *q {
-                    1.0 + GAIN * (1.0 - BEYOND)
+                    1.0 + GAIN * (1.0 - TAIL_PROBABILITY)
                 } else {
-                    1.0 - GAIN * BEYOND
+                    1.0 - GAIN * TAIL_PROBABILITY
                 };
             }
             for (p, r) in self.inner.iter_mut().zip(errors) {
                 *p *= if r.abs() > *p {
-                    1.0 + INNER_GAIN * (1.0 - BEYOND_INNER)
+                    1.0 + INNER_GAIN * (1.0 - INNER_TAIL_PROBABILITY)
                 } else {
-                    1.0 - INNER_GAIN * BEYOND_INNER
+                    1.0 - INNER_GAIN * INNER_TAIL_PROBABILITY
                 };
             }
         }
         self.follow(x, errors);
     }
 
-    /// Takes a sample into the prediction only.
+    /// Updates the prediction with a sample, but not the quantiles.
     #[inline(always)]
     pub fn follow(&mut self, x: f64, errors: &[f64; ORDERS]) {
         self.last = x;
@@ -277,15 +282,16 @@ impl ChannelGuard {
     fn average_tails(&mut self) {
         self.averaged = self.averaged.saturating_add(1).min(AVERAGED);
         let weight = 1.0 / f64::from(self.averaged);
-        for ((heavy, q), p) in self.heavy.iter_mut().zip(&self.quantiles).zip(&self.inner) {
+        for ((tail_ratio, q), p) in self.tail_ratio.iter_mut().zip(&self.quantiles).zip(&self.inner) {
             let quotient = q / p;
-            // A tail without prior knowledge (0/0) is Gaussian.
-            let square = (quotient * quotient).clamp(LIMIT, HEAVIEST);
-            *heavy += weight * (square - *heavy);
+            // Unknown quantiles give 0/0; the limit of such a tail is the lower bound `LIMIT`, which is about that of a
+            // Gaussian tail.
+            let square = (quotient * quotient).clamp(LIMIT, LARGEST_TAIL_RATIO);
+            *tail_ratio += weight * (square - *tail_ratio);
         }
     }
 
-    /// Ends a block: averages the tails and chooses the order of the prediction again.
+    /// Ends a block: updates the averages of the tails and selects the order of the prediction.
     pub fn end_block(&mut self) {
         self.average_tails();
         self.choose();
@@ -299,33 +305,33 @@ impl ChannelGuard {
         }
     }
 
-    /// Returns the number of held-back samples.
+    /// Returns the number of consecutive held-back samples.
     pub fn held(&self) -> u32 {
         self.held
     }
 
-    /// Returns the largest error among them.
-    pub fn size(&self) -> f64 {
-        self.size
+    /// Returns the largest error among the held-back samples.
+    pub fn largest_error(&self) -> f64 {
+        self.largest_error
     }
 
-    /// Holds back a sample, or a missing one (NaN); returns its replacement.
+    /// Holds back a sample, which may be missing (NaN), and returns its replacement.
     pub fn hold(&mut self, x: f64) -> f64 {
         if self.held == 0 {
-            (self.size, self.base) = (0.0, self.last);
+            (self.largest_error, self.base) = (0.0, self.last);
             self.slope = self.slope();
         }
         self.held += 1;
         let error = (x - self.last).abs();
-        if error > self.size {
-            self.size = error;
+        if error > self.largest_error {
+            self.largest_error = error;
         }
         self.slope *= self.damping;
         self.last += self.slope;
         self.last
     }
 
-    /// True if a held-back signal has returned with this sample.
+    /// True if a held-back signal has returned to a plausible value with this sample.
     pub fn is_back(&self, x: f64) -> bool {
         let expected = self.last + self.damping * self.slope;
         let (limit, held) = (self.limit(self.order_in_use()), f64::from(self.held));
@@ -337,18 +343,19 @@ impl ChannelGuard {
         (x - expected).abs() <= room
     }
 
-    /// Continues from a sample with which the signal has returned, with the mean slope since the last good one.
+    /// Continues from the sample with which the signal has returned, with the mean slope since the last accepted
+    /// sample.
     pub fn resume(&mut self, x: f64) {
         let slope = (x - self.base) / (f64::from(self.held) + 1.0);
         self.last = x;
         self.differences = [slope, 0.0, 0.0];
         self.known = 1;
-        (self.held, self.size) = (0, 0.0);
+        (self.held, self.largest_error) = (0, 0.0);
     }
 
-    /// Continues from the last samples of the signal as recorded, the newest last.
+    /// Continues from the last recorded samples of the signal, the newest last.
     pub fn restart(&mut self, samples: impl Iterator<Item = f64>) {
-        (self.known, self.held, self.size, self.slope) = (0, 0, 0.0, 0.0);
+        (self.known, self.held, self.largest_error, self.slope) = (0, 0, 0.0, 0.0);
         let mut first = true;
         for x in samples {
             if first {
@@ -446,7 +453,7 @@ mod tests {
             let stands = channel.hold(x);
             assert!((stands - signal(t)).abs() < 0.1, "{t}: {stands}");
         }
-        assert!(channel.is_back(signal(308)) && (channel.size() - 5.0).abs() < 0.1);
+        assert!(channel.is_back(signal(308)) && (channel.largest_error() - 5.0).abs() < 0.1);
         channel.resume(signal(308));
         for t in 309..400 {
             let errors = channel.errors(signal(t));
@@ -511,9 +518,9 @@ mod tests {
                 }
                 x
             });
-            assert!(channel.moves_as_usual(signal.iter().map(|x| x + 1e3)), "{order}");
-            assert!(!channel.moves_as_usual(signal.iter().map(|x| 5.0 * x)), "{order}");
-            assert!(!channel.moves_as_usual(signal[..=order].iter().copied()), "{order}");
+            assert!(channel.moves_typically(signal.iter().map(|x| x + 1e3)), "{order}");
+            assert!(!channel.moves_typically(signal.iter().map(|x| 5.0 * x)), "{order}");
+            assert!(!channel.moves_typically(signal[..=order].iter().copied()), "{order}");
         }
     }
 
@@ -522,11 +529,11 @@ mod tests {
         let mut channel = ChannelGuard::new(0.01);
         channel.follow(0.0, &[0.0; ORDERS]);
         channel.start_learning([0.0; ORDERS]);
-        channel.watch();
+        channel.start_detection();
         assert!(!channel.is_known());
         channel.start_learning([0.1; ORDERS]);
         assert!(!channel.is_outlier(&channel.errors(1e9)));
-        channel.watch();
+        channel.start_detection();
         assert!(channel.is_known() && channel.is_outlier(&channel.errors(1e9)));
     }
 

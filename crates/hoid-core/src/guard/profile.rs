@@ -1,77 +1,78 @@
-//! Comparison of the signals of one second with those of the time before.
+//! Comparison of the signals of one second with earlier data.
 //!
-//! For each block of a second the mean magnitudes of e and u about their long-run means are kept, `m_c`, of their
-//! backward differences of order 1 to 4, `a_cj`, and of the innovations of the recursion, `a_eps`. Their long-run
-//! means M_c and A_cj follow with a time constant of 60 blocks; a block enters with no less than half and no more than
-//! twice the long-run value, so that no block moves them by more than 1/60. Blocks in which a fault is found do not
-//! enter.
+//! For each block of one second, the following mean magnitudes are computed: those of e and u about their long-run
+//! means, `m_c`, those of their backward differences of order 1 to 4, `a_cj`, and that of the innovations of the
+//! recursion, `a_eps`. The long-run values M_c and A_cj follow with a time constant of 60 blocks. The values of a block
+//! are limited to between half and twice the long-run values, so that no block changes these by more than 1/60. Blocks
+//! in which a fault is found are not used.
 //!
 //! | finding | rule | reason |
 //! |---|---|---|
-//! | frozen e | `a_e1 <= A_e1/1000` in a block | the error of a person who tracks never stays constant |
-//! | frozen u | `a_u1 <= A_u1/1000` in three blocks in a row, except for a rest ([`super::resting`]) in which `a_eps` is at most twice its long-run value | a hand may rest |
-//! | idle | e and u each within a range of `M_c/20` in two blocks in a row | silence, with noise |
-//! | larger | `a_c1 > 5 A_c1` and `a_c3 > 5 A_c3` for e and u in two blocks in a row | both signals are scaled by a factor |
-//! | rescaled | all four `a_cj/A_cj` of one channel above 3.5 and within a factor of 1.5 of each other, those of the other below 2, in two blocks in a row | the unit or a gain setting was changed |
-//! | swapped | the sum over blocks of `d(own) - d(other) - 1`, at most 4 a block and never below 0, reaches 6 | e resembles the earlier u, and u the earlier e; d is the sum over both channels of `\|log a_1/A_1\| + \|log a_3/A_3\|` |
-//! | misfit | `R = a_eps/min_j a_uj` is above 4 times its long-run value, and above 1.5, and a_eps above twice its own, in two blocks in a row | the last samples of u predict it better than the model, which also uses e; before, the model was better |
+//! | frozen e | `a_e1 <= A_e1/1000` in a block | the error of a tracking person never stays constant |
+//! | frozen u | `a_u1 <= A_u1/1000` in three consecutive blocks, except for a rest ([`super::resting`]) during which `a_eps` is at most twice its long-run value | a hand may rest |
+//! | idle | e and u each within a range of `M_c/20` in two consecutive blocks | only noise is recorded |
+//! | larger | `a_c1 > 5 A_c1` and `a_c3 > 5 A_c3` for both e and u in two consecutive blocks | both signals are scaled by a factor |
+//! | rescaled | all four `a_cj/A_cj` of one channel above 3.5 and within a factor of 1.5 of each other, those of the other channel below 2, in two consecutive blocks | a unit or a gain setting was changed |
+//! | swapped | the sum over blocks of `d(own) - d(other) - 1`, at most 4 per block and never below 0, reaches 6 | e resembles the earlier u, and u the earlier e; d is the sum over both channels of `\|log a_1/A_1\| + \|log a_3/A_3\|` |
+//! | misfit | `R = a_eps/min_j a_uj` is above 4 times its long-run value and above 1.5, and a_eps is above twice its long-run value, in two consecutive blocks | the last samples of u predict it better than the model, which also uses e; earlier, the model was better |
 //!
-//! The sum for swapped channels is a one-sided CUSUM (E. S. Page, *Biometrika* 41 (1954) 100-115) of a difference that
-//! is negative for channels that are not swapped and at most the distance of the two profiles for swapped ones:
-//! channels that are alike are never reported as swapped.
+//! The sum for swapped channels is a one-sided CUSUM (E. S. Page, *Biometrika* 41 (1954) 100-115). Its terms are
+//! negative for channels that are not swapped, and at most the distance between the two profiles for swapped channels.
+//! Channels with similar profiles are therefore never reported as swapped.
 
 use super::channel::ORDERS;
 use crate::bounds::within;
 
-/// e and u.
+/// Number of channels: e and u.
 pub const CHANNELS: usize = 2;
-/// Number of blocks after which the long-run values are known.
-const LEARNT: u32 = 10;
-/// Weight of a block after that.
+/// Number of blocks from which the long-run values are learnt.
+const LEARNING_BLOCKS: u32 = 10;
+/// Weight of a block once the long-run values are known.
 const WEIGHT: f64 = 1.0 / 60.0;
-/// Limits of the rules. Share of the typical mean difference up to which a signal counts as constant.
-pub const STILL: f64 = 1e-3;
+/// Fraction of the typical mean difference up to which a signal counts as constant. The constants below are the limits
+/// of the other rules.
+pub const CONSTANT_FRACTION: f64 = 1e-3;
 const FROZEN_U_BLOCKS: u32 = 3;
 const IDLE: f64 = 0.05;
 const IDLE_BLOCKS: u32 = 2;
 const LARGER: f64 = 5.0;
 const RESCALED: f64 = 3.5;
-const ALL_ORDERS: f64 = 1.5;
-const OTHER: f64 = 2.0;
+const LARGEST_ORDER_RATIO: f64 = 1.5;
+const OTHER_CHANNEL_RATIO: f64 = 2.0;
 const LARGER_BLOCKS: u32 = 2;
 const SWAPPED_DRIFT: f64 = 1.0;
 const SWAPPED: f64 = 6.0;
-/// Largest contribution of one block to the sum.
+/// Largest contribution of one block to the sum for swapped channels.
 const MOST_EVIDENCE: f64 = 4.0;
 const MISFIT: f64 = 4.0;
-/// Ratio R up to which a model predicts well enough.
+/// Ratio R up to which there is never a misfit.
 const LEAST_RATIO: f64 = 1.5;
-/// Growth of the innovations below which there is no misfit.
+/// Ratio of the innovations to their long-run value below which there is no misfit.
 const LEAST_GROWTH: f64 = 2.0;
 const MISFIT_BLOCKS: u32 = 2;
-/// Distance of a typical block: four logarithms of four.
-const ALIKE: f64 = 4.0 * 1.386;
-/// Distance of an unusual block.
-const UNLIKE: f64 = 4.0;
-/// Limit of the logarithms of features.
+/// Largest distance of a block that resembles the long-run values: four times the logarithm of four.
+const SIMILAR_DISTANCE: f64 = 4.0 * 1.386;
+/// Distance from the long-run values above which a block is unusual.
+const UNUSUAL_DISTANCE: f64 = 4.0;
+/// Largest contribution of one logarithm to a distance.
 const LARGEST_LOG: f64 = 10.0;
 
-/// Sums over a block, or its means.
+/// Sums over the samples of a block, or the means computed from them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Block {
-    /// Magnitudes of the backward differences of order 1 to 4.
+    /// Magnitudes of the backward differences of order 1 to 4 of e and u.
     pub differences: [[f64; ORDERS]; CHANNELS],
-    /// Magnitudes about the long-run means.
+    /// Magnitudes of e and u about their long-run means.
     pub magnitude: [f64; CHANNELS],
-    /// Smallest and largest value.
+    /// Smallest and largest values of e and u.
     pub range: [[f64; 2]; CHANNELS],
-    /// Values.
+    /// Sums or means of the values of e and u.
     pub mean: [f64; CHANNELS],
-    /// Magnitudes of innovations.
+    /// Magnitudes of the innovations.
     pub innovation: f64,
     /// Number of samples.
     pub samples: u32,
-    /// Number of innovations among them.
+    /// Number of samples with an innovation.
     pub innovations: u32,
 }
 
@@ -92,7 +93,7 @@ impl Default for Block {
 }
 
 impl Block {
-    /// Adds the samples of both channels: differences, values, and the long-run means.
+    /// Adds a sample of both channels: its backward differences and values; `centre` are the long-run means.
     #[inline(always)]
     pub fn add(&mut self, differences: &[[f64; ORDERS]; CHANNELS], values: [f64; CHANNELS], centre: [f64; CHANNELS]) {
         for c in 0..CHANNELS {
@@ -117,7 +118,7 @@ impl Block {
         self.innovations += 1;
     }
 
-    /// Returns the means.
+    /// Returns the means over the block, computed from the sums.
     #[must_use]
     pub fn means(&self) -> Self {
         let over = |sum: f64, count: u32| if count > 0 { sum / f64::from(count) } else { 0.0 };
@@ -131,13 +132,13 @@ impl Block {
         }
     }
 
-    /// R: the mean innovation over the least mean difference of u; `None` if either is missing.
+    /// Ratio R of the mean innovation to the smallest mean difference of u; `None` if either is missing.
     fn ratio(&self) -> Option<f64> {
         let least = self.least_of_u();
         (self.innovations > 0 && least > 0.0).then(|| self.innovation / least)
     }
 
-    /// The smallest mean of the differences of u: the error of predicting u from its own past.
+    /// Smallest mean difference of u, which is the error of predicting u from its own past.
     fn least_of_u(&self) -> f64 {
         self.differences[1]
             .iter()
@@ -145,16 +146,16 @@ impl Block {
     }
 }
 
-/// Kind of trouble of a block.
+/// Kind of fault found in a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Trouble {
+pub enum Fault {
     /// e stays constant.
     FrozenInput,
     /// u stays constant.
     FrozenOutput,
-    /// e and u are nearly silent.
+    /// e and u contain little more than noise.
     Idle,
-    /// Both are larger by a factor.
+    /// e and u are both larger by a factor.
     Larger,
     /// e is scaled by a factor.
     RescaledInput,
@@ -166,13 +167,13 @@ pub enum Trouble {
     Misfit,
 }
 
-impl Trouble {
-    /// True for troubles that may become the typical state; silence may not.
+impl Fault {
+    /// True for faults that can become the new normal state of the signals; frozen and idle channels cannot.
     pub fn may_be_the_new_level(self) -> bool {
         !matches!(self, Self::FrozenInput | Self::FrozenOutput | Self::Idle)
     }
 
-    /// Least duration in blocks at the first report.
+    /// Minimum duration of the fault in blocks when it is first reported.
     pub fn blocks(self) -> u32 {
         match self {
             Self::FrozenInput => 1,
@@ -185,11 +186,11 @@ impl Trouble {
     }
 }
 
-/// The long-run values, and the duration of troubles.
+/// Long-run values of the signals, and durations of the current faults.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Profile {
     typical: Block,
-    /// Number of blocks from which they were learnt.
+    /// Number of blocks from which the long-run values were learnt.
     blocks: u32,
     frozen_u: u32,
     idle: u32,
@@ -213,7 +214,7 @@ impl Default for Profile {
 }
 
 impl Profile {
-    /// An empty profile.
+    /// Returns a profile without long-run values.
     pub fn new() -> Self {
         Self {
             typical: Block::default(),
@@ -230,16 +231,16 @@ impl Profile {
         }
     }
 
-    /// A profile with known long-run values.
+    /// Returns a profile with the given long-run values.
     pub fn of(typical: &Block) -> Self {
         Self {
             typical: *typical,
-            blocks: LEARNT,
+            blocks: LEARNING_BLOCKS,
             ..Self::new()
         }
     }
 
-    /// True if the last blocks gave no reason for suspicion.
+    /// True if the long-run values are known and no fault was suspected in the last blocks.
     pub fn is_calm(&self) -> bool {
         self.is_known()
             && self.frozen_u == 0
@@ -250,20 +251,20 @@ impl Profile {
             && self.misfits == 0
     }
 
-    /// True for the means of an unusual block: different by a factor of e in the mean of the logarithms.
-    pub fn is_unusual(&self, block: &Block) -> bool {
-        self.is_known() && self.distance(block, [0, 1]) > UNLIKE
-    }
-
-    /// True for the means of a block that is like the typical ones: within a factor of four in the mean of the
+    /// True if the means of a block differ from the long-run values by more than a factor of e, in the mean of the
     /// logarithms.
-    pub fn resembles(&self, block: &Block) -> bool {
-        self.is_known() && self.distance(block, [0, 1]) < ALIKE
+    pub fn is_unusual(&self, block: &Block) -> bool {
+        self.is_known() && self.distance(block, [0, 1]) > UNUSUAL_DISTANCE
     }
 
-    /// True once long-run values are known.
+    /// True if the means of a block are within a factor of four of the long-run values, in the mean of the logarithms.
+    pub fn resembles(&self, block: &Block) -> bool {
+        self.is_known() && self.distance(block, [0, 1]) < SIMILAR_DISTANCE
+    }
+
+    /// True once the long-run values are known.
     pub fn is_known(&self) -> bool {
-        self.blocks >= LEARNT
+        self.blocks >= LEARNING_BLOCKS
     }
 
     /// Returns the long-run values.
@@ -271,7 +272,7 @@ impl Profile {
         &self.typical
     }
 
-    /// Takes the means of a sound block into the long-run values.
+    /// Updates the long-run values with the means of a block without a fault.
     pub fn update(&mut self, block: &Block) {
         let known = self.is_known();
         self.blocks = self.blocks.saturating_add(1);
@@ -280,10 +281,10 @@ impl Profile {
             let bounded = if known { within(found, [least, most]) } else { found };
             *typical += weight * (bounded - *typical);
         };
-        // Signals whose squares underflow have no ratio.
+        // If the squares of a signal underflow, the ratio is not defined.
         let sound = |ratio: &f64| ratio.is_finite() && block.innovation.is_finite();
         if let Some(ratio) = block.ratio().filter(sound) {
-            let known = self.ratios >= LEARNT;
+            let known = self.ratios >= LEARNING_BLOCKS;
             self.ratios = self.ratios.saturating_add(1);
             let weight = if known { WEIGHT } else { 1.0 / f64::from(self.ratios) };
             let bounded = if known {
@@ -317,23 +318,23 @@ impl Profile {
         }
     }
 
-    /// Returns the least duration in blocks of a trouble that was just reported.
-    pub fn lasting(&self, trouble: Trouble) -> u32 {
+    /// Returns the minimum duration, in blocks, of a fault that was just reported.
+    pub fn duration_blocks(&self, trouble: Fault) -> u32 {
         match trouble {
-            Trouble::FrozenOutput => self.frozen_u.max(trouble.blocks()),
+            Fault::FrozenOutput => self.frozen_u.max(trouble.blocks()),
             _ => trouble.blocks(),
         }
     }
 
-    /// Returns the fault found in a block, given the earlier blocks; `rests` if u is constant at its end because the
-    /// person rests.
-    pub fn judge(&mut self, block: &Block, rests: bool) -> Option<Trouble> {
+    /// Returns the fault found in a block, taking the preceding blocks into account. `rests` is true if u is constant
+    /// at the end of the block because the person is resting.
+    pub fn find_fault(&mut self, block: &Block, rests: bool) -> Option<Fault> {
         if !self.is_known() {
             return None;
         }
-        // A channel that never moved (there is no input, or it was never recorded) is not frozen.
+        // A channel that has never moved (there is no input, or it was not recorded) is not frozen.
         let below = |found: f64, share: f64, typical: f64| typical > 0.0 && found <= share * typical;
-        let still = |c: usize| below(block.differences[c][0], STILL, self.typical.differences[c][0]);
+        let still = |c: usize| below(block.differences[c][0], CONSTANT_FRACTION, self.typical.differences[c][0]);
         let silent = |c: usize| below(block.range[c][1] - block.range[c][0], IDLE, self.typical.magnitude[c]);
         let count = |run: u32, is: bool| if is { run.saturating_add(1) } else { 0 };
         let frozen_e = still(0);
@@ -348,39 +349,39 @@ impl Profile {
         for (c, run) in self.rescaled.iter_mut().enumerate() {
             let [least, most] = ratios[c];
             let other = ratios[1 - c][1];
-            *run = count(*run, least > RESCALED && most < ALL_ORDERS * least && other < OTHER);
+            *run = count(*run, least > RESCALED && most < LARGEST_ORDER_RATIO * least && other < OTHER_CHANNEL_RATIO);
         }
         let evidence = self.distance(block, [0, 1]) - self.distance(block, [1, 0]) - SWAPPED_DRIFT;
         let evidence = evidence.clamp(-MOST_EVIDENCE, MOST_EVIDENCE);
         self.swapped = (self.swapped + evidence).clamp(0.0, 2.0 * SWAPPED);
         let limit = (MISFIT * self.ratio).max(LEAST_RATIO);
-        let misfit = self.ratios >= LEARNT && block.ratio().is_some_and(|ratio| ratio > limit);
-        // During a rest the past predicts u exactly, and the model need not be wrong.
-        let as_foretold = self.ratios < LEARNT || block.innovation <= LEAST_GROWTH * self.innovation;
-        let misfit = misfit && !as_foretold;
+        let misfit = self.ratios >= LEARNING_BLOCKS && block.ratio().is_some_and(|ratio| ratio > limit);
+        // During a rest the past of u predicts u exactly, which does not imply that the model is wrong.
+        let innovations_normal = self.ratios < LEARNING_BLOCKS || block.innovation <= LEAST_GROWTH * self.innovation;
+        let misfit = misfit && !innovations_normal;
         self.misfits = count(self.misfits, misfit);
         if frozen_e {
-            Some(Trouble::FrozenInput)
+            Some(Fault::FrozenInput)
         } else if self.idle >= IDLE_BLOCKS {
-            Some(Trouble::Idle)
-        } else if self.frozen_u >= FROZEN_U_BLOCKS && !(rests && as_foretold) {
-            Some(Trouble::FrozenOutput)
+            Some(Fault::Idle)
+        } else if self.frozen_u >= FROZEN_U_BLOCKS && !(rests && innovations_normal) {
+            Some(Fault::FrozenOutput)
         } else if self.larger >= LARGER_BLOCKS {
-            Some(Trouble::Larger)
+            Some(Fault::Larger)
         } else if self.rescaled[0] >= LARGER_BLOCKS {
-            Some(Trouble::RescaledInput)
+            Some(Fault::RescaledInput)
         } else if self.rescaled[1] >= LARGER_BLOCKS {
-            Some(Trouble::RescaledOutput)
+            Some(Fault::RescaledOutput)
         } else if self.swapped >= SWAPPED {
-            Some(Trouble::Swapped)
+            Some(Fault::Swapped)
         } else if self.misfits >= MISFIT_BLOCKS {
-            Some(Trouble::Misfit)
+            Some(Fault::Misfit)
         } else {
             None
         }
     }
 
-    /// The least and the largest ratio of the differences of a channel to the typical ones.
+    /// Smallest and largest ratio of the differences of a channel to their long-run values.
     fn ratios_of(&self, block: &Block, c: usize) -> [f64; 2] {
         let mut ends = [f64::INFINITY, 0.0];
         for (found, typical) in block.differences[c].iter().zip(&self.typical.differences[c]) {
@@ -390,13 +391,13 @@ impl Profile {
         ends
     }
 
-    /// Distance of a block from the long-run values, those of `of[c]` for channel c.
+    /// Distance of a block from the long-run values, where channel c is compared with channel `of[c]`.
     fn distance(&self, block: &Block, of: [usize; CHANNELS]) -> f64 {
         let mut sum = 0.0;
         for (c, typical) in of.into_iter().enumerate() {
             for j in [0, 2] {
                 let (found, typical) = (block.differences[c][j], self.typical.differences[typical][j]);
-                // Zero compared with zero is not a difference.
+                // Two values of zero do not differ.
                 let log = if found == typical {
                     0.0
                 } else {
@@ -430,7 +431,7 @@ mod tests {
         let mut profile = Profile::new();
         for _ in 0..20 {
             let typical = block([0.02, 0.1], [0.1, 1.1]);
-            assert_eq!(profile.judge(&typical, false), None);
+            assert_eq!(profile.find_fault(&typical, false), None);
             profile.update(&typical);
         }
         profile
@@ -454,29 +455,29 @@ mod tests {
     fn each_trouble_has_its_name_and_ends() {
         let typical = block([0.02, 0.1], [0.1, 1.1]);
         let cases = [
-            (block([0.0, 0.1], [0.1, 1.1]), Trouble::FrozenInput, 1),
-            (block([0.02, 0.0], [0.1, 1.1]), Trouble::FrozenOutput, 3),
-            (block([1e-4, 1e-4], [0.1, 1.1]), Trouble::Idle, 2),
-            (block([0.2, 1.0], [0.1, 1.1]), Trouble::Larger, 2),
-            (block([0.1, 0.1], [0.1, 1.1]), Trouble::RescaledInput, 2),
-            (block([0.02, 0.45], [0.1, 1.1]), Trouble::RescaledOutput, 2),
-            (block([0.1, 0.02], [1.1, 0.1]), Trouble::Swapped, 2),
+            (block([0.0, 0.1], [0.1, 1.1]), Fault::FrozenInput, 1),
+            (block([0.02, 0.0], [0.1, 1.1]), Fault::FrozenOutput, 3),
+            (block([1e-4, 1e-4], [0.1, 1.1]), Fault::Idle, 2),
+            (block([0.2, 1.0], [0.1, 1.1]), Fault::Larger, 2),
+            (block([0.1, 0.1], [0.1, 1.1]), Fault::RescaledInput, 2),
+            (block([0.02, 0.45], [0.1, 1.1]), Fault::RescaledOutput, 2),
+            (block([0.1, 0.02], [1.1, 0.1]), Fault::Swapped, 2),
             (
                 Block {
                     innovation: 1.0,
                     ..typical
                 },
-                Trouble::Misfit,
+                Fault::Misfit,
                 2,
             ),
         ];
         for (bad, trouble, after) in cases {
             let mut profile = known();
             for n in 1..=5 {
-                let found = profile.judge(&bad, false);
+                let found = profile.find_fault(&bad, false);
                 assert_eq!(found, (n >= after).then_some(trouble), "{n} {trouble:?}");
             }
-            let left = (0..30).find(|_| profile.judge(&typical, false).is_none());
+            let left = (0..30).find(|_| profile.find_fault(&typical, false).is_none());
             assert!(left.is_some_and(|n| n <= 12), "{trouble:?}: {left:?}");
         }
     }
@@ -492,18 +493,18 @@ mod tests {
         };
         let after = |rests: bool, found: &Block| {
             let mut profile = known();
-            (1..=20).find_map(|n| profile.judge(found, rests).map(|trouble| (n, trouble)))
+            (1..=20).find_map(|n| profile.find_fault(found, rests).map(|trouble| (n, trouble)))
         };
-        assert_eq!(after(false, &still), Some((3, Trouble::FrozenOutput)));
+        assert_eq!(after(false, &still), Some((3, Fault::FrozenOutput)));
         assert_eq!(after(true, &quiet(0.0, 0.02)), None);
         assert_eq!(after(true, &quiet(0.19, 0.02)), None);
-        assert_eq!(after(true, &quiet(0.21, 0.02)), Some((3, Trouble::FrozenOutput)));
-        assert_eq!(after(true, &quiet(0.0, 0.0)), Some((1, Trouble::FrozenInput)));
+        assert_eq!(after(true, &quiet(0.21, 0.02)), Some((3, Fault::FrozenOutput)));
+        assert_eq!(after(true, &quiet(0.0, 0.0)), Some((1, Fault::FrozenInput)));
         // A channel that was trusted for long has had the trouble for as long.
         let mut profile = known();
-        (0..9).for_each(|_| assert_eq!(profile.judge(&quiet(0.0, 0.02), true), None));
-        let told = profile.judge(&quiet(0.0, 0.02), false);
-        assert_eq!(told.map(|trouble| profile.lasting(trouble)), Some(10));
+        (0..9).for_each(|_| assert_eq!(profile.find_fault(&quiet(0.0, 0.02), true), None));
+        let told = profile.find_fault(&quiet(0.0, 0.02), false);
+        assert_eq!(told.map(|trouble| profile.duration_blocks(trouble)), Some(10));
     }
 
     #[test]
@@ -523,7 +524,7 @@ mod tests {
         let mut size = 0.1;
         for n in 0..200 {
             let found = block([size, size], [0.9, 0.9]);
-            assert_eq!(profile.judge(&found, false), None, "{n}");
+            assert_eq!(profile.find_fault(&found, false), None, "{n}");
             profile.update(&found);
             size *= if n % 7 < 4 { 1.5 } else { 0.6 };
         }

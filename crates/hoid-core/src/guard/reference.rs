@@ -1,39 +1,41 @@
-//! A fixed model: how well the start of a recursion predicts the current u.
+//! Fixed reference model, which shows how well the start of a recursion predicts the current u.
 //!
-//! The general model `A u = (B/F) q^-nk e + (C/D) eps` with the coefficients of the start gives the innovations eps_0,
-//! which are compared with those of the recursion, eps. Over a block of n samples the estimate is worse than the fixed
-//! model by
+//! The general model `A u = (B/F) q^-nk e + (C/D) eps` with the initial coefficients of the recursion gives the
+//! innovations eps_0, which are compared with the innovations eps of the recursion. Over a block of n samples the
+//! estimate is worse than the fixed model by
 //!
 //! `s = n log(mean |eps| / mean |eps_0|)`
 //!
-//! units of log likelihood: the ratio of the mean magnitudes is that of the standard deviations for every shape of the
-//! distribution, and a few outliers have little weight. The innovations of a sound recursion are larger than those of
-//! a fixed model by half of its effective number of parameters over its memory: .2 % for memories of 2 to 5 s and
-//! white innovations, several per cent for seconds if the order of its noise model is too low for the remnant, and
-//! more for an unsteady person. The part beyond [`DRIFT`] counts. The one-sided cumulative sum (E. S. Page,
-//! *Biometrika* 41 (1954) 100-115) reports a diverged estimate when it reaches [`ASTRAY`].
+//! units of log likelihood. The mean magnitude is proportional to the standard deviation for every shape of the
+//! distribution, and gives little weight to a few outliers. Relative to those of a fixed model, the innovations of a
+//! sound recursion are larger by half its effective number of parameters divided by its memory: .2 % for memories of 2
+//! to 5 s and white innovations. They are larger by several per cent for a few seconds at a time if the order of the
+//! noise model is too low for the remnant, and by more for an unsteady person. Only the part beyond [`DRIFT`] counts.
+//! The one-sided cumulative sum (E. S. Page, *Biometrika* 41 (1954) 100-115) reports a diverged estimate when it
+//! reaches [`DIVERGED`].
 //!
-//! A changed person is predicted better by an estimate that has followed than by the start: the sum stays at zero.
+//! After a change of the person, an estimate that has followed the change predicts u better than the initial model, and
+//! the sum stays at zero.
 
-/// Largest order of a polynomial.
-pub const ROOM: usize = 16;
-/// Relative increase of the innovations that does not count.
+/// Highest order of a polynomial of the model.
+pub const MAX_ORDER: usize = 16;
+/// Increase of the log mean magnitude of the innovations that is tolerated.
 pub const DRIFT: f64 = 0.2;
-/// Sum at which the estimate has diverged.
-pub const ASTRAY: f64 = 40.0;
-/// Largest contribution of one block to the sum.
-const MOST: f64 = 15.0;
+/// Cumulative sum above which the estimate is reported as diverged.
+pub const DIVERGED: f64 = 40.0;
+/// Largest contribution of one block to the cumulative sum.
+const LARGEST_CONTRIBUTION: f64 = 15.0;
 
 /// Orders of the model: na, nb, nc, nd, nf.
 pub type Orders = [usize; 5];
 
-/// The model and its signals.
+/// Fixed model with its past signals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReferenceModel {
     orders: Orders,
-    coefficients: [[f64; ROOM]; 5],
-    /// u, x, eps, v and w of the last samples, the newest first.
-    past: [[f64; ROOM]; 5],
+    coefficients: [[f64; MAX_ORDER]; 5],
+    /// Last values of u, x, eps, v and w, the newest first.
+    past: [[f64; MAX_ORDER]; 5],
     sum: f64,
     samples: u32,
     score: f64,
@@ -42,13 +44,13 @@ pub struct ReferenceModel {
 crate::state!([] ReferenceModel { coefficients, past, sum, samples, score });
 
 impl ReferenceModel {
-    /// Builds the model of `theta = [a.., b.., c.., d.., f..]`. `None` if an order is above [`ROOM`] or theta has
-    /// another length.
+    /// Builds the model from `theta = [a.., b.., c.., d.., f..]`. Returns `None` if an order is above [`MAX_ORDER`] or
+    /// if the length of theta does not match the orders.
     pub fn new(orders: Orders, theta: &[f64]) -> Option<Self> {
-        if orders.iter().any(|n| *n > ROOM) || orders.iter().sum::<usize>() != theta.len() {
+        if orders.iter().any(|n| *n > MAX_ORDER) || orders.iter().sum::<usize>() != theta.len() {
             return None;
         }
-        let (mut coefficients, mut first) = ([[0.0; ROOM]; 5], 0);
+        let (mut coefficients, mut first) = ([[0.0; MAX_ORDER]; 5], 0);
         for (place, n) in coefficients.iter_mut().zip(orders) {
             place[..n].copy_from_slice(&theta[first..first + n]);
             first += n;
@@ -56,28 +58,28 @@ impl ReferenceModel {
         Some(Self {
             orders,
             coefficients,
-            past: [[0.0; ROOM]; 5],
+            past: [[0.0; MAX_ORDER]; 5],
             sum: 0.0,
             samples: 0,
             score: 0.0,
         })
     }
 
-    /// Resets the filters and the sum.
+    /// Resets the filters, the current block and the cumulative sum.
     pub fn reset(&mut self) {
-        (self.past, self.sum, self.samples, self.score) = ([[0.0; ROOM]; 5], 0.0, 0, 0.0);
+        (self.past, self.sum, self.samples, self.score) = ([[0.0; MAX_ORDER]; 5], 0.0, 0, 0.0);
     }
 
-    /// Takes a sample `x(t) = e(t - nk)`, `u(t)`; returns eps_0.
+    /// Takes a sample `x(t) = e(t - nk)`, `u(t)` and returns its innovation eps_0.
     #[inline]
     pub fn step(&mut self, x: f64, u: f64) -> f64 {
         let [na, nb, nc, nd, nf] = self.orders;
         let [a, b, c, d, f] = &self.coefficients;
         let [us, xs, errors, vs, ws] = &self.past;
-        let sum = |c: &[f64; ROOM], past: &[f64; ROOM], n: usize| -> f64 {
+        let sum = |c: &[f64; MAX_ORDER], past: &[f64; MAX_ORDER], n: usize| -> f64 {
             c[..n].iter().zip(&past[..n]).map(|(c, x)| c * x).sum()
         };
-        // b starts with x(t) itself.
+        // The first coefficient of B multiplies x(t) itself.
         let mut w = -sum(f, ws, nf);
         if nb > 0 {
             w += b[0] * x;
@@ -96,22 +98,22 @@ impl ReferenceModel {
         eps
     }
 
-    /// Drops the errors of the block so far.
+    /// Discards the errors of the current block.
     pub fn skip_block(&mut self) {
         (self.sum, self.samples) = (0.0, 0);
     }
 
-    /// Ends a block in which the innovations of the recursion have this mean magnitude: true if its estimate has
-    /// diverged.
+    /// Ends a block, given the mean magnitude of the innovations of the recursion. Returns true if the estimate of the
+    /// recursion has diverged.
     pub fn end_block(&mut self, innovation: f64) -> bool {
         let own = self.sum / f64::from(self.samples.max(1));
-        let said = f64::from(self.samples) * (libm::log(innovation / own) - DRIFT);
+        let score = f64::from(self.samples) * (libm::log(innovation / own) - DRIFT);
         self.skip_block();
-        // A comparison with NaN is false: zero over zero carries no information.
-        if said.abs() <= f64::INFINITY {
-            self.score = (self.score + said.clamp(-MOST, MOST)).max(0.0);
+        // A comparison with NaN is false; zero divided by zero carries no information.
+        if score.abs() <= f64::INFINITY {
+            self.score = (self.score + score.clamp(-LARGEST_CONTRIBUTION, LARGEST_CONTRIBUTION)).max(0.0);
         }
-        self.score >= ASTRAY
+        self.score >= DIVERGED
     }
 }
 

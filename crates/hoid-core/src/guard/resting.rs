@@ -1,64 +1,67 @@
-//! A resting stick and a frozen channel: both signals stay constant, but only a frozen channel is a fault.
+//! Distinction between a resting stick and a frozen channel: in both cases the signal stays constant, but only a frozen
+//! channel is a fault.
 //!
-//! A stick with a dead zone rests at its centre, and one that is pushed to its end rests there. Such values are atoms
-//! of the distribution of u: u returns to them often, and stays. The last [`ATOMS`] values at which u stayed for
-//! `LEAST_S` or more are kept, each with the number of its rests n, their sum s and the longest of them, l. A constant
-//! span of length T is a **rest**, and no fault, if
+//! A stick with a dead zone rests at its centre, and a stick that is pushed to its end rests there. Such values are
+//! atoms of the distribution of u: u often returns to them and stays there. The last [`ATOMS`] values at which u stayed
+//! for `LEAST_S` or longer are stored, each with the number n of its rests, their total duration S and the duration l
+//! of the longest rest. A constant span of length T is a **rest**, and no fault, if
 //!
-//! `n >= 3`, `s >= .05 t`, `T < max(8 s, 2 l)`
+//! `n >= 3`, `S >= .05 t`, `T < max(8 s, 2 l)`,
 //!
-//! after t seconds. A frozen channel has an arbitrary value, which u has never or hardly ever had before, since a
-//! distribution without an atom there gives that value probability zero; and a channel that freezes within a rest is
-//! constant for longer than the person ever rested. The next rest is longer than the longest of n identically
-//! distributed rests with probability 1/(n+1), whatever their distribution (order statistics; H. A. David and H. N.
-//! Nagaraja, *Order Statistics*, 2003, §2.1); for exponential rests, it is twice as long with a probability of about
-//! `2/((n+1)(n+2))`. The minimum of 8 s is for the time in which only a few rests have been observed.
+//! where t is the time before the span. A frozen channel has an arbitrary value, at which u has never or hardly ever
+//! been before, since a distribution without an atom at this value gives it probability zero. A channel that freezes
+//! during a rest stays constant for longer than the person ever rested. The next rest is longer than the longest of n
+//! independent, identically distributed rests with probability 1/(n+1) for any continuous distribution (order
+//! statistics; H. A. David and H. N. Nagaraja, *Order Statistics*, 2003, §2.1). For exponentially distributed rests, it
+//! is more than twice as long with probability `2/((n+1)(n+2))`. The minimum of 8 s applies while only a few rests have
+//! been observed.
 //!
-//! The caller checks the other conditions of a rest: e has to move meanwhile, and the innovations must be no larger
-//! than typical.
+//! The caller checks the other conditions of a rest: e must move during it, and the innovations must not be larger than
+//! is typical.
 
-/// Number of values that are kept.
+/// Number of stored values.
 pub const ATOMS: usize = 4;
-/// Least length of a rest, s.
+/// Minimum duration of a rest in s.
 const LEAST_S: f64 = 0.1;
-/// Number of rests at a value, and their share of the time, that make it an atom.
+/// Minimum number of rests at a value, and minimum fraction of the time, for which the value counts as an atom.
 const RESTS: u32 = 3;
 const SHARE: f64 = 0.05;
-/// Longest rest at an atom that is always accepted, s, and the same in units of the longest so far.
-const BELIEVED_S: f64 = 8.0;
-const LONGER: f64 = 2.0;
+/// A rest at an atom is accepted if it is shorter than `ACCEPTED_REST_S` seconds or than `LONGEST_REST_FACTOR` times
+/// the longest rest so far.
+const ACCEPTED_REST_S: f64 = 8.0;
+const LONGEST_REST_FACTOR: f64 = 2.0;
 
-/// A value at which u has rested.
+/// Value at which u has rested.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Atom {
     value: f64,
     rests: u32,
-    /// Number of samples of its rests, and of the longest.
+    /// Number of samples in all rests at this value, and in the longest of them.
     samples: u64,
     longest: u64,
 }
 
 crate::state!([] Atom { value, rests, samples, longest });
 
-/// The rests of u.
+/// Values at which u has rested, and the current constant span.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Resting {
     sample_time: f64,
-    /// Distance up to which two values are equal.
+    /// Largest difference between two values that count as equal.
     tolerance: f64,
     atoms: [Atom; ATOMS],
     samples: u64,
-    /// The current value of u, and how long it has been constant.
+    /// Current value of u, and number of samples for which it has been constant.
     value: f64,
-    stands: u64,
-    /// True if the constant span is not to be learnt.
-    doubted: bool,
+    constant_samples: u64,
+    /// True if the current constant span must not be learnt.
+    rejected: bool,
 }
 
-crate::state!([] Resting { tolerance, atoms, samples, value, stands, doubted });
+crate::state!([] Resting { tolerance, atoms, samples, value, constant_samples, rejected });
 
 impl Resting {
-    /// An empty list of rests.
+    /// Returns an empty list of rests.
     pub fn new(sample_time: f64) -> Self {
         Self {
             sample_time,
@@ -66,37 +69,38 @@ impl Resting {
             atoms: [Atom::default(); ATOMS],
             samples: 0,
             value: 0.0,
-            stands: 0,
-            doubted: false,
+            constant_samples: 0,
+            rejected: false,
         }
     }
 
-    /// Sets the distance up to which two values are equal.
+    /// Sets the largest difference between two values that count as equal.
     pub fn set_tolerance(&mut self, tolerance: f64) {
         self.tolerance = tolerance;
     }
 
-    /// Takes a sample of u; NaN ends a constant span.
+    /// Takes a sample of u. NaN ends a constant span.
     #[inline]
     pub fn take(&mut self, u: f64) {
         self.samples += 1;
-        if self.stands > 0 && (u - self.value).abs() <= self.tolerance {
-            self.stands += 1;
+        if self.constant_samples > 0 && (u - self.value).abs() <= self.tolerance {
+            self.constant_samples += 1;
         } else {
-            if self.stands as f64 * self.sample_time >= LEAST_S && !self.doubted {
+            if self.constant_samples as f64 * self.sample_time >= LEAST_S && !self.rejected {
                 self.learn();
             }
-            (self.value, self.stands) = if u.is_finite() { (u, 1) } else { (0.0, 0) };
-            self.doubted = false;
+            (self.value, self.constant_samples) = if u.is_finite() { (u, 1) } else { (0.0, 0) };
+            self.rejected = false;
         }
     }
 
-    /// Marks the current constant span as no rest: it is not learnt.
-    pub fn doubt(&mut self) {
-        self.doubted = true;
+    /// Marks the current constant span as no rest, so that it is not learnt.
+    pub fn reject(&mut self) {
+        self.rejected = true;
     }
 
-    /// Learns the constant span that has ended; if the list is full, it replaces the value with the least time.
+    /// Learns the constant span that has just ended. If the list is full, its value replaces the value with the
+    /// shortest total duration.
     fn learn(&mut self) {
         let place = self.place().unwrap_or_else(|| {
             let least = (0..ATOMS).min_by_key(|i| self.atoms[*i].samples).unwrap_or(0);
@@ -106,19 +110,19 @@ impl Resting {
             };
             least
         });
-        let (atom, stands) = (&mut self.atoms[place], self.stands);
+        let (atom, constant_samples) = (&mut self.atoms[place], self.constant_samples);
         atom.rests = atom.rests.saturating_add(1);
-        atom.samples += stands;
-        atom.longest = atom.longest.max(stands);
+        atom.samples += constant_samples;
+        atom.longest = atom.longest.max(constant_samples);
     }
 
-    /// Index of the current value.
+    /// Index of the current value in the list of atoms.
     fn place(&self) -> Option<usize> {
         let known = |atom: &Atom| atom.rests > 0 && (atom.value - self.value).abs() <= self.tolerance;
         self.atoms.iter().position(known)
     }
 
-    /// True while u is constant because the person rests.
+    /// True while u is constant because the person is resting.
     pub fn is_rest(&self) -> bool {
         let Some(place) = self.place() else {
             return false;
@@ -129,11 +133,11 @@ impl Resting {
             longest,
             ..
         } = self.atoms[place];
-        let stands = self.stands as f64 * self.sample_time;
-        let believed = (LONGER * longest as f64 * self.sample_time).max(BELIEVED_S);
-        // The time before this constant span.
-        let time = self.samples.saturating_sub(self.stands) as f64;
-        self.stands > 0 && rests >= RESTS && samples as f64 >= SHARE * time && stands < believed && !self.doubted
+        let duration_s = self.constant_samples as f64 * self.sample_time;
+        let believed = (LONGEST_REST_FACTOR * longest as f64 * self.sample_time).max(ACCEPTED_REST_S);
+        // Number of samples before this constant span.
+        let time = self.samples.saturating_sub(self.constant_samples) as f64;
+        self.constant_samples > 0 && rests >= RESTS && samples as f64 >= SHARE * time && duration_s < believed && !self.rejected
     }
 }
 
@@ -153,7 +157,7 @@ mod tests {
     }
 
     /// The time after which a constant span at a value is no longer a rest, s.
-    fn told_after(mut resting: Resting, value: f64) -> f64 {
+    fn rest_ends_after(mut resting: Resting, value: f64) -> f64 {
         let last = (1..10_000).take_while(|_| {
             resting.take(value);
             resting.is_rest()
@@ -164,11 +168,11 @@ mod tests {
     #[test]
     fn a_stick_rests_where_it_often_did_and_not_for_ever() {
         let resting = person(&[60, 150, 80, 120]);
-        assert!((told_after(resting, 0.0) - 8.0).abs() < 0.02);
-        assert!((told_after(person(&[60, 600, 80, 120]), 0.0) - 12.0).abs() < 0.02);
+        assert!((rest_ends_after(resting, 0.0) - 8.0).abs() < 0.02);
+        assert!((rest_ends_after(person(&[60, 600, 80, 120]), 0.0) - 12.0).abs() < 0.02);
         // A new value, and one with a single rest.
-        assert!(told_after(resting, 0.37) == 0.0);
-        assert!(told_after(person(&[150]), 0.0) == 0.0);
+        assert!(rest_ends_after(resting, 0.37) == 0.0);
+        assert!(rest_ends_after(person(&[150]), 0.0) == 0.0);
     }
 
     /// A signal with many values for a moment each, as from a coarse converter.
@@ -180,7 +184,7 @@ mod tests {
             (0..12).for_each(|_| resting.take(value));
         }
         for value in [0.0, 7.0, 33.0, 63.0] {
-            assert!(told_after(resting, value) == 0.0, "{value}");
+            assert!(rest_ends_after(resting, value) == 0.0, "{value}");
         }
     }
 
@@ -188,9 +192,9 @@ mod tests {
     fn a_doubted_stand_is_not_learnt_and_no_number_is_no_rest() {
         let mut resting = person(&[60, 150, 80]);
         (0..3000).for_each(|_| resting.take(0.0));
-        resting.doubt();
+        resting.reject();
         resting.take(1.0);
-        assert!((told_after(resting, 0.0) - 8.0).abs() < 0.02);
+        assert!((rest_ends_after(resting, 0.0) - 8.0).abs() < 0.02);
         resting.take(f64::NAN);
         assert!(!resting.is_rest());
         assert!(!Resting::new(0.01).is_rest());

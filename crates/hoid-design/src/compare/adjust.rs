@@ -1,10 +1,10 @@
-//! Probabilities of several tests at once.
+//! Adjustment of the p-values of several tests.
 //!
-//! S. Holm, *Scand. J. Stat.* 6 (1979) 65-70: of m probabilities in ascending order `p_1 <= .. <= p_m` the adjusted ones are
-//! `max_{j <= i} min(1, (m - j + 1) p_j)`. The chance of one false finding or more among them is at most the level,
-//! however the tests depend on each other.
+//! S. Holm, *Scand. J. Stat.* 6 (1979) 65-70: for m p-values in ascending order `p_1 <= .. <= p_m` the adjusted values
+//! are `max_{j <= i} min(1, (m - j + 1) p_j)`. The probability of one or more false findings among the tests is then at
+//! most the significance level, regardless of how the tests depend on each other.
 
-/// Returns the adjusted probabilities, in the order of the given ones.
+/// Returns the adjusted p-values, in the order of the given p-values.
 pub fn holm(probabilities: &[f64]) -> Vec<f64> {
     let m = probabilities.len();
     let mut order: Vec<usize> = (0..m).collect();

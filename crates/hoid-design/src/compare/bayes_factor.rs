@@ -1,8 +1,8 @@
-//! Bayes factor of a difference: how much more probable its t is with a difference than without one.
+//! Bayes factor of a difference: how many times more probable the observed t is with a difference than without one.
 //!
-//! Without a difference the effect size delta is 0; with one it is drawn from a Cauchy distribution of scale
-//! r = sqrt(2)/2 (the prior of Jeffreys, Zellner and Siow). With t, its nu degrees of freedom and N = n people, or
-//! N = n_1 n_2/(n_1 + n_2) of two groups,
+//! Without a difference the effect size delta is 0; with a difference it is drawn from a Cauchy distribution of scale r
+//! = sqrt(2)/2 (the prior of Jeffreys, Zellner and Siow). For t with nu degrees of freedom, and N = n people or N = n_1
+//! n_2/(n_1 + n_2) for two groups,
 //!
 //! ```text
 //!           int_0^inf (1 + N g r^2)^(-1/2) (1 + t^2/((1 + N g r^2) nu))^(-(nu + 1)/2) p(g) dg
@@ -12,18 +12,18 @@
 //! p(g) = (2 pi)^(-1/2) g^(-3/2) e^(-1/(2 g))
 //! ```
 //!
-//! (J. N. Rouder et al., *Psychonomic Bulletin & Review* 16 (2009) 225-237, eq. 1). In x = log g the integrand falls at
-//! least exponentially to both sides, and the trapezoidal rule is exact to rounding.
+//! (J. N. Rouder et al., *Psychonomic Bulletin & Review* 16 (2009) 225-237, eq. 1). As a function of x = log g the
+//! integrand falls at least exponentially on both sides, so that the trapezoidal rule is exact to rounding.
 
 use std::f64::consts::PI;
 
-/// Scale of the effect sizes that are expected.
+/// Scale of the prior distribution of effect sizes.
 const R: f64 = std::f64::consts::FRAC_1_SQRT_2;
-/// Steps of the rule in a unit of log g.
+/// Number of steps of the trapezoidal rule per unit of log g.
 const STEPS: usize = 64;
 
-/// Returns BF_10 of a t test of one group of people, with `second` = 0, or of two; `None` if too few people or a t
-/// that is no number leave none.
+/// Returns BF_10 of a t test of one group of people (`second` is 0) or of two groups; `None` if there are too few
+/// people or t is not finite.
 pub fn bayes_factor(t: f64, first: usize, second: usize) -> Option<f64> {
     let (n1, n2) = (first as f64, second as f64);
     let (people, nu) = match second {
@@ -39,7 +39,8 @@ pub fn bayes_factor(t: f64, first: usize, second: usize) -> Option<f64> {
         let spread = people * R * R * x.exp();
         -0.5 * (x + (-x).exp() + (2.0 * PI).ln() + spread.ln_1p()) - power * (t * t / ((1.0 + spread) * nu)).ln_1p()
     };
-    // Below, e^(-1/(2 g)) is nothing; above, the integrand falls by e^(-x) once N g r^2 has passed t^2.
+    // Below log g = -8, e^(-1/(2 g)) is negligible; at the upper end the integrand falls as e^(-x), once N g r^2
+    // exceeds t^2.
     let (from, to) = (-8.0, 45.0 + (t * t).ln_1p());
     let count = ((to - from) * STEPS as f64).ceil() as usize;
     let sum: f64 = (0..=count)

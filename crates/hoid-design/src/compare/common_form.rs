@@ -1,9 +1,10 @@
-//! One form for all people and conditions that are compared: parameters have one meaning within one form only.
+//! One form for all people and conditions that are compared, since parameters have the same meaning only within one
+//! form.
 //!
-//! People are independent, so that the evidence of a form is the sum of its criteria over people and conditions, each
-//! above the least of that person (K. P. Burnham and D. R. Anderson, *Model Selection and Multimodel Inference*, 2002,
-//! section 2.6). The common form is the simplest within 2 of the least sum. A form that the data of most people leave
-//! open is not considered: its parameters would not be determined.
+//! People are independent, so the evidence for a form is the sum of its criteria over people and conditions, each
+//! relative to the best form of that person (K. P. Burnham and D. R. Anderson, *Model Selection and Multimodel
+//! Inference*, 2002, section 2.6). The common form is the simplest form within 2 of the smallest sum. A form that the
+//! data of most people leave open is not considered, because its parameters would not be determined.
 
 use hoid_ident::family::{LEAST_WEIGHT, NO_EVIDENCE};
 use hoid_model::{Finding, Form};
@@ -14,24 +15,24 @@ use hoid_study::group::FormEvidence;
 pub struct CommonForm {
     /// The form.
     pub form: Form,
-    /// Sum over people and conditions of its criterion above that of the best form of each.
+    /// Criterion of the form relative to the best form, summed over people and conditions.
     pub criterion: f64,
-    /// Number of people and conditions.
+    /// Number of combinations of person and condition.
     pub cells: usize,
 }
 
-/// True if the data leave the form open: it has no weight, although its criterion is near the least.
-fn is_open(of: &FormEvidence) -> bool {
+/// True if the data leave the form open: its weight is zero, although its criterion is close to the smallest one.
+fn is_undetermined(of: &FormEvidence) -> bool {
     of.weight == 0.0 && of.criterion < -2.0 * LEAST_WEIGHT.ln()
 }
 
-/// The simplest form within 2 of the least sum of criteria; `None` if no form has a criterion for all people and
-/// conditions.
+/// Returns the simplest form within 2 of the smallest sum of criteria; `None` if no form has a criterion for all people
+/// and conditions.
 pub(super) fn common_form(people: &[&[FormEvidence]]) -> Option<CommonForm> {
     let sum = |form: Form| -> Option<CommonForm> {
         let of = |forms: &&[FormEvidence]| forms.iter().find(|of| of.form == form).cloned();
         let all: Vec<FormEvidence> = people.iter().map(of).collect::<Option<_>>()?;
-        let open = all.iter().filter(|of| is_open(of)).count();
+        let open = all.iter().filter(|of| is_undetermined(of)).count();
         (2 * open <= all.len()).then(|| CommonForm {
             form,
             criterion: all.iter().map(|of| of.criterion).sum(),
@@ -48,12 +49,12 @@ pub(super) fn common_form(people: &[&[FormEvidence]]) -> Option<CommonForm> {
 }
 
 impl CommonForm {
-    /// The note on a comparison in this form.
+    /// Returns the note about a comparison in this form.
     pub(super) fn finding(&self, best: &str) -> Finding {
         Finding::note(
             "common-form",
             format!(
-                "parameters are those of the form {} for all, the form of most evidence over {} fits (sum of criteria {:.1} above the best of each: {best})",
+                "parameters are those of the form {} for all people, the form with the most evidence over {} fits (its sum of criteria is {:.1} above that of the best form of each fit: {best})",
                 self.form.name(),
                 self.cells,
                 self.criterion,

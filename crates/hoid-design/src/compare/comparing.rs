@@ -18,10 +18,10 @@ use super::{
     sentence::sentence,
 };
 
-/// Adjustment of the probabilities of several tests.
+/// Adjustment of the p-values of several tests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Adjustment {
-    /// Holm's, over all differences of the comparison.
+    /// Holm's adjustment, over all differences of the comparison.
     #[default]
     Holm,
     /// No adjustment.
@@ -47,29 +47,29 @@ named_choice!(Covariate, "covariate", 1, {
 /// Options of a comparison of people and conditions.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Comparing {
-    /// The factors; if empty, the conditions are the levels of one factor.
+    /// Factors to compare; if empty, the conditions are the levels of one factor.
     pub factors: Vec<Factor>,
-    /// Whether the factors vary within or between people; determined from the group if `None`.
+    /// Whether the factor varies within or between people; determined from the group if `None`.
     pub variation: Option<Variation>,
-    /// Quantities to compare; if empty, those of [`Quantity::defaults`] that the group has.
-    pub of: Vec<Quantity>,
+    /// Quantities to compare; if empty, [`Quantity::defaults`].
+    pub quantities: Vec<Quantity>,
     /// Covariate whose effect is removed from the estimates.
     pub covariate: Option<Covariate>,
-    /// Adjustment of the probabilities of several tests.
+    /// Adjustment of the p-values of several tests.
     pub adjustment: Adjustment,
     /// Weights of the people.
     pub weights: Weights,
 }
 
-/// Share of the prior in an estimate above which it is reported.
+/// Share of the prior in an estimate above which a finding is reported.
 const PRIOR_WEIGHS: f64 = 0.5;
 
 impl Comparing {
     /// Computes the comparison.
     ///
     /// # Errors
-    /// The errors of invalid factors, and [`CompareError::NotInJson`]. A quantity that cannot be estimated for a person
-    /// is reported in the result.
+    /// The errors of invalid factors, and [`CompareError::NotInJson`] if the JSON of a group lacks a quantity. A
+    /// quantity that cannot be estimated for a person is reported in the result.
     pub fn run(&self, group: &GroupEstimates) -> Result<Comparison, CompareError> {
         let asked = match self.factors.is_empty() {
             true => vec![Factor::conditions()],
@@ -78,13 +78,13 @@ impl Comparing {
         let resolve = |factor: &Factor| Resolved::of(factor, self.variation.filter(|_| asked.len() == 1), group);
         let factors: Vec<Resolved> = asked.iter().map(resolve).collect::<Result<_, _>>()?;
         let contrasts = contrasts(&factors, group)?;
-        let quantities = match self.of.is_empty() {
+        let quantities = match self.quantities.is_empty() {
             true => Quantity::defaults(),
-            false => self.of.clone(),
+            false => self.quantities.clone(),
         };
         if !group.has_runs() {
             let from_runs = |q: &&Quantity| matches!(q.column(), None | Some("rms_e" | "rms_u"));
-            let what = self.covariate.map(|_| "what each run shows".to_owned());
+            let what = self.covariate.map(|_| "the value of each run".to_owned());
             if let Some(what) = what.or(quantities.iter().find(from_runs).map(Quantity::words)) {
                 return Err(CompareError::NotInJson { what });
             }
@@ -136,7 +136,7 @@ impl Comparing {
         if result.differences.is_empty() {
             findings.push(Finding::undetermined(
                 "nothing-compared",
-                "there is no difference: too few people have the request in all of its levels",
+                "no difference can be estimated: too few people have an estimate in all levels of the factor",
             ));
         }
         let parameters = quantities.iter().any(|quantity| !quantity.is_of_any_form());
@@ -160,7 +160,7 @@ impl Comparing {
         let names: Vec<String> = quantities.iter().map(Quantity::to_string).collect();
         vec![
             Setting::new("factor", joined(factors.iter().map(factor).collect())).given(!self.factors.is_empty()),
-            Setting::new("of", names.join(", ")).given(!self.of.is_empty()),
+            Setting::new("of", names.join(", ")).given(!self.quantities.is_empty()),
             Setting::new("covariate", self.covariate.map_or("none", Covariate::name)).given(self.covariate.is_some()),
             Setting::new("adjust", self.adjustment.name()).given(self.adjustment != Adjustment::default()),
             Setting::new("weights", self.weights.name()).given(self.weights != Weights::default()),
@@ -175,12 +175,12 @@ struct Work<'a> {
     covariate: Option<Covariate>,
     weights: Weights,
     findings: Vec<Finding>,
-    /// Parameters that belong to several forms, by the reason why they are not compared.
+    /// Parameters that are not compared because the people have different forms, with the reason.
     apart: Vec<(String, Vec<String>)>,
     result: Comparison,
 }
 
-/// The estimate of a cell and its change per run, or the reason why there is none.
+/// Subject and condition, with the estimate and its change per run, or the reason why there is no estimate.
 type OfCell = (String, String, Result<(EstimatedValue, Option<Coefficient>), String>);
 
 impl Work<'_> {
@@ -224,7 +224,7 @@ impl Work<'_> {
             .collect()
     }
 
-    /// Returns true if the quantity can be compared: parameters only within one form.
+    /// Returns true if the quantity can be compared; a parameter can be compared only within one form.
     fn is_comparable(&mut self, quantity: &Quantity, cells: &[OfCell]) -> bool {
         let compared = cells.iter();
         let forms = forms(compared.filter_map(|(subject, condition, _)| self.group.cell(subject, condition)));
@@ -235,14 +235,14 @@ impl Work<'_> {
         if quantity.is_of_any_form() {
             self.findings.push(Finding::note(
                 "forms-differ",
-                format!("{} is that of different forms ({all})", quantity.words()),
+                format!("{} comes from fits of different forms ({all})", quantity.words()),
             ));
             return true;
         }
         let most = || forms.iter().max_by_key(|(_, names)| names.len()).map_or("", |f| f.0);
         let form = self.group.common_form().map_or_else(most, |common| common.form.name());
         let why = format!(
-            "a parameter means the same in one form alone ({all}); compare the manifest of the recordings in place of the results, or write form = \"{form}\" under [analysis] in group.toml and run the group again"
+            "a parameter has the same meaning only within one form ({all}); compare the manifest of the recordings instead of the results, or write form = \"{form}\" under [analysis] in group.toml and run the group again"
         );
         match self.apart.iter_mut().find(|(known, _)| *known == why) {
             Some((_, names)) => names.push(quantity.to_string()),
@@ -288,7 +288,7 @@ impl Work<'_> {
             self.findings.push(Finding::doubt(
                 "prior-weighs",
                 format!(
-                    "{quantity} is mostly prior ({}): one prior for all draws people together and differences towards zero; prior = \"none\" under [analysis] in group.toml leaves it out",
+                    "{quantity} is mostly prior ({}): one prior for all people draws them together and differences towards zero; prior = \"none\" under [analysis] in group.toml leaves it out",
                     prior.join(", ")
                 ),
             ));
@@ -345,7 +345,7 @@ impl Work<'_> {
         }
     }
 
-    /// Computes one difference, from the people who have all of its conditions.
+    /// Computes one difference, from the people who have estimates in all of its conditions.
     fn difference(&mut self, quantity: &Quantity, contrast: &Contrast, cells: &[OfCell]) {
         let mut people: Vec<(String, usize)> = Vec::new();
         let mut of: Vec<EstimatedValue> = Vec::new();
@@ -402,14 +402,14 @@ impl Work<'_> {
         if weighted.iter().all(|o| o.variance == 0.0) {
             self.findings.push(Finding::note(
                 "no-errors",
-                format!("{name}: some people have no standard error, and each counts the same"),
+                format!("{name}: some people have no standard error, so all people have the same weight"),
             ));
         }
         if found.degrees_of_freedom < 2 {
             self.findings.push(Finding::doubt(
                 "few-people",
                 format!(
-                    "{name}: {} people leave one degree of freedom, and an interval of so few carries little information",
+                    "{name}: {} people leave one degree of freedom, and an interval from so few people carries little information",
                     people.len()
                 ),
             ));
@@ -451,7 +451,7 @@ impl Work<'_> {
     }
 }
 
-/// Computes the mean, or the difference of the groups.
+/// Computes the mean over people, or the difference between two groups of people.
 fn fitted(
     contrast: &Contrast,
     people: &[(String, usize)],
@@ -467,7 +467,8 @@ fn fitted(
     }
 }
 
-/// Observations with squared standard errors; if one of these is missing, all have the same weight.
+/// Converts estimates to observations with squared standard errors; if any standard error is missing, all observations
+/// have the same weight.
 fn observations(all: &[EstimatedValue]) -> Vec<Observation> {
     let known = all
         .iter()
@@ -493,7 +494,7 @@ fn known_of(e: &PersonEstimate) -> EstimatedValue {
     known(e.value, e.standard_error)
 }
 
-/// Returns a finding about missing people, by reason.
+/// Returns one finding for each missing estimate, with the quantities concerned.
 fn missing(result: &Comparison) -> Vec<Finding> {
     let mut all: Vec<(String, Vec<String>)> = Vec::new();
     for out in &result.left_out {
@@ -508,7 +509,7 @@ fn missing(result: &Comparison) -> Vec<Finding> {
     all.into_iter().map(one).collect()
 }
 
-/// Returns a finding about people who are included although their own verdict is doubtful.
+/// Returns a finding about people who are included although the verdict on their own fit is doubtful.
 fn doubtful(group: &GroupEstimates, result: &Comparison) -> Option<Finding> {
     let counts = |subject: &str, condition: &str| {
         let mut all = result.estimates.iter();
@@ -524,7 +525,10 @@ fn doubtful(group: &GroupEstimates, result: &Comparison) -> Option<Finding> {
     (!names.is_empty()).then(|| {
         Finding::note(
             "person-doubtful",
-            format!("the operator of {} is doubtful by itself, and counts", names.join(", ")),
+            format!(
+                "the operator of {} is doubtful, and is included in the comparison",
+                names.join(", ")
+            ),
         )
     })
 }

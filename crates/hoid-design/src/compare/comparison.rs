@@ -7,37 +7,37 @@ use serde_json::{Map, Value, json};
 
 use super::{Coefficient, EffectSize, Quantity, Variation};
 
-/// An estimate of a person, from which the means and differences are computed.
+/// An estimate for one person, from which the means and differences are computed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PersonEstimate {
-    /// The quantity.
+    /// Quantity that was estimated.
     pub quantity: Quantity,
     /// Name of the person.
     pub subject: String,
-    /// The condition.
+    /// Name of the condition.
     pub condition: String,
     /// Group of the person; empty if groups are not compared.
     pub group: String,
-    /// The value; with a covariate, the value at the centre of the covariate.
+    /// Value of the quantity; with a covariate, the value at the mean of the covariate.
     pub value: f64,
-    /// Its standard error.
+    /// Standard error of the value.
     pub standard_error: Option<f64>,
-    /// Number of runs from which it was estimated.
+    /// Number of runs from which the value was estimated.
     pub runs: usize,
 }
 
-/// Mean over people.
+/// Mean over people in one condition.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Mean {
-    /// The quantity.
+    /// Quantity that was averaged.
     pub quantity: Quantity,
-    /// The condition.
+    /// Name of the condition.
     pub condition: String,
     /// Group of people; empty if groups are not compared.
     pub group: String,
     /// Number of people.
     pub people: usize,
-    /// Standard deviation between people, without the errors of their estimates.
+    /// Standard deviation between people, excluding the errors of their estimates.
     pub tau: f64,
     /// The mean with its confidence interval.
     #[serde(flatten)]
@@ -47,7 +47,7 @@ pub struct Mean {
 /// A difference between two levels of a factor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Difference {
-    /// The quantity.
+    /// Quantity that was compared.
     pub quantity: Quantity,
     /// The factor; for an interaction, both factors.
     pub factor: String,
@@ -55,46 +55,47 @@ pub struct Difference {
     pub variation: Variation,
     /// The level that is subtracted.
     pub from: String,
-    /// The level from which it is subtracted.
+    /// The level from which `from` is subtracted.
     pub to: String,
-    /// For an interaction: the factor whose effect differs, and its levels.
+    /// For an interaction, the factor whose effect differs, and its two levels.
     pub effect: Option<[String; 3]>,
-    /// The people, each with the number of the group; the group differs only in comparisons between people.
+    /// Names of the people, each with the number of their group; all numbers are the same in comparisons within people.
     pub people: Vec<(String, usize)>,
-    /// The difference with its confidence interval, t and p.
+    /// The difference with its confidence interval, t and p-value.
     #[serde(flatten)]
     pub estimate: Coefficient,
     /// Degrees of freedom of t.
     pub degrees_of_freedom: usize,
-    /// p adjusted for all differences of this comparison.
+    /// p-value adjusted for all differences of this comparison.
     pub p_adjusted: f64,
     /// Effect size of the difference.
     pub effect_size: Option<EffectSize>,
-    /// Bayes factor of a difference against none, of the t test with equal weights ([`bayes_factor`](super::bayes_factor)).
+    /// Bayes factor of a difference against no difference, from the t test with equal weights
+    /// ([`bayes_factor`](super::bayes_factor)).
     #[serde(default)]
     pub bayes_factor: Option<f64>,
-    /// Standard deviation of the difference between people, without the errors of their estimates.
+    /// Standard deviation of the difference between people, excluding the errors of their estimates.
     pub tau: f64,
-    /// Share of this variance in the variance of a typical estimate.
+    /// Share of tau^2 in the total variance of a typical estimate (I^2).
     pub i_squared: Option<f64>,
-    /// Heterogeneity Q, and its probability if all people are equal.
+    /// Heterogeneity Q, and its p-value under the hypothesis that all people are equal.
     pub heterogeneity: Option<(f64, f64)>,
-    /// The t test with equal weights of all people.
+    /// Result of the t test with equal weights for all people.
     pub unweighted: Coefficient,
-    /// The difference as a sentence.
+    /// Sentence that describes the difference.
     pub sentence: String,
 }
 
-/// Change of a quantity from run to run.
+/// Change of a quantity from run to run, averaged over people.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Learning {
-    /// The quantity.
+    /// Quantity whose change is given.
     pub quantity: Quantity,
-    /// The condition; empty for the mean over all conditions.
+    /// Name of the condition; empty for the mean over all conditions.
     pub condition: String,
     /// Number of people.
     pub people: usize,
-    /// Change per run, with its confidence interval.
+    /// Change per run with its confidence interval.
     #[serde(flatten)]
     pub estimate: Coefficient,
 }
@@ -102,32 +103,32 @@ pub struct Learning {
 /// A missing estimate, with the reason.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LeftOut {
-    /// The quantity that was compared without it.
+    /// The quantity that was compared without this estimate.
     pub quantity: Quantity,
     /// Name of the person.
     pub subject: String,
-    /// The condition.
+    /// Name of the condition.
     pub condition: String,
-    /// The reason.
+    /// Reason why the estimate is missing.
     pub reason: String,
 }
 
-/// Comparison of conditions and of people.
+/// Result of a comparison of conditions or of people.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
     /// Name of the group.
     pub group: String,
     /// The estimates of the people.
     pub estimates: Vec<PersonEstimate>,
-    /// Means of the estimates by condition.
+    /// Means over people, by condition.
     pub means: Vec<Mean>,
-    /// The differences.
+    /// Differences between the levels of the factors.
     pub differences: Vec<Difference>,
     /// Changes from run to run, if requested.
     pub learning: Vec<Learning>,
     /// Missing estimates.
     pub left_out: Vec<LeftOut>,
-    /// The settings.
+    /// Settings of the comparison.
     pub settings: Vec<Setting>,
     /// The verdict on the comparison.
     pub verdict: Verdict,
@@ -137,7 +138,7 @@ pub struct Comparison {
 const KIND: &str = "comparison";
 
 impl Comparison {
-    /// Returns the quantities that were compared, in their order.
+    /// Returns the quantities that were compared, in order.
     pub fn quantities(&self) -> Vec<&Quantity> {
         let mut all: Vec<&Quantity> = Vec::new();
         for one in self.estimates.iter().map(|e| &e.quantity) {
@@ -148,7 +149,7 @@ impl Comparison {
         all
     }
 
-    /// Returns the JSON object.
+    /// Returns the comparison as a JSON object.
     pub fn json(&self) -> Map<String, Value> {
         let mut map = json::envelope(KIND, &[], &[], &[], &self.verdict, &self.settings);
         let with_unit = |quantity: &Quantity, one: Value| {
@@ -176,7 +177,7 @@ impl Comparison {
         map
     }
 
-    /// Returns the JSON as indented text.
+    /// Returns the comparison as indented JSON text.
     pub fn to_json(&self) -> String {
         format!("{:#}", Value::Object(self.json()))
     }

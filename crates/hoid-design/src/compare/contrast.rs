@@ -1,13 +1,14 @@
 //! Contrasts: for each person, a weighted sum of the estimates in their conditions.
 //!
-//! - A factor **within** people: the mean over the conditions of the one level less that over those of the other, so
-//!   that a second factor is averaged out. One contrast a person, and its mean over people: no assumption on how the
-//!   conditions of a person scatter together (sphericity) is left, and a mixed model of the balanced experiment states
-//!   the same.
-//! - A factor **between** people: the mean over the conditions that they have, and the difference of two groups of people.
-//! - **Two factors within**: next to each of them their interaction, by how much the effect of the first differs
-//!   between the levels of the second. **One within, one between**: the effect of the first, compared between the
-//!   groups.
+//! - A factor **within** people: the mean over the conditions of one level minus the mean over the conditions of the
+//!   other, so that a second factor is averaged out. Each person gives one contrast, which is averaged over people. No
+//!   assumption about the covariance of the conditions (sphericity) is needed, and in a balanced experiment a mixed
+//!   model gives the same result.
+//! - A factor **between** people: for each person the mean over their conditions, and then the difference between two
+//!   groups of people.
+//! - **Two factors within** people: each of the factors, and their interaction, which is how much the effect of the
+//!   first differs between the levels of the second. **One within, one between**: the effect of the first, compared
+//!   between the groups.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +17,7 @@ use super::{
     factor::{CONDITION, Factor, Variation},
 };
 
-/// A level with its members.
+/// A level and its members.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Members {
     pub name: String,
@@ -40,9 +41,9 @@ pub(super) struct Contrast {
     pub variation: Variation,
     pub from: String,
     pub to: String,
-    /// For an interaction: the effect that differs, and its levels.
+    /// For an interaction, the factor whose effect differs, and its two levels.
     pub effect: Option<[String; 3]>,
-    /// People with the weights of their conditions and their group, 0 or 1.
+    /// For each person, the weights of their conditions and their group, 0 or 1.
     pub people: Vec<(String, BTreeMap<String, f64>, usize)>,
 }
 
@@ -117,7 +118,7 @@ impl Resolved {
         Ok(resolved)
     }
 
-    /// Returns the levels that contain a person.
+    /// Returns the names of the levels to which a person belongs.
     pub fn levels_of(&self, subject: &str, group: &GroupEstimates) -> Vec<&str> {
         let is_in = |level: &&Members| {
             if self.of_people {
@@ -142,7 +143,7 @@ impl Resolved {
     }
 }
 
-/// Returns the conditions that are compared: those of all factors over conditions.
+/// Returns the conditions that are compared: those of all factors whose members are conditions.
 pub(super) fn conditions_of(factors: &[Resolved], group: &GroupEstimates) -> Vec<String> {
     let counts = |condition: &String| {
         let mut over = factors.iter().filter(|factor| !factor.of_people);
@@ -151,7 +152,7 @@ pub(super) fn conditions_of(factors: &[Resolved], group: &GroupEstimates) -> Vec
     group.conditions().into_iter().filter(counts).collect()
 }
 
-/// Returns all comparisons of these factors.
+/// Returns all contrasts of these factors.
 pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<Vec<Contrast>, CompareError> {
     let conditions = conditions_of(factors, group);
     let between: Vec<&Resolved> = factors.iter().filter(|f| f.variation == Variation::Between).collect();
@@ -261,8 +262,8 @@ pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<
     Ok(all)
 }
 
-/// Returns the weight of each condition in the difference: the mean over the conditions of b minus the mean over those
-/// of a.
+/// Returns the weight of each condition in the difference: the mean over the conditions of b minus the mean over the
+/// conditions of a.
 fn difference(conditions: &[String], a: &Members, b: &Members) -> BTreeMap<String, f64> {
     let mut weights = BTreeMap::new();
     for (level, sign) in [(a, -1.0), (b, 1.0)] {

@@ -1,18 +1,19 @@
-//! Effect sizes.
+//! Effect sizes of differences, with confidence intervals.
 //!
-//! | name | of | value |
+//! | name | data | value |
 //! |---|---|---|
-//! | `d_z` | differences within n people | mean over standard deviation of the differences, `t/sqrt(n)` |
-//! | Hedges `g` | two groups of people | difference of means over the pooled standard deviation, times `J(n_1 + n_2 - 2)` |
+//! | `d_z` | differences within n people | mean of the differences divided by their standard deviation, `t/sqrt(n)` |
+//! | Hedges `g` | two groups of people | difference of the means divided by the pooled standard deviation, times `J(n_1 + n_2 - 2)` |
 //!
-//! Both use the estimates without weights, one for each person (J. Cohen, *Statistical Power Analysis*, 1988, sections
+//! Both effect sizes use unweighted estimates, one per person (J. Cohen, *Statistical Power Analysis*, 1988, sections
 //! 2.2 and 2.3; L. V. Hedges, *J. Educ. Stat.* 6 (1981) 107-128). `J(m) = Gamma(m/2)/(sqrt(m/2) Gamma((m-1)/2))`
-//! removes the bias of small groups. Confidence intervals of 95 % invert the noncentral t distribution (J. H. Steiger
-//! and R. T. Fouladi, 1997): t has the noncentrality `delta = d sqrt(n)`, or `d sqrt(n_1 n_2/(n_1 + n_2))`, and the
-//! ends are the two delta for which t is the .975 and the .025 quantile.
+//! removes the bias of small groups. The 95 % confidence intervals follow from inversion of the noncentral t
+//! distribution (J. H. Steiger and R. T. Fouladi, 1997): t has the noncentrality `delta = d sqrt(n)`, or `d sqrt(n_1
+//! n_2/(n_1 + n_2))` for two groups, and the ends of the interval are the two values of delta for which t is the .975
+//! and the .025 quantile.
 //!
-//! With `f(s)` the density of `s = sqrt(chi^2_nu/nu)` the distribution is `P(T <= t) = int Phi(t s - delta) f(s) ds`, by
-//! Simpson's rule over the range in which f is not negligible.
+//! With the density `f(s)` of `s = sqrt(chi^2_nu/nu)`, the distribution is `P(T <= t) = int Phi(t s - delta) f(s) ds`,
+//! computed by Simpson's rule over the range in which f is not negligible.
 
 use hoid_numerics::statistics::{mean, sample_variance, squared_deviations};
 use serde::{Deserialize, Serialize};
@@ -21,25 +22,26 @@ use statrs::{
     function::gamma::ln_gamma,
 };
 
-/// An effect size.
+/// An effect size with its confidence interval.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EffectSize {
-    /// `d_z` or `g`.
+    /// Name of the effect size, `d_z` or `g`.
     pub name: String,
-    /// Its value.
+    /// Value of the effect size.
     pub value: f64,
     /// The 95 % confidence interval.
     pub interval: (f64, f64),
 }
 
-/// Returns d_z of the differences of people; `None` for fewer than two people, or if the differences are all equal.
+/// Returns d_z of the differences of several people; `None` if there are fewer than two people or if all differences
+/// are equal.
 pub fn d_z(differences: &[f64]) -> Option<EffectSize> {
     let n = differences.len() as f64;
     let deviation = sample_variance(differences).sqrt();
     of("d_z", mean(differences) / deviation, n.sqrt(), n - 1.0, 1.0)
 }
 
-/// Returns Hedges' g of the second group of people against the first.
+/// Returns Hedges' g of the second group of people relative to the first.
 pub fn hedges_g(first: &[f64], second: &[f64]) -> Option<EffectSize> {
     let (n1, n2) = (first.len() as f64, second.len() as f64);
     if n1 < 1.0 || n2 < 1.0 {
@@ -64,7 +66,7 @@ fn of(name: &str, d: f64, root: f64, dof: f64, correction: f64) -> Option<Effect
     })
 }
 
-/// J(m), which removes the bias of small groups; `None` for one degree of freedom.
+/// Returns J(m), which removes the bias of small groups; `None` for one degree of freedom.
 fn correction(m: f64) -> f64 {
     if m <= 1.0 {
         return f64::NAN;
@@ -91,7 +93,7 @@ fn noncentrality(t: f64, dof: f64, share: f64) -> f64 {
 /// Number of intervals of Simpson's rule.
 const INTERVALS: usize = 600;
 
-/// Computes `P(T <= t)` of the noncentral t distribution.
+/// Returns `P(T <= t)` of the noncentral t distribution.
 pub(super) fn noncentral_t(t: f64, dof: f64, delta: f64) -> f64 {
     let normal = Normal::standard();
     // log f(s) = log(2) + nu/2 log(nu/2) - log Gamma(nu/2) + (nu - 1) log s - nu s^2/2

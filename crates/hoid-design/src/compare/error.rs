@@ -3,62 +3,64 @@
 use hoid_study::StudyError;
 use thiserror::Error;
 
-/// The reason why there is no comparison.
+/// Reason why a comparison is not possible.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum CompareError {
-    /// Not more people than coefficients.
-    #[error("{found} with an estimate, expected at least {expected}: record more, or compare fewer levels")]
+    /// There are not more people than coefficients.
+    #[error(
+        "{found} people or runs with an estimate, expected at least {expected}: record more, or compare fewer levels"
+    )]
     TooFew {
-        /// Number of people, or of runs.
+        /// Number of people or runs.
         found: usize,
-        /// Minimum number.
+        /// Minimum number of people or runs.
         expected: usize,
     },
-    /// A value or a standard error that is not finite.
-    #[error("an estimate or its standard error is not finite, or negative: leave that person out")]
+    /// A value or a standard error is not finite.
+    #[error("an estimate is not finite, or a standard error is negative or not finite: leave that person out")]
     NotFinite,
-    /// Columns that are linearly dependent.
-    #[error("the covariates cannot be distinguished (one is constant, or a sum of others): leave one out")]
+    /// Columns are linearly dependent.
+    #[error("the covariates cannot be distinguished (one is constant, or a sum of other covariates): leave one out")]
     Collinear,
-    /// No scatter from which the error of a mean could be estimated.
+    /// All values are equal, so the error of a mean cannot be estimated.
     #[error("all estimates are equal: there is no scatter to judge a difference by; is a run given twice?")]
     NoScatter,
-    /// An invalid quantity.
+    /// The requested quantity does not exist.
     #[error(
         "there is no quantity {found:?} to compare; expected crossover, phase_margin, tau_e, gain_db@W or phase_deg@W with W in rad/s, rms_e, rms_u, or a parameter of the operator such as K, T_L, omega_nm"
     )]
     Quantity {
-        /// The requested quantity.
+        /// Name of the requested quantity.
         found: String,
     },
-    /// An invalid factor.
+    /// The requested factor is invalid.
     #[error(
         "factor {name:?}: {reason}; expected NAME, or NAME:LEVEL=A,B;LEVEL=C with conditions or people of the group"
     )]
     Factor {
-        /// The requested factor.
+        /// Name of the requested factor.
         name: String,
-        /// The problem.
+        /// The problem with the factor.
         reason: String,
     },
-    /// A path without the result of a group.
+    /// The path does not hold the result of a group.
     #[error(
         "{place} holds no result of a group ({reason}); expected recordings with their manifest group.toml, a directory that `hoid group DIR --out` wrote, or what `hoid group --json` printed"
     )]
     NoGroup {
-        /// The path.
+        /// Path that was given.
         place: String,
-        /// The problem.
+        /// The problem with the path.
         reason: String,
     },
-    /// A quantity that is missing in the JSON of a group.
+    /// The JSON of a group does not contain a quantity.
     #[error("{what} is not in the JSON of a group: name the directory that `hoid group DIR --out` wrote")]
     NotInJson {
         /// The requested quantity.
         what: String,
     },
-    /// Tables that cannot be read.
+    /// The tables of a group cannot be read.
     #[error(transparent)]
     Study(Box<StudyError>),
 }

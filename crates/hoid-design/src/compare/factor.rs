@@ -2,7 +2,8 @@
 //!
 //! A factor has levels, and a level has members: conditions (`axis:roll=C1_roll,C2_roll;pitch=C1_pitch,C2_pitch`) or
 //! people (`training:yes=P1,P4;no=P2,P3`). It varies **within** people if each person is in all of its levels, and
-//! **between** people if each person is in one. By default the conditions are the levels of the factor `condition`.
+//! **between** people if each person is in only one of them. By default the conditions are the levels of the factor
+//! `condition`.
 
 use std::str::FromStr;
 
@@ -18,9 +19,9 @@ pub const CONDITION: &str = "condition";
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Variation {
-    /// Each person is in all of its levels.
+    /// Each person is in all levels of the factor.
     Within,
-    /// Each person is in exactly one of its levels.
+    /// Each person is in exactly one level of the factor.
     Between,
 }
 
@@ -32,18 +33,18 @@ named_choice!(Variation, "variation", 2, {
 /// A level of a factor.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Level {
-    /// Its name.
+    /// Name of the level.
     pub name: String,
-    /// Its conditions or people.
+    /// Conditions or people of the level.
     pub members: Vec<String>,
 }
 
 /// A requested factor.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Factor {
-    /// Its name.
+    /// Name of the factor.
     pub name: String,
-    /// Its levels; if empty, those of the manifest, or the conditions.
+    /// Levels of the factor; if empty, those of the manifest, or the conditions.
     pub levels: Vec<Level>,
 }
 

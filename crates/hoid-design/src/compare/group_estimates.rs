@@ -1,10 +1,10 @@
-//! Estimates of each person in each condition, from the result directory of a group or from the JSON that `hoid group`
-//! printed.
+//! Estimates for each person in each condition, read from the result directory of a group or from the JSON output of
+//! `hoid group`.
 //!
-//! A person in a condition is a cell. Crossover, margin and parameters are those of the fit to all runs together, with
-//! the standard errors of that fit. Root mean squares are means over the runs, responses are those of all runs, and the
-//! standard errors of both are the standard deviation between runs divided by the root of their number. If some
-//! parameters were estimated for each run, a cell is the mean of its runs.
+//! A person in a condition is a cell. Crossover, margin and parameters come from the joint fit to all runs, with the
+//! standard errors of that fit. Root mean squares are means over the runs; responses come from the joint fit. The
+//! standard errors of root mean squares and responses are the standard deviation between runs divided by the square
+//! root of the number of runs. If some parameters were estimated for each run, a cell is the mean over its runs.
 
 use std::{
     collections::BTreeMap,
@@ -21,7 +21,7 @@ use serde_json::Value;
 
 use super::{CommonForm, CompareError, Observation, Quantity, common_form::common_form};
 
-/// A value with its standard error, its share of prior, and the number of its runs.
+/// A value with its standard error, the share of the prior in it, and the number of runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct EstimatedValue {
     pub value: f64,
@@ -37,10 +37,10 @@ pub(super) struct Cell {
     pub subject: String,
     pub condition: String,
     pub form: String,
-    /// The reason why the person has no operator.
+    /// Reason why the person has no operator; `None` if there is one.
     pub missing: Option<String>,
     pub doubtful: bool,
-    /// Evidence of the forms; empty if it is not known.
+    /// Evidence for the forms; empty if it is not known.
     forms: Vec<FormEvidence>,
     runs: usize,
     known: BTreeMap<String, EstimatedValue>,
@@ -52,14 +52,15 @@ pub struct GroupEstimates {
     pub(super) name: String,
     pub(super) cells: Vec<Cell>,
     runs: Option<RunEstimates>,
-    /// The runs that parameters of one form are read from, if these are not `runs`.
+    /// Estimates of the runs in the common form; `None` if the runs were not analysed again in that form.
     runs_in_form: Option<RunEstimates>,
-    /// The note on the common form of the parameters.
+    /// Note about the common form of the parameters.
     pub(super) common: Option<Finding>,
 }
 
 impl GroupEstimates {
-    /// The manifest, if the place is one, or a directory with recordings and their manifest but without results.
+    /// Returns the path of a manifest whose recordings are still to analyse: `place` itself, or the manifest in a
+    /// directory without results.
     pub fn recordings(place: &Path) -> Option<PathBuf> {
         if place.is_file() {
             return place
@@ -71,10 +72,10 @@ impl GroupEstimates {
         (manifest.is_file() && !has_results(place)).then_some(manifest)
     }
 
-    /// Reads the result directory of a group, or the JSON of one.
+    /// Reads the results of a group from their directory or from JSON.
     ///
     /// # Errors
-    /// [`CompareError::NoGroup`] with the reason; the errors of tables that cannot be read.
+    /// [`CompareError::NoGroup`] with the reason, or [`CompareError::Study`] if a table cannot be read.
     pub fn read(place: &Path) -> Result<Self, CompareError> {
         let none = |reason: String| CompareError::NoGroup {
             place: place.display().to_string(),
@@ -108,12 +109,12 @@ impl GroupEstimates {
         })
     }
 
-    /// Reads the object that `hoid group --json` prints.
+    /// Reads the JSON object that `hoid group --json` writes.
     fn of_json(object: &Value) -> Result<Self, String> {
         let people = object["people"].as_array().ok_or("it has no people")?;
         let cells: Vec<Cell> = people.iter().map(Cell::of_json).collect();
         if cells.iter().any(|cell| cell.subject.is_empty()) {
-            return Err("a person of it has no subject".to_owned());
+            return Err("one of its people has no subject".to_owned());
         }
         Ok(Self {
             name: object["group"].as_str().unwrap_or("group").to_owned(),
@@ -134,15 +135,15 @@ impl GroupEstimates {
         distinct(self.cells.iter().map(|cell| &cell.subject))
     }
 
-    /// Returns the form in which the parameters of all people can be compared; `None` if there is none, or if the
-    /// evidence of the forms is not known.
+    /// Returns the form in which the parameters of all people can be compared; `None` if there is no such form, or if
+    /// the evidence for the forms is not known.
     pub fn common_form(&self) -> Option<CommonForm> {
         let fitted = self.cells.iter().filter(|cell| !cell.form.is_empty());
         let forms: Vec<&[FormEvidence]> = fitted.map(|cell| cell.forms.as_slice()).collect();
         common_form(&forms)
     }
 
-    /// Replaces the parameters of one form by those of fits in the common form.
+    /// Replaces the parameters that belong to one form by those of the fits in the common form.
     pub(super) fn with_parameters_of(mut self, other: Self, common: CommonForm) -> Self {
         let best = in_words(&forms(self.cells.iter()));
         for cell in &mut self.cells {
@@ -166,7 +167,7 @@ impl GroupEstimates {
         self.cells.iter().find(is)
     }
 
-    /// Returns a quantity of a cell, or the reason why it has none.
+    /// Returns a quantity of a cell, or the reason why the cell does not have it.
     pub(super) fn estimate(&self, cell: &Cell, quantity: &Quantity) -> Result<EstimatedValue, String> {
         let of_runs = || {
             let all: Vec<f64> = self.of_runs(cell, quantity).into_iter().map(|(_, o)| o.value).collect();
@@ -241,7 +242,7 @@ impl GroupEstimates {
         }
     }
 
-    /// True if the single runs are known; false for the JSON of a group.
+    /// True if the estimates of single runs are known; false if the group was read from JSON.
     pub(super) fn has_runs(&self) -> bool {
         self.runs.is_some()
     }
@@ -339,7 +340,7 @@ impl Cell {
     }
 }
 
-/// Returns the forms of cells, with the names of the cells of each.
+/// Returns the forms that occur in some cells, with the names of the cells that have each form.
 pub(super) fn forms<'a>(cells: impl Iterator<Item = &'a Cell>) -> Vec<(&'a str, Vec<String>)> {
     let mut forms: Vec<(&str, Vec<String>)> = Vec::new();
     for cell in cells.filter(|cell| !cell.form.is_empty()) {
@@ -352,7 +353,7 @@ pub(super) fn forms<'a>(cells: impl Iterator<Item = &'a Cell>) -> Vec<(&'a str, 
     forms
 }
 
-/// `lead: P03 in fo, P05 in fo; lead-lag: P09 in fo`.
+/// Formats forms and their cells, such as `lead: P03 in fo, P05 in fo; lead-lag: P09 in fo`.
 pub(super) fn in_words(forms: &[(&str, Vec<String>)]) -> String {
     let all = forms
         .iter()
@@ -370,13 +371,13 @@ fn known(value: f64, standard_error: Option<f64>, runs: usize) -> EstimatedValue
     }
 }
 
-/// Returns the mean over runs, with the standard error from their scatter.
+/// Returns the mean over runs, with the standard error from the scatter of the runs.
 fn over_runs(values: &[f64]) -> EstimatedValue {
     let error = (sample_variance(values) / values.len() as f64).sqrt();
     known(mean(values), Some(error).filter(|e| e.is_finite()), values.len())
 }
 
-/// Merges the cells of single runs into one.
+/// Merges the cells of the single runs of a person in a condition into one cell.
 fn merged(cells: Vec<Cell>) -> Vec<Cell> {
     let mut all: Vec<Vec<Cell>> = Vec::new();
     for cell in cells {

@@ -1,9 +1,9 @@
-//! Learning: a quantity over the runs of a person in a condition.
+//! Learning: trend of a quantity over the runs of a person in a condition.
 //!
-//! `y_r = a + b (r - r0) + u_r + e_r`, r the number of a run, r0 the centre of all runs of the group: a regression of
-//! the runs with their errors, and an additional variance between runs ([`meta_regression`]). The comparison uses a, so
-//! that conditions are compared at the same amount of practice; b is the change per run, whose mean over people is
-//! reported.
+//! The model is `y_r = a + b (r - r0) + u_r + e_r`, where r is the number of a run and r0 the mean number of all runs
+//! of the group: a regression on the run number with the standard errors of the runs and an additional variance between
+//! runs ([`meta_regression`]). The comparison uses a, so that conditions are compared at the same amount of practice; b
+//! is the change per run, whose mean over people is reported.
 
 use hoid_numerics::statistics::mean;
 
@@ -11,11 +11,11 @@ use super::{
     Coefficient, CompareError, GroupEstimates, Observation, Quantity, Weights, group_estimates::Cell, meta_regression,
 };
 
-/// Numbers of the runs: from their names if all of these are numbers, otherwise their positions.
+/// Numbering of the runs: by their names if all names are numbers, otherwise by position.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Practice {
     by_name: bool,
-    /// The centre of all runs.
+    /// Mean number of all runs.
     pub middle: f64,
 }
 
@@ -48,8 +48,8 @@ impl Practice {
         }
     }
 
-    /// Returns the quantity of a cell at the centre of the runs and its change per run with its error, or the reason if
-    /// there is none.
+    /// Returns the quantity of a cell at the mean run number and its change per run, both with errors, or the reason
+    /// why they cannot be computed.
     pub fn of_cell(
         &self,
         group: &GroupEstimates,
@@ -62,7 +62,7 @@ impl Practice {
             .enumerate()
             .map(|(place, (run, _))| vec![1.0, self.number(run, place) - self.middle])
             .collect();
-        // If some runs lack a standard error, none is used.
+        // If one run lacks a standard error, the standard errors of all runs are ignored.
         let all_known = runs.iter().all(|(_, o)| o.variance > 0.0);
         let observations: Vec<Observation> = runs
             .iter()

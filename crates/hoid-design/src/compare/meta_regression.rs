@@ -1,28 +1,30 @@
-//! Meta-regression: estimates with standard errors, one per person, on properties that differ between people.
+//! Meta-regression: regression of estimates with standard errors, one per person, on properties in which people differ.
 //!
-//! `y_i = x_i' beta + u_i + e_i`, `u_i ~ N(0, tau^2)` between people, `e_i ~ N(0, v_i)` within them, `v_i` the
-//! square of the standard error. With `w_i = 1/(v_i + tau^2)`, `W = diag(w)` and
+//! The model is `y_i = x_i' beta + u_i + e_i` with `u_i ~ N(0, tau^2)` between people and `e_i ~ N(0, v_i)` within
+//! people, where `v_i` is the squared standard error. With `w_i = 1/(v_i + tau^2)`, `W = diag(w)` and
 //! `P = W - W X (X'W X)^-1 X'W`:
 //!
 //! - **tau^2** maximises the restricted likelihood (D. A. Harville, *J. Am. Stat. Assoc.* 72 (1977) 320-338)
-//!   `l = -1/2 sum log(v_i + tau^2) - 1/2 log |X'W X| - 1/2 y'P y`, whose slope is `1/2 (y'P P y - tr P)`: the best
-//!   place of a grid, then the zero of the slope next to it. l may have two maxima where errors differ much.
-//! - **The weights** are those of the tau^2 that maximises `l + log tau^2`, which is never zero (the idea of Y. Chung,
-//!   S. Rabe-Hesketh and I.-H. Choi, *Stat. Med.* 32 (2013) 4071-4089, who add `log tau`): with few people l is at its greatest at zero
-//!   by chance, and the one with the smallest error decides alone. Three people whose errors are .1, .3 and .5 and who
-//!   differ by .4 have their difference in 87 % of the intervals with the weights of l, and in 95 % with these
-//!   (`tests/coverage.rs`, where other numbers of people and other tau are). With one or two degrees of freedom all weights are
-//!   equal: two and three people are a t test.
-//! - **beta** is `(X'W X)^-1 X'W y`, its covariance `s^2 (X'W X)^-1` with `s^2 = y'P y/(n - p)`, and its interval
-//!   Student's with n - p degrees of freedom (J. Hartung and G. Knapp, *Stat. Med.* 20 (2001) 3875-3889; of regression
-//!   G. Knapp and J. Hartung, *Stat. Med.* 22 (2003) 2693-2710). With equal errors and X of ones alone this is the t
-//!   test of one sample, whatever tau^2 is; s^2 is not held at one or above, which would make few people show less than
-//!   they do.
-//! - **Q** is `y'P y` at tau^2 = 0, chi-squared with n - p degrees of freedom where all people are the same, and
-//!   `I^2 = tau^2/(tau^2 + v)` with the typical `v = (n - p)/tr P` at zero (J. P. T. Higgins and S. G. Thompson,
-//!   *Stat. Med.* 21 (2002) 1539-1558).
+//!   `l = -1/2 sum log(v_i + tau^2) - 1/2 log |X'W X| - 1/2 y'P y`, whose slope is `1/2 (y'P P y - tr P)`. The search
+//!   takes the best point of a grid and then the adjacent zero of the slope, since l may have two maxima if the errors
+//!   differ much.
+//! - **The weights** use the tau^2 that maximises `l + log tau^2`, which is never zero (following Y. Chung, S.
+//!   Rabe-Hesketh and I.-H. Choi, *Stat. Med.* 32 (2013) 4071-4089, who add `log tau`). With few people l often has its
+//!   maximum at zero by chance, and the person with the smallest error would then dominate. For three people whose
+//!   errors are .1, .3 and .5 and who differ by .4, the intervals cover the true difference in 87 % of cases with the
+//!   weights from l, and in 95 % with these weights (`tests/coverage.rs`, which also has other numbers of people and
+//!   other values of tau). With one or two degrees of freedom all weights are equal, so that two or three people give a
+//!   t test.
+//! - **beta** is `(X'W X)^-1 X'W y`, with the covariance `s^2 (X'W X)^-1`, `s^2 = y'P y/(n - p)`, and Student's
+//!   interval with n - p degrees of freedom (J. Hartung and G. Knapp, *Stat. Med.* 20 (2001) 3875-3889; for regression,
+//!   G. Knapp and J. Hartung, *Stat. Med.* 22 (2003) 2693-2710). If all errors are equal and X is a column of ones,
+//!   this is the one-sample t test for any tau^2. s^2 is not limited to one or more, since this would understate what
+//!   few people show.
+//! - **Q** is `y'P y` at tau^2 = 0, which is chi-squared with n - p degrees of freedom if all people are the same, and
+//!   `I^2 = tau^2/(tau^2 + v)` with the typical variance `v = (n - p)/tr P` at zero (J. P. T. Higgins and S. G.
+//!   Thompson, *Stat. Med.* 21 (2002) 1539-1558).
 //!
-//! Where no error is known all `v_i` are zero: tau^2 is the sample variance, and Q is missing.
+//! If the standard errors are not known, all `v_i` are zero, tau^2 is the sample variance, and Q is missing.
 
 use hoid_model::named_choice;
 use nalgebra::{DMatrix, DVector};
@@ -31,22 +33,22 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 use super::CompareError;
 
-/// The estimate of one person.
+/// The estimate for one person.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation {
-    /// The value.
+    /// Value of the estimate.
     pub value: f64,
-    /// Square of its standard error; zero if not known.
+    /// Squared standard error of the value; zero if it is not known.
     pub variance: f64,
 }
 
-/// The tau^2 on which the weights depend.
+/// Choice of the tau^2 from which the weights are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Weights {
-    /// The maximum of the penalised likelihood, which is never zero.
+    /// tau^2 at the maximum of the penalised likelihood, which is never zero.
     #[default]
     Penalised,
-    /// The maximum of the restricted likelihood.
+    /// tau^2 at the maximum of the restricted likelihood.
     Restricted,
 }
 
@@ -58,13 +60,13 @@ named_choice!(Weights, "choice of weights", 2, {
 /// A coefficient with its standard error, test and confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Coefficient {
-    /// The value.
+    /// Value of the coefficient.
     pub value: f64,
-    /// Its standard error.
+    /// Standard error of the coefficient.
     pub standard_error: f64,
     /// `value/standard_error`.
     pub t: f64,
-    /// Two-sided p-value of Student's t.
+    /// Two-sided p-value from Student's t distribution.
     pub p: f64,
     /// The 95 % confidence interval.
     pub interval: (f64, f64),
@@ -75,21 +77,21 @@ pub struct Coefficient {
 pub struct MetaRegression {
     /// Coefficients, in the order of the columns of X.
     pub coefficients: Vec<Coefficient>,
-    /// Variance between people, by the restricted likelihood.
+    /// Variance between people, from the restricted likelihood.
     pub tau_squared: f64,
     /// The tau^2 from which the weights are computed.
     pub tau_squared_of_weights: f64,
     /// Degrees of freedom n - p.
     pub degrees_of_freedom: usize,
-    /// Share of tau^2 in the variance of a typical estimate.
+    /// Share of tau^2 in the total variance of a typical estimate.
     pub i_squared: Option<f64>,
-    /// Heterogeneity Q, and its probability if all people are equal.
+    /// Heterogeneity Q, and its p-value under the hypothesis that all people are equal.
     pub heterogeneity: Option<(f64, f64)>,
-    /// `(X'W X)^-1` times s^2.
+    /// Covariance of the coefficients, `s^2 (X'W X)^-1`.
     pub covariance: DMatrix<f64>,
 }
 
-/// Computes the mean over people: X is a column of ones.
+/// Computes the mean over people, which is the regression on a column of ones.
 ///
 /// # Errors
 /// As [`meta_regression`].
@@ -97,11 +99,11 @@ pub fn meta_mean(observations: &[Observation], weights: Weights) -> Result<MetaR
     meta_regression(observations, &vec![vec![1.0]; observations.len()], weights)
 }
 
-/// Computes the regression with the rows x of X.
+/// Computes the regression; `x` contains the rows of X.
 ///
 /// # Errors
-/// [`CompareError::TooFew`] for no more observations than columns, [`CompareError::NotFinite`],
-/// [`CompareError::Collinear`], [`CompareError::NoScatter`] of values that are all equal.
+/// [`CompareError::TooFew`] if there are not more observations than columns, [`CompareError::NotFinite`],
+/// [`CompareError::Collinear`], [`CompareError::NoScatter`] if all values are equal.
 pub fn meta_regression(
     observations: &[Observation],
     x: &[Vec<f64>],
@@ -139,12 +141,12 @@ pub fn meta_regression(
     })
 }
 
-/// Returns the variance between people at the maximum of `l + log tau`. It is never zero, and less often too large than
-/// the tau^2 of the weights.
+/// Returns the variance between people at the maximum of `l + log tau`. It is never zero, and it overestimates the
+/// variance less often than the tau^2 used for the weights.
 ///
 /// # Errors
 /// As [`meta_regression`].
-pub fn variance_between(observations: &[Observation]) -> Result<f64, CompareError> {
+pub fn variance_between_people(observations: &[Observation]) -> Result<f64, CompareError> {
     let (model, scatter, known) = checked(observations, &vec![vec![1.0]; observations.len()])?;
     match known {
         true => model.tau_squared(scatter, 0.5).ok_or(CompareError::Collinear),
@@ -152,7 +154,7 @@ pub fn variance_between(observations: &[Observation]) -> Result<f64, CompareErro
     }
 }
 
-/// Returns the model, the variance of y about its regression, and whether standard errors are known.
+/// Returns the model, the residual variance of y with equal weights, and whether the standard errors are known.
 fn checked(observations: &[Observation], x: &[Vec<f64>]) -> Result<(Model, f64, bool), CompareError> {
     let (n, p) = (observations.len(), x.first().map_or(0, Vec::len));
     if n <= p {
@@ -180,7 +182,7 @@ fn checked(observations: &[Observation], x: &[Vec<f64>]) -> Result<(Model, f64, 
 }
 
 impl Coefficient {
-    /// Returns a coefficient with the interval of Student's distribution.
+    /// Creates a coefficient with its test and interval from Student's t distribution.
     pub(super) fn of(value: f64, standard_error: f64, dof: usize) -> Self {
         let t = value / standard_error;
         let reach = student_quantile(0.975, dof as f64) * standard_error;
@@ -194,7 +196,7 @@ impl Coefficient {
     }
 }
 
-/// Quantile of Student's distribution; infinite for zero degrees of freedom.
+/// Returns a quantile of Student's t distribution; infinite for zero degrees of freedom.
 pub(super) fn student_quantile(share: f64, dof: f64) -> f64 {
     StudentsT::new(0.0, 1.0, dof).map_or(f64::INFINITY, |d| d.inverse_cdf(share))
 }
@@ -213,7 +215,7 @@ struct Model {
     v: Vec<f64>,
 }
 
-/// The model at one tau^2.
+/// The model evaluated at one tau^2.
 struct At {
     beta: DVector<f64>,
     /// `(X'W X)^-1`.
@@ -222,13 +224,13 @@ struct At {
     q: f64,
     /// tr P.
     trace: f64,
-    /// The restricted log-likelihood without its constants.
+    /// Restricted log-likelihood without constants.
     likelihood: f64,
-    /// Its derivative with respect to tau^2.
+    /// Derivative of the likelihood with respect to tau^2.
     slope: f64,
 }
 
-/// Range of the grid of tau^2 in decades relative to the scatter, and steps per decade.
+/// Range of the grid of tau^2, in decades relative to the scatter, and number of steps per decade.
 const DECADES: (i32, i32) = (-8, 6);
 const STEPS: i32 = 3;
 
@@ -261,11 +263,11 @@ impl Model {
         })
     }
 
-    /// Variance of y about its regression with equal weights; `None` if X is singular.
+    /// Returns the residual variance of y with equal weights; `None` if X is singular.
     fn scatter(&self) -> Option<f64> {
         let (n, p) = self.x.shape();
         let information = self.x.transpose() * &self.x;
-        // Rounding lets columns that are multiples of each other pass a factorisation.
+        // Because of rounding, a factorisation may succeed even if columns are multiples of each other.
         let scale = DVector::from_fn(p, |j, _| information[(j, j)].sqrt());
         if scale.iter().any(|s| *s == 0.0) {
             return None;
@@ -279,7 +281,7 @@ impl Model {
         Some((&self.y - &self.x * beta).norm_squared() / (n - p) as f64)
     }
 
-    /// Returns the tau^2 that maximises `l + penalty log tau^2`, for known standard errors.
+    /// Returns the tau^2 that maximises `l + penalty log tau^2`, if the standard errors are known.
     fn tau_squared(&self, scatter: f64, penalty: f64) -> Option<f64> {
         let unit = scatter.max(self.v.iter().sum::<f64>() / self.v.len() as f64);
         let steps = (DECADES.0 * STEPS..=DECADES.1 * STEPS).map(|k| unit * 10f64.powf(f64::from(k) / f64::from(STEPS)));
@@ -290,7 +292,7 @@ impl Model {
         let heights: Vec<f64> = grid.iter().map(|tau| height(*tau)).collect::<Option<_>>()?;
         let best = (0..grid.len()).max_by(|a, b| heights[*a].total_cmp(&heights[*b]))?;
         let rises = slope(grid[best])? > 0.0;
-        // At the edges of the grid there is no neighbour.
+        // At the ends of the grid there is no neighbour on that side.
         if (best == 0 && !rises) || (best + 1 == grid.len() && rises) {
             return Some(grid[best]);
         }

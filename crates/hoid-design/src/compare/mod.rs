@@ -1,21 +1,21 @@
 //! Comparison of conditions and of people.
 //!
 //! Each person has an estimate with its standard error in each condition (`hoid group`). Contrasts of the conditions
-//! (`contrast`) are computed for each person, and their mean over people, or the difference of groups of people, by a
-//! random-effects meta-analysis: people with precise estimates have more weight if people are similar.
+//! (`contrast`) are computed for each person. A random-effects meta-analysis then gives their mean over people, or the
+//! difference between groups of people; if people are similar, those with precise estimates have more weight.
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`meta_regression`](fn@meta_regression) | estimates of people with their errors: restricted likelihood, interval by Hartung and Knapp |
-//! | [`EffectSize`] | d_z, Hedges g, with intervals |
-//! | [`bayes_factor`] | evidence for a difference against none |
-//! | [`holm`] | probabilities of several tests |
-//! | [`GroupEstimates`] | estimates of a group for each person, from its directory or its JSON |
+//! | [`meta_regression`](fn@meta_regression) | regression of the estimates of people with their errors: restricted likelihood, intervals by Hartung and Knapp |
+//! | [`EffectSize`] | d_z and Hedges' g, with intervals |
+//! | [`bayes_factor`] | evidence for a difference against no difference |
+//! | [`holm`] | adjustment of the p-values of several tests |
+//! | [`GroupEstimates`] | estimates for each person of a group, from its directory or its JSON |
 //! | [`Quantity`] | quantities to compare |
-//! | [`Factor`] | variables in which conditions or people differ; `contrast`: the weights of conditions |
-//! | [`CommonForm`] | the form in which parameters of all people are compared; `recordings`: the analysis of recordings in it |
+//! | [`Factor`] | variables in which conditions or people differ; `contrast`: weights of the conditions |
+//! | [`CommonForm`] | form in which the parameters of all people are compared; `recordings`: analysis of recordings in this form |
 //! | [`Comparing`] | comparison of a group; `learning`: runs as a covariate |
-//! | [`Comparison`] | the result, its JSON and back; `sentence`: each difference for a paper |
+//! | [`Comparison`] | result of a comparison, written to and read from JSON; `sentence`: description of each difference for a paper |
 
 mod adjust;
 mod bayes_factor;
@@ -43,6 +43,6 @@ pub use error::CompareError;
 pub use factor::{Factor, Level, Variation};
 pub use group_estimates::GroupEstimates;
 pub use meta_regression::{
-    Coefficient, MetaRegression, Observation, Weights, meta_mean, meta_regression, variance_between,
+    Coefficient, MetaRegression, Observation, Weights, meta_mean, meta_regression, variance_between_people,
 };
 pub use quantity::Quantity;

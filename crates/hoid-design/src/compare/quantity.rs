@@ -1,4 +1,4 @@
-//! Quantities to compare: those with the same meaning for every person, and the parameters of one form.
+//! Quantities to compare: quantities with the same meaning for every person, and parameters of one form.
 
 use std::{fmt, str::FromStr};
 
@@ -18,13 +18,13 @@ pub enum Quantity {
     Crossover,
     /// Phase margin, deg.
     PhaseMargin,
-    /// Gain of the person at a frequency in rad/s, dB.
+    /// Gain of the person in dB, at a frequency in rad/s.
     Gain(f64),
-    /// Phase of the person at a frequency in rad/s, deg.
+    /// Phase of the person in deg, at a frequency in rad/s.
     Phase(f64),
-    /// Root mean square of the error.
+    /// Root mean square of the error e.
     RmsE,
-    /// Root mean square of the control.
+    /// Root mean square of the control output u.
     RmsU,
     /// A parameter of the operator, by its name.
     Parameter(String),
@@ -36,7 +36,7 @@ impl Quantity {
         vec![Self::Crossover, Self::PhaseMargin, Self::Parameter(DELAY.to_owned())]
     }
 
-    /// Returns the unit; empty if there is none, or if it is that of the recording.
+    /// Returns the unit of the quantity; empty if it has none or has the unit of the recording.
     pub fn unit(&self) -> &str {
         match self {
             Self::Crossover => "rad/s",
@@ -47,7 +47,7 @@ impl Quantity {
         }
     }
 
-    /// Returns the name for use in a sentence.
+    /// Returns the name of the quantity for use in a sentence.
     pub fn words(&self) -> String {
         match self {
             Self::Crossover => "crossover".to_owned(),
@@ -61,12 +61,12 @@ impl Quantity {
         }
     }
 
-    /// True if the meaning does not depend on the form: all quantities except the parameters other than the delay.
+    /// True if the meaning of the quantity does not depend on the form; false for all parameters except the delay.
     pub fn is_of_any_form(&self) -> bool {
         !matches!(self, Self::Parameter(name) if name != DELAY)
     }
 
-    /// Returns its name in the tables of a group, if it is a single number there.
+    /// Returns the name of the quantity in the tables of a group; `None` for a gain or phase at a frequency.
     pub(super) fn column(&self) -> Option<&str> {
         match self {
             Self::Crossover => Some("crossover_rad_s"),

@@ -1,4 +1,4 @@
-//! Estimates of recordings that are compared without an analysis by `hoid group` first.
+//! Comparison of recordings that have not been analysed by `hoid group`.
 
 use std::path::Path;
 
@@ -7,14 +7,14 @@ use hoid_study::group::Manifest;
 use super::{CompareError, Comparing, GroupEstimates, Quantity, group_estimates::forms};
 
 impl Comparing {
-    /// Estimates of recordings: the runs are analysed by `analyse` into directories below `directory`, and if parameters
-    /// are compared and people differ in their form, once more in the common form.
+    /// Returns the estimates of recordings. The runs are analysed by `analyse` in a directory below `directory`. If
+    /// parameters are compared and people differ in their form, the runs are analysed once more in the common form.
     ///
-    /// `analyse` runs [`hoid_study::group::run_group`] on the manifest, into the directory; a completed directory is
-    /// not analysed again.
+    /// `analyse` runs [`hoid_study::group::run_group`] on a manifest in the given directory. A directory with complete
+    /// results is not analysed again.
     ///
     /// # Errors
-    /// Those of `analyse`, and of [`GroupEstimates::read`].
+    /// The errors of `analyse` and of [`GroupEstimates::read`].
     pub fn estimates_of<E: From<CompareError>>(
         &self,
         manifest: &Manifest,
@@ -28,7 +28,7 @@ impl Comparing {
         };
         let estimates = estimates_in(manifest, "group")?;
         let of_one_form = |quantity: &Quantity| !quantity.is_of_any_form();
-        if !self.of.iter().any(of_one_form) || forms(estimates.cells.iter()).len() < 2 {
+        if !self.quantities.iter().any(of_one_form) || forms(estimates.cells.iter()).len() < 2 {
             return Ok(estimates);
         }
         let Some(common) = estimates.common_form() else {

@@ -7,10 +7,9 @@ use super::{Difference, Variation};
 /// Significance level.
 pub(super) const LEVEL: f64 = 0.05;
 
-/// Returns for example
-/// `crossover fell by 0.63 rad/s from fo to so (95 % 0.14 to 1.12, t(2) = -5.5, p = 0.032, d_z = -3.2, n = 3)`; if the
-/// adjusted p is not below .05, it reports that no difference was found. For an interaction it names the factor whose
-/// effect differs.
+/// Returns a sentence such as `crossover fell by 0.63 rad/s from fo to so (95 % 0.14 to 1.12, t(2) = -5.5, p = 0.032,
+/// d_z = -3.2, n = 3)`. If the adjusted p-value is not below .05, the sentence reports that no difference was found.
+/// For an interaction it names the factor whose effect differs.
 pub(super) fn sentence(difference: &Difference, adjusted: bool) -> String {
     let Difference {
         quantity,
@@ -25,7 +24,7 @@ pub(super) fn sentence(difference: &Difference, adjusted: bool) -> String {
         unit => format!(" {unit}"),
     };
     let error = Some(estimate.standard_error);
-    // The ends of the interval have the digits of the value.
+    // The ends of the interval are rounded to the digits of the value.
     let digits = |v: f64| with_uncertainty(v, error).0;
     let test = test(difference, adjusted);
     let (low, high) = estimate.interval;
@@ -83,7 +82,7 @@ fn test(difference: &Difference, adjusted: bool) -> String {
     parts.join(", ")
 }
 
-/// Formats a probability: `= 0.032`, or `< 0.0001`.
+/// Formats a p-value, such as `= 0.032` or `< 0.0001`.
 pub(super) fn probability(p: f64) -> String {
     if p < 1e-4 {
         "< 0.0001".to_owned()

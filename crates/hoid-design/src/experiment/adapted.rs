@@ -1,16 +1,18 @@
-//! The operator that people typically have with a controlled element, without a fit to their data.
+//! The operator that people typically adopt with a controlled element, without a fit to their data.
 //!
-//! **Crossover model** (D. T. McRuer and H. R. Jex, *IEEE Trans. Human Factors in Electronics* 8 (1967) 231-249): people
-//! adapt lead and lag so that `|H P|` falls by 20 dB a decade near the crossover frequency. With
-//! `s = d ln|P|/d ln omega` at 3 rad/s the operator has to add the slope `p = -1 - s`; a lead adds
-//! `x^2/(1 + x^2)`, `x = T_L omega`, and a lag subtracts as much. If no form is given: a lead for p above .3, a lag
-//! below -.3, otherwise a gain. Time constants are limited to those of people.
+//! **Crossover model** (D. T. McRuer and H. R. Jex, *IEEE Trans. Human Factors in Electronics* 8 (1967) 231-249):
+//! people adapt lead and lag so that `|H P|` falls by 20 dB per decade near the crossover frequency. With
+//! `s = d ln|P|/d ln omega` at 3 rad/s, the operator has to add the slope `p = -1 - s`; a lead adds `x^2/(1 + x^2)`,
+//! `x = T_L omega`, and a lag subtracts as much. If no form is given, it is a lead for p above .3, a lag for p below
+//! -.3, and otherwise a gain. Time constants are limited to the range found in people.
 //!
-//! **Gain**: the largest crossover frequency up to 5 rad/s with a phase margin of 40 deg (the middle of 20 to 65 deg of
-//! the same source); if the delay leaves less, the crossover frequency with the largest margin, of at least 15 deg.
+//! **Gain**: it gives the largest crossover frequency up to 5 rad/s with a phase margin of at least 40 deg (the middle
+//! of the range of 20 to 65 deg in the same source). If the delay does not allow this margin, it gives the crossover
+//! frequency with the largest margin, which must be at least 15 deg.
 //!
-//! **Neuromuscular system and delay**: the medians of [`OperatorPrior::population`], and one spread to each side for
-//! people who differ from the typical person. The gain is adapted separately for each of these people.
+//! **Neuromuscular system and delay**: the medians of [`OperatorPrior::population`]; for people who differ from the
+//! typical person, one parameter is a spread above or below its median. The gain is adapted separately for each of
+//! these people.
 
 use hoid_ident::family::OperatorPrior;
 use hoid_model::{
@@ -19,31 +21,31 @@ use hoid_model::{
 
 use super::{DesignError, chosen::NamedState};
 
-/// Frequency at which slopes are compared, rad/s.
+/// Frequency at which slopes are evaluated, rad/s.
 pub(super) const NEAR_CROSSOVER_RAD_S: f64 = 3.0;
-/// Slope that a form without lead and lag may lack.
+/// Largest slope to be added for which the form has neither lead nor lag.
 const SMALL_SLOPE: f64 = 0.3;
-/// Shortest time constant, longest lead and longest lag, s.
+/// Shortest time constant, longest lead and longest lag, in s.
 const SHORTEST_S: f64 = 0.1;
 pub(super) const LONGEST_LEAD_S: f64 = 2.0;
 const LONGEST_LAG_S: f64 = 3.0;
-/// The phase margin, and the least one, deg.
+/// Desired and smallest phase margin, in deg.
 const MARGIN_DEG: f64 = 40.0;
 const LEAST_MARGIN_DEG: f64 = 15.0;
-/// Range of crossover frequencies in rad/s, and number of trials.
+/// Range of the crossover frequencies to try, in rad/s, and their number.
 const CROSSOVERS_RAD_S: (f64, f64) = (0.3, 5.0);
 const TRIALS: usize = 300;
 
 /// Neuromuscular system and delay of a person.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Muscles {
+struct NeuromuscularValues {
     omega_nm_rad_s: f64,
     zeta_nm: f64,
     tau_e_s: f64,
 }
 
-impl Muscles {
-    /// The medians of the population, with one parameter at another value.
+impl NeuromuscularValues {
+    /// Returns the medians of the population, except for one parameter with a given value.
     fn with(other: Option<(&str, f64)>) -> Self {
         let prior = OperatorPrior::population();
         let of = |name: &str| match other {
@@ -61,28 +63,28 @@ impl Muscles {
     }
 }
 
-/// Returns the typical person of the population with this element, and people who differ from them in one parameter.
+/// Returns the typical person with this element, and people who differ from them in one parameter.
 pub(super) fn population(
     element: &ContinuousTransferFunction,
     form: Option<Form>,
 ) -> Result<(NamedState, Vec<NamedState>), DesignError> {
     let form = form.unwrap_or_else(|| form_of(element));
     let named =
-        |name: String, muscles: Muscles| adapted(element, form, muscles).map(|state| NamedState { name, state });
-    let typical = named("typical of the population".to_owned(), Muscles::with(None))?;
+        |name: String, muscles: NeuromuscularValues| adapted(element, form, muscles).map(|state| NamedState { name, state });
+    let typical = named("typical of the population".to_owned(), NeuromuscularValues::with(None))?;
     let mut others = Vec::new();
     for entry in OperatorPrior::population().entries() {
         for sign in [-1.0, 1.0] {
             let value = entry.centre * (sign * entry.spread).exp();
             let name = format!("{} = {value:.2}", entry.parameter);
-            // A delay with which no one could control this element does not occur in the population.
-            others.extend(named(name, Muscles::with(Some((&entry.parameter, value)))).ok());
+            // A person whose delay is too long to control this element is left out.
+            others.extend(named(name, NeuromuscularValues::with(Some((&entry.parameter, value)))).ok());
         }
     }
     Ok((typical, others))
 }
 
-/// Slope of `ln|P|` over `ln omega` near the crossover.
+/// Returns the slope `d ln|P|/d ln omega` near the crossover.
 pub(super) fn slope(element: &ContinuousTransferFunction) -> f64 {
     let gain = |omega: f64| element.response(omega).norm().ln();
     let step = 0.01_f64;
@@ -90,7 +92,7 @@ pub(super) fn slope(element: &ContinuousTransferFunction) -> f64 {
     (gain(up) - gain(down)) / (2.0 * step)
 }
 
-/// The form that people use with an element.
+/// Returns the form that people typically adopt with an element.
 fn form_of(element: &ContinuousTransferFunction) -> Form {
     match -1.0 - slope(element) {
         added if added > SMALL_SLOPE => Form::Lead,
@@ -99,13 +101,13 @@ fn form_of(element: &ContinuousTransferFunction) -> Form {
     }
 }
 
-/// The time constant whose lead adds this slope at 3 rad/s, up to a longest one.
+/// Returns the time constant of a lead that adds this slope at 3 rad/s, limited to `longest_s`.
 pub(super) fn time_constant(slope: f64, longest_s: f64) -> f64 {
     let x = (slope.max(0.0) / (1.0 - slope).max(1e-9)).sqrt();
     (x / NEAR_CROSSOVER_RAD_S).clamp(SHORTEST_S, longest_s)
 }
 
-fn adapted(element: &ContinuousTransferFunction, form: Form, muscles: Muscles) -> Result<FamilyState, DesignError> {
+fn adapted(element: &ContinuousTransferFunction, form: Form, muscles: NeuromuscularValues) -> Result<FamilyState, DesignError> {
     let operator = unit_operator(element, form, muscles)?;
     let (low, high) = CROSSOVERS_RAD_S;
     let crossover = |k: usize| high * (low / high).powf(k as f64 / (TRIALS - 1) as f64);
@@ -135,11 +137,11 @@ fn adapted(element: &ContinuousTransferFunction, form: Form, muscles: Muscles) -
     })
 }
 
-/// The operator with a gain of one.
+/// Returns the operator with a gain of one.
 fn unit_operator(
     element: &ContinuousTransferFunction,
     form: Form,
-    muscles: Muscles,
+    muscles: NeuromuscularValues,
 ) -> Result<FamilyOperator, DesignError> {
     let with_both = form.degree() > 0 && form.has_lag();
     let lag_s = match with_both {

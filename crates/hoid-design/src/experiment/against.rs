@@ -1,4 +1,4 @@
-//! Forcing functions that are compared with the designed one.
+//! Forcing functions with which the designed one is compared.
 
 use std::{
     convert::Infallible,
@@ -14,8 +14,8 @@ use hoid_model::{
 
 use super::{DesignError, Enters, Forcing};
 
-/// Another forcing function: the ten sines of the thesis by the name `reference`, those of a scenario, or the lines in
-/// a table with the columns omega_rad_s, amplitude and, if there is one, phase_rad.
+/// Another forcing function: the ten sines of the thesis (`reference`), the forcing functions of a scenario, or the
+/// lines in a table with the columns omega_rad_s, amplitude and, optionally, phase_rad.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Against {
     /// The ten sines of the thesis.
@@ -28,7 +28,7 @@ pub enum Against {
 const REFERENCE: &str = "reference";
 
 impl Against {
-    /// Parses the text of a request.
+    /// Parses the name `reference` or the path of a file.
     pub fn of_text(text: &str) -> Self {
         match text {
             REFERENCE => Self::Reference,
@@ -53,7 +53,7 @@ impl Against {
         }
     }
 
-    /// The lines that enter at these points.
+    /// Returns the forcing function with lines at these points of entry.
     pub(super) fn forcing(&self, points: &[Enters]) -> Result<Forcing, DesignError> {
         let one = |function: &ForcingFunction| match points {
             [enters] => Ok(Forcing::of(*enters, function)),
@@ -89,7 +89,7 @@ fn is_scenario(path: &Path) -> bool {
         .is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
-/// Reads a scenario of the family.
+/// Reads a scenario with an operator of the family.
 pub(super) fn family(path: &Path) -> Result<FamilyScenario, DesignError> {
     match read_any_scenario(path)? {
         AnyScenario::Family(scenario) => Ok(*scenario),

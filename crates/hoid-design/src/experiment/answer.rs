@@ -1,4 +1,4 @@
-//! The designed experiment: forcing function, expected errors of the typical person and of the others, and its JSON.
+//! The designed experiment: forcing function, expected errors for the typical person and for others, and its JSON.
 
 use hoid_analysis::{AnalysisError, Setting, json};
 use hoid_model::{
@@ -8,25 +8,25 @@ use hoid_model::{
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
-use super::{DesignedLine, DifferencePlan, Enters, Expected, ExpectedResponse, Task, Wanted};
+use super::{DesignedLine, DifferencePlan, Enters, Expected, ExpectedResponse, Task, RequestedQuantity};
 
-/// Expected errors with a name: of another person, or with another forcing function over the same time.
+/// Expected errors with a name: for another person, or for another forcing function of the same duration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NamedExpected {
     /// Name of the person or of the forcing function.
     pub name: String,
-    /// Errors of all runs.
+    /// Expected errors from all runs.
     pub expected: Expected,
-    /// Number of runs until every requested quantity has its accepted error.
+    /// Number of runs needed for the accepted errors of all requested quantities.
     pub runs_needed: usize,
 }
 
 /// A designed experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ExperimentDesign {
-    /// The typical person, with element and remnant.
+    /// The typical person, with controlled element and remnant.
     pub task: Task,
-    /// Point of entry of the forcing function; a target on a display that shows it comes with a disturbance.
+    /// Point of entry of the forcing function. If the display shows the target, a disturbance is added.
     pub enters: Enters,
     /// Name of the typical person.
     pub person: String,
@@ -34,33 +34,34 @@ pub struct ExperimentDesign {
     pub length_s: f64,
     /// Number of runs.
     pub runs: usize,
-    /// Number of runs until every requested quantity of the typical person has its accepted error.
+    /// Number of runs needed for the accepted errors of all requested quantities, for the typical person.
     pub runs_needed: usize,
-    /// The requested quantities.
-    pub wanted: Vec<Wanted>,
+    /// The requested quantities with their accepted errors.
+    pub wanted: Vec<RequestedQuantity>,
     /// Display of the task.
     pub display: Display,
-    /// Lines of the forcing function, with the errors of all runs.
+    /// Lines of the forcing function, with the expected errors from all runs.
     pub lines: Vec<DesignedLine>,
-    /// The operator between the lines, with the errors of all runs.
+    /// Response of the operator between the lines, with the expected errors from all runs.
     pub response: Vec<ExpectedResponse>,
-    /// The response to a target that is seen, likewise; empty without it.
+    /// Response to a displayed target between the lines, with the expected errors from all runs; empty if the target is
+    /// not displayed.
     pub response_to_target: Vec<ExpectedResponse>,
-    /// Peak of the forcing function divided by its rms, the larger one of two.
+    /// Ratio of peak to rms of the forcing function; of two forcing functions, the larger ratio.
     pub crest_factor: f64,
-    /// Errors of all runs of the typical person.
+    /// Expected errors from all runs, for the typical person.
     pub expected: Expected,
-    /// The other people, with the same forcing function.
+    /// Expected errors for the other people, with the same forcing function.
     pub people: Vec<NamedExpected>,
-    /// The person with the greatest errors; `None` for one person.
+    /// The other person with the largest errors; `None` if there are no other people.
     pub worst: Option<NamedExpected>,
-    /// Another forcing function.
+    /// Expected errors with another forcing function, if requested.
     pub against: Option<NamedExpected>,
-    /// People and runs to find a difference.
+    /// Number of people and runs needed to find a difference, if requested.
     pub difference: Option<DifferencePlan>,
-    /// The settings.
+    /// Settings of the design.
     pub settings: Vec<Setting>,
-    /// The verdict.
+    /// Verdict on the design.
     pub verdict: Verdict,
 }
 
@@ -68,7 +69,7 @@ pub struct ExperimentDesign {
 const KIND: &str = "design";
 
 impl ExperimentDesign {
-    /// Returns the JSON object.
+    /// Returns the design as a JSON object.
     pub fn json(&self) -> Map<String, Value> {
         let mut map = json::envelope(KIND, &[], &[], &[], &self.verdict, &self.settings);
         let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
@@ -82,7 +83,7 @@ impl ExperimentDesign {
         set("enters", json!(self.enters.name()));
         set(
             "feedforward",
-            self.task.feedforward.as_ref().map_or(Value::Null, of_seen),
+            self.task.feedforward.as_ref().map_or(Value::Null, feedforward_json),
         );
         set("runs", json!(self.runs));
         set("length_s", json::number(self.length_s));
@@ -109,7 +110,7 @@ impl ExperimentDesign {
         map
     }
 
-    /// Returns the JSON as indented text.
+    /// Returns the design as indented JSON text.
     pub fn to_json(&self) -> String {
         format!("{:#}", Value::Object(self.json()))
     }
@@ -132,7 +133,7 @@ fn of_line(designed: &DesignedLine) -> Value {
     one
 }
 
-fn of_seen(seen: &Feedforward) -> Value {
+fn feedforward_json(seen: &Feedforward) -> Value {
     json!({
         "form": seen.operator.form().name(),
         "preview_s": json::number(seen.preview_s),

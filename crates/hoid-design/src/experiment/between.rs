@@ -1,13 +1,13 @@
-//! The standard deviation of a difference between people, from which the number of people to detect it follows.
+//! The standard deviation of a difference between people, which determines how many people are needed to detect it.
 //!
-//! | source | the standard deviation b of the difference between two conditions |
+//! | source | standard deviation b of the difference between two conditions |
 //! |---|---|
-//! | a number | that part of the quantity |
-//! | a comparison (`hoid compare --json`) | tau of its differences within people, without the errors of the estimates; of several their root mean square |
-//! | the result of a group with several conditions | the same of the comparison of its conditions |
-//! | the population of one condition (`hoid group --pool`) | sigma of its people, as a bound |
+//! | a number | that fraction of the quantity |
+//! | a comparison (`hoid compare --json`) | tau of its differences within people, which excludes the errors of the estimates; the root mean square of several such differences |
+//! | the result of a group with several conditions | the same, from a comparison of the conditions |
+//! | the population of one condition (`hoid group --pool`) | sigma between its people, as an upper bound |
 //!
-//! For two conditions with the correlation rho between people, b is `sigma sqrt(2 (1 - rho))`: no more than sigma if
+//! If rho is the correlation of two conditions over people, b is `sigma sqrt(2 (1 - rho))`, which is at most sigma if
 //! rho is one half or more. A population of one condition does not determine rho.
 
 use std::{
@@ -28,12 +28,12 @@ use crate::compare::{Comparing, Comparison, GroupEstimates, Quantity, Variation}
 pub enum Between {
     /// A fraction of the quantity.
     Part(f64),
-    /// A comparison, the result of a group, or a population.
+    /// A file with a comparison, the result of a group, or a population.
     File(PathBuf),
 }
 
 impl Between {
-    /// Parses the text of a request.
+    /// Parses a number or the path of a file.
     pub fn of_text(text: &str) -> Self {
         match text.parse() {
             Ok(part) => Self::Part(part),
@@ -59,7 +59,7 @@ impl fmt::Display for Between {
     }
 }
 
-/// A spread in the unit of the quantity, with its source in words.
+/// A spread in the unit of the quantity, with a text that names its source.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Spread {
     pub value: f64,
@@ -67,11 +67,11 @@ pub(super) struct Spread {
 }
 
 impl Between {
-    /// The spread of a quantity with this value. If no source is given, it is that of the people of the design if they
-    /// have one, otherwise the default fraction.
+    /// Returns the spread of a quantity with this value. If no source is given, the spread comes from the people of the
+    /// design if they provide one; otherwise it is the default fraction.
     ///
     /// # Errors
-    /// [`DesignError::NoSpread`] for a file that has none.
+    /// [`DesignError::NoSpread`] if a file does not provide a spread.
     pub(super) fn spread(
         given: Option<&Self>,
         people: &People,
@@ -123,14 +123,14 @@ fn of_file(path: &Path, (name, value): (&str, f64)) -> Result<Spread, DesignErro
     }
     let group = GroupEstimates::read(path).map_err(|error| none(error.to_string()))?;
     let comparing = Comparing {
-        of: vec![quantity.clone()],
+        quantities: vec![quantity.clone()],
         ..Comparing::default()
     };
     let found = comparing.run(&group).map_err(|error| none(error.to_string()))?;
     of_comparison(&found, &quantity, &shown.to_string()).map_err(none)
 }
 
-/// Standard deviation of the logarithm between people.
+/// Returns the standard deviation between people of the logarithm of a parameter.
 fn in_population(object: &Value, name: &str) -> Option<f64> {
     let parameters = object["parameters"].as_array()?;
     parameters.iter().find(|p| p["name"] == name)?["spread"].as_f64()
@@ -142,7 +142,10 @@ fn of_comparison(found: &Comparison, quantity: &Quantity, shown: &str) -> Result
     let all: Vec<(f64, usize)> = within.map(|d| (d.tau, d.people.len())).collect();
     let Some(people) = all.iter().map(|(_, people)| *people).max() else {
         let known: Vec<String> = found.quantities().iter().map(ToString::to_string).collect();
-        return Err(format!("it has differences within people of {}", known.join(", ")));
+        return Err(format!(
+            "it has differences within people only for {}",
+            known.join(", ")
+        ));
     };
     let square = all.iter().map(|(tau, _)| tau * tau).sum::<f64>() / all.len() as f64;
     Ok(Spread {

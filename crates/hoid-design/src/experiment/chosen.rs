@@ -16,12 +16,12 @@ pub(super) struct NamedState {
 pub(super) struct Chosen {
     pub typical: NamedState,
     pub others: Vec<NamedState>,
-    /// The response to a target that is seen, where the people state it.
+    /// Response to a displayed target, if the source of the people specifies it.
     pub feedforward: Option<Feedforward>,
     pub findings: Vec<Finding>,
 }
 
-/// Options given together with the people.
+/// Options given in addition to the people.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Given<'a> {
     pub controlled_element: Option<&'a ContinuousTransferFunction>,
@@ -30,7 +30,7 @@ pub(super) struct Given<'a> {
 }
 
 impl Given<'_> {
-    /// The controlled element, which these people do not state.
+    /// Returns the given controlled element, for people whose source does not name one.
     pub fn element(&self, people: &str) -> Result<ContinuousTransferFunction, DesignError> {
         let missing = || DesignError::NoElement {
             people: people.to_owned(),
@@ -39,7 +39,7 @@ impl Given<'_> {
     }
 }
 
-/// The finding that a person is left out.
+/// Returns the finding that a person is left out.
 pub(super) fn left_out(name: &str, reason: &str) -> Finding {
     Finding::doubt("person-left-out", format!("{name} is left out: {reason}"))
 }

@@ -1,22 +1,22 @@
 //! Design of the most informative forcing function.
 //!
-//! If the remnant is a share of the variance of u, the errors depend on the distribution of the power of u over the
-//! lines, and not on its size (`information`): with the shares q of the lines in the response of u to the forcing
-//! function the information is `I = sum q_k M_k`. The requested quantities are parameters, crossover or margin, with
-//! gradients g and accepted errors s; the design minimises `J = sum over wanted g' I^-1 g/s^2`, the sum of the squared
-//! ratios of errors to accepted errors.
+//! If the remnant is a share of the variance of u, the errors depend on how the power of u is distributed over the
+//! lines, and not on its size (`information`). With the shares q of the lines in the response of u to the forcing
+//! function, the information is `I = sum q_k M_k`. The requested quantities are parameters, crossover or margin, with
+//! gradients g and accepted errors s. The design minimises `J = sum over wanted g' I^-1 g/s^2`, the sum of the squared
+//! ratios of expected to accepted errors.
 //!
-//! Amplitudes, frequencies and limits are computed in the module `search`.
+//! Amplitudes and frequencies are searched, within their limits, in the module `search`.
 
 use std::f64::consts::TAU;
 
 use nalgebra::DVector;
 
 use super::{
-    DesignError, Enters, Expected, Forcing, Task, Wanted,
+    DesignError, Enters, Expected, Forcing, Task, RequestedQuantity,
     information::Loop,
     joint::Quantity,
-    lines::{crest_factor, far_enough, multiples, set_phases},
+    lines::{crest_factor, are_separate_lines, multiples, set_phases},
     periods,
     search::Search,
 };
@@ -24,21 +24,23 @@ use super::{
 /// Options of the design of a forcing function.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Designing {
-    /// The requested quantities; if empty, all parameters, each relative to its value.
-    pub wanted: Vec<Wanted>,
-    /// Period in s: the duration of a run, or an integer fraction of it.
+    /// The requested quantities; if empty, all parameters, with errors relative to their values.
+    pub wanted: Vec<RequestedQuantity>,
+    /// Period in s: the duration of a run divided by an integer.
     pub period_s: f64,
     /// Number of lines of each forcing function.
     pub lines: usize,
-    /// Least distance of two lines in multiples of the fundamental.
+    /// Smallest distance between two lines, in multiples of the fundamental.
     pub spacing: u32,
-    /// The lowest and the highest frequency, rad/s.
+    /// Lowest and highest frequency of the lines, rad/s.
     pub band_rad_s: (f64, f64),
-    /// Largest amplitude of a line above the crossover, relative to the geometric mean of the amplitudes below it.
+    /// Largest amplitude of a line above the crossover frequency, relative to the geometric mean of the amplitudes of
+    /// the lines below it.
     pub shelf: f64,
-    /// Largest rms of e and of u; without limits the forcing function has an rms of one.
+    /// Largest rms of e and of u; if neither is limited, the forcing function has an rms of one.
     pub most_rms: [Option<f64>; 2],
-    /// Start of the search for phases: each gives other phases of the same lines, so that a signal is not learned.
+    /// Seed of the search for phases. Different seeds give different phases of the same lines, so that people do not
+    /// learn the signal.
     pub seed: u64,
 }
 
@@ -57,16 +59,16 @@ impl Default for Designing {
     }
 }
 
-/// A forcing function with its expected errors.
+/// Designed forcing functions with their expected errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Designed {
-    /// The forcing functions.
+    /// Forcing function for each point of entry.
     pub forcing: Forcing,
-    /// Peak divided by rms; the larger one of two.
+    /// Ratio of peak to rms; of two forcing functions, the larger ratio.
     pub crest_factor: f64,
     /// Expected errors for one period.
     pub expected: Expected,
-    /// Number of periods until every requested quantity has its accepted error; at least one.
+    /// Number of periods needed for the accepted errors of all requested quantities; at least one.
     pub periods: usize,
 }
 
@@ -74,8 +76,8 @@ impl Designing {
     /// Designs a forcing function for each point of entry.
     ///
     /// # Errors
-    /// [`DesignError`] as for [`super::expected`], if a requested quantity does not exist, and if the band has no room for
-    /// the lines.
+    /// [`DesignError`] as for [`super::expected`], if a requested quantity does not exist, or if the band has no room
+    /// for the lines.
     pub fn run(&self, task: &Task, points: &[Enters]) -> Result<Designed, DesignError> {
         let least = (self.band_rad_s.0 * self.period_s / TAU).ceil();
         let largest = (self.band_rad_s.1 * self.period_s / TAU).floor();
@@ -107,7 +109,7 @@ impl Designing {
         let (places, shares) = search.places(places, |all, k, moved| {
             let others = all.iter().enumerate().filter(|(j, _)| *j != k);
             let mut others = others.map(|(_, (m, _))| *m);
-            (least..=largest).contains(&moved) && others.all(|m| far_enough(m, moved, self.spacing))
+            (least..=largest).contains(&moved) && others.all(|m| are_separate_lines(m, moved, self.spacing))
         })?;
         let mut lines = search.lines(&places, &shares);
         lines.sort_by(|(_, a), (_, b)| a.omega_rad_s.total_cmp(&b.omega_rad_s));
@@ -138,10 +140,10 @@ impl Designing {
         })
     }
 
-    /// Gradients of the requested quantities, each divided by the accepted error.
+    /// Returns the gradients of the requested quantities, each divided by the accepted error.
     fn gradients(&self, all: &Loop<'_>) -> Result<Vec<DVector<f64>>, DesignError> {
         let known = all.quantities();
-        let of = |wanted: &Wanted| {
+        let of = |wanted: &RequestedQuantity| {
             let found = known.iter().find(|q| q.name == wanted.name).ok_or_else(|| {
                 let names: Vec<&str> = known.iter().map(|q| q.name).collect();
                 DesignError::NotThere {
@@ -223,7 +225,7 @@ mod tests {
     fn what_is_wanted_is_told_better() {
         let task = task(0.2);
         let of = |name: &str| {
-            let wanted = vec![Wanted {
+            let wanted = vec![RequestedQuantity {
                 name: name.to_owned(),
                 error: 0.02,
             }];
@@ -242,7 +244,7 @@ mod tests {
             crossover[0] < omega[0] && omega[1] < crossover[1],
             "{crossover:?} {omega:?}"
         );
-        let wanted = vec![Wanted {
+        let wanted = vec![RequestedQuantity {
             name: "T_I".to_owned(),
             error: 0.1,
         }];

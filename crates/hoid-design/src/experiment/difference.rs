@@ -1,20 +1,20 @@
-//! Number of people and runs to find a difference between two conditions, each person in both.
+//! Number of people and runs needed to find a difference between two conditions, if each person is in both conditions.
 //!
-//! A person's difference of the means of r runs in each of two conditions has the variance
+//! For one person, the difference of the means of r runs in each of two conditions has the variance
 //!
 //! `sigma^2 = b^2 + 2 (w^2 + s^2)/r`
 //!
-//! with the standard deviation b of the true difference between people, w of a person from run to run, and the expected
-//! error s of one run (`information`). The power of the paired t test is computed in `power`. More runs help against w
-//! and s, and only more people against b.
+//! where b is the standard deviation of the true difference between people, w the standard deviation of a person from
+//! run to run, and s the expected error of one run (`information`). The power of the paired t test is computed in
+//! `power`. More runs reduce the effect of w and s; only more people reduce the effect of b.
 //!
-//! **Defaults.** From run to run 6 % (4 to 9 % of the gain in three recorded people), between people 10 % (the crossover of three
-//! recorded people fell by .31 to .78 rad/s from one element to another: a standard deviation of 10 % of its mean). A
-//! spread is relative to the quantity, and for the phase margin it is the spread that results from a gain with this
-//! spread.
+//! **Defaults.** The spread from run to run is 6 % (in three recorded people the gain varied by 4 to 9 %). The spread
+//! between people is 10 % (the crossover of three recorded people fell by .31 to .78 rad/s from one element to another,
+//! a standard deviation of 10 % of its mean). A spread is relative to the quantity; for the phase margin it is the
+//! spread that results from this spread of the gain.
 //!
-//! **Answer.** Without a number of runs it is the one for which people cost least, if a person costs as much as four
-//! runs more (instruction and training).
+//! **Answer.** If the number of runs is not given, the number with the lowest total cost is chosen, where each person
+//! costs as much as four runs (instruction and training) in addition to their own runs.
 
 use std::str::FromStr;
 
@@ -31,19 +31,19 @@ use super::{
 
 /// The difference to be found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Sought {
-    /// `crossover`, `phase_margin`, or a parameter.
+pub struct TargetDifference {
+    /// Name of the quantity: `crossover`, `phase_margin`, or a parameter.
     pub name: String,
-    /// Its size: in the unit of the quantity, or relative to its value.
+    /// Size of the difference, in the unit of the quantity or relative to its value.
     pub size: f64,
     /// True if the size is relative.
     pub relative: bool,
 }
 
-impl FromStr for Sought {
+impl FromStr for TargetDifference {
     type Err = DesignError;
 
-    /// `crossover=.5` in rad/s, `tau_e=10%` of its value.
+    /// Parses a text such as `crossover=.5` (in rad/s) or `tau_e=10%` (of its value).
     fn from_str(text: &str) -> Result<Self, DesignError> {
         let (name, number, relative) = named_number(text, "quantity with the size of its difference")?;
         Ok(Self {
@@ -54,34 +54,34 @@ impl FromStr for Sought {
     }
 }
 
-/// Options of the search for a difference.
+/// A difference to be found, with the assumptions for its test.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DifferenceRequest {
-    /// The difference.
-    pub sought: Sought,
-    /// The required probability of finding it.
+    /// The difference to be found.
+    pub sought: TargetDifference,
+    /// Required probability of finding the difference.
     pub power: f64,
-    /// The level of the test.
+    /// Significance level of the test.
     pub alpha: f64,
-    /// Standard deviation of the difference between people; if `None` that of the people of the design where they have
-    /// one, else [`BETWEEN_PEOPLE`].
+    /// Standard deviation of the difference between people. If `None`, it comes from the people of the design if they
+    /// provide it; otherwise it is [`BETWEEN_PEOPLE`].
     pub between_people: Option<Between>,
-    /// Standard deviation of a person from run to run, relative.
+    /// Relative standard deviation of a person from run to run.
     pub run_to_run: f64,
 }
 
-/// Required probability of finding a difference.
+/// Default required probability of finding a difference.
 pub const POWER: f64 = 0.8;
-/// Level of the test.
+/// Default significance level of the test.
 pub const ALPHA: f64 = 0.05;
-/// Standard deviation of the difference between people, relative.
+/// Default relative standard deviation of the difference between people.
 pub const BETWEEN_PEOPLE: f64 = 0.1;
-/// Standard deviation of a person from run to run, relative.
+/// Default relative standard deviation of a person from run to run.
 pub const RUN_TO_RUN: f64 = 0.06;
 
 impl DifferenceRequest {
-    /// The difference with the defaults.
-    pub fn new(sought: Sought) -> Self {
+    /// Creates a request for a difference with the default assumptions.
+    pub fn new(sought: TargetDifference) -> Self {
         Self {
             sought,
             power: POWER,
@@ -92,39 +92,39 @@ impl DifferenceRequest {
     }
 }
 
-/// A number of runs in each condition with the people that it takes.
+/// A number of runs in each condition, and the number of people that it requires.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunsAndPeople {
     /// Number of runs in each condition.
     pub runs: usize,
-    /// Standard deviation of a person's difference.
+    /// Standard deviation of the measured difference of one person.
     pub of_person: f64,
-    /// Number of people; `None` if it is above a thousand.
+    /// Number of people needed; `None` if it exceeds a thousand.
     pub people: Option<usize>,
-    /// Power for each number of people of the table.
+    /// Power for each number of people in the table.
     pub power: Vec<f64>,
 }
 
-/// People and runs for a difference.
+/// Number of people and runs needed to find a difference.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DifferencePlan {
-    /// The request.
+    /// The request that the plan answers.
     pub request: DifferenceRequest,
-    /// Difference in the unit of the quantity.
+    /// Size of the difference in the unit of the quantity.
     pub size: f64,
     /// Expected error of one run.
     pub error_of_run: f64,
-    /// Standard deviation from run to run.
+    /// Standard deviation of a person from run to run, in the unit of the quantity.
     pub run_to_run: f64,
-    /// Standard deviation of the difference between people.
+    /// Standard deviation of the difference between people, in the unit of the quantity.
     pub between_people: f64,
-    /// Source of the latter.
+    /// Source of the standard deviation between people.
     pub between_source: String,
     /// Numbers of people in the table.
     pub people: Vec<usize>,
     /// Rows of the table: number of runs, people needed, and power for each number of people.
     pub rows: Vec<RunsAndPeople>,
-    /// Index of the row of the answer.
+    /// Index of the recommended row.
     pub answer: usize,
 }
 
@@ -132,14 +132,14 @@ pub struct DifferencePlan {
 const RUNS: [usize; 6] = [1, 2, 3, 4, 6, 8];
 /// Numbers of people in the table.
 const PEOPLE: [usize; 8] = [4, 6, 8, 10, 12, 16, 20, 30];
-/// Cost of a person in runs.
+/// Cost of a person in addition to their runs, expressed as a number of runs.
 const COST_OF_PERSON: usize = 4;
 
 impl DifferenceRequest {
-    /// Plans people and runs; `of_run` are the errors of one run.
+    /// Plans people and runs; `of_run` contains the expected errors of one run.
     ///
     /// # Errors
-    /// [`DesignError::OutOfRange`], [`DesignError::NotThere`].
+    /// [`DesignError::OutOfRange`] for an option out of range, [`DesignError::NotThere`] for an unknown quantity.
     pub(super) fn plan(
         &self,
         (task, people): (&Task, &People),
@@ -235,7 +235,7 @@ impl DifferenceRequest {
     }
 }
 
-/// The row of the given number of runs, or the one that costs least.
+/// Returns the index of the row with the given number of runs, otherwise of the row with the lowest cost.
 fn answer(rows: &[RunsAndPeople], runs: Option<usize>) -> usize {
     if let Some(place) = rows.iter().position(|row| Some(row.runs) == runs) {
         return place;
@@ -246,7 +246,7 @@ fn answer(rows: &[RunsAndPeople], runs: Option<usize>) -> usize {
 }
 
 impl DifferencePlan {
-    /// The answer: runs, and people.
+    /// Returns the recommended row: the number of runs and of people.
     pub fn answer(&self) -> Option<&RunsAndPeople> {
         self.rows.get(self.answer)
     }
@@ -276,7 +276,7 @@ impl DifferencePlan {
         })
     }
 
-    /// Returns the table of the power as CSV: a row for each number of runs and people.
+    /// Returns the table of the power as CSV, with a row for each combination of runs and people.
     pub fn csv(&self) -> String {
         let mut text = "runs,people,power\n".to_owned();
         for row in &self.rows {

@@ -8,11 +8,11 @@ use thiserror::Error;
 
 use super::Enters;
 
-/// Errors of the design of an experiment.
+/// Reason why an experiment cannot be designed.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum DesignError {
-    /// A number out of range.
+    /// A number is out of range.
     #[error("{quantity} is {found}, expected {expected}")]
     OutOfRange {
         /// Name of the quantity.
@@ -22,12 +22,12 @@ pub enum DesignError {
         /// The admissible values.
         expected: &'static str,
     },
-    /// A loop without a crossover.
+    /// The loop has no crossover.
     #[error(
-        "the gain of the loop does not fall through one between 0.01 and 100 rad/s: give the person another gain, or other units of the element"
+        "the loop gain does not cross 1 from above between 0.01 and 100 rad/s: give the person another gain, or other units of the element"
     )]
     NoCrossover,
-    /// Lines that do not determine the parameters of the person.
+    /// The lines do not determine the parameters of the person.
     #[error(
         "{lines} lines do not determine {coordinates} parameters: add lines, each of which gives two numbers, and spread them over the frequencies at which the person works"
     )]
@@ -37,147 +37,148 @@ pub enum DesignError {
         /// Number of parameters of the person.
         coordinates: usize,
     },
-    /// A band without room for the lines.
+    /// The band has no room for the lines.
     #[error(
         "the band has room for only {found} of the {asked} lines, which must be {spacing} multiples of the fundamental \
          apart and no harmonics of each other: give fewer lines (--lines), a wider band (--band), a longer run \
          (--length), or a smaller spacing (--spacing)"
     )]
     NoRoom {
-        /// Number of lines that were asked for.
+        /// Number of lines requested.
         asked: usize,
-        /// Number of lines that were found.
+        /// Number of lines that fit into the band.
         found: usize,
-        /// The distance.
+        /// Smallest distance between two lines, in multiples of the fundamental.
         spacing: u32,
     },
-    /// A requested quantity that is not a parameter of the person.
+    /// The requested quantity is not a quantity of the person.
     #[error("{name} is not a quantity of this person; expected one of {expected}")]
     NotThere {
         /// Name of the requested quantity.
         name: String,
-        /// The available quantities.
+        /// Names of the available quantities.
         expected: String,
     },
-    /// A quantity with a number that cannot be read.
+    /// The number given for a quantity cannot be read.
     #[error("{found:?} is not a {what}; write NAME=5% or NAME=0.05, such as tau_e=5%")]
     Unreadable {
-        /// The value expected.
+        /// The expected text.
         what: &'static str,
         /// The text found.
         found: String,
     },
-    /// People whose controlled element is not known.
+    /// The controlled element of the people is not known.
     #[error("the controlled element is not known from {people}: add it (--controlled-element), such as 90/(s(s+6))")]
     NoElement {
         /// Source of the people.
         people: String,
     },
-    /// A form of the response to the target that no typical person has.
+    /// People have no typical response to a displayed target with this controlled element.
     #[error(
-        "with {element} people have no typical response to a target that they see: give a person with [feedforward] (--people scenario.toml), design the disturbance alone (--disturbance), or for a compensatory display"
+        "with {element} people have no typical response to a target that they see: give a person with [feedforward] (--people scenario.toml), design the disturbance alone (--disturbance), or design for a compensatory display"
     )]
     NoFeedforward {
         /// The controlled element.
         element: String,
     },
-    /// A forcing function without lines that the design has.
+    /// A forcing function for comparison lacks lines that the design has.
     #[error(
-        "{name} has no lines of a {missing}; expected a scenario with those of each forcing function of the design: [target], [disturbance], or both for a display that shows the target"
+        "{name} has no lines of a {missing}; expected a scenario with lines for each forcing function of the design: [target], [disturbance], or both for a display that shows the target"
     )]
     OneForcing {
-        /// The forcing function.
+        /// Name of the forcing function.
         name: String,
-        /// The lines that it lacks.
+        /// Point of entry at which lines are missing.
         missing: Enters,
     },
-    /// A form that is given together with people who have their own.
+    /// A form is given although the people already have a form.
     #[error("the form {form} was given, but {people} has its own; leave the form out, or design for the population")]
     FormOfPeople {
         /// Source of the people.
         people: String,
-        /// The form.
+        /// The form given.
         form: Form,
     },
-    /// A form without typical values.
+    /// The form has no typical values.
     #[error(
         "people have no typical values of the form {form}: expected gain, lead, lead2, lag, lead-lag or lead2-lag, or a person of that form from a file"
     )]
     NoTypicalPerson {
-        /// The form.
+        /// The form given.
         form: Form,
     },
-    /// An element that the population does not control.
+    /// The typical person cannot control this element.
     #[error(
         "with {element} no gain of the form {form} makes a stable loop with a phase margin of 15 deg and a crossover of .3 to 5 rad/s: give another form, or a person who controls it (a scenario or a fit)"
     )]
     NotControlled {
         /// The controlled element.
         element: String,
-        /// The form.
+        /// Form of the operator.
         form: Form,
     },
-    /// A source without people.
+    /// The source does not contain people.
     #[error(
         "{place} holds no people to design for ({reason}); expected population, a scenario, a fit (identify --json), a directory that `hoid group DIR --out` wrote, or its population.json"
     )]
     NoPeople {
-        /// The source.
+        /// Source of the people.
         place: String,
-        /// The problem.
+        /// The problem with the source.
         reason: String,
     },
-    /// No condition, or an unknown one, of a group with several.
+    /// A group has several conditions, and the condition given is missing or unknown.
     #[error("the group has several conditions, and the given one is {found}: choose one (--condition) of {expected}")]
     Condition {
-        /// The given condition.
+        /// The condition given.
         found: String,
         /// The conditions of the group.
         expected: String,
     },
-    /// A file without the spread of a difference between people.
+    /// The file does not provide the spread of a difference between people.
     #[error(
-        "{path} has no spread between people of {name} ({reason}); expected a comparison with it (`hoid compare --of \
-         {name} --json`), the result of a group with several conditions, a population.json, or a number, such as 0.1"
+        "{path} has no spread between people of {name} ({reason}); expected a comparison that contains it (`hoid \
+         compare --of {name} --json`), the result of a group with several conditions, a population.json, or a number, \
+         such as 0.1"
     )]
     NoSpread {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// The quantity.
+        /// Name of the quantity.
         name: String,
-        /// The problem.
+        /// The problem with the file.
         reason: String,
     },
-    /// A scenario of the thesis, which has no operator of the family.
+    /// The scenario is one of the thesis, which has no operator of the family.
     #[error("{path} is a scenario of the thesis; write one with the key form, such as form = \"lead\"")]
     OtherScenario {
-        /// The file.
+        /// Path of the scenario.
         path: String,
     },
-    /// A table without lines.
+    /// The table contains no lines.
     #[error("{path} holds no forcing function: its columns are {found}, expected omega_rad_s, amplitude and phase_rad")]
     NoLines {
-        /// The file.
+        /// Path of the table.
         path: String,
-        /// The columns found.
+        /// Names of the columns found.
         found: String,
     },
-    /// A file that cannot be read.
+    /// A file cannot be read.
     #[error(transparent)]
     Io(#[from] IoError),
-    /// A scenario that cannot be read.
+    /// A scenario cannot be read.
     #[error(transparent)]
     Scenario(#[from] ScenarioFileError),
-    /// The tables of a group that cannot be read.
+    /// The tables of a group cannot be read.
     #[error(transparent)]
     Study(Box<StudyError>),
-    /// An invalid operator or element, or an unstable loop.
+    /// The operator or element is invalid, or the loop is unstable.
     #[error(transparent)]
     Model(#[from] ModelError),
 }
 
 impl DesignError {
-    /// True if the request is wrong, and not the data.
+    /// True if the error is in the request, not in the data.
     pub fn is_of_request(&self) -> bool {
         !matches!(
             self,

@@ -1,5 +1,5 @@
-//! Standard errors to be expected: `se(theta_k) = sqrt((I^-1)_kk)` with the information I of the lines
-//! (`information`); N runs have errors that are `1/sqrt(N)` of those of one.
+//! Expected standard errors: `se(theta_k) = sqrt((I^-1)_kk)` with the information I of the lines (`information`). The
+//! errors of N runs are those of one run divided by `sqrt(N)`.
 
 use hoid_model::{interned::Name, uncertainty::Estimate};
 use serde::{Deserialize, Serialize};
@@ -7,13 +7,13 @@ use serde::{Deserialize, Serialize};
 /// A parameter of a person with its expected standard error.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ExpectedParameter {
-    /// Its name.
+    /// Name of the parameter.
     #[serde(deserialize_with = "hoid_model::interned::name")]
     pub name: Name,
-    /// Its unit.
+    /// Unit of the parameter.
     #[serde(deserialize_with = "hoid_model::interned::name")]
     pub unit: Name,
-    /// Value and standard error.
+    /// Value of the parameter with its expected standard error.
     pub estimate: Estimate,
 }
 
@@ -26,14 +26,14 @@ pub struct Expected {
     pub crossover_rad_s: Estimate,
     /// Phase margin, deg.
     pub phase_margin_deg: Estimate,
-    /// Root mean square of the error, in the unit of the forcing function.
+    /// Root mean square of the error e, in the unit of the forcing function.
     pub rms_e: f64,
-    /// Root mean square of the control.
+    /// Root mean square of the control output u.
     pub rms_u: f64,
 }
 
 impl Expected {
-    /// Returns the same with all errors multiplied by a factor.
+    /// Returns a copy with all standard errors multiplied by a factor.
     #[must_use]
     pub fn scaled(&self, by: f64) -> Self {
         let of = |e: &Estimate| Estimate {
@@ -52,7 +52,7 @@ impl Expected {
         }
     }
 
-    /// Returns `crossover` in rad/s, `phase_margin` in deg, or a parameter, with its error.
+    /// Returns `crossover` in rad/s, `phase_margin` in deg, or a parameter, with its standard error.
     pub fn estimate(&self, name: &str) -> Option<Estimate> {
         match name {
             "crossover" => Some(self.crossover_rad_s),
@@ -61,7 +61,7 @@ impl Expected {
         }
     }
 
-    /// Error of `crossover` or of a parameter relative to its value; of `phase_margin` in deg.
+    /// Returns the standard error of a quantity: in deg for `phase_margin`, otherwise relative to its value.
     pub fn relative_error(&self, name: &str) -> Option<f64> {
         let found = self.estimate(name)?;
         match name {

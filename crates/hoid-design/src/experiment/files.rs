@@ -1,4 +1,5 @@
-//! The files of a designed experiment: a scenario that simulates it, the lines as a table, and an experiment for `hoid lab`.
+//! The files of a designed experiment: a scenario for its simulation, a table of the lines, and an experiment for
+//! `hoid lab`.
 
 use hoid_model::{
     FamilyOperator,
@@ -13,7 +14,7 @@ use super::{DesignedLine, Enters, ExperimentDesign, task::SAMPLE_S};
 const RUN_IN_S: f64 = 10.0;
 
 impl ExperimentDesign {
-    /// Returns a scenario with the designed forcing function: the text of its file.
+    /// Returns the text of a scenario file with the designed forcing function.
     pub fn scenario(&self) -> String {
         let operator = &self.task.state.operator;
         let forcing = |enters: Enters| {
@@ -43,13 +44,13 @@ impl ExperimentDesign {
             self.task
                 .feedforward
                 .as_ref()
-                .map_or_else(String::new, |seen| of_seen(seen, sample_s)),
+                .map_or_else(String::new, |seen| feedforward_keys(seen, sample_s)),
             forcing(Enters::Disturbance),
             self.task.remnant.share,
         )
     }
 
-    /// Time between samples, such that a run is a whole number of samples.
+    /// Returns a sample time in s such that a run is a whole number of samples.
     fn sample_s(&self) -> f64 {
         let whole = self.length_s / SAMPLE_S;
         match (whole - whole.round()).abs() < 1e-6 {
@@ -58,7 +59,7 @@ impl ExperimentDesign {
         }
     }
 
-    /// Returns the lines as a table in CSV, which [`super::Against`] reads.
+    /// Returns the table of the lines as CSV, which [`super::Against`] reads.
     pub fn forcing_csv(&self) -> String {
         let line = |DesignedLine { enters, line: l, .. }: &DesignedLine| {
             let enters = enters.name();
@@ -69,23 +70,24 @@ impl ExperimentDesign {
     }
 }
 
-/// Half width of the display and full deflection, in rms of e and u: Gaussian signals are beyond in 1 of 16000 samples.
-const ROOM: f64 = 4.0;
-/// Most runs of a condition of `hoid lab`.
+/// Half width of the display and full deflection of the stick, in multiples of the rms of e and u. A Gaussian signal
+/// exceeds four times its rms in 1 of 16000 samples.
+const RMS_MULTIPLE: f64 = 4.0;
+/// Largest number of runs of a condition in `hoid lab`.
 const MOST_RUNS: usize = 100;
 
 impl ExperimentDesign {
-    /// Returns an experiment for `hoid lab --config`, whose condition is the scenario in a file of this name next to it.
-    /// `None` if a run is not a whole number of hundredths of a second, as the lab requires.
+    /// Returns an experiment for `hoid lab --config`; its condition is the scenario in a file with the name `scenario`
+    /// in the same directory. `None` if a run is not a whole number of hundredths of a second, as the lab requires.
     pub fn lab(&self, scenario: &str) -> Option<String> {
         if self.sample_s().to_bits() != SAMPLE_S.to_bits() {
             return None;
         }
-        let room = |rms: f64| ROOM * if rms > 0.0 { rms } else { 1.0 };
+        let room = |rms: f64| RMS_MULTIPLE * if rms > 0.0 { rms } else { 1.0 };
         Some(format!(
             "# Made by `hoid design`; show it with `hoid lab --config`.\nname = \"design\"\n\n[[condition]]\nname = \"design\"\n\
              text = \"Keep the error small.\"\nscenario = \"{scenario}\"\ndisplay = \"{}\"\n{}\
-             # {ROOM} rms of the error and of the control that are to be expected.\nhalf_width = {:.4}\nfull_deflection = {:.4}\n\
+             # {RMS_MULTIPLE} times the expected rms of the error and of the control.\nhalf_width = {:.4}\nfull_deflection = {:.4}\n\
              training = 1\nruns = {}\n",
             self.display.name(),
             self.preview(),
@@ -103,8 +105,9 @@ fn of_line(line: &Sinusoid) -> String {
     )
 }
 
-/// The response to a target that is seen; its neuromuscular system is that of the response to the error.
-fn of_seen(seen: &Feedforward, sample_s: f64) -> String {
+/// Returns the keys of the response to a displayed target. Its neuromuscular system is the same as in the response to
+/// the error.
+fn feedforward_keys(seen: &Feedforward, sample_s: f64) -> String {
     let named = seen.operator.named();
     let own = |p: &&NamedParameter| {
         let common = matches!(p.coordinate, Some(Coordinate::LogOmega | Coordinate::LogZeta));
@@ -116,7 +119,7 @@ fn of_seen(seen: &Feedforward, sample_s: f64) -> String {
     };
     let keys: String = named.iter().filter(own).map(key).collect();
     let form = seen.operator.form().name();
-    // Of whole samples.
+    // The preview is rounded to whole samples.
     let preview_s = sample_s * (seen.preview_s / sample_s).round();
     format!("[feedforward]\nform = \"{form}\"\n{keys}preview_s = {preview_s}\n\n")
 }
@@ -127,7 +130,7 @@ fn operator_keys(operator: &FamilyOperator) -> String {
 }
 
 impl ExperimentDesign {
-    /// The preview, as a key of the lab.
+    /// Returns the preview as a key of a lab experiment.
     fn preview(&self) -> String {
         let seen = self
             .task
@@ -138,7 +141,7 @@ impl ExperimentDesign {
     }
 }
 
-/// A parameter as a key of a scenario.
+/// Returns the name of a parameter as a key of a scenario.
 fn key_of(p: &NamedParameter) -> String {
     let name = match p.name {
         "K_e" => "K",

@@ -1,9 +1,9 @@
-//! People of a group: from the directory that `hoid group --out` wrote, from its JSON, or from `population.json` of
-//! `hoid group --pool`.
+//! The people of a group: from the directory that `hoid group --out` wrote, from its JSON, or from `population.json`,
+//! which `hoid group --pool` writes.
 //!
-//! The typical person has the form that most people have, and the median of each of their parameters. Where a parameter
-//! was pooled, the typical person has the median of the population, and each person the estimate from all people.
-//! Parameters that the data of too few people determine are not pooled.
+//! The typical person has the most frequent form, and the median of each parameter over the people with this form. If a
+//! parameter was pooled, the typical person has the median of the population, and each person has their pooled
+//! estimate. Parameters that the data of too few people determine are not pooled.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use super::{
     chosen::{Chosen, Given, NamedState, left_out},
 };
 
-/// A person in a condition: parameters by name.
+/// A person in a condition, with parameters by name.
 #[derive(Debug, Clone, PartialEq)]
 struct Row {
     subject: String,
@@ -26,7 +26,7 @@ struct Row {
     parameters: Vec<(String, f64)>,
 }
 
-/// A pooled population of a condition.
+/// The pooled population of a condition.
 struct Pooled {
     centre: Row,
     people: Vec<Row>,
@@ -68,7 +68,7 @@ pub(super) fn of_json(object: &Value, path: &Path, given: &Given<'_>) -> Result<
         condition: text(p, "condition"),
         form: text(p, "form"),
         parameters: match p["parameters"].as_object() {
-            // JSON has no infinite number.
+            // JSON cannot represent infinity, so an infinite value is read as NaN.
             Some(all) => all
                 .iter()
                 .map(|(name, q)| (name.clone(), q["value"].as_f64().unwrap_or(f64::NAN)))
@@ -108,7 +108,7 @@ fn none(place: &Path, reason: impl Into<String>) -> DesignError {
     }
 }
 
-/// The condition: the given one, or the only one.
+/// Returns the condition: the given one, or the only one of the group.
 fn condition_of(rows: &[Row], place: &Path, given: &Given<'_>) -> Result<String, DesignError> {
     let mut all: Vec<&str> = Vec::new();
     for row in rows {
@@ -140,7 +140,7 @@ fn element_of(
     Ok(text.ok_or_else(missing)?.parse()?)
 }
 
-/// The pooled population of a condition among the files of a directory.
+/// Reads the pooled population of a condition from the files of a directory; `None` if there is none.
 fn read_pooled(directory: &Path, condition: &str) -> Result<Option<Pooled>, DesignError> {
     let unreadable = |error: std::io::Error| none(directory, error.to_string());
     let mut names: Vec<_> = std::fs::read_dir(directory)
@@ -199,7 +199,7 @@ fn of_pooled(pooled: &Pooled, place: &Path, element: &ContinuousTransferFunction
 }
 
 impl Row {
-    /// The same with the pooled values of another row, where it has them.
+    /// Replaces parameters by the pooled values of another row, if it contains them.
     fn with(mut self, pooled: &Self) -> Self {
         for (name, value) in &mut self.parameters {
             if let Some((_, better)) = pooled.parameters.iter().find(|(n, _)| n == name) {
@@ -222,14 +222,14 @@ fn of_rows(
     };
     let rows: Vec<Row> = rows.into_iter().map(with_pooled).collect();
     let count = |form: &str| rows.iter().filter(|row| row.form == form).count();
-    // Of two forms with as many people, the first.
+    // If two forms have equally many people, the form of the first person is chosen.
     let first = rows.iter().rev().max_by_key(|row| count(&row.form));
     let form = first.map(|row| row.form.clone()).unwrap_or_default();
     let alike: Vec<&Row> = rows.iter().filter(|row| row.form == form).collect();
     let centre = |name: &String| {
         let of = |row: &&Row| row.parameters.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
         let mut values: Vec<f64> = alike.iter().filter_map(of).collect();
-        // An infinite T_I is written as no number in JSON.
+        // NaN represents an infinite T_I, which JSON cannot contain.
         values
             .iter_mut()
             .filter(|v| v.is_nan())
@@ -274,7 +274,7 @@ fn with_others(typical: NamedState, rows: &[Row], element: &ContinuousTransferFu
     }
 }
 
-/// The loop of a person, or the reason why there is none.
+/// Returns the operator and element of a person, or the reason why they cannot be used.
 fn state_of(row: &Row, element: &ContinuousTransferFunction) -> Result<FamilyState, String> {
     let form: Form = row.form.parse().map_err(|_| match row.form.is_empty() {
         true => {
@@ -287,7 +287,7 @@ fn state_of(row: &Row, element: &ContinuousTransferFunction) -> Result<FamilySta
     let dependent = |name: &&str| *name == "K_e_dot" || (*name == "K" && form.has_lag());
     let pair = |name: &str| match value(name) {
         Some(v) if v.is_finite() => Ok((name.to_owned(), v)),
-        // The lag of an integration.
+        // An infinite lag time constant represents a pure integration.
         Some(_) if name == "T_I" => Ok((name.to_owned(), f64::INFINITY)),
         _ => Err(format!("{name} of the form {form} is not known")),
     };

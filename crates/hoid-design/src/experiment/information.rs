@@ -1,27 +1,28 @@
-//! Standard errors of an experiment before it is carried out.
+//! Expected standard errors of an experiment before it is carried out.
 //!
-//! A person responds to the error of a loop with the controlled element P, and to the target f if it is displayed,
-//! `u = B e + F f + n` (`task`), with the parameters theta. With `S = 1/(1 + B P)` a line of amplitude A at omega makes
-//! `E = S (1 - P F) A` of e if it is of the target, and `E = -S P A` if it is of the disturbance. Over T seconds of
-//! whole periods the Fourier coefficients obey `U = B E + F X + N`, X that of f, `E|N|^2 = 4 S_n/T` with the power
-//! density `S_n(f)` of the remnant, of both signs of f: `var n = int S_n df`. Half of it is in the real and half in the
-//! imaginary part, and the information of the lines on theta is
+//! In a loop with the controlled element P, a person responds to the error and, if it is displayed, to the target f:
+//! `u = B e + F f + n` (`task`), with the parameters theta. With `S = 1/(1 + B P)`, a line of amplitude A at omega
+//! contributes `E = S (1 - P F) A` to e if it belongs to the target, and `E = -S P A` if it belongs to the disturbance.
+//! Over T seconds of whole periods the Fourier coefficients obey `U = B E + F X + N`, where X is the coefficient of f
+//! and `E|N|^2 = 4 S_n/T`, with the two-sided power density `S_n(f)` of the remnant, `var n = int S_n df`. Half of this
+//! variance is in the real part and half in the imaginary part, so the information of the lines on theta is
 //!
 //! `I = sum over lines of T/(2 S_n) Re[g* g']`, `g = dB/dtheta E + dF/dtheta X` (`joint`),
 //!
-//! whose inverse is the least covariance that an unbiased estimate can have (H. Cramér, *Mathematical Methods of Statistics*, 1946, section
-//! 32.6). The part of the loop signals that the remnant itself excites is not counted: a free noise model takes up this
-//! information (U. Forssell and L. Ljung, *Automatica* 35 (1999) 1215-1241, section 5). Errors of functions of theta,
-//! such as crossover and margin, are to first order.
+//! whose inverse is the smallest covariance that an unbiased estimate can have (H. Cramér, *Mathematical Methods of
+//! Statistics*, 1946, section 32.6). The part of the loop signals that the remnant itself excites is not included,
+//! because a free noise model uses up this information (U. Forssell and L. Ljung, *Automatica* 35 (1999) 1215-1241,
+//! section 5). The errors of functions of theta, such as crossover and margin, are computed to first order.
 //!
-//! The lines have to exceed the remnant in e: at a line that does not, the estimate of B is biased towards -1/P, and
+//! The lines have to exceed the remnant in e. At a line that does not, the estimate of B is biased towards -1/P, and
 //! the predicted error is too small.
 //!
-//! **The remnant** is a lag of order m, `S_n = K^2/(1 + (T_n omega)^2)^m`, whose share p of the variance of u, through the loop,
-//! sets K: `K^2 = p/(1 - p) sum |U|^2/2 / int |S|^2/(1 + (T_n omega)^2)^m df`. It is proportional to the forcing
-//! function, as it is for people, so that errors do not depend on the amplitude but on the distribution of power over
-//! frequency, and on T. The integral ends at half the sampling rate: of white noise (`T_n = 0`) the density for a given
-//! share depends on it.
+//! **The remnant** is white noise through a lag of order m, `S_n = K^2/(1 + (T_n omega)^2)^m`. K follows from the share
+//! p of the variance of u that the remnant has through the loop:
+//! `K^2 = p/(1 - p) sum |U|^2/2 / int |S|^2/(1 + (T_n omega)^2)^m df`. The remnant is proportional to the forcing
+//! function, as it is for people, so the errors do not depend on the amplitude, but on the distribution of power over
+//! frequency and on T. The integral ends at half the sampling rate; for white noise (`T_n = 0`) this limit affects the
+//! density that corresponds to a given share.
 
 use std::f64::consts::TAU;
 
@@ -34,13 +35,13 @@ use super::{
     task::SAMPLE_S,
 };
 
-/// Power and information of a line, for unit amplitude.
-struct Worth {
-    /// `|e|^2` divided by `A^2`.
+/// Power and information of a line of unit amplitude.
+struct LineInformation {
+    /// `|e|^2/A^2` at the line.
     error: f64,
-    /// `|u|^2` divided by `A^2`.
+    /// `|u|^2/A^2` at the line.
     control: f64,
-    /// `Re[conj(g) g']` divided by the density of the remnant of unit gain.
+    /// `Re[conj(g) g']` divided by the power density of a remnant of unit gain.
     information: DMatrix<f64>,
 }
 
@@ -48,12 +49,12 @@ struct Worth {
 pub(super) struct Loop<'a> {
     pub task: &'a Task,
     pub joint: Joint,
-    /// `int |S|^2 density df`, and the same through P, for a remnant of unit gain.
+    /// Variances of u and of e due to a remnant of unit gain: `int |S|^2 density df` and `int |S P|^2 density df`.
     noise: [f64; 2],
     pub crossover_rad_s: f64,
 }
 
-/// Range of the integrals over frequency in rad/s, up to half the sampling rate, and number of points.
+/// Range of the integrals over frequency in rad/s, up to half the sampling rate, and the number of points.
 const RANGE: (f64, f64) = (1e-3, std::f64::consts::PI / SAMPLE_S);
 const POINTS: usize = 6000;
 
@@ -62,7 +63,7 @@ impl<'a> Loop<'a> {
         let share = task.remnant.share;
         if !(share > 0.0 && share < 1.0) {
             return Err(DesignError::OutOfRange {
-                quantity: "share of the remnant in the variance of u",
+                quantity: "share of the variance of u due to the remnant",
                 found: share,
                 expected: "above 0 and below 1",
             });
@@ -75,7 +76,7 @@ impl<'a> Loop<'a> {
             noise: [0.0; 2],
             crossover_rad_s,
         };
-        // Trapezoidal rule over log omega; both signs of f.
+        // Trapezoidal rule over log omega; the factor 2 accounts for negative frequencies.
         let ratio = (RANGE.1 / RANGE.0).ln() / (POINTS - 1) as f64;
         for k in 0..POINTS {
             let omega = RANGE.0 * (ratio * k as f64).exp();
@@ -89,14 +90,14 @@ impl<'a> Loop<'a> {
         Ok(all)
     }
 
-    /// Returns S and P.
+    /// Returns the sensitivity S and the response of the controlled element P.
     pub fn sensitivity(&self, omega: f64) -> (Complex64, Complex64) {
         let p = self.task.state.controlled_element.response(omega);
         let h = self.task.state.operator.response(omega);
         (1.0 / (1.0 + h * p), p)
     }
 
-    /// Density of the remnant of unit gain.
+    /// Returns the power density of a remnant of unit gain.
     pub fn density(&self, omega: f64) -> f64 {
         let Remnant {
             time_constant_s, order, ..
@@ -104,16 +105,16 @@ impl<'a> Loop<'a> {
         (1.0 + (time_constant_s * omega).powi(2)).powi(-order)
     }
 
-    /// The response F to the target; zero if it is not seen.
+    /// Returns the response F to the target; zero if the target is not displayed.
     pub fn feedforward(&self, omega: f64) -> Complex64 {
         let seen = self.task.feedforward.as_ref();
         seen.map_or_else(Complex64::default, |seen| {
-            // The delay of the operator is relative to the end of the preview.
+            // The operator's delay is counted from the end of the preview.
             seen.operator.response(omega) * ahead(seen.preview_s, omega)
         })
     }
 
-    /// Coefficients of e and of the target, if this line has unit amplitude.
+    /// Returns the Fourier coefficients of e and of the target for a line of unit amplitude.
     pub fn excited(&self, (enters, omega): (Enters, f64)) -> [Complex64; 2] {
         let (s, p) = self.sensitivity(omega);
         match enters {
@@ -122,7 +123,7 @@ impl<'a> Loop<'a> {
         }
     }
 
-    fn worth(&self, (enters, omega): (Enters, f64)) -> Worth {
+    fn line_information(&self, (enters, omega): (Enters, f64)) -> LineInformation {
         let [error, target] = self.excited((enters, omega));
         let feedback = self.task.state.operator.response_and_gradient(omega);
         let seen = self.task.feedforward.as_ref();
@@ -144,7 +145,7 @@ impl<'a> Loop<'a> {
         };
         let density = self.density(omega);
         let n = self.joint.count;
-        Worth {
+        LineInformation {
             error: error.norm_sqr(),
             control: (feedback.value * error + answer).norm_sqr(),
             information: DMatrix::from_fn(n, n, |a, b| (gradient[a].conj() * gradient[b]).re / density),
@@ -152,8 +153,8 @@ impl<'a> Loop<'a> {
     }
 
     /// Returns the rms of e and u, and K^2 of the remnant, for a forcing function.
-    fn powers(&self, worths: &[(Worth, f64)]) -> [f64; 3] {
-        let sum = |of: fn(&Worth) -> f64| -> f64 { worths.iter().map(|(w, square)| 0.5 * square * of(w)).sum() };
+    fn powers(&self, lines: &[(LineInformation, f64)]) -> [f64; 3] {
+        let sum = |of: fn(&LineInformation) -> f64| -> f64 { lines.iter().map(|(w, square)| 0.5 * square * of(w)).sum() };
         let (e, u) = (sum(|w| w.error), sum(|w| w.control));
         let share = self.task.remnant.share;
         let gain = share / (1.0 - share) * u / self.noise[0];
@@ -164,7 +165,7 @@ impl<'a> Loop<'a> {
         ]
     }
 
-    /// Computes the expected errors of a forcing function over a given number of seconds of whole periods.
+    /// Computes the expected errors for a forcing function over `length_s` seconds of whole periods.
     pub fn expected(&self, forcing: &Forcing, length_s: f64) -> Result<Expected, DesignError> {
         if !(length_s.is_finite() && length_s > 0.0) {
             return Err(DesignError::OutOfRange {
@@ -173,7 +174,7 @@ impl<'a> Loop<'a> {
                 expected: "a positive number",
             });
         }
-        let [rms_e, rms_u, _] = self.powers(&self.worths(forcing));
+        let [rms_e, rms_u, _] = self.powers(&self.lines(forcing));
         let covariance = self.covariance(forcing, length_s)?;
         let estimate = |q: &Quantity| match q.value.is_finite() {
             true => Estimate::with_variance(q.value, (&covariance * &q.gradient).dot(&q.gradient)),
@@ -194,55 +195,55 @@ impl<'a> Loop<'a> {
         })
     }
 
-    /// The lines with the squares of their amplitudes.
-    fn worths(&self, forcing: &Forcing) -> Vec<(Worth, f64)> {
+    /// Returns power and information of each line for unit amplitude, with the square of its amplitude.
+    fn lines(&self, forcing: &Forcing) -> Vec<(LineInformation, f64)> {
         let of =
-            |(enters, line): &(Enters, Sinusoid)| (self.worth((*enters, line.omega_rad_s)), line.amplitude_deg.powi(2));
+            |(enters, line): &(Enters, Sinusoid)| (self.line_information((*enters, line.omega_rad_s)), line.amplitude_deg.powi(2));
         forcing.lines().iter().map(of).collect()
     }
 
-    /// Returns K^2 of the remnant with these lines.
+    /// Returns the squared gain K^2 of the remnant with this forcing function.
     pub fn remnant_gain(&self, forcing: &Forcing) -> f64 {
-        let [_, _, gain] = self.powers(&self.worths(forcing));
+        let [_, _, gain] = self.powers(&self.lines(forcing));
         gain
     }
 
-    /// Returns the least covariance of the coordinates.
+    /// Returns the smallest covariance of the coordinates that an unbiased estimate can have.
     pub fn covariance(&self, forcing: &Forcing, length_s: f64) -> Result<DMatrix<f64>, DesignError> {
-        let worths = self.worths(forcing);
-        let [_, _, gain] = self.powers(&worths);
+        let lines = self.lines(forcing);
+        let [_, _, gain] = self.powers(&lines);
         let n = self.joint.count;
         let mut information = DMatrix::zeros(n, n);
-        for (worth, square) in &worths {
+        for (worth, square) in &lines {
             information += &worth.information * (0.5 * length_s * square / gain);
         }
         inverse(&information).ok_or(DesignError::NotIdentifiable {
-            lines: worths.len(),
+            lines: lines.len(),
             coordinates: n,
         })
     }
 
-    /// Information in one second of a line that makes the whole response of u, with the share of the remnant.
+    /// Returns the information per second of a line that alone excites u, with the given share of the remnant.
     pub fn information_by_share(&self, line: (Enters, f64)) -> DMatrix<f64> {
-        let worth = self.worth(line);
+        let worth = self.line_information(line);
         let share = self.task.remnant.share;
         // K^2 = p/(1 - p) U/noise: A^2/(2 K^2) = (A^2/2/U) (1 - p)/p noise.
         worth.information * ((1.0 - share) / share * self.noise[0] / worth.control)
     }
 
-    /// Variance of u divided by that of a line of the forcing function.
+    /// Returns the variance of u due to a line, divided by the variance of the line itself.
     pub fn control_by_power(&self, line: (Enters, f64)) -> f64 {
-        self.worth(line).control
+        self.line_information(line).control
     }
 
-    /// Quantities that can be requested.
+    /// Returns the quantities that can be requested.
     pub fn quantities(&self) -> Vec<Quantity> {
         let parameters = self.joint.parameters(self.task).into_iter();
         let parameters = parameters.filter(|q| q.value.is_finite() && q.size != 0.0);
         self.margins().into_iter().chain(parameters).collect()
     }
 
-    /// Change of the phase margin in deg with the logarithm of the gain, without its sign.
+    /// Returns the absolute derivative of the phase margin in deg with respect to the logarithm of the gain.
     pub fn margin_by_gain_deg(&self) -> f64 {
         let [_, margin] = self.margins();
         // The first coordinate is the gain.
@@ -250,7 +251,7 @@ impl<'a> Loop<'a> {
         gain.map_or(f64::NAN, |gain| (margin.gradient[0] * gain).abs())
     }
 
-    /// Crossover and margin.
+    /// Returns the crossover frequency and the phase margin.
     fn margins(&self) -> [Quantity; 2] {
         let [(crossover, of_crossover), (margin, of_margin)] = self.margin_gradients(&self.task.state.operator);
         let quantity = |name, unit, value: f64, gradient: &DVector<f64>, scale| Quantity {
@@ -267,14 +268,14 @@ impl<'a> Loop<'a> {
         ]
     }
 
-    /// Crossover and margin with their gradients: `L = H P`, `d ln|L|/d omega domega = -Re dlnH`, and
+    /// Returns crossover and margin with their gradients: with `L = H P`, `d ln|L|/d omega domega = -Re dlnH` and
     /// `dphi = Im dlnH + d arg L/d omega domega`.
     fn margin_gradients(&self, operator: &FamilyOperator) -> [(f64, DVector<f64>); 2] {
         let omega = self.crossover_rad_s;
         let response = operator.response_and_gradient(omega);
         let logarithm = |w: f64| (operator.response(w) * self.task.state.controlled_element.response(w)).ln();
         let step = 1e-5 * omega;
-        // The phase may differ by a whole turn between the two.
+        // The two phases may differ by a whole turn.
         let slope = {
             let difference = logarithm(omega + step) - logarithm(omega - step);
             let turn = difference.im - TAU * (difference.im / TAU).round();
@@ -290,21 +291,21 @@ impl<'a> Loop<'a> {
     }
 }
 
-/// Computes the expected errors of an experiment; `length_s` is the duration of all runs together, in whole periods.
+/// Computes the expected errors of an experiment; `length_s` is the total duration of all runs, in whole periods.
 ///
 /// # Errors
-/// [`DesignError`] for numbers out of range, a loop that is unstable or without a crossover, and lines that do not
-/// determine the parameters.
+/// [`DesignError`] if a number is out of range, the loop is unstable or has no crossover, or the lines do not determine
+/// the parameters.
 pub fn expected(task: &Task, forcing: &Forcing, length_s: f64) -> Result<Expected, DesignError> {
     Loop::of(task)?.expected(forcing, length_s)
 }
 
-/// Advance of a preview.
+/// Returns the phase advance of a preview.
 pub(super) fn ahead(preview_s: f64, omega: f64) -> Complex64 {
     Complex64::from_polar(1.0, omega * preview_s)
 }
 
-/// Inverse, after scaling to a unit diagonal; `None` if the matrix is singular.
+/// Returns the inverse, computed after scaling to a unit diagonal; `None` if the matrix is singular.
 pub(super) fn inverse(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = information.nrows();
     let scale: Vec<f64> = (0..n).map(|k| information[(k, k)].sqrt()).collect();

@@ -1,10 +1,10 @@
-//! The coordinates of both responses of a person together: those of the response B to the error, then those of the
-//! response F to the target, without the neuromuscular system, which F has in common with B.
+//! The joint coordinates of both responses of a person: first those of the response B to the error, then those of the
+//! response F to the target. The neuromuscular system of F is the same as that of B and is not repeated.
 //!
-//! A line of the target with the amplitude X makes `E` of e, and `U = B E + F X + N`: its derivative with respect to a
-//! coordinate is `dB E + dF X`, in which F is zero at a line of the disturbance. At a line of the target, the part of U
-//! due to B is determined by the lines of the disturbance (M. M. van Paassen and M. Mulder, *Identification of Human
-//! Operator Control Behaviour in Multiple-Loop Tracking Tasks*, IFAC 1998).
+//! A line of the target with the amplitude X contributes `E` to e and `U = B E + F X + N` to u. The derivative of U
+//! with respect to a coordinate is `dB E + dF X`, where the second term is absent at a line of the disturbance. At a
+//! line of the target, the part of U due to B is determined by the lines of the disturbance (M. M. van Paassen and M.
+//! Mulder, *Identification of Human Operator Control Behaviour in Multiple-Loop Tracking Tasks*, IFAC 1998).
 
 use hoid_model::{
     Complex64, FamilyOperator, interned::interned, operator_family::Coordinate, operator_family::NamedParameter,
@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Task;
 
-/// The names of a parameter of F: its own names with the suffix `_f`.
+/// Returns the name of a parameter of F: its name in the operator with the suffix `_f`.
 fn name_of_target(parameter: &NamedParameter) -> &'static str {
     let name = match parameter.name {
         "K_d" | "K_e" => "K".to_owned(),
@@ -23,22 +23,22 @@ fn name_of_target(parameter: &NamedParameter) -> &'static str {
     interned(&format!("{name}_f")).unwrap_or(parameter.name)
 }
 
-/// A parameter, crossover or margin with its derivatives.
+/// A parameter, the crossover or the margin, with its derivatives.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Quantity {
     pub name: &'static str,
     pub unit: &'static str,
     pub value: f64,
-    /// With respect to the joint coordinates.
+    /// Derivatives with respect to the joint coordinates.
     pub gradient: DVector<f64>,
-    /// The accepted error is relative to this: the value, or one unit.
+    /// Unit of the accepted error: the value of the quantity, or one.
     pub scale: f64,
-    /// The size to which the error is relative where all parameters count alike.
+    /// Size to which the error is relative if all parameters have the same weight.
     pub size: f64,
 }
 
 impl Quantity {
-    /// A quantity whose errors are relative to its value.
+    /// Creates a quantity whose errors are relative to its value.
     fn relative(parameter: &NamedParameter, name: &'static str, gradient: DVector<f64>) -> Self {
         let scale = parameter.value.abs();
         Self {
@@ -52,7 +52,7 @@ impl Quantity {
     }
 }
 
-/// Indices of the coordinates.
+/// Number of the joint coordinates, and positions of the coordinates of F among them.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Joint {
     pub count: usize,
@@ -79,19 +79,19 @@ impl Joint {
         Self { count, of_target }
     }
 
-    /// The gradient of a quantity of B.
+    /// Returns the joint gradient of a quantity of B.
     pub fn feedback(&self, own: &[f64]) -> DVector<f64> {
         DVector::from_fn(self.count, |k, _| own.get(k).copied().unwrap_or(0.0))
     }
 
-    /// The gradient of a quantity of F.
+    /// Returns the joint gradient of a quantity of F.
     fn target(&self, own: &[f64]) -> DVector<f64> {
         let mut all = DVector::zeros(self.count);
         self.of_target.iter().zip(own).for_each(|(k, g)| all[*k] = *g);
         all
     }
 
-    /// `dB E + dF X`.
+    /// Returns `dB E + dF X` for all joint coordinates.
     pub fn derivatives(
         &self,
         (of_error, error): (&[Complex64], Complex64),
@@ -104,7 +104,7 @@ impl Joint {
         all
     }
 
-    /// The parameters of both responses.
+    /// Returns the parameters of both responses.
     pub fn parameters(&self, task: &Task) -> Vec<Quantity> {
         let feedback = &task.state.operator;
         let mut all: Vec<Quantity> = feedback
@@ -120,7 +120,7 @@ impl Joint {
             }
             let mut one = Quantity::relative(p, name_of_target(p), self.target(gradient));
             if p.coordinate == Some(Coordinate::Delay) {
-                // Zero is an ordinary value of this delay: its error is one in s.
+                // This delay may well be zero, so its error is absolute, in s.
                 one.value -= seen.preview_s;
                 one.scale = 1.0;
                 one.size = feedback.tau_e_s();
@@ -130,12 +130,12 @@ impl Joint {
         all
     }
 
-    /// The covariance of the coordinates of B, by rows.
+    /// Returns the covariance of the coordinates of B, row by row.
     pub fn of_feedback(&self, covariance: &DMatrix<f64>, operator: &FamilyOperator) -> Vec<f64> {
         block(covariance, &(0..operator.coordinates().len()).collect::<Vec<_>>())
     }
 
-    /// The covariance of the coordinates of F, by rows.
+    /// Returns the covariance of the coordinates of F, row by row.
     pub fn of_feedforward(&self, covariance: &DMatrix<f64>) -> Vec<f64> {
         block(covariance, &self.of_target)
     }
@@ -152,12 +152,12 @@ mod tests {
     use hoid_model::family_scenario::Display;
 
     use super::*;
-    use crate::experiment::{Remnant, adapted::population, seen};
+    use crate::experiment::{Remnant, adapted::population, feedforward};
 
     fn task() -> Task {
         let state = population(&"90/(s(s+6))".parse().unwrap(), None).unwrap().0.state;
         Task {
-            feedforward: Some(seen::typical(&state, Display::Preview).unwrap()),
+            feedforward: Some(feedforward::typical(&state, Display::Preview).unwrap()),
             state,
             remnant: Remnant::default(),
         }

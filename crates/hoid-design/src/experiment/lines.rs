@@ -1,38 +1,38 @@
-//! Lines of a forcing function: integer multiples of `2 pi/T`, none of them a harmonic of another.
+//! Lines of a forcing function: integer multiples of `2 pi/T`, none of which is a harmonic of another.
 //!
-//! **Frequencies.** A person's response to a line has harmonics, and a nonlinearity adds power at multiples. The
-//! multiples are chosen so that no ratio of two of them is an integer, as with primes, but with a larger choice (R.
-//! Pintelon and J. Schoukens, *System Identification*, 2012, section 5.2). The candidates are spread evenly over the
-//! logarithm of frequency.
+//! **Frequencies.** The response of a person to a line contains harmonics, and a nonlinearity adds power at multiples
+//! of its frequency. The multiples are chosen so that no ratio of two of them is an integer. Primes have this property,
+//! but this condition leaves a larger choice (R. Pintelon and J. Schoukens, *System Identification*, 2012, section
+//! 5.2). The candidates are evenly spaced over the logarithm of frequency.
 //!
-//! **Phases.** From several starts, that of M. R. Schroeder (*IEEE Trans. Inf. Theory* 16 (1970) 85-89),
-//! `phi_k = -2 pi sum_{j < k} (k - j) p_j` with the relative powers p, and others spread over the circle, the phases
-//! are changed one after the other, by an eighth of a turn and less, as long as the peak of the signal decreases; the
-//! best result is kept.
+//! **Phases.** The search starts from the phases of M. R. Schroeder (*IEEE Trans. Inf. Theory* 16 (1970) 85-89),
+//! `phi_k = -2 pi sum_{j < k} (k - j) p_j` with the relative powers p, and from others spread over the circle. From
+//! each start, the phases are changed one after the other, by an eighth of a turn and less, as long as the peak of the
+//! signal decreases; the best result is kept.
 
 use std::f64::consts::TAU;
 
 use hoid_model::forcing::Sinusoid;
 
-/// True if two multiples are at least so far apart, and none is a harmonic of the other.
-pub(super) fn far_enough(a: u32, b: u32, spacing: u32) -> bool {
+/// True if two multiples differ by at least `spacing` and neither is a harmonic of the other.
+pub(super) fn are_separate_lines(a: u32, b: u32, spacing: u32) -> bool {
     a.abs_diff(b) >= spacing.max(1) && !a.is_multiple_of(b) && !b.is_multiple_of(a)
 }
 
-/// Multiples within these bounds that are [`far_enough`] from each other, about evenly spread over the logarithm; fewer than asked for
-/// if there is no room.
+/// Returns multiples within these bounds, all separate ([`are_separate_lines`]) and approximately evenly spaced over
+/// the logarithm; fewer than `count` if there is not enough room.
 pub(super) fn multiples((least, largest): (u32, u32), count: usize, spacing: u32) -> Vec<u32> {
     let mut taken: Vec<u32> = Vec::new();
     let (low, high) = (f64::from(least).ln(), f64::from(largest).ln());
     for k in 0..count {
         let part = if count > 1 { k as f64 / (count - 1) as f64 } else { 0.0 };
         let wanted = (low + part * (high - low)).exp().round() as u32;
-        // The nearest free multiple; of two, the larger.
+        // Takes the nearest free multiple; of two equally near ones, the larger.
         let near = (0..=largest)
             .flat_map(|d| [wanted.checked_add(d), wanted.checked_sub(d)])
             .flatten();
         let mut near = near.filter(|m| (least..=largest).contains(m));
-        if let Some(m) = near.find(|m| taken.iter().all(|t| far_enough(*t, *m, spacing))) {
+        if let Some(m) = near.find(|m| taken.iter().all(|t| are_separate_lines(*t, *m, spacing))) {
             taken.push(m);
         }
     }
@@ -40,7 +40,7 @@ pub(super) fn multiples((least, largest): (u32, u32), count: usize, spacing: u32
     taken
 }
 
-/// Samples of one period of each line, sixteen per period of the fastest.
+/// Returns the cosine and sine of each line over one period T, with 16 samples per period of the fastest line.
 fn samples(lines: &[Sinusoid], period_s: f64) -> Vec<Vec<(f64, f64)>> {
     let fastest = lines.iter().map(|l| l.omega_rad_s).fold(0.0, f64::max);
     let n = ((16.0 * fastest * period_s / TAU).ceil() as usize).clamp(64, 8192);
@@ -53,7 +53,7 @@ fn samples(lines: &[Sinusoid], period_s: f64) -> Vec<Vec<(f64, f64)>> {
     lines.iter().map(of).collect()
 }
 
-/// Ratio of peak to rms of a sum of sines over its period.
+/// Returns the ratio of peak to rms of a sum of sines over its period.
 pub fn crest_factor(lines: &[Sinusoid], period_s: f64) -> f64 {
     let table = samples(lines, period_s);
     peak(&sum(&table, lines)) / rms(lines)
@@ -67,7 +67,7 @@ fn peak(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |most, v| most.max(v.abs()))
 }
 
-/// `A sin(omega t + phi) = sin phi A cos(omega t) + cos phi A sin(omega t)`.
+/// Computes the sum of the lines by `A sin(omega t + phi) = sin phi A cos(omega t) + cos phi A sin(omega t)`.
 fn sum(table: &[Vec<(f64, f64)>], lines: &[Sinusoid]) -> Vec<f64> {
     let mut values = vec![0.0; table.first().map_or(0, Vec::len)];
     for (of, line) in table.iter().zip(lines) {
@@ -79,27 +79,27 @@ fn sum(table: &[Vec<(f64, f64)>], lines: &[Sinusoid]) -> Vec<f64> {
     values
 }
 
-/// Steps of the phases, in turns.
+/// Steps by which phases are changed, in turns.
 const STEPS: [f64; 6] = [1.0 / 8.0, 1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0, 1.0 / 128.0, 1.0 / 256.0];
 /// Largest number of rounds per step.
 const ROUNDS: usize = 12;
-/// Number of starts.
+/// Number of starts of the search for phases.
 const STARTS: usize = 24;
 
-/// Sets the phases of the lines for a low crest factor; another seed has other starts.
+/// Sets the phases of the lines for a low crest factor. Different seeds use different starts.
 pub(super) fn set_phases(lines: &mut [Sinusoid], period_s: f64, seed: u64) {
     let power: f64 = lines.iter().map(|l| l.amplitude_deg.powi(2)).sum();
     let relative: Vec<f64> = lines.iter().map(|l| l.amplitude_deg.powi(2) / power).collect();
     let table = samples(lines, period_s);
     let mut best = f64::INFINITY;
     let mut trial = lines.to_vec();
-    // Beyond a million seeds the starts repeat: larger products would lose the fraction.
+    // The seed is limited to a million, because larger products would lose their fractional part.
     let first = (seed % 1_000_000) as usize * STARTS;
     for start in first..first + STARTS {
         for k in 0..trial.len() {
             let turns = match start {
                 0 => -(0..k).map(|j| (k - j) as f64 * relative[j]).sum::<f64>(),
-                // Multiples of irrational numbers do not repeat.
+                // The fractional parts of the multiples of an irrational number do not repeat.
                 _ => ((start * (k + 1)) as f64 * 0.618_033_988_75) + ((k * k) as f64 * 0.414_213_562_37 * start as f64),
             };
             trial[k].phase_rad = (TAU * turns).rem_euclid(TAU);

@@ -1,16 +1,16 @@
-//! Expected results of an experiment before it is carried out.
+//! Expected results of an experiment, computed before it is carried out.
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`DesignRequest`] | from the question to the answer, an [`ExperimentDesign`] with its JSON and its files (`files`) |
-//! | [`People`] | for whom: the population (`adapted`), a person, a group (`group_people`) |
-//! | [`Task`], [`Forcing`] | person, element and remnant; the lines, and where they enter |
-//! | [`expected`](fn@expected) | standard errors of a person from the information of the lines (`information`), of both responses to error and target (`joint`, `seen`) |
-//! | [`Designing`] | most informative amplitudes and frequencies of the lines (`search`), under limits |
-//! | [`crest_factor`] | lines without common harmonics (`lines`), and their phases |
+//! | [`DesignRequest`] | a question about an experiment, and its answer, an [`ExperimentDesign`] with its JSON and its files (`files`) |
+//! | [`People`] | people for whom the experiment is designed: the population (`adapted`), one person, or a group (`group_people`) |
+//! | [`Task`], [`Forcing`] | person, controlled element and remnant; lines with their points of entry |
+//! | [`expected`](fn@expected) | standard errors from the information of the lines (`information`), for the responses to error and target (`joint`, `feedforward`) |
+//! | [`Designing`] | most informative amplitudes and frequencies of the lines within limits (`search`) |
+//! | [`crest_factor`] | lines without common harmonics, and their phases (`lines`) |
 //! | [`Against`] | another forcing function for comparison |
-//! | [`DifferenceRequest`] | people and runs to find a difference between conditions, by the [`power`](fn@power) of the test and the spread [`Between`] people |
-//! | [`Wanted`] | requested quantities, and the number of runs that they need |
+//! | [`DifferenceRequest`] | number of people and runs needed to find a difference between conditions, from the [`power`](fn@power) of the test and the spread [`Between`] people |
+//! | [`RequestedQuantity`] | requested quantities, and the number of runs needed for their accepted errors |
 
 mod adapted;
 mod against;
@@ -31,7 +31,7 @@ mod power;
 mod request;
 mod response;
 mod search;
-mod seen;
+mod feedforward;
 mod task;
 mod wanted;
 
@@ -40,7 +40,7 @@ pub use answer::{ExperimentDesign, NamedExpected};
 pub use between::Between;
 pub use designing::{Designed, Designing};
 pub use difference::{
-    ALPHA, BETWEEN_PEOPLE, DifferencePlan, DifferenceRequest, POWER, RUN_TO_RUN, RunsAndPeople, Sought,
+    ALPHA, BETWEEN_PEOPLE, DifferencePlan, DifferenceRequest, POWER, RUN_TO_RUN, RunsAndPeople, TargetDifference,
 };
 pub use error::DesignError;
 pub use expected::{Expected, ExpectedParameter};
@@ -51,4 +51,4 @@ pub use power::{noncentral_t_cdf, people_needed, power};
 pub use request::DesignRequest;
 pub use response::{DesignedLine, ExpectedResponse};
 pub use task::{Enters, Forcing, Remnant, Task};
-pub use wanted::{Wanted, periods};
+pub use wanted::{RequestedQuantity, periods};

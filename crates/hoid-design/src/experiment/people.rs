@@ -2,8 +2,8 @@
 //!
 //! | source | typical person | others |
 //! |---|---|---|
-//! | `population` | of the crossover model (`adapted`) | one spread to each side of each parameter of the prior |
-//! | scenario, fit (with its response to a target) | that one | none |
+//! | `population` | person predicted by the crossover model (`adapted`) | for each parameter of the prior, two people one spread above and below its median |
+//! | scenario, fit (including the response to a target) | the person of the file | none |
 //! | result of a group, `population.json` | medians over people (`group_people`) | each person |
 
 use std::{
@@ -25,10 +25,11 @@ use super::{
 /// The people for whom an experiment is designed.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum People {
-    /// People in general, as they adapt to the controlled element.
+    /// Typical people, adapted to the controlled element.
     #[default]
     Population,
-    /// A scenario (`.toml`), a fit, the population or the result of a group (`.json`), or the directory of a group.
+    /// A file or directory: a scenario (`.toml`), a fit, a population or the result of a group (`.json`), or the
+    /// directory of a group.
     File(PathBuf),
 }
 
@@ -36,7 +37,7 @@ pub enum People {
 const POPULATION: &str = "population";
 
 impl People {
-    /// Parses the text of a request.
+    /// Parses the name `population` or a path.
     pub fn of_text(text: &str) -> Self {
         match text {
             POPULATION => Self::Population,
@@ -63,7 +64,7 @@ impl std::fmt::Display for People {
 }
 
 impl People {
-    /// Returns the file, if there is one.
+    /// Returns the path of the file or directory; `None` for the population.
     pub fn path(&self) -> Option<&Path> {
         match self {
             Self::Population => None,

@@ -1,17 +1,17 @@
-//! Power of the t test, exactly, by the noncentral t distribution.
+//! Exact power of the t test, from the noncentral t distribution.
 //!
-//! Of n people the mean difference divided by its standard error has the noncentral t distribution with n - 1 degrees of
-//! freedom and `delta = D sqrt(n)/sigma`, D the true difference and sigma the standard deviation of a person's
-//! difference. The two-sided test detects it with the probability
+//! For n people, the mean difference divided by its standard error has the noncentral t distribution with n - 1 degrees
+//! of freedom and `delta = D sqrt(n)/sigma`, where D is the true difference and sigma the standard deviation of the
+//! difference of one person. The two-sided test detects D with the probability
 //!
-//! `1 - F(t_c; n - 1, delta) + F(-t_c; n - 1, delta)`, `t_c` the quantile of Student's t at `1 - alpha/2`.
+//! `1 - F(t_c; n - 1, delta) + F(-t_c; n - 1, delta)`, where `t_c` is the quantile of Student's t at `1 - alpha/2`.
 //!
-//! For t of zero or more (R. V. Lenth, *Applied Statistics* 38 (1989) 185-189, algorithm AS 243), with
-//! `x = t^2/(t^2 + nu)` and the regularised incomplete beta function I,
+//! For `t >= 0` (R. V. Lenth, *Applied Statistics* 38 (1989) 185-189, algorithm AS 243), with `x = t^2/(t^2 + nu)` and
+//! the regularised incomplete beta function I,
 //!
 //! `F = Phi(-delta) + 1/2 sum_j [p_j I_x(j + 1/2, nu/2) + q_j I_x(j + 1, nu/2)]`,
 //!
-//! `p_j = e^-l l^j/j!`, `q_j = delta e^-l l^j/(sqrt(2) Gamma(j + 3/2))`, `l = delta^2/2`; otherwise
+//! `p_j = e^-l l^j/j!`, `q_j = delta e^-l l^j/(sqrt(2) Gamma(j + 3/2))`, `l = delta^2/2`; for negative t,
 //! `F(t; delta) = 1 - F(-t; -delta)`.
 
 use statrs::{
@@ -19,10 +19,10 @@ use statrs::{
     function::{beta::beta_reg, gamma::ln_gamma},
 };
 
-/// Largest noncentrality that is computed; with more, the test finds every difference.
+/// Largest excess of delta over the critical value for which the power is computed; beyond it, the power is one.
 const LARGEST_DELTA: f64 = 60.0;
 
-/// Distribution function of the noncentral t distribution.
+/// Returns the distribution function of the noncentral t distribution.
 pub fn noncentral_t_cdf(t: f64, degrees: f64, delta: f64) -> f64 {
     if t < 0.0 {
         return 1.0 - noncentral_t_cdf(-t, degrees, -delta);
@@ -33,7 +33,7 @@ pub fn noncentral_t_cdf(t: f64, degrees: f64, delta: f64) -> f64 {
     }
     let x = t * t / (t * t + degrees);
     let half = 0.5 * delta * delta;
-    // The terms are those of a Poisson distribution around its mean.
+    // The terms are those of a Poisson distribution, and only those near its mean are summed.
     let reach = 12.0 * half.sqrt() + 40.0;
     let (from, to) = ((half - reach).max(0.0) as usize, (half + reach) as usize);
     let term = |j: usize| {
@@ -48,8 +48,8 @@ pub fn noncentral_t_cdf(t: f64, degrees: f64, delta: f64) -> f64 {
     (base + 0.5 * sum).clamp(0.0, 1.0)
 }
 
-/// Probability that the two-sided paired t test detects a difference; `effect` is the difference divided by the
-/// standard deviation of a person's difference. `None` for fewer than two people.
+/// Returns the probability that the two-sided paired t test detects a difference; `effect` is the difference divided by
+/// the standard deviation of the difference of one person. `None` for fewer than two people.
 pub fn power(effect: f64, people: usize, alpha: f64) -> Option<f64> {
     let degrees = people.checked_sub(1).filter(|d| *d > 0)? as f64;
     let critical = StudentsT::new(0.0, 1.0, degrees).ok()?.inverse_cdf(1.0 - 0.5 * alpha);
@@ -60,16 +60,16 @@ pub fn power(effect: f64, people: usize, alpha: f64) -> Option<f64> {
     Some(1.0 - noncentral_t_cdf(critical, degrees, delta) + noncentral_t_cdf(-critical, degrees, delta))
 }
 
-/// Largest number of people that is searched.
+/// Largest number of people considered.
 pub const MOST_PEOPLE: usize = 1000;
 
-/// Least number of people with this power; `None` above a thousand.
+/// Returns the smallest number of people with at least this power; `None` if it exceeds a thousand.
 pub fn people_needed(effect: f64, wanted: f64, alpha: f64) -> Option<usize> {
     let suffices = |people: usize| power(effect, people, alpha).is_some_and(|found| found >= wanted);
     if !suffices(MOST_PEOPLE) {
         return None;
     }
-    // The power grows with the number of people.
+    // The power increases with the number of people, so the number is found by bisection.
     let (mut few, mut enough) = (1, MOST_PEOPLE);
     while enough - few > 1 {
         let middle = few.midpoint(enough);
@@ -87,12 +87,12 @@ mod tests {
     use super::*;
 
     /// Of scipy and statsmodels; `make.py` next to the file made it.
-    const TWIN: &str = include_str!("../../../../fixtures/power/power.csv");
+    const REFERENCE_TABLE: &str = include_str!("../../../../fixtures/power/power.csv");
 
     #[test]
     fn twin_of_scipy_and_statsmodels() {
         let mut worst = [0.0_f64; 2];
-        for row in TWIN.lines().skip(1) {
+        for row in REFERENCE_TABLE.lines().skip(1) {
             let (kind, numbers) = row.split_once(',').unwrap();
             let numbers: Vec<f64> = numbers.split(',').map(|n| n.parse().unwrap()).collect();
             let [a, b, c, expected] = numbers[..] else {

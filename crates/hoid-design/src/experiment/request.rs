@@ -1,4 +1,4 @@
-//! From the question to the designed experiment.
+//! Request for the design of an experiment, and its execution.
 
 use hoid_analysis::Setting;
 use hoid_model::{
@@ -8,37 +8,37 @@ use hoid_model::{
 
 use super::{
     Against, BETWEEN_PEOPLE, Between, DesignError, DesignedLine, Designing, DifferenceRequest, Enters, Expected,
-    ExperimentDesign, Forcing, NamedExpected, People, Remnant, Task, Wanted,
+    ExperimentDesign, Forcing, NamedExpected, People, Remnant, Task, RequestedQuantity,
     chosen::{Chosen, Given, NamedState, left_out},
     expected,
     information::Loop,
-    periods, seen,
+    periods, feedforward,
 };
 
-/// A question about an experiment.
+/// Request for the design of an experiment.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DesignRequest {
-    /// The people.
+    /// People for whom the experiment is designed.
     pub people: People,
-    /// The condition of a group, if there are several.
+    /// Name of the condition, for a group with several conditions.
     pub condition: Option<String>,
-    /// The controlled element; that of the people if `None`.
+    /// Controlled element; if `None`, the element named by the source of the people.
     pub controlled_element: Option<ContinuousTransferFunction>,
-    /// Form of the population; the one that people use with the element if `None`.
+    /// Form of the operators of the population; if `None`, the form that people typically adopt with the element.
     pub form: Option<Form>,
-    /// Point at which the forcing function enters; a target on a display that shows it comes with a disturbance.
+    /// Point at which the forcing function enters. If the display shows the target, a disturbance is added.
     pub enters: Enters,
     /// Display of the task.
     pub display: Display,
-    /// The remnant.
+    /// Remnant of the people.
     pub remnant: Remnant,
-    /// The forcing function.
+    /// Options of the forcing function.
     pub designing: Designing,
-    /// Number of runs; the number that the requested quantities need if `None`.
+    /// Number of runs; if `None`, the number needed for the accepted errors of the requested quantities.
     pub runs: Option<usize>,
-    /// A forcing function to be compared with the design.
+    /// Forcing function with which the designed one is compared.
     pub against: Option<Against>,
-    /// A difference between two conditions to be found.
+    /// Difference between two conditions that the experiment should find.
     pub difference: Option<DifferenceRequest>,
 }
 
@@ -46,7 +46,8 @@ impl DesignRequest {
     /// Designs the experiment.
     ///
     /// # Errors
-    /// [`DesignError`] for people who cannot be read, an unknown element, and as [`Designing::run`].
+    /// [`DesignError`] if the people cannot be read or the controlled element is not known, and as for
+    /// [`Designing::run`].
     pub fn run(&self) -> Result<ExperimentDesign, DesignError> {
         let given = Given {
             controlled_element: self.controlled_element.as_ref(),
@@ -75,7 +76,7 @@ impl DesignRequest {
         let all = Loop::of(&task)?;
         let lines = all.designed_lines(&designed.forcing, self.designing.period_s, runs)?;
         let [response, response_to_target] = all.responses(&designed.forcing, length_s)?;
-        findings.extend(drowned(&lines, task.feedforward.is_some()));
+        findings.extend(lines_below_remnant(&lines, task.feedforward.is_some()));
         let people = self.people((&others, feedforward), &designed.forcing, runs, &mut findings);
         let against = self.against.as_ref();
         let against = against.map(|other| self.compared(other, &task, runs)).transpose()?;
@@ -106,7 +107,7 @@ impl DesignRequest {
         })
     }
 
-    /// Points at which the forcing functions enter.
+    /// Returns the points at which forcing functions enter.
     fn points(&self) -> &'static [Enters] {
         match (self.enters, self.display) {
             (Enters::Target, Display::Compensatory) => &[Enters::Target],
@@ -115,12 +116,12 @@ impl DesignRequest {
         }
     }
 
-    /// The task of a person, with their response to a target that is seen: the given one, or the typical one.
+    /// Returns the task of a person, including, for a displayed target, the given or the typical response to it.
     fn task(&self, person: &NamedState, given: Option<&Feedforward>) -> Result<Task, DesignError> {
         let feedforward = match (self.points().len(), given) {
             (1, _) => None,
             (_, Some(given)) => Some(given.clone()),
-            (_, None) => Some(seen::typical(&person.state, self.display)?),
+            (_, None) => Some(feedforward::typical(&person.state, self.display)?),
         };
         Ok(Task {
             state: person.state.clone(),
@@ -129,7 +130,8 @@ impl DesignRequest {
         })
     }
 
-    /// The errors of the other people; those without a loop are reported.
+    /// Returns the expected errors for the other people. A person whose errors cannot be computed is reported in
+    /// `findings`.
     fn people(
         &self,
         (others, feedforward): (&[NamedState], Option<&Feedforward>),
@@ -232,24 +234,27 @@ impl DesignRequest {
     }
 }
 
-/// The finding of lines at which the remnant in e is not small; the target itself has no remnant.
-fn drowned(lines: &[DesignedLine], is_seen: bool) -> Option<Finding> {
+/// Returns a finding about lines at which the remnant in e is not small. A displayed target contains no remnant, so its
+/// lines are not checked.
+fn lines_below_remnant(lines: &[DesignedLine], is_seen: bool) -> Option<Finding> {
     let of_error = lines.iter().filter(|l| !(is_seen && l.enters == Enters::Target));
-    let weak = of_error.filter(|l| l.to_remnant < LEAST_TO_REMNANT);
+    let weak = of_error.filter(|l| l.to_remnant < MIN_LINE_TO_REMNANT);
     let weak: Vec<String> = weak.map(|l| format!("{:.2}", l.line.omega_rad_s)).collect();
     let message = format!(
-        "in one run the power of the lines at {} rad/s is less than {LEAST_TO_REMNANT} times that of the remnant in e, \
+        "in one run the power of the lines at {} rad/s is less than {MIN_LINE_TO_REMNANT} times that of the remnant in e, \
          so that the errors predicted there are too small: use fewer lines or longer runs",
         weak.join(", ")
     );
     (!weak.is_empty()).then(|| Finding::note("lines-drown", message))
 }
 
-/// Ratio of powers below which the estimate at a line is biased towards `-1/P`, by a tenth.
-const LEAST_TO_REMNANT: f64 = 10.0;
+/// Ratio of the power of a line to that of the remnant below which the estimate is biased towards `-1/P` by more than a
+/// tenth.
+const MIN_LINE_TO_REMNANT: f64 = 10.0;
 
-/// The person with the greatest errors, relative to the accepted ones; without these, relative to the parameters.
-fn worst<'a>(people: &'a [NamedExpected], wanted: &[Wanted]) -> Option<&'a NamedExpected> {
+/// Returns the person with the largest errors relative to the accepted errors; if none are given, relative to the
+/// parameters.
+fn worst<'a>(people: &'a [NamedExpected], wanted: &[RequestedQuantity]) -> Option<&'a NamedExpected> {
     let of = |person: &NamedExpected| -> f64 {
         let e = &person.expected;
         if wanted.is_empty() {

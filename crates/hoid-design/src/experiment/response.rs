@@ -1,16 +1,16 @@
-//! Expected errors of the response of the person: at the lines, and of the operator between them.
+//! Expected errors of the frequency response of a person: at the lines, and of the fitted operator between them.
 //!
-//! At a line the response is the ratio of the Fourier coefficients of u and e, `var H^ = 4 S_n/(T a^2)`, a the amplitude of e (`information`),
-//! half of it along the response and half across: gain and phase have the relative error
-//! `sqrt(2 S_n/(T a^2))/|H|` each, times 8.7 dB and 57 deg. The operator has
-//! fewer parameters than lines have numbers: its error, `dH/H = sum dH/dtheta_k dtheta_k/H` with the inverse of the
-//! information, is smaller.
+//! At a line the response is the ratio of the Fourier coefficients of u and e, with `var H^ = 4 S_n/(T a^2)`, where a
+//! is the amplitude of e (`information`). Half of this variance is along the response and half across it, so gain and
+//! phase each have the relative error `sqrt(2 S_n/(T a^2))/|H|`, times 8.7 dB and 57 deg. The operator has fewer
+//! parameters than the lines give numbers; its error, `dH/H = sum dH/dtheta_k dtheta_k/H` with the inverse of the
+//! information, is therefore smaller.
 //!
-//! In e the line exceeds the power of the remnant by the factor `T a^2/(4 S_n |P S|^2)`.
+//! In e, the power of a line exceeds that of the remnant by the factor `T a^2/(4 S_n |P S|^2)`.
 //!
-//! A line of a target X that is seen determines the response F to it by `F = (U - B E)/X`, with B from all lines:
-//! `dF/F = N/(F X) - (E B)/(X F) dB/B`, two independent parts, since the remnant at this line is independent of that at
-//! the others.
+//! A line of a displayed target X determines the response to the target by `F = (U - B E)/X`, with B from all lines:
+//! `dF/F = N/(F X) - (E B)/(X F) dB/B`. The two terms are independent, since the remnant at this line is independent of
+//! the remnant at the other lines.
 
 use hoid_model::{Complex64, FamilyOperator, forcing::Sinusoid, uncertainty::Estimate};
 use serde::{Deserialize, Serialize};
@@ -20,7 +20,7 @@ use super::{
     information::{Loop, ahead},
 };
 
-/// Response of a person at a frequency with its expected errors.
+/// Response of a person at one frequency, with its expected errors.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ExpectedResponse {
     /// The frequency, rad/s.
@@ -34,28 +34,28 @@ pub struct ExpectedResponse {
 /// A line of the designed forcing function.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DesignedLine {
-    /// Point at which it enters.
+    /// Point at which the line enters the loop.
     pub enters: Enters,
-    /// Amplitude, frequency and phase.
+    /// Amplitude, frequency and phase of the line.
     pub line: Sinusoid,
-    /// The response that it determines, with the errors of this line alone: the response to the error or, for a line of
-    /// a displayed target, the response to the target.
+    /// The response that the line determines, with the errors from this line alone: the response to the error or, for a
+    /// line of a displayed target, the response to the target.
     pub response: ExpectedResponse,
-    /// Power divided by that of the remnant at this frequency, in one run: the power in e or, for a line of a displayed
-    /// target, that of the response to the target in u.
+    /// Ratio of the power of the line to the power of the remnant at this frequency, in one run. The power of the line
+    /// is measured in e or, for a line of a displayed target, in the part of u that responds to the target.
     pub to_remnant: f64,
 }
 
-/// Number of frequencies of a response between lines.
+/// Number of frequencies at which the response of the operator is evaluated.
 const POINTS: usize = 120;
-/// Decibels of a natural logarithm of a gain.
+/// Factor from the natural logarithm of a gain to dB.
 const DB: f64 = 20.0 / std::f64::consts::LN_10;
 
 impl Loop<'_> {
-    /// The lines with the errors of `runs` runs of a length in s.
+    /// Returns the lines with the expected errors from `runs` runs of length `period_s`.
     ///
     /// # Errors
-    /// [`DesignError::NotIdentifiable`].
+    /// [`DesignError::NotIdentifiable`] if the lines do not determine the parameters.
     pub fn designed_lines(
         &self,
         forcing: &Forcing,
@@ -109,11 +109,11 @@ impl Loop<'_> {
         seen.map_or(0.0, |seen| seen.operator.tau_e_s() - seen.preview_s)
     }
 
-    /// The responses to the error and to a target that is seen between the lines, with the errors of their parameters
-    /// over `length_s`.
+    /// Returns the responses of the operator to the error and to a displayed target over the band of the lines, with
+    /// the errors that result from those of the parameters after `length_s`.
     ///
     /// # Errors
-    /// [`DesignError::NotIdentifiable`].
+    /// [`DesignError::NotIdentifiable`] if the lines do not determine the parameters.
     pub fn responses(&self, forcing: &Forcing, length_s: f64) -> Result<[Vec<ExpectedResponse>; 2], DesignError> {
         let covariance = self.covariance(forcing, length_s)?;
         let of_line = |(_, line): &(Enters, Sinusoid)| line.omega_rad_s;
@@ -139,7 +139,7 @@ impl Loop<'_> {
     }
 }
 
-/// Variances of the real and imaginary part of `c z`, from the covariance of those of z.
+/// Returns the variances of the real and imaginary parts of `c z`, from the covariance of the parts of z.
 fn turned(covariance: [[f64; 2]; 2], c: Complex64) -> [f64; 2] {
     let [[aa, ab], [_, bb]] = covariance;
     let along = |x: f64, y: f64| x * x * aa + 2.0 * x * y * ab + y * y * bb;
@@ -158,7 +158,7 @@ fn expected(omega_rad_s: f64, value: Complex64, [gain, phase]: [f64; 2]) -> Expe
     }
 }
 
-/// A model with a frequency response.
+/// A value that contains a frequency response.
 trait HasResponse {
     fn response(&mut self) -> &mut ExpectedResponse;
 }
@@ -175,7 +175,8 @@ impl HasResponse for DesignedLine {
     }
 }
 
-/// Phases without jumps: without that of the delay, a phase of people stays within half a turn.
+/// Removes jumps of whole turns from the phases: apart from the phase of the delay, the phase of a person stays within
+/// half a turn.
 fn unwrapped<T: HasResponse>(mut all: Vec<T>, delay_s: f64) -> Vec<T> {
     for one in &mut all {
         let response = one.response();

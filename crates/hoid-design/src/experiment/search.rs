@@ -1,21 +1,22 @@
-//! Search for the frequencies and amplitudes of the lines: the shares q of the lines in the response of u that minimise
-//! `J = sum over wanted g' I^-1 g/s^2`, `I = sum q_k M_k` (`designing`).
+//! Search for the frequencies and amplitudes of the lines. It minimises `J = sum over wanted g' I^-1 g/s^2`,
+//! `I = sum q_k M_k`, over the shares q of the lines in the response of u (`designing`).
 //!
-//! - **Amplitudes.** J is convex in q. From equal shares, `q_k <- q_k sqrt(d_k/sum q d)`,
-//!   `d_k = sum g' I^-1 M_k I^-1 g/s^2`, decreases J in every step (D. M. Titterington, *Applied Statistics* 27 (1978)
-//!   227-234; Y. Yu, *Ann. Stat.* 38 (2010) 1593-1606). Each line keeps at least a fraction of an equal share, for
-//!   people who differ from the assumed operator.
-//! - **Frequencies.** Each line in turn is moved to multiples near it and keeps the one with the smallest J (V. V.
-//!   Fedorov, *Theory of Optimal Experiments*, 1972), on condition that no line is a harmonic of another.
-//! - **Two forcing functions.** A person who sees the target responds to the target and to the error: lines of a target
-//!   and of a disturbance, alternating in frequency, separate the two responses (`joint`). Their shares are searched
-//!   together, and the limits hold for each.
+//! - **Amplitudes.** J is convex in q. Starting from equal shares, `q_k <- q_k sqrt(d_k/sum q d)` with
+//!   `d_k = sum g' I^-1 M_k I^-1 g/s^2` decreases J in every step (D. M. Titterington, *Applied Statistics* 27 (1978)
+//!   227-234; Y. Yu, *Ann. Stat.* 38 (2010) 1593-1606). Each line keeps at least a fraction of an equal share, since
+//!   people may differ from the assumed operator.
+//! - **Frequencies.** Each line in turn is moved to nearby multiples, and the multiple with the smallest J is kept (V.
+//!   V. Fedorov, *Theory of Optimal Experiments*, 1972), provided that no line is a harmonic of another.
+//! - **Two forcing functions.** If the target is displayed, a person responds to both the target and the error. Lines
+//!   of a target and of a disturbance, alternating in frequency, separate the two responses (`joint`). Their shares are
+//!   searched together, and the limits apply to each forcing function.
 //! - **Limits.** If a target has much power above the crossover frequency, people lower their crossover frequency (D.
-//!   T. McRuer and H. R. Jex, *IEEE Trans. Human Factors in Electronics* 8 (1967) 231-249): the lines above it
-//!   therefore form a shelf, with amplitudes of up to a given fraction of the geometric mean of the amplitudes below
-//!   it. Lines below are between half and twice that mean. The size is then the largest that satisfies the limits of
-//!   the rms of e and u. Lines have a minimum distance (`spacing`): if a person varies over a run, part of the power is
-//!   near a line instead of at it, and the remnant at a line is estimated from the neighbouring bins.
+//!   T. McRuer and H. R. Jex, *IEEE Trans. Human Factors in Electronics* 8 (1967) 231-249). The lines above it
+//!   therefore form a shelf: their amplitudes are at most a given fraction of the geometric mean of the amplitudes
+//!   below it. The amplitudes below it are between half and twice that mean. The overall amplitude is then the largest
+//!   within the limits on the rms of e and u. Lines have a minimum distance (`spacing`) for two reasons: if a person
+//!   varies during a run, part of the power moves from a line to nearby frequencies, and the remnant at a line is
+//!   estimated from the neighbouring bins.
 
 use std::f64::consts::TAU;
 
@@ -28,20 +29,21 @@ use super::{
     information::{Loop, inverse},
 };
 
-/// Largest ratio of the amplitude of a line below the crossover to their geometric mean; its inverse is the smallest.
+/// Largest ratio of an amplitude below the crossover frequency to the geometric mean of these amplitudes; the inverse
+/// is the smallest ratio.
 const WITHIN: f64 = 2.0;
 /// Smallest fraction of an equal share that each line keeps.
 const LEAST_SHARE: f64 = 0.1;
-/// Steps of the iteration of the shares, and steps if a line is moved for a trial.
+/// Number of iterations for the shares: in general, and when a line is moved on trial.
 const STEPS: usize = 400;
 const STEPS_OF_TRIAL: usize = 60;
-/// Multiples by which a line is moved, and number of rounds.
+/// Numbers of multiples by which a line is moved on trial, and the number of rounds.
 const MOVES: [i32; 10] = [-16, -8, -4, -2, -1, 1, 2, 4, 8, 16];
 const ROUNDS: usize = 3;
-/// Least relative improvement for which a line is moved.
+/// Smallest relative improvement of J for which a line is moved.
 const WORTH: f64 = 1e-3;
 
-/// A line: its multiple of the fundamental, and its point of entry.
+/// A line, given by its multiple of the fundamental and its point of entry.
 pub(super) type Place = (u32, Enters);
 
 pub(super) struct Search<'a> {
@@ -60,7 +62,7 @@ impl Search<'_> {
         (enters, self.omega(multiple))
     }
 
-    /// Moves the lines one after the other as long as J decreases, to multiples that are admissible, and returns them with
+    /// Moves the lines one after the other to admissible multiples, as long as J decreases, and returns the lines with
     /// their shares.
     pub fn places(
         &self,
@@ -95,7 +97,7 @@ impl Search<'_> {
         Ok((places, found))
     }
 
-    /// Returns the best shares of lines at these frequencies, and J.
+    /// Returns the optimal shares of lines at these frequencies, and J.
     fn shares(&self, places: &[Place], steps: usize) -> Result<(Vec<f64>, f64), DesignError> {
         let by_share: Vec<DMatrix<f64>> = places
             .iter()
@@ -133,7 +135,7 @@ impl Search<'_> {
         Ok((shares, last))
     }
 
-    /// Limits the amplitudes of the lines of each forcing function, redistributes the rest, and normalises the sum to one.
+    /// Limits the amplitudes of the lines of each forcing function and normalises the sum of the shares to one.
     fn limit(&self, places: &[Place], shares: &mut [f64]) {
         for enters in [Enters::Target, Enters::Disturbance] {
             let mut lines: Vec<(f64, bool, &mut f64)> = (places.iter().zip(shares.iter_mut()))
@@ -162,7 +164,7 @@ impl Search<'_> {
         shares.iter_mut().for_each(|q| *q /= whole);
     }
 
-    /// Returns lines with these shares; the first forcing function has an rms of one.
+    /// Returns lines with these shares, scaled so that the first forcing function has an rms of one.
     pub fn lines(&self, places: &[Place], shares: &[f64]) -> Vec<(Enters, Sinusoid)> {
         let power = |(place, q): (&Place, &f64)| q / self.all.control_by_power(self.line(*place));
         let powers: Vec<f64> = places.iter().zip(shares).map(power).collect();

@@ -1,7 +1,7 @@
-//! The loop of an experiment, and what excites it.
+//! The loop of an experiment and the signals that excite it.
 //!
-//! `e = f - y`, `u = B e + F f + n`, `y = P (u + d)`: the target f and the disturbance d at the input of the controlled
-//! element P, a person who responds to the error (B) and, on a display that shows it, to the target (F), and the
+//! `e = f - y`, `u = B e + F f + n`, `y = P (u + d)`, with the target f, the disturbance d at the input of the
+//! controlled element P, a person who responds to the error (B) and, if it is displayed, to the target (F), and the
 //! remnant n.
 
 use hoid_model::{
@@ -11,16 +11,16 @@ use hoid_model::{
 };
 use serde::{Deserialize, Serialize};
 
-/// Time between samples of an experiment, s, if the length of a run is a whole number of them.
+/// Sample time of an experiment in s, if the length of a run is a multiple of it.
 pub(super) const SAMPLE_S: f64 = 0.01;
 
 /// Point at which a forcing function enters the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Enters {
-    /// As the target signal.
+    /// The forcing function is the target signal.
     #[default]
     Target,
-    /// At the input of the controlled element, to which it is added.
+    /// The forcing function is added to u at the input of the controlled element.
     Disturbance,
 }
 
@@ -32,16 +32,16 @@ hoid_model::named_choice!(Enters, "point of entry of the forcing function", 2, {
 /// The remnant of a person.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Remnant {
-    /// Its share of the variance of u.
+    /// Share of the variance of u due to the remnant.
     pub share: f64,
     /// Time constant T_n in s; zero for white noise.
     pub time_constant_s: f64,
-    /// Order m.
+    /// Order m of the lag.
     pub order: i32,
 }
 
 impl Default for Remnant {
-    /// A fifth of the variance of u, of first order with a time constant of .06 s.
+    /// Returns a remnant with a fifth of the variance of u, of first order with a time constant of .06 s.
     fn default() -> Self {
         Self {
             share: 0.2,
@@ -56,14 +56,14 @@ impl Default for Remnant {
 pub struct Task {
     /// The person and the controlled element.
     pub state: FamilyState,
-    /// The response to a target that is shown; `None` for a display of the error only.
+    /// Response to a displayed target; `None` if the display shows only the error.
     #[serde(default, with = "written")]
     pub feedforward: Option<Feedforward>,
     /// Remnant of the person.
     pub remnant: Remnant,
 }
 
-/// A response to the target as operator and preview.
+/// Serialises a response to the target as operator and preview.
 mod written {
     use hoid_model::{FamilyOperator, family_scenario::Feedforward};
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -86,23 +86,23 @@ pub struct Forcing {
 }
 
 impl Forcing {
-    /// One forcing function.
+    /// Creates a single forcing function that enters at the given point.
     pub fn of(enters: Enters, function: &ForcingFunction) -> Self {
         let lines = function.sinusoids().iter().map(|line| (enters, *line)).collect();
         Self { lines }
     }
 
-    /// Both of them.
+    /// Creates a target and a disturbance.
     pub fn both(target: &ForcingFunction, disturbance: &ForcingFunction) -> Self {
         let mut all = Self::of(Enters::Target, target);
         all.lines.extend(Self::of(Enters::Disturbance, disturbance).lines);
         all
     }
 
-    /// Lines with their points of entry.
+    /// Creates the forcing functions from lines with their points of entry.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] as [`ForcingFunction::new`] for the lines of each point.
+    /// [`ModelError::OutOfRange`] as for [`ForcingFunction::new`], with the lines of each point.
     pub fn new(lines: Vec<(Enters, Sinusoid)>) -> Result<Self, ModelError> {
         let all = Self { lines };
         for enters in [Enters::Target, Enters::Disturbance] {
@@ -111,18 +111,18 @@ impl Forcing {
         Ok(all)
     }
 
-    /// The lines, each with its point of entry.
+    /// Returns all lines, each with its point of entry.
     pub fn lines(&self) -> &[(Enters, Sinusoid)] {
         &self.lines
     }
 
-    /// The lines that enter at a point.
+    /// Returns the lines that enter at a point.
     pub fn sinusoids(&self, enters: Enters) -> Vec<Sinusoid> {
         let here = self.lines.iter().filter(|(at, _)| *at == enters);
         here.map(|(_, line)| *line).collect()
     }
 
-    /// The forcing function of a point; without lines it is at rest.
+    /// Returns the forcing function that enters at a point; it is zero if no line enters there.
     ///
     /// # Errors
     /// As [`ForcingFunction::new`].

@@ -1,5 +1,6 @@
-//! Requested quantities with their accepted errors, and the number of runs that they need: errors of N runs are
-//! `1/sqrt(N)` of those of one, so that a quantity with the error s of one run and the accepted error a needs `(s/a)^2`.
+//! Requested quantities with their accepted errors, and the number of runs that they need. The errors of N runs are
+//! those of one run divided by `sqrt(N)`, so a quantity with the error s of one run and the accepted error a needs
+//! `(s/a)^2` runs.
 
 use std::str::FromStr;
 
@@ -7,16 +8,16 @@ use serde::{Deserialize, Serialize};
 
 use super::{DesignError, Expected};
 
-/// A quantity to be estimated, with its accepted error; as text `crossover=3%`, `tau_e=0.05`, `phase_margin=2`.
+/// A quantity to be estimated, with its accepted error. In text form: `crossover=3%`, `tau_e=0.05`, `phase_margin=2`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Wanted {
-    /// `crossover`, `phase_margin`, or a parameter.
+pub struct RequestedQuantity {
+    /// Name of the quantity: `crossover`, `phase_margin`, or a parameter.
     pub name: String,
-    /// The accepted standard error: in deg for the phase margin, relative to the value for all others.
+    /// Accepted standard error: in deg for the phase margin, relative to the value for other quantities.
     pub error: f64,
 }
 
-/// The name of a quantity, from one of its names.
+/// Returns the name of a quantity that may be given by a synonym.
 pub(super) fn known_name(name: &str) -> String {
     match name.trim() {
         "margin" => "phase_margin",
@@ -26,7 +27,7 @@ pub(super) fn known_name(name: &str) -> String {
     .to_owned()
 }
 
-/// `NAME=5%`, `NAME=0.05`: the name, and the number with its sign of percent.
+/// Parses `NAME=5%` or `NAME=0.05`; returns the name, the number, and whether it has a percent sign.
 pub(super) fn named_number(text: &str, what: &'static str) -> Result<(String, f64, bool), DesignError> {
     let unreadable = || DesignError::Unreadable {
         what,
@@ -42,7 +43,7 @@ pub(super) fn named_number(text: &str, what: &'static str) -> Result<(String, f6
     Ok((known_name(name), value, percent))
 }
 
-impl FromStr for Wanted {
+impl FromStr for RequestedQuantity {
     type Err = DesignError;
 
     fn from_str(text: &str) -> Result<Self, DesignError> {
@@ -54,8 +55,8 @@ impl FromStr for Wanted {
     }
 }
 
-/// Number of periods until each quantity has its accepted error.
-pub fn periods(of_one: &Expected, wanted: &[Wanted]) -> usize {
+/// Returns the number of periods needed for the accepted errors of all quantities.
+pub fn periods(of_one: &Expected, wanted: &[RequestedQuantity]) -> usize {
     let needed = wanted
         .iter()
         .filter_map(|w| Some((of_one.relative_error(&w.name)? / w.error).powi(2)));

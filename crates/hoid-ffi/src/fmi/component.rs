@@ -1,4 +1,4 @@
-//! Handles, statuses and messages that both interfaces share.
+//! Handles, status codes and messages shared by FMI 2.0 and FMI 3.0.
 
 use std::{
     ffi::{CStr, CString, c_char, c_int, c_void},
@@ -10,17 +10,17 @@ use std::{
 use super::{instance::Instance, values::Done};
 use crate::status::panic_message;
 
-/// Statuses, of both interfaces.
+/// Status codes that FMI 2.0 and FMI 3.0 have in common.
 pub(super) const OK: i32 = 0;
 pub(super) const ERROR: i32 = 3;
 pub(super) const FATAL: i32 = 4;
 
-/// `fmi2CallbackLogger`.
+/// Type `fmi2CallbackLogger`.
 pub type Fmi2Logger = unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, ...);
-/// `fmi3LogMessageCallback`.
+/// Type `fmi3LogMessageCallback`.
 pub type Fmi3Logger = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char);
 
-/// Pages that show the error.
+/// Logging callback of the importer.
 #[derive(Clone, Copy)]
 pub(super) enum Logger {
     Nobody,
@@ -37,16 +37,17 @@ pub(super) enum Logger {
 const CATEGORY: &CStr = c"logStatusError";
 
 impl Logger {
-    /// Prints a message.
+    /// Passes a message to the logging callback.
     ///
     /// # Safety
-    /// The function is supplied by the importer, and its environment is alive.
-    unsafe fn tell(self, name: &CString, status: i32, message: &str) {
+    /// The callback was supplied by the importer, and its environment still exists.
+    unsafe fn log(self, name: &CString, status: i32, message: &str) {
         let message = CString::new(message.replace('\0', " ")).unwrap_or_default();
         match self {
             Self::Nobody => {}
             Self::Two { function, environment } => {
-                // SAFETY: texts end with a zero and stay during the call; the format takes one of them.
+                // SAFETY: the strings are null-terminated and exist during the call; the format consumes exactly one of
+                // them.
                 unsafe {
                     function(
                         environment,
@@ -59,14 +60,14 @@ impl Logger {
                 }
             }
             Self::Three { function, environment } => {
-                // SAFETY: texts end with a zero and stay during the call.
+                // SAFETY: the strings are null-terminated and exist during the call.
                 unsafe { function(environment, status, CATEGORY.as_ptr(), message.as_ptr()) };
             }
         }
     }
 }
 
-/// An instance in the hands of an importer.
+/// Instance of a unit, as an importer holds it.
 pub struct Component {
     instance: Instance,
     name: CString,
@@ -74,11 +75,11 @@ pub struct Component {
     is_broken: bool,
 }
 
-/// Makes an instance; null if that fails.
+/// Creates an instance; returns null on failure.
 ///
 /// # Safety
-/// `logger` is supplied by the importer.
-pub(super) unsafe fn made(name: &str, logger: Logger, instance: impl FnOnce() -> Done<Instance>) -> *mut Component {
+/// `logger` was supplied by the importer.
+pub(super) unsafe fn create(name: &str, logger: Logger, instance: impl FnOnce() -> Done<Instance>) -> *mut Component {
     let name = CString::new(name.replace('\0', " ")).unwrap_or_default();
     let made = catch_unwind(AssertUnwindSafe(instance)).unwrap_or_else(|panic| Err(panic_message(&*panic)));
     match made {
@@ -89,8 +90,8 @@ pub(super) unsafe fn made(name: &str, logger: Logger, instance: impl FnOnce() ->
             is_broken: false,
         })),
         Err(message) => {
-            // SAFETY: by the contract of this function.
-            unsafe { logger.tell(&name, ERROR, &message) };
+            // SAFETY: guaranteed by the caller of this function.
+            unsafe { logger.log(&name, ERROR, &message) };
             std::ptr::null_mut()
         }
     }
@@ -99,24 +100,24 @@ pub(super) unsafe fn made(name: &str, logger: Logger, instance: impl FnOnce() ->
 /// Frees an instance.
 ///
 /// # Safety
-/// `component` is null or was made here and not freed.
+/// `component` is null, or came from [`create`] and has not been freed.
 pub(super) unsafe fn free(component: *mut Component) {
     if component.is_null() {
         return;
     }
-    // SAFETY: it came from `made`, by the contract for the only time.
+    // SAFETY: the pointer came from `create`; the caller guarantees that it is freed only once.
     drop(unsafe { Box::from_raw(component) });
 }
 
-/// Works on an instance: its status; what went wrong is reported.
+/// Calls a function with an instance and returns the status; the message of an error is passed to the logger.
 ///
 /// # Safety
-/// `component` is null or was made here, and no other thread uses it.
-pub(super) unsafe fn with(component: *mut Component, call: impl FnOnce(&mut Instance) -> Done) -> i32 {
+/// `component` is null or came from [`create`], and no other thread uses it.
+pub(super) unsafe fn with_instance(component: *mut Component, call: impl FnOnce(&mut Instance) -> Done) -> i32 {
     if component.is_null() || !component.is_aligned() {
         return ERROR;
     }
-    // SAFETY: not null, aligned; by the contract it is ours alone.
+    // SAFETY: the pointer is not null and is aligned; the caller guarantees exclusive access.
     let component = unsafe { &mut *component };
     if component.is_broken {
         return FATAL;
@@ -130,15 +131,15 @@ pub(super) unsafe fn with(component: *mut Component, call: impl FnOnce(&mut Inst
             (FATAL, panic_message(&*panic))
         }
     };
-    // SAFETY: the logger is supplied by the importer.
-    unsafe { component.logger.tell(&component.name, status, &message) };
+    // SAFETY: the logger was supplied by the importer.
+    unsafe { component.logger.log(&component.name, status, &message) };
     status
 }
 
-/// A list from the importer; empty for no elements, regardless of the pointer.
+/// Returns an array passed by the importer; with a count of zero it is empty, regardless of the pointer.
 ///
 /// # Safety
-/// `pointer` has `count` elements that stay during the call.
+/// `pointer` points to `count` elements that do not change during the call.
 pub(super) unsafe fn list<'a, T>(pointer: *const T, count: usize) -> Done<&'a [T]> {
     if count == 0 {
         return Ok(&[]);
@@ -146,14 +147,14 @@ pub(super) unsafe fn list<'a, T>(pointer: *const T, count: usize) -> Done<&'a [T
     if pointer.is_null() || !pointer.is_aligned() {
         return Err("a list is null or not aligned".to_owned());
     }
-    // SAFETY: not null, aligned; that there are this many is the contract.
+    // SAFETY: the pointer is not null and is aligned; the caller guarantees `count` elements.
     Ok(unsafe { slice::from_raw_parts(pointer, count) })
 }
 
-/// A list supplied by the importer for output.
+/// Returns an output array supplied by the importer.
 ///
 /// # Safety
-/// `pointer` has room for `count` initialised elements that no other code uses during the call.
+/// `pointer` points to `count` initialised elements that no other code uses during the call.
 pub(super) unsafe fn list_mut<'a, T>(pointer: *mut T, count: usize) -> Done<&'a mut [T]> {
     if count == 0 {
         return Ok(&mut []);
@@ -161,21 +162,21 @@ pub(super) unsafe fn list_mut<'a, T>(pointer: *mut T, count: usize) -> Done<&'a 
     if pointer.is_null() || !pointer.is_aligned() {
         return Err("a list is null or not aligned".to_owned());
     }
-    // SAFETY: not null, aligned; that there is so much room is the contract.
+    // SAFETY: the pointer is not null and is aligned; the caller guarantees `count` elements.
     Ok(unsafe { slice::from_raw_parts_mut(pointer, count) })
 }
 
-/// A text from the importer; empty for null and for invalid UTF-8.
+/// Returns a string passed by the importer; empty for null and for invalid UTF-8.
 ///
 /// # Safety
-/// `pointer` is null or a text that ends with a zero and stays during the call.
-pub(super) unsafe fn words<'a>(pointer: *const c_char) -> &'a str {
-    // SAFETY: by the contract of this function.
+/// `pointer` is null or a null-terminated string that does not change during the call.
+pub(super) unsafe fn string<'a>(pointer: *const c_char) -> &'a str {
+    // SAFETY: guaranteed by the caller of this function.
     let text = unsafe { crate::boundary::text(pointer, "the text") };
     text.ok().flatten().unwrap_or_default()
 }
 
-/// The folder of a URI such as `file:///tmp/a%20b/resources`, or of a path; `None` for an empty one.
+/// Returns the folder given by a URI, such as `file:///tmp/a%20b/resources`, or by a path; `None` for an empty string.
 pub(super) fn folder(uri: &str) -> Option<PathBuf> {
     if uri.is_empty() {
         return None;
@@ -184,7 +185,7 @@ pub(super) fn folder(uri: &str) -> Option<PathBuf> {
         return Some(PathBuf::from(uri));
     };
     let path = match rest.strip_prefix("//") {
-        // After the host, which is empty or this one.
+        // The path follows the host, which is empty or this computer.
         Some(rest) => rest.find('/').map_or("", |slash| &rest[slash..]),
         None => rest,
     };
@@ -202,7 +203,7 @@ pub(super) fn folder(uri: &str) -> Option<PathBuf> {
         }
     }
     let path = String::from_utf8_lossy(&bytes).into_owned();
-    // A drive of Windows: /C:/a.
+    // A Windows path starts with a drive: /C:/a.
     let is_drive = path.as_bytes().get(2) == Some(&b':');
     Some(PathBuf::from(if is_drive { &path[1..] } else { &path }))
 }

@@ -1,8 +1,8 @@
-//! The functions of FMI 2.0 for co-simulation (Modelica Association, *Functional Mock-up Interface for
-//! Model Exchange and Co-Simulation* 2.0.4, 2022, chapters 2 and 4).
+//! Functions of FMI 2.0 for co-simulation (Modelica Association, *Functional Mock-up Interface for Model Exchange and
+//! Co-Simulation* 2.0.4, 2022, chapters 2 and 4).
 //!
-//! Names, types and order are those of `fmi2Functions.h`; a component is one that `fmi2Instantiate` has made and
-//! `fmi2FreeInstance` has not freed, and a list has as many elements as the call reports.
+//! Names, types and order of arguments follow `fmi2Functions.h`. A component must have been created by
+//! `fmi2Instantiate` and not freed by `fmi2FreeInstance`, and an array must have as many elements as the call states.
 #![allow(missing_docs, non_snake_case, clippy::missing_safety_doc)]
 
 use std::ffi::{c_char, c_int, c_uint, c_void};
@@ -10,12 +10,12 @@ use std::ffi::{c_char, c_int, c_uint, c_void};
 use hoid_io::fmu::FmuStart;
 
 use super::{
-    component::{Component, ERROR, Fmi2Logger, Logger, folder, free, list, list_mut, made, with, words},
+    component::{Component, ERROR, Fmi2Logger, Logger, folder, free, list, list_mut, create, with_instance, string},
     instance::Instance,
     values::Done,
 };
 
-/// `fmi2CallbackFunctions`; memory is allocated by Rust.
+/// Struct `fmi2CallbackFunctions`; its memory callbacks are not used, since Rust allocates the memory.
 #[repr(C)]
 pub struct Fmi2Callbacks {
     logger: Option<Fmi2Logger>,
@@ -25,7 +25,7 @@ pub struct Fmi2Callbacks {
     environment: *mut c_void,
 }
 
-/// `fmi2CoSimulation`.
+/// Value `fmi2CoSimulation` of the type of an FMU.
 const CO_SIMULATION: c_int = 1;
 
 #[unsafe(no_mangle)]
@@ -48,40 +48,40 @@ pub unsafe extern "C" fn fmi2Instantiate(
     _visible: c_int,
     _logging: c_int,
 ) -> *mut Component {
-    // SAFETY: null or that of the importer, which stays for the life of the component.
+    // SAFETY: the pointer is null or refers to callbacks of the importer, which exist as long as the component.
     let callbacks = unsafe { callbacks.as_ref() };
     let logger = match callbacks.and_then(|c| Some((c.logger?, c.environment))) {
         Some((function, environment)) => Logger::Two { function, environment },
         None => Logger::Nobody,
     };
-    // SAFETY: the texts are supplied by the importer.
+    // SAFETY: the strings are supplied by the importer.
     let (name, guid, resources) = unsafe { three(name, guid, resources) };
     let instance = || {
         if kind != CO_SIMULATION {
-            return Err("the unit is for co-simulation, not for model exchange".to_owned());
+            return Err("the unit supports only co-simulation, not model exchange".to_owned());
         }
         Instance::new(guid, folder(resources).as_deref())
     };
     // SAFETY: the logger is supplied by the importer.
-    unsafe { made(name, logger, instance) }
+    unsafe { create(name, logger, instance) }
 }
 
-/// Three texts supplied by the importer.
+/// Returns three strings passed by the importer.
 ///
 /// # Safety
-/// As [`words`].
+/// As for [`string`].
 pub(super) unsafe fn three<'a>(a: *const c_char, b: *const c_char, c: *const c_char) -> (&'a str, &'a str, &'a str) {
-    // SAFETY: by the contract of this function.
-    let a = unsafe { words(a) };
-    // SAFETY: by the contract of this function.
-    let b = unsafe { words(b) };
-    // SAFETY: by the contract of this function.
-    (a, b, unsafe { words(c) })
+    // SAFETY: guaranteed by the caller of this function.
+    let a = unsafe { string(a) };
+    // SAFETY: guaranteed by the caller of this function.
+    let b = unsafe { string(b) };
+    // SAFETY: guaranteed by the caller of this function.
+    (a, b, unsafe { string(c) })
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2FreeInstance(component: *mut Component) {
-    // SAFETY: by the contract of the interface.
+    // SAFETY: guaranteed by the FMI standard.
     unsafe { free(component) }
 }
 
@@ -92,8 +92,8 @@ pub unsafe extern "C" fn fmi2SetDebugLogging(
     _count: usize,
     _categories: *const *const c_char,
 ) -> c_int {
-    // SAFETY: by the contract of the interface.
-    unsafe { with(component, |_| Ok(())) }
+    // SAFETY: guaranteed by the FMI standard.
+    unsafe { with_instance(component, |_| Ok(())) }
 }
 
 #[unsafe(no_mangle)]
@@ -105,20 +105,20 @@ pub unsafe extern "C" fn fmi2SetupExperiment(
     _has_stop: c_int,
     _stop: f64,
 ) -> c_int {
-    // SAFETY: by the contract of the interface.
-    unsafe { with(component, |instance| instance.begins_at(start)) }
+    // SAFETY: guaranteed by the FMI standard.
+    unsafe { with_instance(component, |instance| instance.set_start_time(start)) }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2EnterInitializationMode(component: *mut Component) -> c_int {
-    // SAFETY: by the contract of the interface.
-    unsafe { with(component, |_| Ok(())) }
+    // SAFETY: guaranteed by the FMI standard.
+    unsafe { with_instance(component, |_| Ok(())) }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2ExitInitializationMode(component: *mut Component) -> c_int {
-    // SAFETY: by the contract of the interface.
-    unsafe { with(component, Instance::start) }
+    // SAFETY: guaranteed by the FMI standard.
+    unsafe { with_instance(component, Instance::start) }
 }
 
 #[unsafe(no_mangle)]
@@ -127,8 +127,8 @@ pub unsafe extern "C" fn fmi2Terminate(component: *mut Component) -> c_int {
         instance.end();
         Ok(())
     };
-    // SAFETY: by the contract of the interface.
-    unsafe { with(component, end) }
+    // SAFETY: guaranteed by the FMI standard.
+    unsafe { with_instance(component, end) }
 }
 
 #[unsafe(no_mangle)]
@@ -137,20 +137,20 @@ pub unsafe extern "C" fn fmi2Reset(component: *mut Component) -> c_int {
         instance.reset();
         Ok(())
     };
-    // SAFETY: by the contract of the interface.
-    unsafe { with(component, reset) }
+    // SAFETY: guaranteed by the FMI standard.
+    unsafe { with_instance(component, reset) }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2DoStep(component: *mut Component, t: f64, step: f64, _no_set_before: c_int) -> c_int {
-    // SAFETY: by the contract of the interface.
-    unsafe { with(component, |instance| instance.step(t, step)) }
+    // SAFETY: guaranteed by the FMI standard.
+    unsafe { with_instance(component, |instance| instance.step(t, step)) }
 }
 
-/// Reads variables.
+/// Reads the values of variables.
 ///
 /// # Safety
-/// As the functions of the interface.
+/// As for the functions of the FMI standard.
 pub(super) unsafe fn get<T>(
     component: *mut Component,
     references: *const c_uint,
@@ -159,23 +159,23 @@ pub(super) unsafe fn get<T>(
     of: impl Fn(&Instance, u32) -> Done<T>,
 ) -> c_int {
     let read = |instance: &mut Instance| {
-        // SAFETY: by the contract of this function.
+        // SAFETY: guaranteed by the caller of this function.
         let references = unsafe { list(references, count) }?;
-        // SAFETY: by the contract of this function.
+        // SAFETY: guaranteed by the caller of this function.
         let values = unsafe { list_mut(values, count) }?;
         for (value, reference) in values.iter_mut().zip(references) {
             *value = of(instance, *reference)?;
         }
         Ok(())
     };
-    // SAFETY: by the contract of this function.
-    unsafe { with(component, read) }
+    // SAFETY: guaranteed by the caller of this function.
+    unsafe { with_instance(component, read) }
 }
 
-/// Sets variables.
+/// Sets the values of variables.
 ///
 /// # Safety
-/// As the functions of the interface.
+/// As for the functions of the FMI standard.
 pub(super) unsafe fn set<T: Copy>(
     component: *mut Component,
     references: *const c_uint,
@@ -184,15 +184,15 @@ pub(super) unsafe fn set<T: Copy>(
     of: impl Fn(T) -> FmuStart,
 ) -> c_int {
     let write = |instance: &mut Instance| {
-        // SAFETY: by the contract of this function.
+        // SAFETY: guaranteed by the caller of this function.
         let references = unsafe { list(references, count) }?;
-        // SAFETY: by the contract of this function.
+        // SAFETY: guaranteed by the caller of this function.
         let values = unsafe { list(values, count) }?;
         let mut each = references.iter().zip(values);
         each.try_for_each(|(reference, value)| instance.set(*reference, of(*value)))
     };
-    // SAFETY: by the contract of this function.
-    unsafe { with(component, write) }
+    // SAFETY: guaranteed by the caller of this function.
+    unsafe { with_instance(component, write) }
 }
 
 pub(super) fn real(instance: &Instance, reference: u32) -> Done<f64> {
@@ -220,10 +220,10 @@ pub(super) fn text(instance: &Instance, reference: u32) -> Done<*const c_char> {
     Ok(instance.text(reference)?.as_ptr())
 }
 
-/// Reads a text from the importer as a value.
+/// Converts a string passed by the importer to a value.
 pub(super) fn as_text(pointer: *const c_char) -> FmuStart {
-    // SAFETY: an element of a list of texts, by the contract of the interface.
-    FmuStart::Text(unsafe { words(pointer) }.to_owned())
+    // SAFETY: the FMI standard guarantees that the pointer is an element of an array of strings.
+    FmuStart::Text(unsafe { string(pointer) }.to_owned())
 }
 
 macro_rules! getters_and_setters {
@@ -235,7 +235,7 @@ macro_rules! getters_and_setters {
             count: usize,
             values: *mut $type,
         ) -> c_int {
-            // SAFETY: by the contract of the interface.
+            // SAFETY: guaranteed by the FMI standard.
             unsafe { get(component, references, count, values, $read) }
         }
 
@@ -246,7 +246,7 @@ macro_rules! getters_and_setters {
             count: usize,
             values: *const $type,
         ) -> c_int {
-            // SAFETY: by the contract of the interface.
+            // SAFETY: guaranteed by the FMI standard.
             unsafe { set(component, references, count, values, $write) }
         }
     )+};
@@ -260,8 +260,9 @@ getters_and_setters! {
     fmi2GetString, fmi2SetString, *const c_char: text, as_text;
 }
 
-/// Functions that the description states are not served: each answers with an error, whatever it is
-/// given. In the calling conventions of C the caller clears its own arguments away.
+/// Defines functions that the model description declares as not supported: each returns an error, regardless of its
+/// arguments. The arguments can be omitted here because in the C calling conventions the caller removes them from the
+/// stack.
 macro_rules! not_served {
     ($($name:ident),+ $(,)?) => {$(
         #[unsafe(no_mangle)]

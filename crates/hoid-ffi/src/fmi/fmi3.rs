@@ -1,8 +1,9 @@
-//! The functions of FMI 3.0 for co-simulation (Modelica Association, *Functional Mock-up Interface
-//! Specification* 3.0.1, 2023, chapters 2 and 4).
+//! Functions of FMI 3.0 for co-simulation (Modelica Association, *Functional Mock-up Interface Specification* 3.0.1,
+//! 2023, chapters 2 and 4).
 //!
-//! Names, types and order are those of `fmi3FunctionTypes.h`; an instance is one that `fmi3InstantiateCoSimulation` has
-//! made and `fmi3FreeInstance` has not freed, and a list has as many elements as the call reports.
+//! Names, types and order of arguments follow `fmi3FunctionTypes.h`. An instance must have been created by
+//! `fmi3InstantiateCoSimulation` and not freed by `fmi3FreeInstance`, and an array must have as many elements as the
+//! call states.
 #![allow(missing_docs, non_snake_case, clippy::missing_safety_doc)]
 
 use std::{
@@ -13,7 +14,7 @@ use std::{
 use hoid_io::fmu::FmuStart;
 
 use super::{
-    component::{Component, ERROR, Fmi3Logger, Logger, free, made, with},
+    component::{Component, ERROR, Fmi3Logger, Logger, free, create, with_instance},
     fmi2::{as_text, boolean, get, integer, not_served, real, set, text, three},
     instance::Instance,
 };
@@ -42,17 +43,17 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
         Some(function) => Logger::Three { function, environment },
         None => Logger::Nobody,
     };
-    // SAFETY: the texts are supplied by the importer.
+    // SAFETY: the strings are supplied by the importer.
     let (name, token, resources) = unsafe { three(name, token, resources) };
-    // A path, not a URI as in FMI 2.0.
+    // FMI 3.0 passes a path, not a URI as FMI 2.0 does.
     let folder = Some(PathBuf::from(resources)).filter(|path| !path.as_os_str().is_empty());
     // SAFETY: the logger is supplied by the importer.
-    unsafe { made(name, logger, || Instance::new(token, folder.as_deref())) }
+    unsafe { create(name, logger, || Instance::new(token, folder.as_deref())) }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3FreeInstance(instance: *mut Component) {
-    // SAFETY: by the contract of the interface.
+    // SAFETY: guaranteed by the FMI standard.
     unsafe { free(instance) }
 }
 
@@ -63,8 +64,8 @@ pub unsafe extern "C" fn fmi3SetDebugLogging(
     _count: usize,
     _categories: *const *const c_char,
 ) -> c_int {
-    // SAFETY: by the contract of the interface.
-    unsafe { with(instance, |_| Ok(())) }
+    // SAFETY: guaranteed by the FMI standard.
+    unsafe { with_instance(instance, |_| Ok(())) }
 }
 
 #[unsafe(no_mangle)]
@@ -76,14 +77,14 @@ pub unsafe extern "C" fn fmi3EnterInitializationMode(
     _has_stop: bool,
     _stop: f64,
 ) -> c_int {
-    // SAFETY: by the contract of the interface.
-    unsafe { with(instance, |instance| instance.begins_at(start)) }
+    // SAFETY: guaranteed by the FMI standard.
+    unsafe { with_instance(instance, |instance| instance.set_start_time(start)) }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3ExitInitializationMode(instance: *mut Component) -> c_int {
-    // SAFETY: by the contract of the interface.
-    unsafe { with(instance, Instance::start) }
+    // SAFETY: guaranteed by the FMI standard.
+    unsafe { with_instance(instance, Instance::start) }
 }
 
 #[unsafe(no_mangle)]
@@ -92,8 +93,8 @@ pub unsafe extern "C" fn fmi3Terminate(instance: *mut Component) -> c_int {
         instance.end();
         Ok(())
     };
-    // SAFETY: by the contract of the interface.
-    unsafe { with(instance, end) }
+    // SAFETY: guaranteed by the FMI standard.
+    unsafe { with_instance(instance, end) }
 }
 
 #[unsafe(no_mangle)]
@@ -102,8 +103,8 @@ pub unsafe extern "C" fn fmi3Reset(instance: *mut Component) -> c_int {
         instance.reset();
         Ok(())
     };
-    // SAFETY: by the contract of the interface.
-    unsafe { with(instance, reset) }
+    // SAFETY: guaranteed by the FMI standard.
+    unsafe { with_instance(instance, reset) }
 }
 
 #[unsafe(no_mangle)]
@@ -121,18 +122,18 @@ pub unsafe extern "C" fn fmi3DoStep(
         instance.step(t, step)?;
         for flag in [event, terminate, early] {
             if !flag.is_null() {
-                // SAFETY: not null, and by the contract of the interface with room for a flag.
+                // SAFETY: the pointer is not null; the FMI standard guarantees memory for a flag.
                 unsafe { flag.write(false) };
             }
         }
         if !last.is_null() {
-            // SAFETY: not null, and by the contract of the interface with room for a number.
+            // SAFETY: the pointer is not null; the FMI standard guarantees memory for a number.
             unsafe { last.write_unaligned(t + step) };
         }
         Ok(())
     };
-    // SAFETY: by the contract of the interface.
-    unsafe { with(instance, go) }
+    // SAFETY: guaranteed by the FMI standard.
+    unsafe { with_instance(instance, go) }
 }
 
 macro_rules! getters_and_setters {
@@ -145,7 +146,7 @@ macro_rules! getters_and_setters {
             values: *mut $type,
             count: usize,
         ) -> c_int {
-            // SAFETY: by the contract of the interface; every variable has one value.
+            // SAFETY: guaranteed by the FMI standard; every variable has one value.
             unsafe { get(instance, references, count, values, $read) }
         }
 
@@ -157,7 +158,7 @@ macro_rules! getters_and_setters {
             values: *const $type,
             count: usize,
         ) -> c_int {
-            // SAFETY: by the contract of the interface; every variable has one value.
+            // SAFETY: guaranteed by the FMI standard; every variable has one value.
             unsafe { set(instance, references, count, values, $write) }
         }
     )+};
@@ -170,7 +171,7 @@ getters_and_setters! {
     fmi3GetString, fmi3SetString, *const c_char: text, as_text;
 }
 
-/// Other ways to instantiate, which give none.
+/// Defines instantiation functions that are not supported: each returns null.
 macro_rules! not_made {
     ($($name:ident),+ $(,)?) => {$(
         #[unsafe(no_mangle)]

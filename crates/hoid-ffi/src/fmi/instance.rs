@@ -1,8 +1,8 @@
-//! An instance of a unit.
+//! Instance of a functional mock-up unit.
 //!
-//! Samples are taken at `t_0 + k Ts`, t_0 the start of the experiment. A step may be as long as the
-//! sample time, or shorter: then the inputs of the first step within a sample are those of the
-//! sample. In a longer one a sample would be lost, and it is refused.
+//! Samples are taken at `t_0 + k Ts`, where t_0 is the start of the experiment. A communication step may be as long as
+//! the sample time or shorter. If it is shorter, the sample uses the inputs of the first step within the sample time. A
+//! longer step is rejected, since a sample would be lost.
 
 use std::{ffi::CString, fs, path::Path};
 
@@ -13,38 +13,38 @@ use super::{
     values::{Done, VariableValues},
 };
 
-/// Share of the sample time by which a time may be off.
-const OFF: f64 = 1e-6;
+/// Tolerance of times, as a fraction of the sample time.
+const TIME_TOLERANCE: f64 = 1e-6;
 
 /// Phase of an instance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Phase {
-    /// Parameters may be set.
+    /// The experiment has not started; parameters may be set.
     Setup,
-    /// Samples are taken.
+    /// The experiment is running; samples are taken.
     Running,
     Ended,
 }
 
-/// An instance.
+/// Instance with its variables and its model.
 pub(super) struct Instance {
     pub(super) token: String,
     pub(super) settings: FmuSettings,
     pub(super) variables: Vec<FmuVariable>,
     pub(super) values: Vec<FmuStart>,
-    /// Texts as C strings, by value reference; empty for values that are not texts.
+    /// String values as C strings, by value reference; empty for variables of other types.
     texts: Vec<CString>,
     first_output: usize,
     pub(super) phase: Phase,
     pub(super) start_s: f64,
-    /// The sample that is next.
+    /// Index of the next sample.
     pub(super) k: u64,
     pub(super) end_s: f64,
     pub(super) model: Option<Model>,
 }
 
 impl Instance {
-    /// The unit of a token, with the resources in a folder.
+    /// Builds the instance of the unit with this token; `resources` is the folder with its settings.
     pub fn new(token: &str, resources: Option<&Path>) -> Done<Self> {
         let kind = (FmuKind::ALL.into_iter().find(|kind| kind.token() == token)).ok_or_else(|| {
             format!(
@@ -84,7 +84,7 @@ impl Instance {
         Ok(instance)
     }
 
-    /// As it was at first.
+    /// Resets the instance to its initial state.
     pub fn reset(&mut self) {
         self.values = self.variables.iter().map(|variable| variable.start.clone()).collect();
         for reference in 0..self.values.len() {
@@ -106,13 +106,13 @@ impl Instance {
         variable.ok_or_else(|| format!("there is no variable with the value reference {reference}"))
     }
 
-    /// The value of a variable.
+    /// Returns the value of a variable.
     pub fn value(&self, reference: u32) -> Done<&FmuStart> {
         self.variable(reference)?;
         Ok(&self.values[reference as usize])
     }
 
-    /// A text, as long as it is not set.
+    /// Returns the value of a string variable; it is valid until the variable is set again.
     pub fn text(&self, reference: u32) -> Done<&CString> {
         match self.value(reference)? {
             FmuStart::Text(_) => Ok(&self.texts[reference as usize]),
@@ -120,13 +120,13 @@ impl Instance {
         }
     }
 
-    /// Error for a variable whose type is not that of the call.
+    /// Error message for a variable whose type differs from that of the call.
     pub fn other_type(&self, reference: u32) -> String {
         let name = self.variable(reference).map_or("?", |variable| variable.name);
         format!("{name} is of another type")
     }
 
-    /// Sets a parameter before the start, or an input.
+    /// Sets a parameter (only before the start) or an input.
     pub fn set(&mut self, reference: u32, value: FmuStart) -> Done {
         let phase = self.phase;
         let variable = self.variable(reference)?;
@@ -137,7 +137,9 @@ impl Instance {
         match role {
             Role::Output => return Err(format!("{name} is an output; it cannot be set")),
             Role::Parameter if phase != Phase::Setup => {
-                return Err(format!("{name} is fixed once the experiment runs; set it before"));
+                return Err(format!(
+                    "{name} is fixed once the experiment runs; set it before the experiment starts"
+                ));
             }
             Role::Parameter | Role::Input => {}
         }
@@ -146,8 +148,8 @@ impl Instance {
         Ok(())
     }
 
-    /// The experiment starts at this time, s.
-    pub fn begins_at(&mut self, start_s: f64) -> Done {
+    /// Sets the start time of the experiment in s.
+    pub fn set_start_time(&mut self, start_s: f64) -> Done {
         if !start_s.is_finite() {
             return Err(format!("the experiment starts at {start_s} s, expected a finite time"));
         }
@@ -158,7 +160,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Values of the parameters and inputs.
+    /// Returns the values of the parameters and inputs.
     fn given(&self) -> VariableValues<'_> {
         VariableValues {
             variables: &self.variables,
@@ -166,7 +168,7 @@ impl Instance {
         }
     }
 
-    /// Makes the model of the parameters.
+    /// Builds the model from the parameters and starts the experiment.
     pub fn start(&mut self) -> Done {
         let model = Model::new(&self.settings, &self.given(), self.start_s)?;
         self.values.splice(self.first_output.., model.outputs());
@@ -175,7 +177,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Goes from a time on by a step, both in s.
+    /// Performs a communication step of length `step_s` from the time `t_s`, both in s.
     pub fn step(&mut self, t_s: f64, step_s: f64) -> Done {
         let given = VariableValues {
             variables: &self.variables,
@@ -186,29 +188,29 @@ impl Instance {
             _ => return Err("the experiment is not running: initialise the unit first".to_owned()),
         };
         let ts = model.sample_time_s();
-        if !(step_s > 0.0 && step_s <= ts * (1.0 + OFF)) {
+        if !(step_s > 0.0 && step_s <= ts * (1.0 + TIME_TOLERANCE)) {
             return Err(format!(
-                "the step is {step_s} s and the sample time {ts} s: samples would be lost; use the sample time as \
-                 step, or a fraction of it"
+                "the step is {step_s} s and the sample time {ts} s: samples would be lost; use the sample time or a \
+                 fraction of it as the step"
             ));
         }
-        if !(t_s >= self.end_s - OFF * ts && t_s.is_finite()) {
+        if !(t_s >= self.end_s - TIME_TOLERANCE * ts && t_s.is_finite()) {
             return Err(format!("the step starts at {t_s} s, expected {} s", self.end_s));
         }
         self.end_s = t_s + step_s;
         let time_of = |k: u64| self.start_s + k as f64 * ts;
-        if time_of(self.k) < self.end_s - OFF * ts {
+        if time_of(self.k) < self.end_s - TIME_TOLERANCE * ts {
             model.take(&given, time_of(self.k));
             self.k += 1;
         }
-        // Information of a model about its next sample is not reported before its time.
-        if model.speaks_at_once() || time_of(self.k) <= self.end_s + OFF * ts {
+        // Outputs that belong to the next sample are not reported before the time of that sample.
+        if model.outputs_of_taken_sample() || time_of(self.k) <= self.end_s + TIME_TOLERANCE * ts {
             self.values.splice(self.first_output.., model.outputs());
         }
         Ok(())
     }
 
-    /// The experiment is over.
+    /// Ends the experiment.
     pub fn end(&mut self) {
         self.phase = Phase::Ended;
     }
@@ -276,7 +278,7 @@ mod tests {
         let record = simulator.run(RunSeed::default(), false).unwrap();
         let ended = |parts: u32| {
             let mut instance = tracker();
-            instance.begins_at(2.0).unwrap();
+            instance.set_start_time(2.0).unwrap();
             instance.start().unwrap();
             for k in 0..1000 {
                 for part in 0..parts {
@@ -356,7 +358,7 @@ mod tests {
         assert!(why(instance.set(0, FmuStart::Integer(1))).contains("type"));
         let output = reference(&instance, "K_e");
         assert!(why(instance.set(output, FmuStart::Real(0.0))).contains("output"));
-        assert!(instance.text(0).is_err() && instance.begins_at(f64::NAN).is_err());
+        assert!(instance.text(0).is_err() && instance.set_start_time(f64::NAN).is_err());
         set(&mut instance, "method", FmuStart::Text("kalman".to_owned()));
         assert!(why(instance.start()).contains("adaptive"));
         instance.reset();

@@ -1,17 +1,17 @@
-//! Functional mock-up units: the tracker, and the operator of a scenario, for simulators.
+//! Functional mock-up units for simulators: the tracker, and the operator of a scenario.
 //!
-//! The shared library is the one of the C ABI; `hoid fmu` packs it with a description. The contents of a unit are
-//! defined by [`hoid_io::fmu`]; this module implements them.
+//! The shared library of the C interface also contains the FMI functions; `hoid fmu` packs it together with a model
+//! description. [`hoid_io::fmu`] defines the contents of a unit; this module implements them.
 //!
 //! | file | contents |
 //! |---|---|
-//! | `instance` | an instance: its values, its phases, when a sample is due |
-//! | `given` | parameters and inputs, by their names |
-//! | `model` | recipients of samples: tracker and operator |
-//! | `operator` | the operator of a scenario, of the thesis or of the family |
-//! | `component` | handles, statuses and messages of both interfaces |
-//! | `state` | its state, to go back to it or to continue elsewhere |
-//! | `fmi2`, `fmi3` | the functions of FMI 2.0 and 3.0 |
+//! | `instance` | instance of a unit: values, phases, times of the samples |
+//! | `values` | parameters and inputs by name |
+//! | `model` | model that receives the samples: tracker or operator |
+//! | `operator` | operator of a scenario, either of the thesis or of the family |
+//! | `component` | handles, status codes and messages of both FMI versions |
+//! | `state` | saved state of an instance, to return to it or to continue elsewhere |
+//! | `fmi2`, `fmi3` | functions of FMI 2.0 and 3.0 |
 
 mod component;
 pub mod fmi2;

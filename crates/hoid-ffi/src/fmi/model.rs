@@ -1,4 +1,4 @@
-//! The recursion or operator of a unit.
+//! Model in a unit: a tracker or an operator.
 
 use hoid_io::fmu::{DETERMINED, FmuKind, FmuSettings, FmuStart};
 use hoid_track::Sample;
@@ -10,17 +10,17 @@ use super::{
 };
 use crate::{
     packed::{as_bytes, as_numbers},
-    reading::number_of,
+    results::number_of,
     session::Session,
 };
 
-/// Components of a unit.
+/// Model in a unit.
 pub(super) enum Model {
     Tracker(Box<TrackerModel>),
     Operator(Box<OperatorModel>),
 }
 
-/// A tracker, and the changes that it has reported.
+/// Tracker, with the changes that it has reported.
 pub(super) struct TrackerModel {
     session: Session,
     with_excitation: bool,
@@ -30,7 +30,7 @@ pub(super) struct TrackerModel {
 }
 
 impl Model {
-    /// For the parameters, from a time in s on.
+    /// Builds the model from the parameters, for an experiment that starts at a time in s.
     pub fn new(settings: &FmuSettings, given: &VariableValues<'_>, start_s: f64) -> Done<Self> {
         Ok(match settings.kind()? {
             FmuKind::Tracker => Self::Tracker(Box::new(TrackerModel::new(settings, given)?)),
@@ -38,7 +38,8 @@ impl Model {
         })
     }
 
-    /// Numbers in addition to the recursion, and its bytes. It does not change.
+    /// Returns the saved state, without changing the model: numbers that are not part of the recursion, and the
+    /// recursion as bytes.
     pub fn saved(&mut self) -> (Vec<f64>, Vec<u8>) {
         match self {
             Self::Tracker(tracker) => {
@@ -49,18 +50,18 @@ impl Model {
         }
     }
 
-    /// The model of the same parameters that [`Model::saved`] was asked of.
+    /// Restores a model with the same parameters from the result of [`Model::saved`].
     pub fn restored(
         settings: &FmuSettings,
         given: &VariableValues<'_>,
         start_s: f64,
-        beside: &[f64],
+        extra_numbers: &[f64],
         bytes: &[u8],
     ) -> Done<Self> {
         let wrong = || "the state is from another model".to_owned();
         Ok(match settings.kind()? {
             FmuKind::Tracker => {
-                let &[innovation, changes, change_t_s] = beside else {
+                let &[innovation, changes, change_t_s] = extra_numbers else {
                     return Err(wrong());
                 };
                 Self::Tracker(Box::new(TrackerModel {
@@ -89,8 +90,8 @@ impl Model {
         }
     }
 
-    /// True if the outputs are of the sample that was taken, not of the next one.
-    pub fn speaks_at_once(&self) -> bool {
+    /// True if the outputs belong to the sample that was taken, false if they belong to the next sample.
+    pub fn outputs_of_taken_sample(&self) -> bool {
         matches!(self, Self::Tracker(_))
     }
 
@@ -102,7 +103,7 @@ impl Model {
         }
     }
 
-    /// Outputs with their names, in the order of the description.
+    /// Returns the outputs with their names, in the order of the model description.
     fn named(&self) -> Vec<(&'static str, FmuStart)> {
         match self {
             Self::Tracker(tracker) => tracker.named(),
@@ -113,7 +114,7 @@ impl Model {
         }
     }
 
-    /// The outputs, in the order of the description.
+    /// Returns the outputs in the order of the model description.
     pub fn outputs(&self) -> Vec<FmuStart> {
         self.named().into_iter().map(|(_, value)| value).collect()
     }
@@ -128,7 +129,7 @@ impl TrackerModel {
     fn new(settings: &FmuSettings, given: &VariableValues<'_>) -> Done<Self> {
         let text = given.text("options");
         let mut options: Map<String, Value> = serde_json::from_str(if text.is_empty() { "{}" } else { text })
-            .map_err(|error| format!("options: no object in JSON ({error})"))?;
+            .map_err(|error| format!("options: not a JSON object ({error})"))?;
         let element = given.text("controlled_element");
         if !element.is_empty() {
             options.insert("controlled_element".to_owned(), element.into());

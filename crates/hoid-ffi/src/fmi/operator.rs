@@ -1,11 +1,11 @@
-//! The operator of a scenario, of the thesis or of the family, as a unit has it.
+//! Operator of a scenario, either of the thesis or of the family, as the model of a unit.
 
 use hoid_io::{AnyScenario, fmu::FmuSettings, parse_any_scenario};
 use hoid_sim::{FamilyOperatorRun, FamilySimulator, OperatorRun, RunSeed, Simulator};
 
 use super::values::{Done, VariableValues};
 
-/// An operator that is at work.
+/// Running operator.
 pub(super) struct OperatorModel {
     run: Run,
     sample_time_s: f64,
@@ -78,7 +78,7 @@ impl OperatorModel {
         }
     }
 
-    /// False if the numbers are of another operator.
+    /// Restores a saved state. Returns false if the numbers belong to another operator.
     pub fn restore(&mut self, saved: &[f64]) -> bool {
         match &mut self.run {
             Run::Reference(run) => run.restore(saved),

@@ -1,9 +1,10 @@
-//! The state of an instance, to go back to it or to continue elsewhere with the same digits (FMI 2.0.4, section 2.1.8;
-//! FMI 3.0.1, section 2.2.10).
+//! Saved state of an instance, to return to it or to continue elsewhere with bit-identical results (FMI 2.0.4, section
+//! 2.1.8; FMI 3.0.1, section 2.2.10).
 //!
-//! An importer holds a state in its serialised form (`packed`). The description is the token of the unit, where the
-//! instance is in its experiment and the values of all variables; the bytes are those of the tracker, or the numbers of
-//! the operator. Numbers of 64 bits are in the description by their bits, for JSON has no NaN.
+//! An importer holds a state in its serialised form (`packed`). The description contains the token of the unit, the
+//! phase and times of the experiment, and the values of all variables. The data are those of the tracker, or the
+//! numbers of the operator. 64-bit floating-point numbers are stored in the description as their bit patterns, since
+//! JSON has no NaN.
 
 #![allow(missing_docs, non_snake_case, clippy::missing_safety_doc)]
 
@@ -13,7 +14,7 @@ use hoid_io::fmu::FmuStart;
 use serde_json::{Value, json};
 
 use super::{
-    component::{Component, list, list_mut, with},
+    component::{Component, list, list_mut, with_instance},
     instance::{Instance, Phase},
     model::Model,
     values::{Done, VariableValues},
@@ -22,11 +23,11 @@ use crate::packed::{opened, packed};
 
 const MAGIC: [u8; 8] = *b"hoidfmu\x01";
 
-/// A state in the hands of an importer.
+/// Saved state, as an importer holds it.
 pub struct State(Vec<u8>);
 
 impl Instance {
-    /// The state as bytes. It does not change.
+    /// Returns the state as bytes, without changing the instance.
     fn saved(&mut self) -> Vec<u8> {
         let phase = match self.phase {
             Phase::Setup => "setup",
@@ -34,8 +35,8 @@ impl Instance {
             Phase::Ended => "ended",
         };
         let values: Vec<Value> = self.values.iter().map(of_value).collect();
-        let (beside, bytes) = self.model.as_mut().map(Model::saved).unwrap_or_default();
-        let beside: Vec<u64> = beside.into_iter().map(f64::to_bits).collect();
+        let (extra_numbers, bytes) = self.model.as_mut().map(Model::saved).unwrap_or_default();
+        let extra_numbers: Vec<u64> = extra_numbers.into_iter().map(f64::to_bits).collect();
         let description = json!({
             "unit": self.token,
             "phase": phase,
@@ -43,12 +44,12 @@ impl Instance {
             "k": self.k,
             "end": self.end_s.to_bits(),
             "values": values,
-            "model": self.model.is_some().then_some(beside),
+            "model": self.model.is_some().then_some(extra_numbers),
         });
         packed(MAGIC, &description, &bytes)
     }
 
-    /// Goes to a state of this unit; one that cannot be leaves all as it is.
+    /// Restores a state of this unit. If this fails, the instance does not change.
     fn restore(&mut self, bytes: &[u8]) -> Done {
         let wrong = || "the state is not from this unit, or was changed or truncated since it was saved".to_owned();
         let (description, bytes) = opened(MAGIC, bytes).map_err(|_| wrong())?;
@@ -76,14 +77,14 @@ impl Instance {
         let k = description["k"].as_u64().ok_or_else(wrong)?;
         let model = match &description["model"] {
             Value::Null if phase != Phase::Running => None,
-            beside => {
-                let beside = beside.as_array().ok_or_else(wrong)?;
-                let beside: Vec<f64> = beside.iter().map(number).collect::<Done<_>>()?;
+            extra_numbers => {
+                let extra_numbers = extra_numbers.as_array().ok_or_else(wrong)?;
+                let extra_numbers: Vec<f64> = extra_numbers.iter().map(number).collect::<Done<_>>()?;
                 let given = VariableValues {
                     variables: &self.variables,
                     values: &values,
                 };
-                Some(Model::restored(&self.settings, &given, start_s, &beside, bytes)?)
+                Some(Model::restored(&self.settings, &given, start_s, &extra_numbers, bytes)?)
             }
         };
         self.values = values;
@@ -102,7 +103,7 @@ fn of_value(value: &FmuStart) -> Value {
     }
 }
 
-/// A value of the type of this one.
+/// Converts a JSON value to the type of `of`.
 fn to_value(of: &FmuStart, value: &Value) -> Option<FmuStart> {
     Some(match of {
         FmuStart::Real(_) => FmuStart::Real(f64::from_bits(value.as_u64()?)),
@@ -112,41 +113,41 @@ fn to_value(of: &FmuStart, value: &Value) -> Option<FmuStart> {
     })
 }
 
-/// Memory supplied by the importer for a state.
+/// Returns the memory that the importer supplies for the handle of a state.
 ///
 /// # Safety
-/// `place` is null or points to null or to a state that was made here and not freed.
+/// `place` is null, or points to null or to a state that came from [`into_handle`] and has not been freed.
 unsafe fn held<'a>(place: *mut *mut State) -> Done<&'a mut *mut State> {
-    // SAFETY: by the contract of this function.
+    // SAFETY: guaranteed by the caller of this function.
     let place = unsafe { list_mut(place, 1) }?;
     place
         .first_mut()
         .ok_or_else(|| "there is no pointer for the state".to_owned())
 }
 
-/// Hands a state over: into the one that is there, else as a new one.
+/// Passes a state to the importer: overwrites the existing state, or creates a new one if there is none.
 ///
 /// # Safety
-/// As [`held`].
-unsafe fn hand_over(bytes: Vec<u8>, place: *mut *mut State) -> Done {
-    // SAFETY: by the contract of this function.
+/// As for [`held`].
+unsafe fn into_handle(bytes: Vec<u8>, place: *mut *mut State) -> Done {
+    // SAFETY: guaranteed by the caller of this function.
     let place = unsafe { held(place) }?;
     if place.is_null() {
         *place = Box::into_raw(Box::new(State(bytes)));
         return Ok(());
     }
-    // SAFETY: not null: by the contract a state that was made here.
+    // SAFETY: the pointer is not null; the caller guarantees that it is a state of this library.
     let there = unsafe { list_mut(*place, 1) }?;
     there.iter_mut().for_each(|state| state.0.clone_from(&bytes));
     Ok(())
 }
 
-/// The bytes of a state.
+/// Returns the bytes of a state.
 ///
 /// # Safety
-/// `state` is null or was made here and not freed.
+/// `state` is null, or came from [`into_handle`] and has not been freed.
 unsafe fn bytes_of<'a>(state: *const State) -> Done<&'a [u8]> {
-    // SAFETY: by the contract of this function.
+    // SAFETY: guaranteed by the caller of this function.
     let states = unsafe { list(state, 1) }?;
     states
         .first()
@@ -160,51 +161,51 @@ macro_rules! states {
         pub unsafe extern "C" fn $get(component: *mut Component, state: *mut *mut State) -> c_int {
             let take = |instance: &mut Instance| {
                 let bytes = instance.saved();
-                // SAFETY: by the contract of the interface.
-                unsafe { hand_over(bytes, state) }
+                // SAFETY: guaranteed by the FMI standard.
+                unsafe { into_handle(bytes, state) }
             };
-            // SAFETY: by the contract of the interface.
-            unsafe { with(component, take) }
+            // SAFETY: guaranteed by the FMI standard.
+            unsafe { with_instance(component, take) }
         }
 
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $set(component: *mut Component, state: *mut State) -> c_int {
             let go = |instance: &mut Instance| {
-                // SAFETY: by the contract of the interface.
+                // SAFETY: guaranteed by the FMI standard.
                 let bytes = unsafe { bytes_of(state) }?;
                 instance.restore(bytes)
             };
-            // SAFETY: by the contract of the interface.
-            unsafe { with(component, go) }
+            // SAFETY: guaranteed by the FMI standard.
+            unsafe { with_instance(component, go) }
         }
 
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $free(component: *mut Component, state: *mut *mut State) -> c_int {
             let free = |_: &mut Instance| {
-                // SAFETY: by the contract of the interface.
+                // SAFETY: guaranteed by the FMI standard.
                 let place = unsafe { held(state) }?;
                 if !place.is_null() {
-                    // SAFETY: it came from `hand_over`, and is null from now on.
+                    // SAFETY: the pointer came from `into_handle`, and is null from now on.
                     drop(unsafe { Box::from_raw(std::mem::replace(place, std::ptr::null_mut())) });
                 }
                 Ok(())
             };
-            // SAFETY: by the contract of the interface.
-            unsafe { with(component, free) }
+            // SAFETY: guaranteed by the FMI standard.
+            unsafe { with_instance(component, free) }
         }
 
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $size(component: *mut Component, state: *mut State, size: *mut usize) -> c_int {
-            let tell = |_: &mut Instance| {
-                // SAFETY: by the contract of the interface.
+            let read = |_: &mut Instance| {
+                // SAFETY: guaranteed by the FMI standard.
                 let bytes = unsafe { bytes_of(state) }?;
-                // SAFETY: by the contract of the interface.
+                // SAFETY: guaranteed by the FMI standard.
                 let size = unsafe { list_mut(size, 1) }?;
                 size.fill(bytes.len());
                 Ok(())
             };
-            // SAFETY: by the contract of the interface.
-            unsafe { with(component, tell) }
+            // SAFETY: guaranteed by the FMI standard.
+            unsafe { with_instance(component, read) }
         }
 
         #[unsafe(no_mangle)]
@@ -215,7 +216,7 @@ macro_rules! states {
             size: usize,
         ) -> c_int {
             let write = |_: &mut Instance| {
-                // SAFETY: by the contract of the interface.
+                // SAFETY: guaranteed by the FMI standard.
                 let bytes = unsafe { bytes_of(state) }?;
                 if size < bytes.len() {
                     return Err(format!(
@@ -223,13 +224,13 @@ macro_rules! states {
                         bytes.len()
                     ));
                 }
-                // SAFETY: by the contract of the interface there is this room, and no more is used.
+                // SAFETY: the FMI standard guarantees memory of this size, and no more is used.
                 let room = unsafe { list_mut(room, bytes.len()) }?;
                 room.copy_from_slice(bytes);
                 Ok(())
             };
-            // SAFETY: by the contract of the interface.
-            unsafe { with(component, write) }
+            // SAFETY: guaranteed by the FMI standard.
+            unsafe { with_instance(component, write) }
         }
 
         #[unsafe(no_mangle)]
@@ -240,15 +241,15 @@ macro_rules! states {
             state: *mut *mut State,
         ) -> c_int {
             let read = |_: &mut Instance| {
-                // SAFETY: by the contract of the interface.
+                // SAFETY: guaranteed by the FMI standard.
                 let bytes = unsafe { list(bytes, size) }?;
                 opened(MAGIC, bytes)
                     .map_err(|_| "the bytes are not a state, or were changed or truncated".to_owned())?;
-                // SAFETY: by the contract of the interface.
-                unsafe { hand_over(bytes.to_vec(), state) }
+                // SAFETY: guaranteed by the FMI standard.
+                unsafe { into_handle(bytes.to_vec(), state) }
             };
-            // SAFETY: by the contract of the interface.
-            unsafe { with(component, read) }
+            // SAFETY: guaranteed by the FMI standard.
+            unsafe { with_instance(component, read) }
         }
     };
 }

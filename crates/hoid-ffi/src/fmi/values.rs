@@ -1,8 +1,8 @@
-//! Parameters and inputs of a unit, by their names.
+//! Parameters and inputs of a unit by name.
 
 use hoid_io::fmu::{FmuStart, FmuVariable};
 
-/// The action taken, or why not.
+/// Result of an action, or the reason why it failed.
 pub(super) type Done<T = ()> = Result<T, String>;
 
 /// Values by the names of their variables.

@@ -1,8 +1,8 @@
-//! Further inputs: `w_i = (B_i/F_i) q^-nk_i x_i`, each with its own polynomials.
+//! Further inputs: `w_i = (B_i/F_i) q^-nk_i x_i`, with separate polynomials for each input.
 //!
-//! Theta contains the coefficients of the first input, then `b_0 .. f_1 ..` of each further one. The columns of psi are
-//! those of the first input with the signals of the other input: `(D/(C F_i)) x_i(t - nk_i - j)` and
-//! `-(D/(C F_i)) w_i(t - j)`.
+//! Theta contains the coefficients of the first input and of the noise model, then `b_0 .. f_1 ..` of each further
+//! input. The columns of psi have the same form as for the first input, with the signals of the further input:
+//! `(D/(C F_i)) x_i(t - nk_i - j)` and `-(D/(C F_i)) w_i(t - j)`.
 
 use std::{borrow::Cow, ops::Range};
 
@@ -30,7 +30,7 @@ impl Criterion<'_> {
         })
     }
 
-    /// Returns the indices in theta of the coefficients of each further F.
+    /// Returns, for each further input, the indices in theta of its F coefficients.
     pub(super) fn further_poles(&self) -> impl Iterator<Item = Range<usize>> {
         let mut at = self.orders.parameters();
         self.further.iter().map(move |input| {
@@ -40,7 +40,7 @@ impl Criterion<'_> {
         })
     }
 
-    /// Computes s and w of the further inputs over these samples, and subtracts w from v.
+    /// Computes the signals s and w of the further inputs over these samples, and subtracts w from v.
     pub(super) fn further_responses(&self, theta: &[f64], record: usize, samples: Range<usize>, ws: &mut Workspace) {
         let (pad, n) = (ws.pad, samples.end);
         ws.further.resize_with(self.further.len(), FurtherSignals::default);
@@ -65,7 +65,7 @@ impl Criterion<'_> {
         }
     }
 
-    /// Computes the signals whose shifts are the columns of the further inputs.
+    /// Computes the filtered signals of the further inputs; shifted, they are columns of psi.
     pub(super) fn whiten_further(&self, theta: &[f64], ws: &mut Workspace) {
         let parts = Polynomials::split(&self.orders, theta);
         let from = ws.pad + self.first_regressed();
@@ -88,7 +88,7 @@ impl Criterion<'_> {
         }
     }
 
-    /// Returns the columns of psi of the further inputs over these rows of the workspace.
+    /// Returns the columns of psi for the further inputs, over these rows of the workspace.
     pub(super) fn further_columns<'w>(&self, counted: &Range<usize>, ws: &'w Workspace) -> Vec<Column<'w>> {
         let mut columns = Vec::new();
         let mut add = |signal: &'w [f64], shifts: Range<usize>, sign: f64| {
@@ -96,7 +96,7 @@ impl Criterion<'_> {
             columns.extend(shifts.map(|j| Column {
                 values: Cow::Borrowed(&signal[counted.start - j..counted.end - j]),
                 sign,
-                follows: j > first,
+                is_shift_of_previous: j > first,
             }));
         };
         for (input, signals) in self.further.iter().zip(&ws.further) {

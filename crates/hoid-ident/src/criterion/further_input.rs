@@ -3,16 +3,16 @@
 /// Numbers of coefficients of B and F of one input, and its delay in samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub struct InputOrders {
-    /// Coefficients `b0 ... b_{nb-1}` of B.
+    /// Number of coefficients `b0 ... b_{nb-1}` of B.
     pub nb: usize,
-    /// Coefficients `f1 ... f_nf` of F.
+    /// Number of coefficients `f1 ... f_nf` of F.
     pub nf: usize,
     /// Delay of b0 in samples.
     pub nk: usize,
 }
 
 impl InputOrders {
-    /// First sample whose response depends on no input before the record: `nk + nb - 1`.
+    /// Returns the first sample at which `B q^-nk` needs no input from before the record: `nk + nb - 1`.
     pub fn first_regressed_sample(&self) -> usize {
         self.nk.saturating_add(self.nb.saturating_sub(1))
     }
@@ -25,7 +25,7 @@ pub(crate) struct FurtherInput<'a> {
     pub values: Vec<&'a [f64]>,
 }
 
-/// The signals of a further input at one theta, each preceded by the zeros of the workspace.
+/// The signals of a further input for one theta, each preceded by the padding zeros of the workspace.
 #[derive(Debug, Default)]
 pub(super) struct FurtherSignals {
     pub s: Vec<f64>,

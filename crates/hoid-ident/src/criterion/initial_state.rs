@@ -1,4 +1,4 @@
-//! Assumptions about the time before a record, and the residuals available under them.
+//! Assumptions about the time before a record, and the first residual that can be computed under each assumption.
 
 use hoid_model::Orders;
 
@@ -7,11 +7,11 @@ use hoid_model::Orders;
 pub enum InitialState {
     /// Input, output and innovations were zero.
     Zero,
-    /// No assumption: the initial states of each record are estimated with the parameters.
+    /// No assumption: the initial states of each record are estimated together with the parameters.
     #[default]
     Estimate,
-    /// The noise was stationary before the record as well (Box and Jenkins's unconditional sum of squares); there is no
-    /// assumption about the response to the input.
+    /// The noise was also stationary before the record (the unconditional sum of squares of Box and Jenkins); nothing
+    /// is assumed about the response to the input.
     Backcast,
 }
 
@@ -19,7 +19,8 @@ hoid_model::named_choice!(InitialState, "rule for initial states", 3, {
     Zero => "zero", Estimate => "estimate", Backcast => "backcast",
 });
 
-/// Returns the first sample whose residual can be computed with this rule for initial states, for these orders.
+/// Returns the first sample whose residual can be computed for these orders and this assumption about the initial
+/// states.
 pub fn first_residual(orders: &Orders, initial: InitialState) -> usize {
     match initial {
         InitialState::Zero => 0,

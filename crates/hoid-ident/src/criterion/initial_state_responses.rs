@@ -1,17 +1,18 @@
-//! Initial states of a record, eliminated exactly.
+//! Exact elimination of the initial states of a record.
 //!
 //! The unknown past of a record enters the residuals linearly: the nf past values of w through the free responses of
-//! `1/F` (as `-(D/C) h`, h the impulse response of `1/F`), the nc past innovations through those of `1/C`. With G the
-//! matrix of these responses and `G = Q R`, the least squares states are `x = -R^-1 Q' eps_0` and the residuals
-//! `eps = (I - Q Q') eps_0`. The responses die away, so that Q is short compared with the record. Source: G. H. Golub
-//! and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432.
+//! `1/F` (as `-(D/C) h`, where h is the impulse response of `1/F`), and the nc past innovations through the free
+//! responses of `1/C`. If G is the matrix of these responses and `G = Q R`, the least squares states are
+//! `x = -R^-1 Q' eps_0` and the residuals are `eps = (I - Q Q') eps_0`. The responses decay, so that Q is short
+//! compared with the record. Source: G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432.
 //!
-//! With a stationary past ([`crate::criterion::stationary_noise`]) the states of the noise model
-//! have a known covariance `sigma^2 L L'`: they are `L z` with z of variance sigma^2, and z counts
-//! as further residuals. G then has the rows `[I; G L]` for them.
+//! With a stationary past ([`crate::criterion::stationary_noise`]) the states of the noise model have a known
+//! covariance `sigma^2 L L'`. They equal `L z`, where z has the covariance `sigma^2 I` and counts as additional
+//! residuals. For these states G has the rows `[I; G L]`.
 //!
 //! A level of u, the constant that is not a response to e, also enters linearly, through `-(D/C) 1`, and is eliminated
-//! with the states. It does not die away: its basis vector is as long as the record.
+//! together with the states. The response to the level does not decay, so that its basis vector is as long as the
+//! record.
 
 use hoid_core::filter::{SecondOrder, divide_in_place};
 
@@ -20,21 +21,20 @@ use crate::{
     linalg::least_squares::{add_scaled, dot},
 };
 
-/// Orthonormal basis of the responses to the initial states of a record, and the map back to the
-/// states.
+/// Orthonormal basis of the responses to the initial states of a record, and the map from this basis to the states.
 #[derive(Debug, Default)]
 pub(crate) struct InitialStateResponses {
-    /// Basis vectors: first the [`InitialStateResponses::prior_rows`] of z, then those from the first residual on;
-    /// beyond their end they are zero.
+    /// Basis vectors. The first `prior_rows` elements belong to z, the others to the residuals from the first residual
+    /// on. Beyond the end of a vector the elements are zero.
     q: Vec<Vec<f64>>,
     /// `G[:, kept[k]] = sum over l <= k of Q_l r[k][l]`.
     r: Vec<Vec<f64>>,
     kept: Vec<usize>,
     /// Impulse response of 1/F for each input.
     h: Vec<Vec<f64>>,
-    /// Input and number of each state of a 1/F; those of the noise model come after them.
+    /// Index of the input, and of the state, for each state of a `1/F`. The states of the noise model follow.
     of_inputs: Vec<(usize, usize)>,
-    /// Place of the level.
+    /// Index of the level among the columns of G.
     level: Option<usize>,
     prior_rows: usize,
 }
@@ -42,26 +42,26 @@ pub(crate) struct InitialStateResponses {
 /// Assumptions about the past of a record.
 pub(crate) struct InitialHistory<'a> {
     pub c: &'a [f64],
-    /// The polynomial that whitens v together with C.
+    /// The polynomial D of the whitening filter D/C.
     pub d: &'a [f64],
     /// F of each input.
     pub f: &'a [&'a [f64]],
-    /// Samples from the first value of w to the first residual.
+    /// Number of samples from the first value of w to the first residual.
     pub lead: usize,
-    /// The past of stationary noise; `None` if nothing is known about it.
+    /// Covariance of the initial state of stationary noise; `None` if nothing is assumed about the past of the noise.
     pub noise: Option<&'a StationaryNoise>,
-    /// Square roots of the weights of the residuals, from the first residual on; `None` if all weights are equal.
+    /// Square roots of the residual weights, from the first residual on; `None` if all weights are equal.
     pub weights: Option<&'a [f64]>,
     /// True if u has a level.
     pub level: bool,
 }
 
 impl InitialStateResponses {
-    /// Computes the responses of `rows` residuals, from the first one on, to the nf initial values of the w of each
-    /// input and to the states of the noise model.
+    /// Computes the responses of the first `rows` residuals to the nf initial values of w of each input and to the
+    /// states of the noise model.
     ///
-    /// Any free response of 1/F is a combination of its impulse response `h` started at the first
-    /// nf samples (that basis stays independent even where f_nf = 0).
+    /// Any free response of 1/F is a combination of copies of its impulse response `h` that start at the first nf
+    /// samples. This basis remains linearly independent even for f_nf = 0.
     pub fn of(past: &InitialHistory<'_>, rows: usize) -> Self {
         let InitialHistory { c, d, f, lead, .. } = *past;
         let mut columns: Vec<Vec<f64>> = Vec::new();
@@ -82,10 +82,10 @@ impl InitialStateResponses {
                 s.resize(rows + lead, 0.0);
                 divide_in_place(c, &mut s);
             }
-            // w grows with a state, the residual falls with w.
+            // w increases with the state, and the residual decreases with w.
             s.iter_mut().for_each(|v| *v = -*v);
             for i in 0..f.len() {
-                // The state enters i samples after w starts.
+                // The response to state i starts i samples after w.
                 columns.push(shifted(&s, i, lead, rows));
                 of_inputs.push((input, i));
             }
@@ -125,7 +125,7 @@ impl InitialStateResponses {
         };
         for (index, column) in columns.into_iter().enumerate() {
             let mut whole = vec![0.0; prior_rows];
-            // For a state of the noise.
+            // A state of the noise model also has a row of the identity matrix.
             if let Some(z) = index
                 .checked_sub(free.of_inputs.len())
                 .and_then(|state| whole.get_mut(state))
@@ -138,7 +138,8 @@ impl InitialStateResponses {
         free
     }
 
-    /// Modified Gram-Schmidt, twice for orthogonality to rounding; a column that depends on the others is dropped.
+    /// Modified Gram-Schmidt, applied twice for orthogonality to rounding. A column that depends linearly on the
+    /// previous columns is dropped.
     fn orthonormalise(&mut self, index: usize, mut column: Vec<f64>) {
         let size = dot(&column, &column).sqrt();
         let mut r = vec![0.0; self.q.len()];
@@ -164,9 +165,9 @@ impl InitialStateResponses {
         self.kept.push(index);
     }
 
-    /// Adds the best initial states to the signals: to the w of each input and to v from the first regressed sample on,
-    /// and to eps (weighted, if there are weights) from the first residual on. Returns z, which is empty if the past is
-    /// not random.
+    /// Adds the contribution of the least squares initial states to the signals: to w of each input and to v, from the
+    /// first regressed sample on, and to eps (weighted if there are weights), from the first residual on. Returns z,
+    /// which is empty unless the past is stationary.
     pub fn eliminate(&self, w: &mut [&mut [f64]], v: &mut [f64], eps: &mut [f64]) -> Vec<f64> {
         let components: Vec<f64> = self.basis().map(|q| dot(q, &eps[..q.len()])).collect();
         for (q, &component) in self.basis().zip(&components) {
@@ -183,7 +184,7 @@ impl InitialStateResponses {
                 states[l] -= self.r[k][l] * states[k];
             }
         }
-        // States of the noise model and a level have no effect on w.
+        // The level changes v but not w; the states of the noise model change neither.
         for (&index, &x) in self.kept.iter().zip(&states) {
             if Some(index) == self.level {
                 v.iter_mut().for_each(|v| *v -= x);
@@ -197,30 +198,30 @@ impl InitialStateResponses {
         z
     }
 
-    /// True if all responses have died away after a given number of rows.
-    pub fn have_died(&self, rows: usize) -> bool {
-        /// Share of its size below which a response has died away.
-        const DEAD: f64 = 1e-15;
-        /// Number of samples that show the amplitude of an oscillation.
-        const SWING: usize = 128;
+    /// True if all responses have decayed after the given number of rows.
+    pub fn have_decayed(&self, rows: usize) -> bool {
+        /// Relative magnitude below which a response counts as decayed.
+        const DECAYED: f64 = 1e-15;
+        /// Number of samples over which the amplitude of an oscillating response is judged.
+        const OSCILLATION_WINDOW: usize = 128;
         let dead = |response: &[f64]| {
             response.len() < rows
-                || response[response.len().saturating_sub(SWING)..]
+                || response[response.len().saturating_sub(OSCILLATION_WINDOW)..]
                     .iter()
-                    .all(|x| x.abs() < DEAD)
+                    .all(|x| x.abs() < DECAYED)
         };
-        // A basis vector has unit length, and the first value of an impulse response is one.
+        // No scaling is needed: a basis vector has unit length, and an impulse response starts at one.
         self.h.iter().all(|h| h.len() < rows) && self.basis().all(dead)
     }
 
-    /// Returns the orthonormal basis in the rows of the residuals; each vector starts at the first residual, and beyond
-    /// its end it is zero.
+    /// Returns the rows of the orthonormal basis that belong to residuals. Each vector starts at the first residual;
+    /// beyond its end it is zero.
     pub fn basis(&self) -> impl Iterator<Item = &[f64]> {
         self.q.iter().map(|q| &q[self.prior_rows..])
     }
 }
 
-/// Returns `response(t + lead - delay)` for t = 0 .. rows, truncated where the response ends.
+/// Returns `response(t + lead - delay)` for t = 0 .. rows, truncated at the end of the response.
 fn shifted(response: &[f64], delay: usize, lead: usize, rows: usize) -> Vec<f64> {
     let mut column = vec![0.0; delay.saturating_sub(lead).min(rows)];
     let from = lead.saturating_sub(delay).min(response.len());
@@ -229,7 +230,8 @@ fn shifted(response: &[f64], delay: usize, lead: usize, rows: usize) -> Vec<f64>
     column
 }
 
-/// Impulse response of `1/D`, until it has died away (1e-16 of its largest value) or its length is `longest`.
+/// Returns the impulse response of `1/D`, truncated when it has decayed to 1e-16 of its largest value or has `longest`
+/// samples.
 fn impulse_response(d: &[f64], longest: usize) -> Vec<f64> {
     const BLOCK: usize = 128;
     let order = d.len();

@@ -1,5 +1,5 @@
-//! Evaluation of the criterion for a search and a fit: feasible theta, sum of squares, descent `psi' eps` and
-//! `psi' psi`, also for single polynomials, and the residuals.
+//! Evaluation of the criterion for a search and a fit: feasibility of theta, residuals, sum of squares, descent
+//! `psi' eps` and `psi' psi`, over all parameters or those of one polynomial.
 
 use std::ops::Range;
 
@@ -24,8 +24,9 @@ impl Criterion<'_> {
         self.linearise(theta, workspace).sum_of_squares
     }
 
-    /// Computes the least squares A and B for the other coefficients of theta, in one step because the residual is
-    /// affine in them, and the sum of squares there. `None` if the regressors are singular or the loss is not finite.
+    /// Returns the coefficients of A and B that minimise the sum of squares for the other coefficients of theta, and
+    /// this minimum. One step suffices, because the residual is affine in A and B. `None` if the regressors are
+    /// singular or the loss is not finite.
     pub fn best_linear_part(&self, theta: &[f64], workspace: &mut Workspace) -> Option<(Vec<f64>, f64)> {
         let linear = self.orders.na + self.orders.nb;
         let mut theta = theta.to_vec();
@@ -44,8 +45,8 @@ impl Criterion<'_> {
         value.is_finite().then_some((best, value))
     }
 
-    /// As [`Objective::linearise`], with only the derivatives with respect to the coefficients of one polynomial; the
-    /// others are zero.
+    /// As [`Objective::linearise`], but computes only the derivatives with respect to the coefficients of one
+    /// polynomial and sets the other elements to zero.
     pub fn linearise_block(&self, theta: &[f64], block: Block, workspace: &mut Workspace) -> Linearisation {
         let (p, place) = (theta.len(), block.place(&self.orders));
         let count = place.len();
@@ -69,11 +70,12 @@ impl Criterion<'_> {
         whole
     }
 
-    /// Returns the residuals of one record, from [`Criterion::first`] on.
+    /// Returns the residuals of one record, starting at [`Criterion::first`].
     pub fn residuals_of(&self, theta: &[f64], record: usize, workspace: &mut Workspace) -> Vec<f64> {
         let mut residuals = Vec::new();
         self.pass(theta, &[], record, workspace, |_, counted, ws| {
-            // For a short record the whole memory at once; for a long one only as much as it needs.
+            // A short record is copied in one call, a long record span by span; the first call reserves memory for all
+            // residuals.
             residuals.reserve_exact(self.data[record].u.len() - self.first - residuals.len());
             residuals.extend_from_slice(&ws.eps[counted]);
         });
@@ -103,7 +105,8 @@ impl Criterion<'_> {
 }
 
 impl Objective for Criterion<'_> {
-    /// True if all roots of C and F are inside the unit circle, and those of the noise poles too for a stationary past.
+    /// True if theta is finite and all roots of C and of each F are inside the unit circle; with a stationary past also
+    /// the poles of the noise model.
     fn is_feasible(&self, theta: &[f64]) -> bool {
         let parts = Polynomials::split(&self.orders, theta);
         theta.iter().all(|v| v.is_finite())

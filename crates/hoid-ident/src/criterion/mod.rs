@@ -1,6 +1,6 @@
 //! The prediction-error criterion of the general model, its gradient and its Gauss-Newton matrix.
 //!
-//! For `A u = (B/F) q^-nk e + (C/D) eps` and given theta
+//! With `A u = (B/F) q^-nk e + (C/D) eps` and given theta,
 //!
 //! `w = (B/F) q^-nk e`, `v = A u - w`, `eps = (D/C) v` (eq. 5.4)
 //!
@@ -15,45 +15,44 @@
 //! | `d_j` | `-(1/C) v(t-j)` |
 //! | `f_j` | `-(D/(C F)) w(t-j)` |
 //!
-//! **Initial states.** With [`InitialState::Zero`] everything before the record is zero and all
-//! residuals count. With [`InitialState::Estimate`] nothing is assumed: residuals are used from the
-//! first sample at which every input and output in the regression lies inside the record, and what
-//! then remains unknown, the nf past values of w and the nc past values of eps, is estimated in
-//! each record. eps is affine in these states, so that they are eliminated exactly for each theta
-//! (variable projection; G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432):
-//! with the orthonormal basis Q of their responses, `eps = (I - Q Q') eps_0`. The loss is then a function of theta
-//! only, its gradient is `-psi' eps` exactly (the states are optimal), and the Gauss-Newton matrix is
+//! **Initial states.** With [`InitialState::Zero`] all signals are zero before the record, and all residuals count.
+//! With [`InitialState::Estimate`] nothing is assumed. The residuals start at the first sample at which every input and
+//! output of the regression lies inside the record. The nf past values of w and the nc past values of eps are still
+//! unknown; they are estimated for each record. Since eps is affine in these states, they are eliminated exactly for
+//! each theta (variable projection; G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432): with the
+//! orthonormal basis Q of their responses, `eps = (I - Q Q') eps_0`. The loss is then a function of theta alone. Its
+//! gradient is exactly `-psi' eps`, because the states are optimal, and the Gauss-Newton matrix is
 //! `psi' (I - Q Q') psi` (the approximation of L. Kaufman, *BIT* 15 (1975) 49-57). A shifted signal differs from the
-//! true derivative only by a free response of 1/F or 1/C, which lies in the span of Q: shifting stays exact. This also
-//! holds if u has a level ([`Data::level`]), which is one more such state.
+//! true derivative only by a free response of 1/F or 1/C, which lies in the span of Q, so that shifting remains exact.
+//! All this also holds if u has a level ([`Data::level`]), which is one more such state.
 //!
-//! With [`InitialState::Backcast`] the past of w is unknown as before, but that of the noise is
-//! stationary ([`stationary_noise`]): the residuals start nd samples earlier, and the state of the
-//! noise model counts as r further residuals z. Without an input, A replaces D and the residuals start with the record.
+//! With [`InitialState::Backcast`] the past of w is also unknown, but the past of the noise is stationary
+//! ([`stationary_noise`]). The residuals start nd samples earlier, and the r states of the noise model count as
+//! additional residuals z. Without an input, A replaces D, and the residuals start at the first sample of the record.
 //!
-//! **Several inputs.** `A u = sum_i (B_i/F_i) q^-nk_i e_i + (C/D) eps`: each has its own s, w, B and
-//! F, psi of its coefficients has the two rows of B and F above with its own signals, and the past
-//! values of each w are unknown ([`further`]). Ljung, 1999, section 4.2 (eq. 4.35).
+//! **Several inputs.** `A u = sum_i (B_i/F_i) q^-nk_i e_i + (C/D) eps`: each input has its own s, w, B and F. Its
+//! columns of psi follow from its own signals by the formulas for `b_j` and `f_j` above, and the past values of each w
+//! are unknown ([`further`]). Ljung, 1999, section 4.2 (eq. 4.35).
 //!
-//! **Weights** multiply the squared residuals; they are used by the robust loss.
+//! **Weights** multiply the squared residuals; the robust loss uses them.
 //!
-//! **A long record** is processed span by span after its first part ([`pass`]), so that a fit needs little memory in
-//! addition to the record.
+//! **Long records** are processed in spans after a first part ([`pass`]), so that a fit needs little memory in addition
+//! to the record.
 //!
 //! | module | contents |
 //! |---|---|
 //! | `prediction_error` | the criterion: records, orders, residuals that count |
 //! | `initial_state` | assumptions about the time before a record |
-//! | `polynomials` | A, B, C, D and F as parts of theta |
+//! | `polynomials` | division of theta into A, B, C, D and F |
 //! | `further_input` | a further input: orders, values, signals |
-//! | `further` | inputs in addition to e |
-//! | `signals`, `whitening` | the signals of a record at one theta |
+//! | `further` | responses to inputs in addition to e, and their columns of psi |
+//! | `signals`, `whitening` | the signals of a record for one theta |
 //! | `initial_state_responses` | exact elimination of the unknown past of a record |
-//! | `stationary_noise` | the noise before the record, when it was stationary |
-//! | `pass` | a pass over a record; a long one span by span |
+//! | `stationary_noise` | stationary noise before the record |
+//! | `pass` | a pass over a record, in spans if the record is long |
 //! | `normal_equations` | products of the residuals and the columns of psi |
 //! | `linearisation` | evaluation of the criterion for a search |
-//! | `workspace` | the memory of the signals |
+//! | `workspace` | memory for the signals |
 
 mod further;
 pub(crate) mod further_input;

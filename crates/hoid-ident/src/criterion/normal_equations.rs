@@ -24,11 +24,11 @@ pub(super) struct Column<'w> {
     pub values: Cow<'w, [f64]>,
     pub sign: f64,
     /// True if this is the previous column delayed by one sample.
-    pub follows: bool,
+    pub is_shift_of_previous: bool,
 }
 
 impl Criterion<'_> {
-    /// Adds one record to the normal equations of the coefficients of these polynomials.
+    /// Adds the contribution of one record to the normal equations for the coefficients of these polynomials.
     pub(super) fn add_record(
         &self,
         theta: &[f64],
@@ -77,14 +77,14 @@ impl Criterion<'_> {
                 columns.push(Column {
                     values,
                     sign,
-                    follows: j > from && !late,
+                    is_shift_of_previous: j > from && !late,
                 });
             }
         }
         columns
     }
 
-    /// Adds one record to the normal equations of these columns.
+    /// Adds the products of these columns and the residuals, with the weights of the record, to the normal equations.
     pub(super) fn accumulate(
         &self,
         states: &EliminatedStates,
@@ -102,13 +102,13 @@ impl Criterion<'_> {
             .map(|column| Column {
                 values: Cow::Owned(weighted(&column.values)),
                 sign: column.sign,
-                follows: false,
+                is_shift_of_previous: false,
             })
             .collect();
         add_products(states, &columns, &weighted(eps), total);
     }
 
-    /// Adds the contribution of the penalty on the stationary past to the descent.
+    /// Adds the penalty on the states of stationary noise to the sum of squares and to the descent.
     pub(super) fn add_penalty(&self, states: &EliminatedStates, total: &mut Linearisation) {
         let Some(noise) = &states.noise else { return };
         let o = &self.orders;
@@ -127,7 +127,7 @@ impl Criterion<'_> {
 /// Adds the products of the residuals and the columns of psi, with the initial states projected out.
 fn add_products(states: &EliminatedStates, columns: &[Column<'_>], eps: &[f64], total: &mut Linearisation) {
     let p = columns.len();
-    // Components of each column in the space of the initial states, one row per column.
+    // Components of each column in the space of the initial states: one row per column of psi.
     let count = states.responses.basis().count();
     let mut inside = Vec::with_capacity(p * count);
     for column in columns {
@@ -135,11 +135,11 @@ fn add_products(states: &EliminatedStates, columns: &[Column<'_>], eps: &[f64], 
     }
     let residuals = Lagged {
         values: eps,
-        follows: false,
+        is_shift_of_previous: false,
     };
     let lagged = columns.iter().map(|column| Lagged {
         values: &column.values,
-        follows: column.follows,
+        is_shift_of_previous: column.is_shift_of_previous,
     });
     let all: Vec<Lagged<'_>> = std::iter::once(residuals).chain(lagged).collect();
     let (raw, q) = (gram(&all), p + 1);

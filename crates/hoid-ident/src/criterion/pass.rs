@@ -1,15 +1,15 @@
-//! A pass over a record at one theta; a long record is passed span by span.
+//! A pass over a record for one theta, in spans if the record is long.
 //!
-//! The terms of the normal equations are sums over time, and every signal in them is the output of a causal filter: the
-//! first part of the record (32 768 samples) is processed like any record, and the rest in spans that fit into the
-//! processor cache, each preceded by the last samples of the previous span. Memory and time per sample then do not grow
-//! with the length of the record.
+//! The terms of the normal equations are sums over time, and every signal in them is the output of a causal filter. The
+//! head of a long record (32 768 samples) is therefore processed like a short record. The rest is processed in spans
+//! that fit into the processor cache, each preceded by the last samples of the previous span. The memory needed and the
+//! time per sample then do not grow with the length of the record.
 //!
-//! The initial states affect only the start. Their responses must have died away within the head
-//! ([`InitialStateResponses::have_died`](crate::criterion::initial_state_responses::InitialStateResponses::have_died));
-//! if a pole is so near the unit circle that they have not, the record is processed as a whole. The same holds with
-//! weights, of which there is one per sample, with further inputs, and with a stationary past, whose columns are
-//! whitened one by one. The sums differ from those over the whole by rounding only.
+//! The initial states affect only the start of the record. Their responses must have decayed within the head
+//! ([`have_decayed`](crate::criterion::initial_state_responses::InitialStateResponses::have_decayed)).
+//! If a pole is so close to the unit circle that they have not, the record is processed as a whole. Records with
+//! weights (one per sample), with further inputs, or with a stationary past (whose columns are whitened one by one) are
+//! also processed as a whole. The sums over spans differ from the sum over the whole record only by rounding.
 
 use std::ops::Range;
 
@@ -25,37 +25,37 @@ use super::{
     workspace::Workspace,
 };
 
-/// Samples of a span: its signals fill a quarter of the second-level cache.
+/// Number of samples in a span: the signals of a span fill a quarter of the second-level cache.
 const SPAN: usize = 1 << 11;
 
-/// Samples of the first part. Only a record of twice this length is processed in spans; others, up to some minutes, as
-/// a whole.
+/// Number of samples in the head. Only a record of at least twice this length is processed in spans; shorter records,
+/// up to several minutes, are processed as a whole.
 const HEAD: usize = 1 << 15;
 
 impl Criterion<'_> {
-    /// Processes a record and calls `show` with the eliminated initial states, the rows of the workspace with the
-    /// residuals that count, and the workspace; for a long record, once for each span. Returns the eliminated initial
-    /// states.
+    /// Processes a record and calls `visit` with the eliminated initial states, the rows of the workspace that contain
+    /// the counted residuals, and the workspace. For a long record `visit` is called once per span. Returns the
+    /// eliminated initial states.
     pub(super) fn pass(
         &self,
         theta: &[f64],
         blocks: &[Block],
         record: usize,
         ws: &mut Workspace,
-        mut show: impl FnMut(&EliminatedStates, Range<usize>, &Workspace),
+        mut visit: impl FnMut(&EliminatedStates, Range<usize>, &Workspace),
     ) -> EliminatedStates {
-        if let Some(states) = self.pass_in_spans(theta, blocks, record, HEAD, ws, &mut show) {
+        if let Some(states) = self.pass_in_spans(theta, blocks, record, HEAD, ws, &mut visit) {
             return states;
         }
         let data = self.data[record];
         let states = self.residual_pass(theta, record, data, ws);
         self.gradient_pass(theta, blocks, data, ws);
-        show(&states, ws.pad + self.first..ws.pad + data.u.len(), ws);
+        visit(&states, ws.pad + self.first..ws.pad + data.u.len(), ws);
         states
     }
 
-    /// Processes a record span by span, with the results of the pass over the head (none for the other spans); `None`,
-    /// without a call of `show`, if the record has to be processed as a whole.
+    /// Processes a record in spans. `visit` receives the eliminated initial states with the head, and empty states with
+    /// the other spans. Returns `None`, without calling `visit`, if the record must be processed as a whole.
     pub(super) fn pass_in_spans(
         &self,
         theta: &[f64],
@@ -63,11 +63,11 @@ impl Criterion<'_> {
         record: usize,
         head: usize,
         ws: &mut Workspace,
-        show: &mut dyn FnMut(&EliminatedStates, Range<usize>, &Workspace),
+        visit: &mut dyn FnMut(&EliminatedStates, Range<usize>, &Workspace),
     ) -> Option<EliminatedStates> {
         let Data { e, u, .. } = self.data[record];
         let plain = self.weights.is_none() && self.initial != InitialState::Backcast && self.further.is_empty();
-        // With long lags the head has no residuals.
+        // With longer lags the head could contain no residuals.
         let least = 2 * (self.first + self.orders.nk) + SPAN;
         if !plain || u.len() < 2 * head || head < least {
             return None;
@@ -78,25 +78,25 @@ impl Criterion<'_> {
             ..self.data[record]
         };
         let states = self.residual_pass(theta, record, begin, ws);
-        if !states.responses.have_died(head - self.first) {
+        if !states.responses.have_decayed(head - self.first) {
             return None;
         }
         self.gradient_pass(theta, blocks, begin, ws);
-        show(&states, ws.pad + self.first..ws.pad + head, ws);
+        visit(&states, ws.pad + self.first..ws.pad + head, ws);
         let parts = Polynomials::split(&self.orders, theta);
         let nothing = EliminatedStates::default();
         let mut behind = head;
         for from in (head..u.len()).step_by(SPAN) {
             let to = (from + SPAN).min(u.len());
-            ws.carry(behind);
+            ws.carry_over_tail(behind);
             behind = to - from;
             self.next_span(&parts, blocks, self.data[record], from..to, ws);
-            show(&nothing, ws.pad..ws.pad + behind, ws);
+            visit(&nothing, ws.pad..ws.pad + behind, ws);
         }
         Some(states)
     }
 
-    /// Computes the signals of the next span, after the last samples of the previous one at the front.
+    /// Computes the signals of the next span; the workspace starts with the last samples of the previous span.
     fn next_span(
         &self,
         parts: &Polynomials<'_>,
@@ -133,7 +133,7 @@ impl Criterion<'_> {
                 }
                 Block::B if o.nb > 0 => whiten_on(parts.c, parts.d, &s[..end], &mut xb[..end], pad),
                 Block::C if o.nc > 0 => whiten_on(parts.c, &[], &eps[..end], &mut xc[..end], pad),
-                // Without C its signal is v itself.
+                // With nc = 0 the signal for D is v itself.
                 Block::D if o.nd > 0 && o.nc > 0 => whiten_on(parts.c, &[], v, &mut xd[..end], pad),
                 Block::F if o.nf > 0 => {
                     let poles = product(&monic(parts.c), &monic(parts.f));
@@ -146,8 +146,8 @@ impl Criterion<'_> {
 }
 
 impl Workspace {
-    /// Copies the last samples of the span of this length to the front.
-    fn carry(&mut self, length: usize) {
+    /// Copies the last samples of a span, whose length is given, to the front of the workspace.
+    fn carry_over_tail(&mut self, length: usize) {
         let pad = self.pad;
         let Self {
             s, w, v, eps, filtered, ..

@@ -1,5 +1,5 @@
-//! The signals of a record: w, v and eps with the best initial states, and the signals whose shifts are the columns of
-//! psi.
+//! The signals of a record: w, v and eps with the least squares initial states, and the filtered signals whose shifts
+//! are the columns of psi.
 
 use std::ops::Range;
 
@@ -16,7 +16,7 @@ use super::{
 };
 use crate::linalg::least_squares::add_scaled;
 
-/// The initial states that a pass over a record has eliminated.
+/// Initial states that a pass over a record has eliminated.
 #[derive(Default)]
 pub(super) struct EliminatedStates {
     pub responses: InitialStateResponses,
@@ -25,7 +25,7 @@ pub(super) struct EliminatedStates {
 }
 
 impl Criterion<'_> {
-    /// Computes w, v and eps of a record, or of its first part, with the best initial states.
+    /// Computes w, v and eps of a record, or of its head, with the least squares initial states.
     pub(super) fn residual_pass(
         &self,
         theta: &[f64],
@@ -36,7 +36,7 @@ impl Criterion<'_> {
         let parts = Polynomials::split(&self.orders, theta);
         let n = data.u.len();
         let o = &self.orders;
-        ws.make_room(o, &self.further, n);
+        ws.allocate(o, &self.further, n);
         let pad = ws.pad;
         let regressed = self.first_regressed();
         let start = match self.initial {
@@ -86,7 +86,7 @@ impl Criterion<'_> {
         states
     }
 
-    /// Computes `w = B s` and `v = A u - w` of these samples, the first of which is at `from` in the workspace.
+    /// Computes `w = B s` and `v = A u - w` over these samples; the first sample has the index `from` in the workspace.
     pub(super) fn response(
         &self,
         parts: &Polynomials<'_>,
@@ -99,7 +99,7 @@ impl Criterion<'_> {
         let u = &data.u[samples.clone()];
         let (w, v) = (&mut ws.w[from..to], &mut ws.v[from..to]);
         match *parts.b {
-            // The orders of the operator: B has two coefficients, in one pass.
+            // An operator has two coefficients of B: one pass computes w and v.
             [b0, b1] => {
                 let inputs = ws.s[from..to].iter().zip(&ws.s[from - 1..to - 1]).zip(u);
                 for ((w, v), ((s0, s1), u)) in w.iter_mut().zip(&mut *v).zip(inputs) {
@@ -129,7 +129,7 @@ impl Criterion<'_> {
         }
     }
 
-    /// Computes the signals whose shifts are the columns of psi.
+    /// Computes the filtered signals whose shifts are the columns of psi.
     pub(super) fn gradient_pass(&self, theta: &[f64], blocks: &[Block], data: Data<'_>, ws: &mut Workspace) {
         let parts = Polynomials::split(&self.orders, theta);
         let (o, pad) = (&self.orders, ws.pad);
@@ -148,7 +148,7 @@ impl Criterion<'_> {
             xc[..pad].fill(0.0);
             divide(parts.c, &ws.eps[pad..], &mut xc[pad..]);
         }
-        // Without C the signal of D is v itself.
+        // With nc = 0 the signal for D is v itself.
         if o.nd > 0 && o.nc > 0 && blocks.contains(&Block::D) {
             xd[..pad].fill(0.0);
             divide(parts.c, &ws.v[pad..], &mut xd[pad..]);
@@ -156,7 +156,7 @@ impl Criterion<'_> {
         if o.nf > 0 && blocks.contains(&Block::F) {
             let from = pad + regressed;
             if passes_once(o) {
-                // w is zero before.
+                // w is zero before `from`.
                 let d1 = parts.d.first().copied().unwrap_or(0.0);
                 xf[..from].fill(0.0);
                 divide_and_whiten([parts.f[0], parts.f[1]], d1, &ws.w[from..], &mut xf[from..]);
@@ -168,8 +168,8 @@ impl Criterion<'_> {
         }
     }
 
-    /// Computes `(D/C) u`; with a stationary past u itself, because each shift is truncated at the first residual
-    /// before it is whitened.
+    /// Computes `(D/C) u`. With a stationary past it copies u unchanged, because each shift is truncated at the first
+    /// residual before it is whitened.
     fn filter_output(&self, parts: &Polynomials<'_>, data: Data<'_>, ws: &mut Workspace) {
         if self.orders.na == 0 {
             return;
@@ -185,7 +185,7 @@ impl Criterion<'_> {
         }
     }
 
-    /// Computes `s = (1/F) e(t-nk)`, of which w is a moving sum: `w = B s`. If the initial states are estimated, w may
+    /// Computes `s = (1/F) e(t-nk)`, from which w follows by `w = B s`. If the initial states are estimated, w may
     /// differ from the response from rest by a free response of 1/F.
     fn filter_input(&self, parts: &Polynomials<'_>, data: Data<'_>, ws: &mut Workspace) {
         let (pad, n) = (ws.pad, data.u.len());
@@ -197,7 +197,7 @@ impl Criterion<'_> {
         divide(parts.f, &data.e[..pad + n - from], &mut ws.s[from..]);
     }
 
-    /// Computes `(D/C) s`; with a stationary past s itself.
+    /// Computes `(D/C) s`. With a stationary past it copies s unchanged.
     fn whiten_input(&self, parts: &Polynomials<'_>, ws: &mut Workspace) {
         if self.orders.nb == 0 {
             return;

@@ -1,28 +1,29 @@
-//! The past of stationary noise, for the rule that MATLAB's toolbox and Box and Jenkins call backcasting.
+//! Initial state of stationary noise, for the treatment of the past that is called backcasting by Box and Jenkins and
+//! in MATLAB's toolbox.
 //!
-//! `v = (C/D) eps` has the state of the innovations form with r = max(nc, nd)
+//! In innovations form `v = (C/D) eps` has r = max(nc, nd) states,
 //!
-//! `x_i(t+1) = x_{i+1}(t) + c_i eps(t) - d_i v(t)`, `v = eps + x_1`: `x(t+1) = Phi x + K eps`,
-//! `K_i = c_i - d_i`,
+//! `x_i(t+1) = x_{i+1}(t) + c_i eps(t) - d_i v(t)`, `v = eps + x_1`, or `x(t+1) = Phi x + K eps` with
+//! `K_i = c_i - d_i`.
 //!
-//! and for a record that starts at t = 0 the predictor reads `C eps = D v + g`,
-//! `g_i = -x_{i+1}(0)`, with zeros before. Where v is stationary, x(0) is random with the
-//! covariance `sigma^2 P`, `P = Phi P Phi' + K K'`, and
+//! For a record that starts at t = 0, the predictor is `C eps = D v + g` with `g_i = -x_{i+1}(0)` and zero signals
+//! before t = 0. If v is stationary, x(0) is random with the covariance `sigma^2 P`, where `P = Phi P Phi' + K K'`, and
 //!
-//! `S(theta) = min over g of  sum eps^2 + g' P^-1 g  =  v' Sigma_v^-1 v`,
+//! `S(theta) = min over g of  sum eps^2 + g' P^-1 g  =  v' Sigma_v^-1 v`
 //!
-//! the *unconditional sum of squares* of G. E. P. Box and G. M. Jenkins (*Time Series Analysis*,
-//! 1976, section 7.1.4), which they reach by running the model backwards. With `P = L L'` and
-//! `g = L z` the penalty is `z' z`, so that z joins the residuals.
+//! is the *unconditional sum of squares* of G. E. P. Box and G. M. Jenkins (*Time Series Analysis*, 1976, section
+//! 7.1.4), who compute it by running the model backwards. With `P = L L'` and `g = L z` the penalty is `z' z`, so that
+//! z can be appended to the residuals.
 //!
-//! The gradient of the penalty follows from the adjoint equation `Z = Phi' Z Phi + y y'`,
+//! The gradient of the penalty follows from the solution Z of the adjoint equation `Z = Phi' Z Phi + y y'` with
 //! `y = P^-1 g`: `y' (dP/dc_i) y = 2 (Z K)_i` and `y' (dP/dd_i) y = -2 (Z K)_i - 2 (Z Phi P)_{i1}`.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::linalg::least_squares::add_scaled;
 
-/// Doublings of the Lyapunov sum: 2^60 terms suffice for any pole that differs from one in double precision.
+/// Number of doublings of the Lyapunov sum: 2^60 terms suffice for any stable pole whose modulus differs from one in
+/// double precision.
 const DOUBLINGS: usize = 60;
 
 /// Covariance of the initial state of a noise model.
@@ -35,7 +36,8 @@ pub(crate) struct StationaryNoise {
 }
 
 impl StationaryNoise {
-    /// Returns the past of `(C/D) eps` with unit variance of eps. `None` if D has a root on or outside the unit circle.
+    /// Returns the initial state of `(C/D) eps` for innovations of unit variance; `None` if D has a root on or outside
+    /// the unit circle.
     pub fn of(c: &[f64], d: &[f64]) -> Option<Self> {
         let r = c.len().max(d.len());
         let coefficient = |p: &[f64], i: usize| p.get(i).copied().unwrap_or(0.0);
@@ -53,12 +55,12 @@ impl StationaryNoise {
         })
     }
 
-    /// Number of states.
+    /// Returns the number of states.
     pub fn states(&self) -> usize {
         self.gain.len()
     }
 
-    /// Response of the residuals to `z_j`, composed of the responses to each `g_i`.
+    /// Returns the response of the residuals to `z_j`, computed from the responses to each `g_i`.
     pub fn response(&self, responses: &[Vec<f64>], j: usize) -> Vec<f64> {
         let longest = responses.iter().map(Vec::len).max().unwrap_or(0);
         let mut column = vec![0.0; longest];
@@ -68,10 +70,10 @@ impl StationaryNoise {
         column
     }
 
-    /// Computes `(1/2) y' dP y` for the coefficients of C and of D at the best z: the contribution of the penalty to
-    /// the descent `psi' eps`.
+    /// Computes `(1/2) y' dP y` with respect to the coefficients of C and of D at the least squares z. This is the
+    /// contribution of the penalty to the descent `psi' eps`.
     pub fn descent(&self, z: &[f64], nc: usize, nd: usize) -> (Vec<f64>, Vec<f64>) {
-        // No state, or no state with a variance.
+        // The noise model has no states.
         if self.states() == 0 {
             return (Vec::new(), Vec::new());
         }
@@ -87,7 +89,7 @@ impl StationaryNoise {
         )
     }
 
-    /// Computes `L^-T z`; a direction without variance remains zero.
+    /// Computes `L^-T z`; elements without variance remain zero.
     fn solve_transposed(&self, z: &[f64]) -> DVector<f64> {
         let r = z.len();
         let mut y = DVector::zeros(r);
@@ -121,7 +123,7 @@ fn lyapunov(transition: &DMatrix<f64>, gain: &DVector<f64>) -> Option<DMatrix<f6
     None
 }
 
-/// Lower triangular L with `L L' = P`; a pivot that is zero up to rounding gives a column of zeros.
+/// Returns the lower triangular L with `L L' = P`; a pivot that is zero to rounding results in a column of zeros.
 fn semidefinite_factor(p: &DMatrix<f64>) -> DMatrix<f64> {
     let r = p.nrows();
     let mut l = DMatrix::zeros(r, r);

@@ -1,10 +1,10 @@
-//! The whitening filter D/C, also for a signal whose past has been filtered already.
+//! The whitening filter D/C, applied from rest or continued from previous samples.
 
 use hoid_core::filter::{SecondOrder, divide_from};
 
 use crate::linalg::least_squares::add_scaled;
 
-/// `y = (1 + d1 q^-1) / (1 + f1 q^-1 + f2 q^-2) x` from rest.
+/// Computes `y = (1 + d1 q^-1) / (1 + f1 q^-1 + f2 q^-2) x` from rest.
 pub(super) fn divide_and_whiten([f1, f2]: [f64; 2], d1: f64, x: &[f64], y: &mut [f64]) {
     let mut filter = SecondOrder::new(f1, f2);
     let mut before = 0.0;
@@ -22,7 +22,8 @@ pub(super) fn divide_and_whiten([f1, f2]: [f64; 2], d1: f64, x: &[f64], y: &mut 
     }
 }
 
-/// Computes `y = (D/C) x` from index `from` on with zeros before: zero state of 1/C, x unchanged before.
+/// Computes `y = (D/C) x` from index `from` on and sets y to zero before it. The filter 1/C starts from rest, but D
+/// also uses x before `from`.
 pub(super) fn whiten(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
     if from >= x.len() {
         y.fill(0.0);
@@ -32,10 +33,11 @@ pub(super) fn whiten(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize
     whiten_on(c, d, x, y, from);
 }
 
-/// Computes `y = (D/C) x` from index `from` on; the values before it are the previous inputs and outputs of the filter.
+/// Computes `y = (D/C) x` from index `from` on. The values of x and y before `from` must be the previous inputs and
+/// outputs of the filter.
 pub(super) fn whiten_on(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
     match *d {
-        // The first lag in the same pass as the copy.
+        // The first lag is added while x is copied.
         [d1, ref rest @ ..] if from > 0 => {
             for ((y, x0), x1) in y[from..].iter_mut().zip(&x[from..]).zip(&x[from - 1..]) {
                 *y = x0 + d1 * x1;
@@ -50,12 +52,13 @@ pub(super) fn whiten_on(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: us
     divide_from(c, y, from);
 }
 
-/// `y(t) += sum_i d_i x(t - first_lag - i)` from index `from` on. Four lags in a pass read and write y once.
+/// Computes `y(t) += sum_i d_i x(t - first_lag - i)` from index `from` on. Each pass adds four lags, so that y is read
+/// and written only once for them.
 fn add_lags(d: &[f64], first_lag: usize, x: &[f64], y: &mut [f64], from: usize) {
     let (fours, rest) = d.as_chunks::<4>();
     let mut lag = first_lag;
     for d in fours {
-        // Up to the sample at which all four lags are inside x, one lag at a time.
+        // The lags are added one by one up to the sample at which all four lags are inside x.
         let whole = from.max(lag + 3).min(y.len());
         for (i, &di) in d.iter().enumerate() {
             add_lag(di, lag + i, x, &mut y[..whole], from);
@@ -74,7 +77,7 @@ fn add_lags(d: &[f64], first_lag: usize, x: &[f64], y: &mut [f64], from: usize) 
     }
 }
 
-/// `y(t) += d x(t - lag)` from index `from` on.
+/// Computes `y(t) += d x(t - lag)` from index `from` on.
 fn add_lag(d: f64, lag: usize, x: &[f64], y: &mut [f64], from: usize) {
     let start = from.max(lag);
     if start < y.len() {

@@ -1,4 +1,4 @@
-//! The signals of a record at one theta, in memory that is reused by the next fit.
+//! Memory for the signals of a record for one theta, reused by the next fit.
 
 use std::{
     cell::Cell,
@@ -9,7 +9,8 @@ use hoid_model::Orders;
 
 use super::further_input::{FurtherInput, FurtherSignals};
 
-/// Signals of one record at one theta. Each is preceded by `pad` zeros, so that a shift needs no case distinction.
+/// Signals of one record for one theta. Each signal is preceded by `pad` zeros, so that shifts need no special case at
+/// the start.
 #[derive(Debug, Default)]
 pub(crate) struct Workspace {
     pub(super) pad: usize,
@@ -24,19 +25,19 @@ pub(crate) struct Workspace {
 }
 
 thread_local! {
-    /// The workspace of the last fit on this thread.
-    static LEFT: Cell<Option<Workspace>> = const { Cell::new(None) };
+    /// Workspace of the last fit on this thread.
+    static LAST_WORKSPACE: Cell<Option<Workspace>> = const { Cell::new(None) };
 }
 
-/// A workspace for one fit, reused by the next on the same thread: allocating new pages for each fit costs a quarter of
-/// a study's time. Its contents are written before they are read.
+/// Workspace for one fit, reused by the next fit on the same thread: allocating new pages for each fit takes a quarter
+/// of the time of a study. The contents are overwritten before they are read.
 #[derive(Debug, Default)]
 pub(crate) struct Borrowed(Workspace);
 
 impl Workspace {
-    /// Returns the workspace of this thread, or a new one if it is in use.
+    /// Returns the workspace of this thread, or a new workspace if that of the thread is in use.
     pub fn of_thread() -> Borrowed {
-        Borrowed(LEFT.take().unwrap_or_default())
+        Borrowed(LAST_WORKSPACE.take().unwrap_or_default())
     }
 }
 
@@ -56,20 +57,20 @@ impl DerefMut for Borrowed {
 
 impl Drop for Borrowed {
     fn drop(&mut self) {
-        if self.0.eps.capacity() <= KEPT {
-            LEFT.set(Some(std::mem::take(&mut self.0)));
+        if self.0.eps.capacity() <= MAX_KEPT_SAMPLES {
+            LAST_WORKSPACE.set(Some(std::mem::take(&mut self.0)));
         }
     }
 }
 
-/// Length in samples of the longest signals that are kept between fits: a record of an hour at 100 Hz would occupy the
-/// memory of the thread permanently.
-const KEPT: usize = 1 << 17;
+/// Maximum length in samples of signals that are kept between fits: otherwise an hour at 100 Hz would permanently
+/// occupy the memory of the thread.
+const MAX_KEPT_SAMPLES: usize = 1 << 17;
 
 impl Workspace {
-    /// Allocates memory for a record, for the signals that these orders have; every pass writes a whole signal, its
-    /// leading zeros included, before it reads the signal.
-    pub(super) fn make_room(&mut self, o: &Orders, further: &[FurtherInput<'_>], n: usize) {
+    /// Allocates memory for the signals that these orders need for a record of n samples. Every pass writes each
+    /// signal, including its leading zeros, before it reads the signal.
+    pub(super) fn allocate(&mut self, o: &Orders, further: &[FurtherInput<'_>], n: usize) {
         let lags = |input: &FurtherInput<'_>| input.orders.nb.max(o.nc + input.orders.nf);
         let own = o.na.max(o.nb).max(o.nd).max(o.nc + o.nf);
         let pad = further.iter().map(lags).fold(own, usize::max);
@@ -92,8 +93,8 @@ impl Workspace {
     }
 }
 
-/// True for the poles of the operator with a noise model of first order or none, whose signal of F is computed in one
-/// pass.
+/// True if nf = 2, nc = 0 and nd <= 1, as for an operator with first-order noise: the signal for F is then computed in
+/// one pass.
 pub(super) fn passes_once(o: &Orders) -> bool {
     (o.nc, o.nf) == (0, 2) && o.nd <= 1
 }

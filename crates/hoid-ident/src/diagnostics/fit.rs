@@ -1,7 +1,7 @@
-//! The verdict of a fit of polynomials.
+//! The verdict on a polynomial fit.
 //!
-//! If the coefficients do not correspond to any operator, the response to e counts as known if b as a whole differs
-//! from zero: `b' P_b^-1 b`, with P_b the covariance of b, exceeds the 95 % point of chi-square with nb degrees of
+//! If the coefficients do not correspond to any operator, a response to e counts as established if b as a whole differs
+//! from zero: `b' P_b^-1 b`, where P_b is the covariance of b, exceeds the 95 % point of chi-square with nb degrees of
 //! freedom (A. Wald, *Trans. AMS* 54 (1943) 426-482).
 
 use hoid_model::{Finding, NotConvertible, Orders, Record, Verdict};
@@ -14,16 +14,16 @@ use super::{
 };
 use crate::{Choice, Fit, IdentError};
 
-/// Share of the power of u below which residuals are rounding of the data.
+/// Residuals with a power below this share of the power of u are only rounding errors of the data.
 const ROUNDING: f64 = 1e-22;
-/// Residuals per unknown below which the results of a fit carry no information.
+/// Minimum number of residuals per unknown; with fewer residuals the results of a fit carry no information.
 const FEWEST_RESIDUALS: usize = 5;
 /// Significance level of the test of b against zero.
 const LEVEL: f64 = 0.05;
 
 impl Fit {
-    /// Returns the verdict on the fit, for the records that it was fitted to and the search that chose its orders, if
-    /// any. The kinds of findings are those of the [module](super).
+    /// Returns the verdict on the fit. `records` are the records of the fit; `choice` is the search that chose its
+    /// orders, if any. The kinds of findings are listed in the [module](super).
     ///
     /// # Errors
     /// As [`Fit::residuals`].
@@ -32,7 +32,7 @@ impl Fit {
         all.extend(choice.and_then(delay_at_end));
         all.extend(self.too_few());
         all.extend(self.system_findings());
-        // Residuals that are rounding carry no information.
+        // Residuals that are only rounding errors carry no information.
         if let Some(share) = self.rounding() {
             all.push(Finding::note(
                 "no-noise",
@@ -48,13 +48,14 @@ impl Fit {
         Ok(Verdict::of(all))
     }
 
-    /// Returns the residuals as a share of the power of u, if they are rounding of the data.
+    /// Returns the power of the residuals as a share of the power of u if the residuals are only rounding errors of the
+    /// data.
     pub fn rounding(&self) -> Option<f64> {
         let share = self.loss / self.output_variance;
         (share < ROUNDING).then_some(share)
     }
 
-    /// Returns a finding if there are too few residuals for the unknowns.
+    /// Returns a finding if there are too few residuals for the number of unknowns.
     fn too_few(&self) -> Option<Finding> {
         let unknowns = self.model.theta().len() + self.states;
         (self.covariance.is_some() && self.residuals < FEWEST_RESIDUALS * unknowns).then(|| {
@@ -88,7 +89,7 @@ impl Fit {
                 all.extend(pole_findings(&operator, self.model.sample_time()));
                 return all;
             }
-            // Models that are not meant to be operators.
+            // These models are not intended to be operators.
             Err(
                 NotConvertible::OtherOrders { .. }
                 | NotConvertible::PolesInBoth { .. }
@@ -102,19 +103,19 @@ impl Fit {
         if self.responds() == Some(false) {
             all.push(Finding::undetermined(
                 "gain",
-                "B does not differ significantly from zero (5 %): there is too little response to e",
+                "B does not differ significantly from zero (5 % level): there is too little response to e",
             ));
         }
         all
     }
 
-    /// True if b differs from zero; `None` if its covariance is not known or singular.
+    /// True if b differs significantly from zero; `None` if the covariance of b is unknown or singular.
     fn responds(&self) -> Option<bool> {
         let covariance = self.covariance.as_ref()?;
         let names = self.orders().parameter_names();
         let p = names.len();
         let of_b: Vec<usize> = (0..p)
-            .filter(|i| names[*i].starts_with('b') && !self.held[*i])
+            .filter(|i| names[*i].starts_with('b') && !self.is_fixed_or_bounded[*i])
             .collect();
         if of_b.is_empty() || covariance.len() != p * p || self.physical.is_some() {
             return None;
@@ -145,7 +146,8 @@ impl Fit {
 
     fn residual_findings(&self, measures: &ResidualMeasures) -> Vec<Finding> {
         if self.instrumented {
-            // Instrumental variables assume nothing about the noise, and residuals of a closed loop follow e.
+            // Instrumental variables do not require white residuals, and in a closed loop these residuals are
+            // correlated with e.
             let note = |finding: Finding| {
                 let words = format!(
                     "{}; instrumental variables do not require white residuals",
@@ -160,15 +162,15 @@ impl Fit {
                 .chain(measures.leverage())
                 .collect();
         }
-        // A robust loss has reduced the weight of single samples.
+        // A robust loss has already reduced the weight of single samples.
         let leverage = measures.leverage().filter(|_| !self.robust);
         let others = [measures.coloured(), measures.structure()];
         others.into_iter().flatten().chain(leverage).collect()
     }
 }
 
-/// Returns a finding about a delay at the end of the range that was searched together with the other orders of the
-/// chosen model.
+/// Returns a finding if the delay is at the end of the range that was searched with the other orders of the chosen
+/// model.
 fn delay_at_end(choice: &Choice) -> Option<Finding> {
     let chosen = choice.fit.orders();
     let same = |o: &Orders| Orders { nk: chosen.nk, ..*o } == chosen;

@@ -1,4 +1,4 @@
-//! The verdict of a fit in physical parameters.
+//! The verdict on a fit in physical parameters.
 
 use hoid_model::{Finding, Record, Verdict, uncertainty::OperatorEstimate};
 
@@ -17,8 +17,8 @@ use crate::{
 };
 
 impl GreyBoxFit {
-    /// Returns the verdict on the fit, for the records that it was fitted to, in their order. The kinds of findings are
-    /// those of the [module](super).
+    /// Returns the verdict on the fit. `records` are the records of the fit, in their order. The kinds of findings are
+    /// listed in the [module](super).
     ///
     /// # Errors
     /// As [`crate::Fit::residuals`].
@@ -46,7 +46,7 @@ impl GreyBoxFit {
     }
 
     fn operator_findings(&self) -> Vec<Finding> {
-        // One operator for all records, or one for each record.
+        // There is one operator for all records, or one for each record.
         let places = &self.layout.positions;
         let several = places.iter().any(|of_record| *of_record != places[0]);
         let records = if several { places.len() } else { 1 };
@@ -87,7 +87,7 @@ impl GreyBoxFit {
         all
     }
 
-    /// Returns doubts if the operator is not constant over the records, or a stretch dominates the fit.
+    /// Returns warnings if the operator changes over the records or a stretch dominates the fit.
     fn constancy_findings(&self, records: &[Record]) -> Option<Vec<Finding>> {
         let layout = &self.layout;
         let initial = self.polynomial_fit(0).initial_state();

@@ -1,27 +1,28 @@
-//! Test of whether the error responds to the output, as it does in a loop.
+//! Test of whether the error responds to the output, as in a closed loop.
 //!
-//! In a loop every change of u returns in e. The test is whether the latest [`LATEST_S`] of u predict e better than the
-//! earlier errors and outputs do (C. W. J. Granger, *Econometrica* 37 (1969) 424-438). A common component of both
-//! signals, such as a forcing function, is in both pasts; the component of u alone is not.
+//! In a closed loop every change of u affects e. The test asks whether the last [`LATEST_S`] of u improve the
+//! prediction of e from earlier errors and outputs (C. W. J. Granger, *Econometrica* 37 (1969) 424-438). A component
+//! that is common to both signals, such as a forcing function, can be predicted from these earlier samples; the
+//! component of u alone cannot.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::whitened::{NOISE, orthogonal, thinning};
 
-/// Latest outputs that are tested, s.
+/// Duration of the latest outputs that are tested, s.
 const LATEST_S: f64 = 0.25;
 
-/// Response of e to u.
+/// Result of the test of whether e responds to u.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoopResponse {
-    /// Probability of such a share by chance, if e does not respond to u.
+    /// Probability of at least this share by chance, if e does not respond to u.
     pub p_value: f64,
-    /// Share of the part of e not explained by the past that the latest outputs explain.
+    /// Share of the variance of e left unexplained by earlier samples that the latest outputs explain.
     pub share: f64,
 }
 
-/// Tests the samples `from..`. `None` if there are too few data, or a value is not a number or a signal is constant.
+/// Tests the samples `from..`. `None` if there are too few data, a value is not a number or a signal is constant.
 pub fn answer(e: &[f64], u: &[f64], from: usize, sample_time_s: f64) -> Option<LoopResponse> {
     let thin = thinning(sample_time_s);
     let latest = (LATEST_S / (thin as f64 * sample_time_s)).round().max(1.0) as usize;

@@ -1,37 +1,37 @@
 //! Findings for and against a result.
 //!
-//! Each rule is one observation with its own kind ([`hoid_model::Finding`]), and the [`hoid_model::Verdict`] follows
-//! from them. The limits are defined where they are used.
+//! Each rule reports one kind of finding ([`hoid_model::Finding`]); the [`hoid_model::Verdict`] follows from the
+//! findings. The limits are defined where they are used.
 //!
 //! | kind | observation |
 //! |---|---|
 //! | `not-converged`, `border` | termination of the search |
-//! | `delay-at-bound`, `parameter-at-bound` | the delay is at the end of its range, another parameter at a bound |
+//! | `delay-at-bound`, `parameter-at-bound` | the delay is at the end of its range; another parameter is at a bound |
 //! | `unstable` | the model from e to u is unstable |
-//! | `gain`, `undetermined-parameter` | standard errors as large as the values |
+//! | `gain`, `undetermined-parameter` | values within two standard errors of zero |
 //! | `not-convertible` | coefficients that do not correspond to any operator |
 //! | `neuromuscular-lag` | the two poles do not describe a neuromuscular system |
-//! | `not-constant` | parameters that change within the records, or from one to the next |
+//! | `not-constant` | parameters that change within a record or from one record to the next |
 //! | `residuals-not-white`, `structure`, `leverage` | properties of the residuals |
 //! | `no-response` | no response beyond chance |
 //! | `other-input`, `inputs-together` | inputs in addition to the error |
-//! | `controlled-element` | the given controlled element, and that of the recorded loop |
+//! | `controlled-element` | the recorded loop does not have the given controlled element |
 //! | `exact-fit`, `no-change`, `change-point` | information; the result remains valid |
 //!
 //! | file | contents |
 //! |---|---|
-//! | `residuals` | deviation of residuals from white noise; also for the family |
-//! | `constancy` | whether parameters change; also for the family |
-//! | `residual_response` | test for a response that a model does not have |
-//! | `loop_response` | test of whether e responds to u, as it does in a loop |
+//! | `residuals` | deviation of residuals from white noise; also used for the operator family |
+//! | `constancy` | test for parameters that change; also used for the operator family |
+//! | `residual_response` | test for a response that the model does not contain |
+//! | `loop_response` | test of whether e responds to u, as in a closed loop |
 //! | `no_response` | test of whether u responds to e at all |
-//! | `operator` | gains, poles and delay of an operator |
-//! | `operator_step` | evidence of a stretch of data against an operator |
-//! | `second_opinion` | fits to records in which no single sample can dominate |
+//! | `operator` | findings about the gains, poles and delay of an operator |
+//! | `operator_step` | evidence against an operator in a stretch of data |
+//! | `second_opinion` | second fits without outlying samples or without slow components |
 //! | `other_inputs` | test of whether u responds to a recorded target in addition to e |
 //! | `recorded_element` | test of whether the recorded loop has the given controlled element |
-//! | `whitened` | least squares after an autoregression, for the tests that need it |
-//! | `fit`, `grey_box`, `sigmoid` | the verdict of each kind of fit |
+//! | `whitened` | least squares with autoregressive noise, for the tests that need it |
+//! | `fit`, `grey_box`, `sigmoid` | the verdict on each kind of fit |
 
 pub(crate) mod constancy;
 mod fit;

@@ -1,18 +1,19 @@
 //! Test of whether u responds to e at all.
 //!
-//! A search over forms, delays and orders finds a response in any two records; its result carries little information on
-//! whether there is one. The test is done beforehand, for all forms at once. Each channel is whitened by an
-//! autoregression, so that a slow component does not count as many samples. At the frequencies `omega_k` of the record
-//! up to [`HIGHEST_RAD_S`] the whitened output is regressed on a gain, a lead and a lag of e after a typical
-//! neuromuscular system and a delay,
+//! A search over forms, delays and orders finds a response in any pair of signals, so that its result is only weak
+//! evidence of a response. This test is therefore done before the search, for all forms at once. Each channel is
+//! whitened by an autoregression, so that a slow component does not count as many independent samples. At the
+//! frequencies `omega_k` of the record up to [`HIGHEST_RAD_S`] the whitened output is regressed on a gain, a lead and a
+//! lag of e, followed by a typical neuromuscular system and a delay,
 //!
 //! `U_k = (A_u/A_e) N e^{-j omega tau} (b_1 + b_2 j omega + b_3/(j omega + a)) E_k + R_k`,
 //!
-//! b real, and T is the share of the power of U that this explains, maximised over delays of [`DELAYS_S`]. Records with
-//! the same spectra but without a relation have random phases of E (J. Theiler et al., *Physica D* 58 (1992) 77-94); T
-//! of [`SURROGATES`] of them is the distribution of such a search without a response. If u does not depend on e, T is
-//! one more draw: the probability that it exceeds all others is 1/([`SURROGATES`] + 1), for any spectra. Only the past
-//! of e counts, so that an e that responds to u is not counted as a response. Several records share b.
+//! where b is real. T is the share of the power of U that this regression explains, maximised over the delays
+//! [`DELAYS_S`]. Surrogate records have the same spectra, but random phases of E and therefore no relation between e
+//! and u (J. Theiler et al., *Physica D* 58 (1992) 77-94). The values of T for [`SURROGATES`] such records give the
+//! distribution of T if there is no response. If u does not depend on e, T is one more draw from this distribution: the
+//! probability that it exceeds all others is 1/([`SURROGATES`] + 1), regardless of the spectra. Only the past of e
+//! counts, so that a response of e to u does not count as a response of u. If there are several records, they share b.
 
 use std::f64::consts::{PI, TAU};
 
@@ -28,15 +29,15 @@ use crate::{family::noise::NoiseProducts, frequency::spectrum, linalg::least_squ
 
 /// Highest frequency that is tested, rad/s.
 const HIGHEST_RAD_S: f64 = 25.0;
-/// Delays that are tried, s.
+/// Tested delays, s.
 const DELAYS_S: [f64; 8] = [0.05, 0.1, 0.16, 0.23, 0.31, 0.4, 0.52, 0.7];
 /// Pole of the lag, 1/s.
 const LAG_RATE: f64 = 0.3;
-/// Typical neuromuscular system: rad/s, and damping.
+/// Typical neuromuscular system: natural frequency in rad/s, and damping ratio.
 const NEUROMUSCULAR: (f64, f64) = (11.0, 0.4);
-/// Number of surrogate records without a relation.
+/// Number of surrogate records without a relation between e and u.
 const SURROGATES: usize = 1999;
-/// Least number of frequencies.
+/// Minimum number of frequencies for the test.
 const FEWEST: usize = 12;
 const SEED: u64 = 0x686f_6964;
 const COLUMNS: usize = 3;
@@ -44,29 +45,29 @@ const COLUMNS: usize = 3;
 /// Result of the test of whether u responds to e.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Response {
-    /// T: share of the power of the whitened output that a response explains.
+    /// T: share of the power of the whitened output that the response explains.
     pub share: f64,
-    /// Number of surrogates whose share is at least as large.
+    /// Number of surrogates with a share at least as large as this one.
     pub reached_by: usize,
     /// Number of surrogates.
     pub surrogates: usize,
 }
 
 impl Response {
-    /// Probability of such a share if there is no response.
+    /// Returns the probability of at least this share if there is no response.
     pub fn p_value(&self) -> f64 {
         (self.reached_by + 1) as f64 / (self.surrogates + 1) as f64
     }
 
-    /// Returns the finding that there is no response, unless the records show one.
+    /// Returns the finding that there is no response, unless the records show a response.
     pub fn finding(&self) -> Option<Finding> {
         (self.reached_by > 0).then(|| {
             Finding::undetermined(
                 "no-response",
                 format!(
                     "no response of u to e can be distinguished from chance: {} of {} pairs of unrelated records with \
-                     the same spectra show as much (p = {:.2}); check that both channels are from one run, and which \
-                     is which",
+                     the same spectra show as large a response (p = {:.2}); check that both channels are from the same \
+                     run and are not exchanged",
                     self.reached_by,
                     self.surrogates,
                     self.p_value()
@@ -81,13 +82,13 @@ struct Spectra {
     /// `E_k` and `U_k`, whitened.
     e: Vec<Complex64>,
     u: Vec<Complex64>,
-    /// Columns without the delay and E: `(A_u/A_e) N G_j`.
+    /// Columns without the delay and without E: `(A_u/A_e) N G_j`.
     columns: Vec<[Complex64; COLUMNS]>,
     /// `e^{-j omega tau}` for each delay.
     delays: Vec<Vec<Complex64>>,
 }
 
-/// Tests records of a person; `None` if there are too few data, or a value is not a number or a signal is constant.
+/// Tests the records of a person. `None` if there are too few data, a value is not a number or a signal is constant.
 pub fn response(records: &[Record]) -> Option<Response> {
     let all: Option<Vec<Spectra>> = records.iter().map(Spectra::of).collect();
     let all = all?;
@@ -96,7 +97,7 @@ pub fn response(records: &[Record]) -> Option<Response> {
     }
     let power: f64 = all.iter().flat_map(|s| &s.u).map(Complex64::norm_sqr).sum();
     let inverse = inverse_gram(&all)?;
-    // Products of columns and output for each frequency and delay; a surrogate changes their phases.
+    // Products of columns and output for each frequency and delay; a surrogate changes only their phases.
     let products: Vec<[[Complex64; COLUMNS]; DELAYS_S.len()]> = all.iter().flat_map(Spectra::products).collect();
     let mut turns = vec![Complex64::ONE; products.len()];
     let share = |turns: &[Complex64]| -> f64 {
@@ -119,7 +120,7 @@ pub fn response(records: &[Record]) -> Option<Response> {
     let mut reached_by = 0;
     for _ in 0..SURROGATES {
         for turn in &mut turns {
-            // 32 bits of a phase are more than enough.
+            // A resolution of 32 bits is more than sufficient for a phase.
             *turn = Complex64::from_polar(1.0, TAU * f64::from(generator.next_u32()) / 4_294_967_296.0);
         }
         reached_by += usize::from(share(&turns) >= own);
@@ -131,8 +132,8 @@ pub fn response(records: &[Record]) -> Option<Response> {
     })
 }
 
-/// Inverse by rows of `sum Re(x_i* x_j)`, which depends on no delay and no phase of E; `None` if columns are linearly
-/// dependent.
+/// Returns by rows the inverse of `sum Re(x_i* x_j)`, which depends neither on the delay nor on the phases of E; `None`
+/// if the columns are linearly dependent.
 fn inverse_gram(all: &[Spectra]) -> Option<Vec<f64>> {
     let mut gram = [0.0; COLUMNS * COLUMNS];
     for spectra in all {
@@ -191,9 +192,9 @@ impl Spectra {
     }
 }
 
-/// Returns the decimated channel after its own autoregression, and its coefficients.
+/// Returns the decimated channel, whitened by its own autoregression, and the coefficients of this autoregression.
 fn whitened(channel: &[f64], thin: usize) -> Option<(Vec<f64>, Vec<f64>)> {
-    // The mean of the discarded samples contains the faster components.
+    // Averaging attenuates the components above the new Nyquist frequency before decimation.
     let mut thinned: Vec<f64> = (channel.chunks_exact(thin)).map(mean).collect();
     let mean = mean(&thinned);
     thinned.iter_mut().for_each(|v| *v -= mean);
@@ -209,7 +210,7 @@ fn whitened(channel: &[f64], thin: usize) -> Option<(Vec<f64>, Vec<f64>)> {
     Some((white, d))
 }
 
-/// `1 + d_1 e^{-j w} + ..`.
+/// Returns the frequency response `1 + d_1 e^{-j w} + ..`.
 fn filter(d: &[f64], omega_ts: f64) -> Complex64 {
     let terms = d.iter().enumerate();
     terms.fold(Complex64::ONE, |sum, (k, d)| {
@@ -219,7 +220,7 @@ fn filter(d: &[f64], omega_ts: f64) -> Complex64 {
 
 /// Computes `sum x_t e^{-j omega t}` in these bins.
 fn coefficients(values: &[f64], bins: std::ops::RangeInclusive<usize>) -> Vec<Complex64> {
-    // Amplitudes of sinusoids there: a record has a weight proportional to its length.
+    // The scale turns amplitudes of sinusoids into sums, so that the weight of a record is proportional to its length.
     let scale = 0.5 * values.len() as f64;
     spectrum::coefficients(values)[bins].iter().map(|x| x * scale).collect()
 }

@@ -1,4 +1,4 @@
-//! Findings against an operator: gains that do not differ from zero, implausible poles, a delay at the end of its
+//! Findings against an operator: gains that do not differ from zero, implausible poles, and a delay at the end of its
 //! range.
 
 use std::f64::consts::PI;
@@ -10,27 +10,27 @@ use hoid_model::{
 
 use crate::{Reason, Termination};
 
-/// Standard errors from zero below which a value counts as undetermined.
+/// A value within this number of its standard errors of zero counts as undetermined.
 const LEAST_ERRORS: f64 = 2.0;
-/// Damping above which the faster of two real poles is 34 times the slower: a lag.
+/// Damping ratio above which the poles count as a lag: the faster of the two real poles is then 34 times the slower.
 const LARGEST_DAMPING: f64 = 3.0;
 
-/// True if a value is less than two of its standard errors from zero. A value without a standard error was given, not
+/// True if a value is less than two standard errors from zero. A value without a standard error was given, not
 /// estimated.
 pub fn is_open(e: &Estimate) -> bool {
     e.standard_error
         .is_some_and(|error| e.value.abs() < LEAST_ERRORS * error)
 }
 
-/// True if K_e and K_e_dot have opposite signs by two standard errors each: a negative lead.
+/// True if K_e and K_e_dot have opposite signs, each by two standard errors or more: a negative lead.
 pub fn leads_backwards(o: &OperatorEstimate) -> bool {
     let sign = |e: &Estimate| if is_open(e) { 0.0 } else { e.value.signum() };
     sign(&o.k_e) * sign(&o.k_e_dot) < 0.0
 }
 
-/// Returns findings about gains and leads that are not determined, and about negative leads. Each operator has a label,
-/// such as ` of record 2`, empty for a single one; if K_e and K_e_dot of all of them are undetermined, nothing is known
-/// about the response.
+/// Returns findings about undetermined gains and leads, and about negative leads. Each operator has a label, such as
+/// ` of record 2`; the label of a single operator is empty. If K_e and K_e_dot of every operator are undetermined, the
+/// only finding is that there is too little response to e.
 pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
     let mut open = Vec::new();
     let mut all_open = !operators.is_empty();
@@ -56,21 +56,22 @@ pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
         .collect()
 }
 
-/// Returns a finding about a negative lead: no person has one; a gain and a lead that represent a lag do.
+/// Returns a finding about a negative lead. People have no negative lead; it arises if a gain and a lead are fitted to
+/// a lag.
 fn negative_lead(negative: &[String]) -> Option<Finding> {
     (!negative.is_empty()).then(|| {
         Finding::doubt(
             "negative-lead",
             format!(
-                "{} below zero, by two standard errors of K_e and of K_e_dot: this person does not have the form of a \
-                 gain and a lead and may have a lag; only the response is valid (--structure operator finds the form)",
+                "{} below zero, by two standard errors of K_e and of K_e_dot: a gain and a lead do not describe this \
+                 person, who may have a lag; only the response is valid (--structure operator finds the form)",
                 negative.join(", ")
             ),
         )
     })
 }
 
-/// Returns findings about omega_nm and zeta_nm that are undetermined, or implausible for a person.
+/// Returns findings about omega_nm and zeta_nm if they are undetermined or implausible for a person.
 pub fn pole_findings(operator: &OperatorEstimate, sample_time: SampleTime) -> Vec<Finding> {
     let named = [("omega_nm", operator.omega_nm_rad_s), ("zeta_nm", operator.zeta_nm)];
     let open: Vec<String> = named
@@ -82,8 +83,8 @@ pub fn pole_findings(operator: &OperatorEstimate, sample_time: SampleTime) -> Ve
     not_determined(&open).into_iter().chain(lag).collect()
 }
 
-/// Returns a finding about poles that describe a lag: omega_nm (rad/s) above the Nyquist frequency, or a damping with
-/// which the two poles are far apart.
+/// Returns a finding about poles that describe a lag: omega_nm is above the Nyquist frequency, or the damping ratio is
+/// so large that the two poles are far apart.
 pub fn neuromuscular_finding(omega_nm_rad_s: f64, zeta_nm: f64, sample_time: SampleTime) -> Option<Finding> {
     let nyquist = PI / sample_time.s();
     let what = if omega_nm_rad_s > nyquist {
@@ -115,20 +116,20 @@ fn not_determined(open: &[String]) -> Option<Finding> {
     })
 }
 
-/// Returns a finding about a delay in s at the end of its search range.
+/// Returns a finding if the delay in s is at the end of its search range.
 pub(super) fn delay_finding(tau_s: f64, (low, high): (f64, f64), of: &str) -> Option<Finding> {
     (high > low && (tau_s <= low || tau_s >= high)).then(|| {
         Finding::doubt(
             "delay-at-bound",
             format!(
-                "the delay{of} {tau_s:.3} s lies at the end of the range {low:.3} to {high:.3} s in which it was searched for; \
-                 widen it"
+                "the delay{of} {tau_s:.3} s lies at an end of its search range, {low:.3} to {high:.3} s; widen this \
+                 range"
             ),
         )
     })
 }
 
-/// Returns a finding about the termination of the search, if it matters.
+/// Returns a finding if the search did not converge, ended at a border or found an exact fit.
 pub(super) fn search_finding(termination: Termination) -> Option<Finding> {
     match termination.reason {
         Reason::Border => Some(Finding::doubt(

@@ -1,14 +1,15 @@
-//! Evidence of a stretch of data against an operator from other data: one step towards the fit of the stretch.
+//! Evidence in a stretch of data against an operator that was estimated from other data: one step towards a fit to this
+//! stretch.
 //!
-//! The operator is held constant, a noise model `D v = eps` of order [`NOISE`] is fitted to the part of u that it does
-//! not explain, and with `psi = -d eps/d eta` for `eta = [K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`
+//! The operator is held constant, and a noise model `D v = eps` of order [`NOISE`] is fitted to the part of u that the
+//! operator does not explain. With `psi = -d eps/d eta` for `eta = [K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`,
 //!
 //! `delta = (psi' psi)^-1 psi' eps`
 //!
-//! is the step of Gauss and Newton to the fit of that stretch (L. Le Cam's one-step estimate, *Proc.
-//! Third Berkeley Symp.* 1 (1956) 129-156). Its covariance is computed from the scores of 2 s blocks at this step,
+//! is the Gauss-Newton step towards the fit to this stretch (L. Le Cam's one-step estimate, *Proc. Third Berkeley
+//! Symp.* 1 (1956) 129-156). Its covariance is computed from the scores of 2 s blocks at this step,
 //! `(n/(n-5)) G^-1 sum_c s_c s_c' G^-1` with `s_c = g_c - G_c delta` (K.-Y. Liang and S. L. Zeger, *Biometrika* 73
-//! (1986) 13-22), and each variance is at least that of the model.
+//! (1986) 13-22). Each variance is at least the variance computed from the model.
 
 use std::collections::BTreeMap;
 
@@ -32,20 +33,20 @@ const NOISE: usize = 4;
 /// Number of parameters of the operator.
 const OPERATOR: usize = 5;
 
-/// The change of one parameter for which a record is fitted better.
+/// Change of one parameter that improves the fit to a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OperatorStep {
     /// Name of the parameter.
     pub name: &'static str,
-    /// The step with its standard error, in the unit of the parameter.
+    /// The step and its standard error, in the unit of the parameter.
     pub by: Estimate,
     /// Number of blocks from which the standard error is computed.
     pub blocks: usize,
 }
 
 impl OperatorStep {
-    /// Probability of such a step if there is no difference, by Student's distribution: the operator itself has this
-    /// standard error, and steps up to `grid` count as zero.
+    /// Returns the probability of at least this step if there is no difference, by Student's distribution. The
+    /// parameter of the operator itself has the standard error `error_of_operator`; steps up to `grid` count as zero.
     pub fn p_value(&self, error_of_operator: f64, grid: f64) -> f64 {
         let Some(own) = self.by.standard_error else { return 1.0 };
         let t = (self.by.value.abs() - grid).max(0.0) / own.hypot(error_of_operator);
@@ -76,7 +77,7 @@ pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[
     };
     let fit = estimator.fit(std::slice::from_ref(record)).ok()?;
     let (theta, first) = (fit.model().theta(), first_residual(&orders, fit.initial_state()));
-    // Coefficients of B are first, those of F last.
+    // Coefficients of B are at the start, those of F at the end.
     let places = [0, 1, 2, theta.len() - 2, theta.len() - 1];
     let mut workspace = Workspace::of_thread();
     let mut scores = |_: usize, data: Data<'_>| {
@@ -108,15 +109,15 @@ pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[
         .iter()
         .map(|b| {
             (
-                DVector::from_column_slice(&b.g),
-                DMatrix::from_row_slice(OPERATOR, OPERATOR, &b.big),
+                DVector::from_column_slice(&b.score),
+                DMatrix::from_row_slice(OPERATOR, OPERATOR, &b.information),
             )
         })
         .collect();
     let whole = each
         .iter()
         .fold(DMatrix::zeros(OPERATOR, OPERATOR), |sum, (_, big)| sum + big);
-    // The units differ by orders of magnitude.
+    // Scaling is needed because the units differ by orders of magnitude.
     let scale = DVector::from_fn(OPERATOR, |i, _| whole[(i, i)].sqrt().recip());
     let scaled = DMatrix::from_fn(OPERATOR, OPERATOR, |i, j| whole[(i, j)] * scale[i] * scale[j]);
     let inverse = scaled.cholesky()?.inverse();

@@ -2,14 +2,14 @@
 //!
 //! A person who sees the target follows it even without an error: a fit with one input then finds neither the response
 //! to the error nor the loop that the person closes ([`crate::family::SeenChannel`]). Each channel with the name of a
-//! target is tried as a second input, in the forms of a gain and of its derivatives, in addition to the form of the
-//! fit; a doubt is raised if the best of them explains far more than chance.
+//! target is tried as a second input, as a gain and with its derivatives, in addition to the form of the fit. A warning
+//! is raised if the best of these models explains far more than chance.
 //!
-//! **Sticks with a dead zone.** If only the target excites the loop, the part of e that follows it is larger than the
-//! rest of e. A dead zone passes large and small signals by different gains (the describing function of A. Gelb and
-//! W. E. Vander Velde, *Multiple-Input Describing Functions*, 1968), so that u follows the target with a gain other
-//! than that of e as a whole: this looks like a response to the target. Where u [rests](Rest) like that of such a
-//! stick, the finding is a note with both explanations.
+//! **Sticks with a dead zone.** If only the target excites the loop, the part of e that follows the target is larger
+//! than the rest of e. A dead zone has different gains for small and for large signals (the describing function of A.
+//! Gelb and W. E. Vander Velde, *Multiple-Input Describing Functions*, 1968), so that u follows the target with a gain
+//! other than that of e as a whole, which looks like a response to the target. If u [rests](Rest) like the signal of
+//! such a stick, the finding is a note with both explanations.
 
 use hoid_model::{Finding, Form, Record};
 
@@ -20,11 +20,12 @@ use crate::{
 
 /// Names of channels that may hold a displayed target.
 pub(super) const TARGETS: [&str; 4] = ["r", "f_t", "target", "reference"];
-/// Probability of the response by chance: if target and disturbance have their own lines, and if only the target
-/// excites the loop, so that an error of the form of the fit looks like a response to the target.
+/// p-value below which a response to the target is reported. The first value applies if target and disturbance have
+/// separate lines, the second if only the target excites the loop: there an error in the form of the fit looks like a
+/// response to the target.
 const BY_CHANCE: [f64; 2] = [1e-2, 1e-7];
 
-/// Returns a doubt for each target that the person responds to.
+/// Returns a warning for each target to which the person responds.
 pub fn of_family(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record]) -> Vec<Finding> {
     let is_recorded = |name: &&str| {
         records.iter().all(|record| {
@@ -45,9 +46,10 @@ pub fn of_family(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record
     TARGETS.into_iter().filter(is_recorded).filter_map(found).collect()
 }
 
-/// Returns the response to a channel in addition to the inputs of a fit, in the form of the fit and with its noise
-/// orders, and whether the lines of excitations tell the two apart. `None` with little noise, and for a fit with several inputs.
-/// A channel that cannot be an input, such as a constant one, is no evidence against the fit: `None` too.
+/// Returns the response to a channel in addition to the inputs of a fit, with the form and the noise orders of the fit,
+/// and whether the excitation lines distinguish the channel from e. `None` if the fit has little noise or several
+/// inputs. A channel that cannot be an input, such as a constant channel, also gives `None`: it is no evidence against
+/// the fit.
 pub fn response_to(
     estimator: &FamilyEstimator,
     fit: &FamilyFit,
@@ -72,7 +74,7 @@ pub fn response_to(
     again.responds_to(records, channel).ok()
 }
 
-/// True if u rests in one of the records as a stick with a dead zone does.
+/// True if u of one of the records rests like the signal of a stick with a dead zone.
 fn rests(records: &[Record]) -> bool {
     records.iter().any(|record| Rest::of(record.output()).is_some())
 }
@@ -82,8 +84,8 @@ fn finding(name: &str, chance: f64, nonlinear: bool) -> Finding {
         return Finding::note(
             "other-input",
             format!(
-                "u follows {name} by more than the response to the error explains (p = {chance:.0e}): a stick with a \
-                 dead zone has this effect; if the person saw {name}, add --input {name}"
+                "u follows {name} more closely than the response to the error explains (p = {chance:.0e}): a stick \
+                 with a dead zone has this effect; if the person saw {name}, add --input {name}"
             ),
         );
     }

@@ -1,26 +1,26 @@
-//! Test of whether the recorded loop has the controlled element that is given for it.
+//! Test of whether the recorded loop has the controlled element given by the user.
 //!
-//! In a loop with the element `P = B/A`, target r and disturbance d, `e = r - P (u + d)`. In the Fourier coefficients
-//! of a record, which need not be periodic,
+//! In a loop with the element `P = B/A`, target r and disturbance d, `e = r - P (u + d)`. In terms of the Fourier
+//! coefficients of a record, which need not be periodic,
 //!
 //! `A(s) E = C(s) R - B(s) e^{-s delta} h(s) (U + kappa D) + T(s)`, `s = j omega`,
 //!
-//! with the hold `h = e^{-s Ts/2} sinc(omega Ts/2)` of u between its samples and a polynomial T for the difference of
-//! the states at both ends (R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach*, 2012,
-//! section 6.3.2). It is linear in the coefficients of A, B, C, `B kappa` and T, which are found by least squares at
-//! the frequencies of manual control; the delay is scanned, with the same delay for d as for u, or with none for d if
-//! only u was recorded late. Rows are divided by `B h` of the previous iteration, so that a residual has the size of a
-//! disturbance at u (C. K. Sanathanan and J. Koerner, IEEE Trans. Automatic Control 8 (1963) 56-58), and weighted by
-//! its smoothed spectrum.
+//! with the hold `h = e^{-s Ts/2} sinc(omega Ts/2)` of u between its samples and a polynomial T for the difference
+//! between the initial and the final states (R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain
+//! Approach*, 2012, section 6.3.2). The equation is linear in the coefficients of A, B, C, `B kappa` and T, which are
+//! found by least squares at the frequencies of manual control. The delay is scanned, with the same delay for d as for
+//! u, and without a delay of d in case only u was recorded late. Rows are divided by `B h` of the previous iteration,
+//! so that a residual is equivalent to a disturbance at u (C. K. Sanathanan and J. Koerner, IEEE Trans. Automatic
+//! Control 8 (1963) 56-58), and weighted by the smoothed spectrum of the residuals.
 //!
 //! | file | contents |
 //! |---|---|
-//! | `spectra` | Fourier coefficients, and the channels that enter the loop from outside |
+//! | `spectra` | Fourier coefficients, and the exogenous channels of the loop |
 //! | `equations` | the least-squares fit of an element |
 //!
-//! A disturbance that was not recorded returns through the person, so that u is not independent of it: the element is
-//! judged only if the recorded signals explain all but [`UNEXPLAINED`] of the power, as they do where the loop is
-//! complete. C is free, since the coefficients of a target are those of A only if e is not scaled.
+//! The person responds to a disturbance that was not recorded, so that u is not independent of it. The element is
+//! therefore judged only if the recorded signals explain all but [`UNEXPLAINED`] of the power, as they do if all
+//! signals of the loop were recorded. C is free, since it equals A only if e is not scaled.
 
 mod equations;
 mod spectra;
@@ -30,42 +30,44 @@ use hoid_model::{Complex64, ContinuousTransferFunction, Finding, Record};
 use equations::Fitted;
 use spectra::{Exogenous, MOST_FREQUENCIES, Spectra};
 
-/// Largest share of the power, as a disturbance at u, that the recorded signals may leave unexplained.
+/// Largest unexplained share of the power, expressed as a disturbance at u, for which the element is judged.
 const UNEXPLAINED: f64 = 0.02;
-/// Share that the steps of the delay leave of exact data: elements that leave less are alike.
+/// Share of the power of exact data that the step width of the delay scan leaves unexplained; smaller differences
+/// between elements do not count.
 const EXACT: f64 = 1e-4;
-/// Frequencies at which two elements are compared, rad/s: where people close their loops.
+/// Frequencies at which two elements are compared, rad/s: the range in which people close their loops.
 const COMPARED_RAD_S: [f64; 7] = [0.5, 0.75, 1.1, 1.6, 2.4, 3.6, 5.4];
-/// Largest difference of the logarithms of two responses: 10 % of the gain or 6 deg.
-const SAME: f64 = 0.1;
-/// Delay up to which e and u count as aligned, samples: recorders store one before or after the other.
+/// Largest difference between the logarithms of two responses that count as equal: 10 % of the gain or 6 deg.
+const EQUAL_RESPONSES: f64 = 0.1;
+/// Delay up to which e and u count as aligned, samples: a recorder may store one of them a sample before or after the
+/// other.
 const ALIGNED_SAMPLES: f64 = 1.5;
-/// Largest degree of an element that is tested.
+/// Largest degree of the given element for which the test is made.
 const MOST_POLES: usize = 4;
 
-/// The controlled element of a recorded loop.
+/// The controlled element identified from a recorded loop.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedElement {
-    /// The element that e and u have, with the delay of the given one.
+    /// Element that relates u to e, with the delay of the given element.
     pub element: ContinuousTransferFunction,
     /// Delay of the machine beyond that of the given element, s; negative if u was recorded late.
     pub delay_s: f64,
-    /// Share of the power at u that it does not explain.
+    /// Share of the power at u that the element does not explain.
     pub unexplained: f64,
-    /// The frequency at which its response differs most, except for the delay, rad/s, and its response there as a
-    /// multiple of that of the given element.
+    /// Frequency in rad/s at which the response differs most from that of the given element, apart from the delay, and
+    /// the ratio of the two responses there.
     pub difference: (f64, Complex64),
-    /// Delay within which e and u count as aligned, s.
+    /// Largest delay for which e and u count as aligned, s.
     aligned_s: f64,
 }
 
 impl RecordedElement {
-    /// True if it has the response of the given element, except for a delay.
+    /// True if the element has the response of the given element, apart from a delay.
     pub fn is_given(&self) -> bool {
-        self.difference.1.ln().norm() <= SAME
+        self.difference.1.ln().norm() <= EQUAL_RESPONSES
     }
 
-    /// Returns a doubt if it is not the given element, or e and u are not aligned.
+    /// Returns a warning if the element is not the given element, or if e and u are not aligned.
     pub fn finding(&self, given: &ContinuousTransferFunction) -> Option<Finding> {
         let (omega, ratio) = self.difference;
         let late = 1e3 * self.delay_s;
@@ -79,8 +81,8 @@ impl RecordedElement {
             (true, true) => return None,
             (true, false) => format!("e follows from u through {given}{beyond}: {loop_lost}"),
             (false, _) => format!(
-                "e follows from u through {}{beyond}, not through {given}: at {omega} rad/s {} times its gain and \
-                 {:+.0} deg; {loop_lost}",
+                "e follows from u through {}{beyond}, not through {given}: at {omega} rad/s the gain of the first is \
+                 {} times that of the second and its phase differs by {:+.0} deg; {loop_lost}",
                 self.element,
                 three_digits(ratio.norm()),
                 ratio.arg().to_degrees()
@@ -90,8 +92,9 @@ impl RecordedElement {
     }
 }
 
-/// Identifies the controlled element from these closed-loop records. `None` if they do not determine it: signals of the
-/// loop are missing, or the records are too short. `excitation` is the channel of a target or a disturbance.
+/// Identifies the controlled element from closed-loop records. `None` if the records do not determine it because
+/// signals of the loop are missing or the records are too short. `excitation` is the channel of a target or a
+/// disturbance.
 pub fn recorded_element(
     records: &[Record],
     given: &ContinuousTransferFunction,
@@ -112,7 +115,8 @@ pub fn recorded_element(
             spectra.push(found);
         }
     }
-    // From the simplest on: a single and a double integrator with their lags, the given orders, and one pole more.
+    // The candidates, in ascending complexity: a single and a double integrator with their lags, the given orders, and
+    // the given orders with one more pole.
     let mut orders = vec![(0, 1), (0, 2), (1, 2), (m, n.max(1)), (m, n + 1)];
     orders.sort_by_key(|&(m, n)| (m + n, n));
     orders.dedup();
@@ -141,7 +145,7 @@ pub fn recorded_element(
     })
 }
 
-/// Returns the element with this delay, without terms that add nothing at the frequencies compared.
+/// Returns the element with this delay, without terms that are negligible at the frequencies compared.
 fn transfer_function(fit: &Fitted, delay_s: f64) -> Option<ContinuousTransferFunction> {
     let without_small = |p: &[f64]| -> Vec<f64> {
         let sizes = |omega: f64| {
@@ -167,13 +171,13 @@ fn transfer_function(fit: &Fitted, delay_s: f64) -> Option<ContinuousTransferFun
     found.and_then(|found| found.with_delay(delay_s)).ok()
 }
 
-/// Rounds to three significant digits: the fit is a test, not an estimate for print.
+/// Rounds to three significant digits, which are sufficient for a test.
 fn three_digits(value: f64) -> f64 {
     if value == 0.0 {
         return value;
     }
     let unit = 10f64.powf(value.abs().log10().floor() - 2.0);
-    // A quotient of integers where the unit is below one, which decimal digits end.
+    // If the unit is below one, a quotient of integers avoids trailing decimal digits.
     if unit < 1.0 {
         (value / unit).round() / (1.0 / unit).round()
     } else {

@@ -1,22 +1,23 @@
-//! Test for a response to the error that a model does not have.
+//! Test for a response to the error that the model does not contain.
 //!
 //! For a model that is linear in its unknowns, `u = X b + v`, the columns X are known: responses of a basis, their
-//! derivatives with respect to the fixed dynamics, a level. With an autoregression `D v = eps` of order [`NOISE`] the
-//! test is whether further taps on e carry information about eps; these taps are Z, which replaces the impulse response
-//! that X cannot represent: means of e over [`TAPS`] consecutive spans of [`TAP_S`]. The statistic is that of the
-//! Lagrange multiplier (T. S. Breusch and A. R. Pagan, *Review of Economic Studies* 47 (1980) 239-253; L. Ljung,
+//! derivatives with respect to the fixed dynamics, and a level. With an autoregression `D v = eps` of order [`NOISE`]
+//! the test asks whether further taps Z on e explain part of eps. The taps are means of e over [`TAPS`] consecutive
+//! spans of [`TAP_S`]; they approximate an impulse response that X cannot represent. The test uses the Lagrange
+//! multiplier statistic (T. S. Breusch and A. R. Pagan, *Review of Economic Studies* 47 (1980) 239-253; L. Ljung,
 //! *System Identification*, 1999, section 16.6, for the residuals of a model)
 //!
-//! `s(t) = z(t) eps(t)`, z the remainder of D Z after the projection on D X and the lags of v,
+//! `s(t) = z(t) eps(t)`, where z is the remainder of D Z after the projection on D X and the lags of v,
 //!
-//! so that the effect of the estimates of b and of D is removed here too: in a closed loop past e and past v are
-//! correlated. There are two variances: that of the model, with `T = (sum s)' (sigma^2 sum z z')^-1 (sum s)`,
-//! chi-square with [`TAPS`] degrees of freedom, and the scatter of the sums over blocks of 2 s, with Hotelling's `T^2`,
-//! which is valid even if the size of the remnant changes (H. Hotelling, *Annals of Mathematical Statistics* 2 (1931)
-//! 360-378). The larger p-value is used.
+//! so that the effect of estimating b and D is removed: in a closed loop past e and past v are correlated. Two
+//! variances are used. The variance of the model gives `T = (sum s)' (sigma^2 sum z z')^-1 (sum s)`, chi-square with
+//! [`TAPS`] degrees of freedom. The scatter of the sums over blocks of 2 s gives Hotelling's `T^2`, which is valid even
+//! if the size of the remnant changes (H. Hotelling, *Annals of Mathematical Statistics* 2 (1931) 360-378). The larger
+//! p-value is used.
 //!
-//! Signals are decimated to [`RATE_HZ`] at most. Residuals are not limited: the pulses of a person who moves a stick in
-//! pulses are the response to e, and the part removed by a limit would look like a missing response.
+//! Signals are decimated to the lowest possible rate that is not below [`RATE_HZ`]. Residuals are not limited: if a
+//! person moves the stick in pulses, these pulses are the response to e, and the part removed by a limit would look
+//! like a missing response.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
@@ -26,23 +27,23 @@ use super::whitened::{NOISE, Whitened, lags, orthogonal, thinning, whitened};
 /// Number of taps, and their length in s.
 pub(crate) const TAPS: usize = 6;
 pub(crate) const TAP_S: f64 = 0.15;
-/// Length of a block in s, and least number of blocks.
+/// Length of a block in s, and minimum number of blocks.
 const BLOCK_S: f64 = 2.0;
 const FEWEST: usize = 10;
 
-/// Result of the test of a model.
+/// Result of the test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ResidualResponse {
-    /// Probability of such a statistic if no response is missing.
+    /// Probability of a statistic at least this large if no response is missing.
     pub p_value: f64,
-    /// The two p-values, by the model and by the scatter of blocks.
+    /// The two p-values: from the variance of the model and from the scatter of blocks.
     pub each: [f64; 2],
     /// Share of the variance of eps that the taps explain.
     pub share: f64,
 }
 
-/// Tests whether columns, all as long as e and u, explain the whole response of u to e in samples `from..`. The level
-/// need not be among them. `None` if there are too few data, or a value is not a number.
+/// Tests whether columns of the same length as e and u explain the whole response of u to e in the samples `from..`.
+/// The columns need not contain the level. `None` if there are too few data or a value is not a number.
 pub fn residual_response(
     columns: &[Vec<f64>],
     e: &[f64],
@@ -63,7 +64,8 @@ pub fn residual_response(
     let n = rows.len();
     let p = columns.len() + 1;
     let z = DMatrix::from_fn(n, TAPS, |i, j| {
-        // The current error already contains the new part of u if the controlled element responds at once.
+        // The newest errors are excluded: they already contain the new part of u if the controlled element responds
+        // immediately.
         let (next, newest) = (rows[i] + 1, if j == 0 { thin } else { j * tap });
         e[next - (j + 1) * tap..next - newest.min((j + 1) * tap - 1)]
             .iter()
@@ -93,7 +95,7 @@ fn of_scores(z: &DMatrix<f64>, eps: &DVector<f64>, block: usize, known: usize) -
     let sums = z.transpose() * eps;
     let freedom = (eps.len() - known) as f64;
     let variance = eps.norm_squared() / freedom;
-    // Only the units of u and e matter: taps have equal scales.
+    // The matrix needs no scaling, because all taps have the unit of e.
     let inverse = gram.cholesky()?.inverse();
     let explained = (sums.transpose() * &inverse * &sums)[(0, 0)];
     let of_model = ChiSquared::new(TAPS as f64).ok()?.sf(explained / variance);

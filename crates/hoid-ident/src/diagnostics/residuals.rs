@@ -2,15 +2,15 @@
 //!
 //! With `S = sum eps^2` over all records,
 //!
-//! - the autocorrelation `sum eps(t) eps(t-k) / S` at lags of 1 to 25: the deficiency of the noise model;
-//! - the correlation `sum eps(t) e(t-k) / sqrt(S sum e^2)` at lags of 0 to 0.6 s: this shows a deficiency of the
-//!   operator. Only past errors are used, as in a closed loop later errors follow the residuals;
-//! - the leverage `max eps^2 / S`: the influence of one sample on the fit.
+//! - the autocorrelation `sum eps(t) eps(t-k) / S` at lags of 1 to 25, which shows a deficiency of the noise model;
+//! - the correlation `sum eps(t) e(t-k) / sqrt(S sum e^2)` at lags of 0 to 0.6 s, which shows a deficiency of the
+//!   operator. Only past errors are used, since in a closed loop later errors respond to the residuals;
+//! - the leverage `max eps^2 / S`, which measures the influence of one sample on the fit.
 //!
-//! Limits are effect sizes and not significance levels: with the samples of ten runs every model of a person is
-//! rejected by a test, and the important question is how much the model misses. In short records chance alone gives
-//! such sizes; there the limits are beyond chance: four standard errors `1/sqrt(n)` of a correlation of white noise,
-//! and 20/n of the sum of squares, which one of n normal residuals exceeds with the probability 8e-6 n.
+//! The limits are effect sizes, not significance levels: with the samples of ten runs a test rejects every model of a
+//! person, and the important question is how much the model leaves unexplained. In short records chance alone gives
+//! effects of this size. There the limits are four standard errors `1/sqrt(n)` of a correlation of white noise, and a
+//! share of 20/n of the sum of squares, which one of n normal residuals exceeds with the probability 8e-6 n.
 
 use hoid_model::{Finding, Record};
 
@@ -20,13 +20,13 @@ use crate::fit::Series;
 const LARGEST_AUTOCORRELATION: f64 = 0.1;
 /// Correlation of the residuals with earlier errors above which the operator is inadequate.
 const LARGEST_CROSS_CORRELATION: f64 = 0.1;
-/// The same in standard errors of a correlation of white noise, for short records.
+/// Limit of a correlation in short records, in standard errors of a correlation of white noise.
 const CHANCE_CORRELATION: f64 = 4.0;
 /// Share of one sample in the sum of squares above which it dominates the fit.
 const LARGEST_LEVERAGE: f64 = 0.05;
-/// The same in mean squares, for short records.
+/// Limit of one squared residual in short records, as a multiple of the mean square.
 const CHANCE_LEVERAGE: f64 = 20.0;
-/// Lags of the autocorrelation.
+/// Number of lags of the autocorrelation.
 const LAGS: usize = 25;
 /// Longest lag of the correlation with the error, in s and in samples.
 const LONGEST_LAG_S: f64 = 0.6;
@@ -43,12 +43,12 @@ pub(crate) struct ResidualMeasures {
     pub cross_correlation: f64,
     /// Largest share of one sample in the sum of squares.
     pub leverage: f64,
-    /// Record and sample of the largest share.
+    /// Record and sample of the residual with the largest share.
     pub at: (usize, usize),
 }
 
 impl ResidualMeasures {
-    /// Computes the measures of residuals that are series of their records.
+    /// Computes the measures from the residual series of all records.
     pub fn of_series(found: &[Series], records: &[Record], sample_time_s: f64) -> Self {
         let pairs: Vec<(&[f64], &[f64])> = found
             .iter()
@@ -58,8 +58,8 @@ impl ResidualMeasures {
         Self::of(&pairs, sample_time_s)
     }
 
-    /// Computes the measures of the residuals of all records, each with the error at the same sample (empty for a model
-    /// without an input).
+    /// Computes the measures from the residuals of all records, each with the error at the same samples (empty for a
+    /// model without an input).
     pub fn of(records: &[(&[f64], &[f64])], sample_time_s: f64) -> Self {
         let sum_of_squares = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
         let total: f64 = records.iter().map(|(eps, _)| sum_of_squares(eps)).sum();
@@ -132,7 +132,8 @@ impl ResidualMeasures {
             Finding::doubt(
                 "leverage",
                 format!(
-                    "one sample (record {}, residual {}) contributes {:.0} % of the sum of squares: look at it, or leave it out",
+                    "one sample (record {}, residual {}) contributes {:.0} % of the sum of squares: look at this \
+                     sample, or leave it out",
                     self.at.0 + 1,
                     self.at.1,
                     100.0 * self.leverage
@@ -141,7 +142,7 @@ impl ResidualMeasures {
         })
     }
 
-    /// Returns all findings.
+    /// Returns all findings about the residuals.
     pub fn findings(&self) -> impl Iterator<Item = Finding> {
         [self.coloured(), self.structure(), self.leverage()]
             .into_iter()

@@ -1,13 +1,13 @@
-//! Second fits to the records with a component removed, and their difference to the first.
+//! Second fits to the records after removal of a component, compared with the first fit.
 //!
 //! | removed | cause of a difference | finding |
 //! |---|---|---|
-//! | values that the neighbours of a sample do not support ([`crate::faults::held`]), in e as in u: their contribution to the filters of a fit is bounded | few samples | `leverage` |
-//! | components slower than 20 s, for a slow system than ten periods of its slowest pole ([`crate::faults::without_slow`]) | a drift or a step of a sensor, which the person does not follow | `slow` |
+//! | deviations of a sample of e or u from its neighbours beyond a limit ([`crate::faults::held`]), so that no sample has a large effect on the filters of the fit | few samples | `leverage` |
+//! | components slower than 20 s or, for a slow system, than ten periods of its slowest pole ([`crate::faults::without_slow`]) | a drift or a step of a sensor, which the person does not follow | `slow` |
 //!
-//! Two fits differ if a parameter, the crossover or the phase margin differs by more than three standard errors: those
-//! of the first fit or, if the second has less information, those of the lost information, `sqrt(se'^2 - se^2)`. If
-//! nothing is removed, the second fit would equal the first and is not made.
+//! Two fits differ if a parameter, the crossover or the phase margin differs by more than three standard errors. The
+//! standard error is that of the first fit or, if larger, that of the information lost in the second fit,
+//! `sqrt(se'^2 - se^2)`. If nothing is removed, there is no second fit, because it would equal the first.
 
 use std::f64::consts::TAU;
 
@@ -23,36 +23,36 @@ use crate::{
     faults::{PERIOD_S, held, without_slow},
 };
 
-/// Periods of the slowest pole of a system above which a component is slow.
+/// Components slower than this number of periods of the slowest pole of a system count as slow.
 const SLOW_PERIODS: f64 = 10.0;
-/// Standard errors by which two fits differ.
-const DIFFERENT: f64 = 3.0;
-/// Standard errors by which a level may move a parameter.
+/// Two fits differ if an estimate differs by more than this number of standard errors.
+const SIGNIFICANT_DIFFERENCE: f64 = 3.0;
+/// Largest acceptable change of a parameter due to a level, in standard errors.
 const LEVEL: f64 = 2.0;
 
-/// Name of a quantity, and its estimates by the first fit and by the other.
+/// Name of a quantity, and its estimates from the first and the second fit.
 type ComparedEstimate = (String, Estimate, Estimate);
 
-/// Component that is removed from the records.
+/// Component that is removed from the records before the second fit.
 #[derive(Debug, Clone, Copy)]
 enum Without {
-    SamplesThatStandOut,
+    Outliers,
     /// Components slower than this period, s.
-    WhatIsSlow(f64),
+    SlowComponents(f64),
 }
 
 impl Without {
-    const ALL: [Self; 2] = [Self::SamplesThatStandOut, Self::WhatIsSlow(PERIOD_S)];
+    const ALL: [Self; 2] = [Self::Outliers, Self::SlowComponents(PERIOD_S)];
 
-    /// Returns the records without the component; `None` if they do not contain it.
+    /// Returns the records without the component; `None` if no record contains it.
     fn records(self, records: &[Record]) -> Option<Vec<Record>> {
         match self {
-            Self::SamplesThatStandOut => held(records),
-            Self::WhatIsSlow(period_s) => without_slow(records, period_s),
+            Self::Outliers => held(records),
+            Self::SlowComponents(period_s) => without_slow(records, period_s),
         }
     }
 
-    /// Returns a doubt if the fits differ in any of these quantities.
+    /// Returns a warning if the fits differ in any of these quantities.
     fn finding(self, pairs: impl IntoIterator<Item = ComparedEstimate>) -> Option<Finding> {
         let differ: Vec<String> = pairs
             .into_iter()
@@ -62,31 +62,32 @@ impl Without {
                     .max(0.0)
                     .sqrt();
                 let off = (first.value - other.value).abs() / error.max(lost);
-                (off > DIFFERENT && off.is_finite()).then(|| format!("{name} by {off:.1}"))
+                (off > SIGNIFICANT_DIFFERENCE && off.is_finite()).then(|| format!("{name} by {off:.1}"))
             })
             .collect();
         let differ = (!differ.is_empty()).then(|| differ.join(", "))?;
         Some(match self {
-            Self::SamplesThatStandOut => Finding::doubt(
+            Self::Outliers => Finding::doubt(
                 "leverage",
                 format!(
-                    "the fit depends on few samples: with each limited to its neighbours it differs in {differ} \
-                     standard errors; look at the recording"
+                    "the fit depends on a few samples: with each sample limited by its neighbours it differs in \
+                     {differ} standard errors; look at the recording"
                 ),
             ),
-            Self::WhatIsSlow(period_s) => Finding::doubt(
+            Self::SlowComponents(period_s) => Finding::doubt(
                 "slow",
                 format!(
                     "the fit depends on a drift or a step that the person does not follow: without components slower \
                      than {period_s:.0} s it differs in {differ} standard errors; look at the recording, or choose a \
-                     span without it"
+                     span without this drift or step"
                 ),
             ),
         })
     }
 }
 
-/// Fits the records without each of `all` in turn; `again` returns the quantities of both fits.
+/// Removes each component of `all` in turn and returns the findings; `again` fits the changed records and returns the
+/// quantities of both fits.
 fn opinions(
     all: &[Without],
     records: &[Record],
@@ -96,14 +97,15 @@ fn opinions(
     all.iter().filter_map(asked).collect()
 }
 
-/// Second fits for polynomials, by the estimator of the first; with its loop if the controlled element is known.
+/// Returns the findings of second fits of polynomials, made with the same estimator; crossover and phase margin are
+/// also compared if the controlled element is known.
 pub fn of_polynomials(
     estimator: &Estimator,
     fit: &Fit,
     records: &[Record],
     element: Option<&ContinuousTransferFunction>,
 ) -> Vec<Finding> {
-    let all = [Without::SamplesThatStandOut, Without::WhatIsSlow(slow_period_s(fit))];
+    let all = [Without::Outliers, Without::SlowComponents(slow_period_s(fit))];
     opinions(&all, records, |others| {
         let other = again(estimator, fit, others)?;
         let mut pairs = compared_parameters(fit, &other);
@@ -112,7 +114,8 @@ pub fn of_polynomials(
     })
 }
 
-/// Period above which a component is slow: that for people, or ten periods of the slowest pole of the system.
+/// Returns the period above which a component is slow: [`PERIOD_S`], or ten periods of the slowest pole of the system
+/// if that is longer.
 fn slow_period_s(fit: &Fit) -> f64 {
     let poles = fit.roots();
     let poles = poles.iter().filter(|root| matches!(root.polynomial, 'a' | 'f'));
@@ -122,7 +125,7 @@ fn slow_period_s(fit: &Fit) -> f64 {
     periods.fold(PERIOD_S, f64::max)
 }
 
-/// Second fits for a grey box, with the order of its remnant unchanged.
+/// Returns the findings of second fits of a grey box; the order of its remnant model stays the same.
 pub fn of_grey_box(
     estimator: &GreyBox,
     fit: &GreyBoxFit,
@@ -141,15 +144,16 @@ pub fn of_grey_box(
     })
 }
 
-/// Second fits for an operator of the family, with its form and the orders of its noise model unchanged. A fit at the
-/// lines of a recorded excitation is part of it already, and has no information about slow components.
+/// Returns the findings of second fits of an operator of the family; its form and the orders of its noise model stay
+/// the same. A fit at the lines of a recorded excitation carries no information about slow components, so that only
+/// single samples are examined.
 pub fn of_family(
     estimator: &FamilyEstimator,
     fit: &FamilyFit,
     records: &[Record],
     element: Option<&ContinuousTransferFunction>,
 ) -> Vec<Finding> {
-    // The standard errors are then those of rounding, which the ends of the removed part exceed.
+    // Without noise the standard errors reflect only rounding, and the end effects of the removal exceed them.
     if fit.noise_free.is_some() {
         return Vec::new();
     }
@@ -163,7 +167,7 @@ pub fn of_family(
         channels: fit.channels_in_use(),
         ..estimator.clone()
     };
-    // Slow components would be removed from e and u only, and not from the other inputs.
+    // Slow components would be removed only from e and u, not from the other inputs.
     let asked = match &fit.lines {
         None if again.channels.is_empty() => &Without::ALL[..],
         _ => &Without::ALL[..1],
@@ -171,7 +175,7 @@ pub fn of_family(
     let measures = |of: &FamilyFit| of.loop_measures_in_front(0, element?);
     opinions(asked, records, |others| {
         let other = again.fit_with_response(others, None).ok()?;
-        // Only the best form: the other fit has no others.
+        // Only the best form is compared, because the second fit has no other forms.
         let (one, two) = (fit.weighed.first()?, other.weighed.first()?);
         let parameters = one.operators.iter().zip(&two.operators).flat_map(|(one, two)| {
             let both = one.parameters.iter().zip(&two.parameters);
@@ -187,10 +191,10 @@ pub fn of_family(
     })
 }
 
-/// Second fits for an operator whose gains change once, without outlying samples. A change that only one of the fits
-/// finds counts as a difference regardless of its size.
+/// Returns the finding of a second fit without outlying samples, for an operator whose gains change once. A change
+/// found by only one of the two fits counts as a difference regardless of its size.
 pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record]) -> Option<Finding> {
-    let without = Without::SamplesThatStandOut;
+    let without = Without::Outliers;
     let other = SigmoidChange {
         likelihood_intervals: false,
         nd: Some(fit.d().len()),
@@ -201,12 +205,12 @@ pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record
     if fit.change_found() != other.change_found() {
         return Some(Finding::doubt(
             "leverage",
-            "the fit depends on few samples: with each limited to its neighbours the records give another result about \
-             a change; look at the recording",
+            "the fit depends on a few samples: with each sample limited by its neighbours the records give another \
+             result about a change; look at the recording",
         ));
     }
     if fit.change_found() {
-        // The noise model alone does not decide: it contains pulses of a stick.
+        // The noise model is not compared, because it also describes the pulses of a stick.
         let named = |of: &SigmoidFit| {
             let operator = of.parameters().len() - of.d().len();
             let parameters = of.parameters().into_iter().take(operator);
@@ -221,8 +225,8 @@ pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record
     without.finding(compared(constant(fit), constant(&other)))
 }
 
-/// Effect of a remaining level of e and u on a fit of polynomials, from a fit without their means: a doubt if a
-/// parameter moves by more than `LEVEL` standard errors.
+/// Returns a warning if a level of e and u affects a polynomial fit: without the means a parameter differs by more than
+/// `LEVEL` standard errors.
 pub fn of_level(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Finding> {
     let without: Vec<Record> = records.iter().map(|r| r.clone().detrended(Detrend::Mean)).collect();
     let other = again(estimator, fit, &without)?;
@@ -244,7 +248,7 @@ pub fn of_level(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<
     })
 }
 
-/// Fits the same model to other records, from the parameters of the fit.
+/// Fits the same model to other records, starting from the parameters of the fit.
 fn again(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Fit> {
     let other = Estimator {
         start: Some(fit.model().theta().to_vec()),
@@ -253,7 +257,7 @@ fn again(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Fit> {
     other.fit(records).ok()
 }
 
-/// The parameters of two fits: those of the operator if both have one.
+/// Pairs the parameters of two fits: those of the operators if both fits have one.
 fn compared_parameters(fit: &Fit, other: &Fit) -> Vec<ComparedEstimate> {
     match (fit.operator(), other.operator()) {
         (Ok(one), Ok(two)) => {
@@ -269,7 +273,7 @@ fn compared(one: Vec<(String, Estimate)>, two: Vec<(String, Estimate)>) -> Vec<C
     pairs.map(|((name, first), (_, other))| (name, first, other)).collect()
 }
 
-/// Crossover and phase margin of two fits with the same controlled element.
+/// Pairs the crossover and the phase margin of two fits with the same controlled element.
 fn compared_loops(fit: &Fit, other: &Fit, element: Option<&ContinuousTransferFunction>) -> Vec<ComparedEstimate> {
     let Some(element) = element else { return Vec::new() };
     let margins = |of: &Fit| {

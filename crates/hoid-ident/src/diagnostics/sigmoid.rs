@@ -1,4 +1,4 @@
-//! The verdict of a fit whose gains change once.
+//! The verdict on a fit with gains that change once.
 
 use hoid_model::{Finding, Record, SampleTime, Verdict};
 
@@ -12,8 +12,8 @@ use crate::{
 };
 
 impl SigmoidFit {
-    /// Returns the verdict on the fit, for the records that it was fitted to. If the records show no change, the
-    /// operator without a change is judged.
+    /// Returns the verdict on the fit. `records` are the records of the fit. If they show no change, the operator
+    /// without a change is judged.
     ///
     /// # Errors
     /// As [`SigmoidFit::residuals`].
@@ -29,7 +29,7 @@ impl SigmoidFit {
             vec![("", self.constant_operator())]
         };
         let leads: Option<Vec<_>> = operators.iter().map(|(label, o)| Some((*label, o.lead()?))).collect();
-        // The poles are the same before and after.
+        // The poles are the same before and after the change.
         match (leads, records.first()) {
             (Some(leads), Some(record)) => {
                 all.extend(gain_findings(&leads));
@@ -54,7 +54,7 @@ impl SigmoidFit {
         if !self.change_found() {
             all.push(Finding::note(
                 "no-change",
-                "the records show no change (BIC): use the operator without one",
+                "the records show no change (BIC): use the operator without a change",
             ));
         } else if self.is_change_point() {
             all.push(Finding::note(
@@ -68,13 +68,13 @@ impl SigmoidFit {
                 Some(Remark::AtBound) if name == "tau_e" => all.push(Finding::doubt(
                     "delay-at-bound",
                     format!(
-                        "the delay {value:.3} s lies at the end of the range in which it was searched for; widen it"
+                        "the delay {value:.3} s lies at an end of its search range; widen this range"
                     ),
                 )),
-                // A pure integration, or no lag.
+                // At a bound of T_I the operator is a pure integration, or has no lag.
                 Some(Remark::AtBound) if name == "T_I" => all.push(Finding::note(
                     "lag",
-                    format!("T_I and K are not determined, K/T_I is: T_I is at a bound, {value:.3} s"),
+                    format!("T_I and K are not determined, only K/T_I is: T_I is at a bound, {value:.3} s"),
                 )),
                 Some(Remark::PriorAlone) => all.push(Finding::note(
                     "prior",
@@ -104,8 +104,9 @@ impl SigmoidFit {
     }
 }
 
-/// Returns findings about parameters of operators of the family that do not differ from zero, and about implausible
-/// poles. An undetermined gain or lead is named; if neither operator has a response, nothing is known.
+/// Returns findings about parameters of family operators that do not differ from zero, and about implausible poles.
+/// Undetermined gains and leads are named; if no operator has a significant gain, the finding is that there is too
+/// little response to e.
 fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTime) -> Vec<Finding> {
     let mut all = Vec::new();
     let mut open = Vec::new();
@@ -113,7 +114,7 @@ fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTi
     for (label, of) in operators {
         for p in &of.parameters {
             let varies = !matches!(p.name, "T_I" | "K" | "omega_nm" | "zeta_nm" | "tau_e");
-            // Without a lag K is the gain itself.
+            // Without a lag, K is the gain itself.
             if varies || (p.name == "K" && of.get("T_I").is_none()) {
                 known |= !is_open(&p.estimate);
                 if is_open(&p.estimate) {
@@ -145,11 +146,11 @@ fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTi
             ),
         ));
     }
-    // An error of T_I as large as half of it: 1/T_I is not distinguished from zero.
+    // The error of T_I is at least half of T_I, so that 1/T_I does not differ significantly from zero.
     if first.get("T_I").as_ref().is_some_and(is_open) {
         all.push(Finding::note(
             "lag",
-            "T_I and K are not determined, K/T_I is: 1/T_I is less than two standard errors from zero",
+            "T_I and K are not determined, only K/T_I is: 1/T_I is less than two standard errors from zero",
         ));
     }
     if let (Some(omega), Some(zeta)) = (first.get("omega_nm"), first.get("zeta_nm")) {

@@ -1,19 +1,19 @@
-//! Least squares after an autoregression: the white part of u that some columns do not explain.
+//! Least squares with autoregressive noise: the white part of u that given columns do not explain.
 //!
-//! For `u = X b + level + v`, `D v = eps`, noise model of order [`NOISE`] and b in turn; if a limit is given, residuals
-//! are limited to this number of standard deviations.
+//! In `u = X b + level + v`, `D v = eps`, the noise model D of order [`NOISE`] and b are estimated in turn. If a limit
+//! is given, residuals are limited to this number of standard deviations.
 
 use nalgebra::{DMatrix, DVector};
 
 /// Order of the noise model.
 pub(super) const NOISE: usize = 16;
-/// Rate to which signals are decimated, Hz.
+/// Lowest rate after decimation, Hz.
 const RATE_HZ: f64 = 50.0;
 /// Standard deviations above which a residual is an outlier.
 pub(super) const LIMIT: f64 = 3.5;
-/// Share of the power of u below which v is rounding.
+/// v counts as rounding error if its power is below this share of the power of u.
 const EXACT: f64 = 1e-18;
-/// Rounds of noise model and least squares.
+/// Number of alternations between noise model and least squares.
 const ROUNDS: usize = 3;
 
 /// Returns the decimation factor.
@@ -21,23 +21,23 @@ pub(super) fn thinning(sample_time_s: f64) -> usize {
     (1.0 / (sample_time_s * RATE_HZ) + 1e-6).floor().max(1.0) as usize
 }
 
-/// A fit of columns and a level.
+/// A least-squares fit of columns and a level to u.
 pub(super) struct Whitened {
     /// Coefficients of the columns, the level last.
     pub b: DVector<f64>,
     /// The part of u that the columns leave unexplained.
     pub v: DVector<f64>,
-    /// `d_1 ..` of its noise model.
+    /// Coefficients `d_1 ..` of the noise model of v.
     pub d: Vec<f64>,
-    /// Columns filtered by the noise model, the level last; [`NOISE`] rows fewer.
+    /// Columns filtered by the noise model, the level last, with [`NOISE`] rows fewer than before.
     pub x: DMatrix<f64>,
-    /// Residuals, limited.
+    /// Limited residuals.
     pub eps: DVector<f64>,
 }
 
 impl Whitened {
-    /// Fits these samples of columns and u; `None` if a value is not a number, columns are linearly dependent, or only
-    /// rounding is left. Residuals are limited to `limit` standard deviations.
+    /// Fits columns to u at these samples. `None` if a value is not a number, columns are linearly dependent, or only
+    /// rounding errors are left. Residuals are limited to `limit` standard deviations.
     pub fn of(columns: &[Vec<f64>], u: &[f64], samples: &[usize], limit: f64) -> Option<Self> {
         let (n, p) = (samples.len(), columns.len() + 1);
         let x = DMatrix::from_fn(n, p, |i, j| columns.get(j).map_or(1.0, |c| c[samples[i]]));
@@ -67,7 +67,7 @@ impl Whitened {
     }
 }
 
-/// Filters with `1 + d_1 q^-1 + ..`, from the first sample on that has all lags.
+/// Filters the columns with `1 + d_1 q^-1 + ..`, starting at the first sample for which all lags exist.
 pub(super) fn whitened(m: &DMatrix<f64>, d: &[f64]) -> DMatrix<f64> {
     DMatrix::from_fn(m.nrows() - NOISE, m.ncols(), |i, j| {
         let own = m[(i + NOISE, j)];
@@ -86,12 +86,12 @@ fn tail(v: &DVector<f64>) -> DVector<f64> {
     v.rows(NOISE, v.len() - NOISE).into_owned()
 }
 
-/// `v(t-1) .. v(t-p)` by rows.
+/// Returns the rows `v(t-1) .. v(t-p)`, where p is [`NOISE`].
 pub(super) fn lags(v: &DVector<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(v.len() - NOISE, NOISE, |i, j| v[i + NOISE - 1 - j])
 }
 
-/// Returns y with outliers moved towards the fit.
+/// Returns y with the residuals of outliers reduced to the limit.
 fn limited(x: &DMatrix<f64>, y: &DVector<f64>, limit: f64) -> Option<DVector<f64>> {
     let fit = x * solution(x, y)?;
     Some(&fit + clipped(&(y - &fit), limit))
@@ -99,11 +99,11 @@ fn limited(x: &DMatrix<f64>, y: &DVector<f64>, limit: f64) -> Option<DVector<f64
 
 fn clipped(eps: &DVector<f64>, limit: f64) -> DVector<f64> {
     let most = limit * (eps.norm_squared() / eps.len() as f64).sqrt();
-    // If all residuals are zero, the limit is not a number; min and max ignore it.
+    // If all residuals are zero, the limit could be `NaN`, which `min` and `max` ignore.
     eps.map(|v| v.max(-most).min(most))
 }
 
-/// Least squares with columns scaled to unit length; `None` if they are linearly dependent.
+/// Returns the least-squares solution with columns scaled to unit length; `None` if they are linearly dependent.
 pub(super) fn solution(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<DVector<f64>> {
     let (q, r, scales) = factored(x)?;
     let mut b = r.solve_upper_triangular(&(q.transpose() * y))?;

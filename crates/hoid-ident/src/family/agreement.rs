@@ -1,48 +1,50 @@
-//! Agreement of methods that use different statistics.
+//! Agreement of estimation methods that use different statistics.
 //!
-//! The prediction error fit uses every sample and needs a noise model; the fit at the lines uses only the excited
-//! frequencies and needs none; refined instrumental variables use every sample of the part that follows the excitation.
-//! For each pair of methods, the difference d between those coordinates that the data determine is compared with its
-//! covariance V: `T = d' V^-1 d`.
+//! The prediction error fit uses every sample and needs a noise model. The fit at the lines uses only the excited
+//! frequencies and needs no noise model. Refined instrumental variables use, at every sample, the part of e that
+//! follows the excitation. For each pair of methods, the difference d of the coordinates that the data determine is
+//! compared with its covariance V: `T = d' V^-1 d`.
 //!
-//! **V** is a sum of three:
+//! **V** is the sum of three terms:
 //!
-//! 1. and 2. The covariances of the two methods from all residuals or lines together, times kappa. A jackknife over n
-//!    runs has a rank of n - 1 at most: with five runs and four coordinates it gives, by chance, a very small variance
-//!    in some direction (H. Hotelling, *Annals of Mathematical Statistics* 2 (1931) 360-378). Both methods see the same
-//!    records, so that the sum is conservative with respect to false alarms.
-//! 3. In a closed loop the prediction error fit has a bias where its noise model is wrong, which
-//!    no scatter shows: `sum d_k d_k'` over its differences to fits with other noise models
-//!    ([`super::sensitivity`]). It becomes part of the errors of the result, and is therefore no reason to doubt them.
+//! 1. and 2. The covariances of the two methods, each from all residuals or all lines together, times kappa. A
+//!    jackknife over n runs has a rank of at most n - 1: with five runs and four coordinates, chance gives a very small
+//!    variance in some direction (H. Hotelling, *Annals of Mathematical Statistics* 2 (1931) 360-378). Since both
+//!    methods use the same records, the sum overestimates V and false alarms are rarer than the significance level.
+//! 3. In a closed loop the prediction error fit is biased if its noise model is wrong, and no scatter between runs
+//!    shows this bias. It is estimated as `sum d_k d_k'` over the differences d_k to fits with other noise models
+//!    ([`super::sensitivity`]). The bias is included in the reported errors, and is therefore no evidence against the
+//!    result.
 //!
-//! **Coordinates that count** are determined by the data, with a share of the prior below a quarter in each method: a
-//! resonance above the lines is determined by the prior in one method and not in the other.
+//! **Compared coordinates** are those that the data determine, with a prior share of at most a quarter in each method.
+//! A resonance above the lines, for example, may be determined by the prior in one method and by the data in another.
 //!
 //! The gain is compared as `ln |Y|` in the middle of the band of manual control. Gain and lead time, or gain and lag,
-//! compensate each other along a curve, K T_L nearly constant, so that two points far apart on this curve can be
-//! equivalent: a linear test about one of them would report a difference.
+//! can compensate each other along a curve such as K T_L = constant, so that two distant points on this curve may be
+//! equivalent. A linear test of the gain itself would report a difference between them.
 //!
-//! T is chi-square with as many degrees of freedom. For several pairs the smallest probability is used, times their
-//! number (Bonferroni): at a level of 1 %, at most one in a hundred people whose operator has the form is reported.
+//! T has a chi-square distribution with as many degrees of freedom as there are compared coordinates. For several pairs
+//! the smallest p-value is multiplied by the number of pairs (Bonferroni): at a level of 1 %, at most one in a hundred
+//! people whose operator has this form is reported.
 
 use hoid_model::{FamilyOperator, operator_family::Coordinate};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::linalg::least_squares::{dot, solve_symmetric};
 
-/// A method that is compared with others.
+/// Method in a comparison of estimation methods.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum AgreementMethod {
-    /// Prediction error.
+    /// Prediction error method, over all samples.
     PredictionError,
-    /// The fit at the lines of the excitation.
+    /// Fit at the lines of the excitation.
     Lines,
     /// Refined instrumental variables.
     Instrumental,
 }
 
 impl AgreementMethod {
-    /// Returns its name for use in a sentence.
+    /// Returns the name of the method for use in a sentence.
     pub fn words(self) -> &'static str {
         match self {
             Self::PredictionError => "the prediction error fit",
@@ -51,7 +53,7 @@ impl AgreementMethod {
         }
     }
 
-    /// Returns its name as a key.
+    /// Returns the name of the method as a key.
     pub fn name(self) -> &'static str {
         match self {
             Self::PredictionError => "prediction_error",
@@ -61,32 +63,33 @@ impl AgreementMethod {
     }
 }
 
-/// Comparison of the methods.
+/// Comparison of the estimates by several methods.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Agreement {
-    /// Each coordinate that counts, for all methods.
+    /// Compared coordinates, each with its estimates by all methods.
     pub rows: Vec<AgreementRow>,
-    /// Each pair of methods.
+    /// Tests of all pairs of methods.
     pub pairs: Vec<AgreementPair>,
-    /// T of the pair with the least agreement.
+    /// Statistic T of the pair with the least agreement.
     pub statistic: f64,
-    /// Probability of such a difference of a pair if all methods are right.
+    /// p-value of the pair with the least agreement, times the number of pairs: the probability of such a difference if
+    /// all methods are unbiased.
     pub p_value: f64,
 }
 
-/// One coordinate, for all methods.
+/// Estimates of one coordinate by all methods.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AgreementRow {
     /// The coordinate.
     pub coordinate: Coordinate,
     /// Value and standard error of each method.
     pub values: Vec<(AgreementMethod, (f64, f64))>,
-    /// The difference of the first pair, in its standard errors.
+    /// Difference between the methods of the first pair, in standard errors of the difference.
     pub difference_in_errors: f64,
 }
 
 impl AgreementRow {
-    /// Returns value and standard error of a method.
+    /// Returns value and standard error of the estimate by a method.
     pub fn of(&self, method: AgreementMethod) -> Option<(f64, f64)> {
         self.values.iter().find(|(m, _)| *m == method).map(|(_, v)| *v)
     }
@@ -97,9 +100,9 @@ impl AgreementRow {
 pub struct AgreementPair {
     /// The two methods.
     pub methods: (AgreementMethod, AgreementMethod),
-    /// `d' V^-1 d`.
+    /// The statistic `T = d' V^-1 d`.
     pub statistic: f64,
-    /// Probability of a statistic at least as large if both are right.
+    /// Probability of a statistic at least as large if both methods are unbiased.
     pub p_value: f64,
     /// The coordinate with the largest difference, in standard errors of the difference.
     pub most: (Coordinate, f64),
@@ -112,24 +115,24 @@ impl Agreement {
     }
 }
 
-/// Result of a method.
+/// Estimate by one method.
 #[derive(Debug, Clone)]
 pub(super) struct Side {
     pub method: AgreementMethod,
-    /// Its coordinates; the first is the level instead of the gain.
+    /// Estimated coordinates, with the level `ln |Y|` in place of the gain as the first one.
     pub coordinates: Vec<f64>,
-    /// Their covariance from all residuals or lines, by rows.
+    /// Covariance of these coordinates by rows, from all residuals or all lines.
     pub covariance: Vec<f64>,
-    /// The coordinates with the reported standard errors; the first is the gain itself.
+    /// Coordinates with the reported standard errors, with the gain itself as the first one.
     pub reported: Vec<(f64, f64)>,
 }
 
 impl Side {
-    /// Converts an operator with its covariance and the reported covariance.
+    /// Creates the estimate from an operator, the covariance for the test, and the reported covariance.
     pub fn of(method: AgreementMethod, operator: &FamilyOperator, covariance: &[f64], reported: &[f64]) -> Self {
         let p = operator.coordinates().len();
         let gradient = level(operator).1;
-        // The first row is the gradient of the level, the others are those of the identity matrix.
+        // The first row is the gradient of the level; the other rows are those of the identity matrix.
         let times = |c: &[f64], i: usize, j: usize| -> f64 {
             match i {
                 0 => (0..p).map(|k| gradient[k] * c[k * p + j]).sum(),
@@ -152,22 +155,22 @@ impl Side {
 /// Frequency at which the gain is compared, rad/s: the middle of the band of manual control.
 const MIDDLE_RAD_S: f64 = 2.4;
 
-/// Returns `ln |Y|` at this frequency, and its gradient.
+/// Returns `ln |Y|` at [`MIDDLE_RAD_S`] and its gradient with respect to the coordinates.
 fn level(operator: &FamilyOperator) -> (f64, Vec<f64>) {
     let response = operator.response_and_gradient(MIDDLE_RAD_S);
     let gradient = response.gradient.iter().map(|g| (g / response.value).re);
     (response.value.norm().ln(), gradient.collect())
 }
 
-/// Returns the coordinates with the level instead of the gain, the first coordinate of all forms.
+/// Returns the coordinates with the level `ln |Y|` in place of the gain, which is the first coordinate of every form.
 pub(super) fn with_level(operator: &FamilyOperator) -> Vec<f64> {
     let mut x = operator.coordinates().to_vec();
     x[0] = level(operator).0;
     x
 }
 
-/// Tests all pairs over the coordinates that count; `bias` is that of the prediction error fit. `None` if there are no
-/// coordinates, or fewer than two methods with errors.
+/// Tests all pairs of methods over the coordinates that count. `bias` is the squared bias of the prediction error fit,
+/// as a matrix by rows. `None` if no coordinate counts, or if fewer than two methods have errors.
 pub(super) fn agreement(
     all: &[Coordinate],
     sides: &[Side],
@@ -200,7 +203,7 @@ pub(super) fn agreement(
     })
 }
 
-/// Tests two methods, and returns the difference of each coordinate in its standard errors.
+/// Tests two methods. Also returns the difference of each coordinate, in standard errors of the difference.
 fn pair(
     all: &[Coordinate],
     used: &[usize],

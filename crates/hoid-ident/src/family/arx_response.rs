@@ -1,64 +1,67 @@
-//! A frequency response without a form: from an ARX model of high order.
+//! A frequency response without a form, from a high-order ARX model.
 //!
-//! In a closed loop the direct prediction error method needs a sufficiently rich noise model and no knowledge of the
-//! loop (L. Ljung, *System Identification*, 1999, section 13.4). An ARX model of high order satisfies this, is a single
-//! linear regression, and its response replaces the describing function if no periodic excitation was recorded: for the
-//! starts of all forms.
+//! In a closed loop the direct prediction error method needs a sufficiently flexible noise model but no knowledge of
+//! the loop (L. Ljung, *System Identification*, 1999, section 13.4). A high-order ARX model is flexible enough and
+//! takes a single linear regression. If no periodic excitation was recorded, its response replaces the describing
+//! function as the source of starts for all forms.
 
 use hoid_model::{Complex64, Orders, Record, SampleTime, Structure};
 
 use super::{prediction::NONE, response_fit::MeasuredResponse};
 use crate::{Estimator, Fit, IdentError, ResponsePoint};
 
-/// Order of A.
+/// Highest order of A.
 const POLES: usize = 16;
-/// Number of coefficients of A or B below which no other model is tried.
+/// Number of coefficients of A and B at which the orders are not reduced further.
 const FEWEST: usize = 4;
-/// Most coefficients of B.
+/// Maximum number of coefficients of B.
 pub(super) const MOST_GAINS: usize = 60;
-/// Share of the innovations in the power of u below which there may be no noise.
-const PROMISING: f64 = 1e-3;
-/// Ratio of two innovation variances that their degrees of freedom and first samples alone cannot explain.
+/// Innovation variance relative to the power of u below which the record may be free of noise.
+const NEARLY_NOISE_FREE: f64 = 1e-3;
+/// Ratio of two innovation variances that cannot result from different degrees of freedom and first samples alone.
 const SAFETY_FACTOR: f64 = 4.0;
-/// Orders of A of an operator: the neuromuscular system, and up to two lags.
+/// Lowest and highest order of A of an exact operator: the neuromuscular system and up to two lags.
 const OWN_ORDERS: (usize, usize) = (2, 4);
-/// Number of coefficients of B beyond the order of A: as many as that, one for a part of a sample of the delay, one for
-/// linear interpolation.
+/// Number of B coefficients minus the order of A for an exact operator: one for the fractional part of the delay and
+/// one for linear interpolation.
 const FURTHER_GAINS: usize = 2;
-/// Frequencies of the response, rad/s, evenly over their logarithm.
+/// Frequency range of the response, rad/s; its points are evenly spaced on a logarithmic scale.
 const BAND_RAD_S: (f64, f64) = (0.5, 20.0);
 const POINTS: usize = 24;
-/// Longest response to an error that B describes, s.
+/// Duration of the longest response to an error that B describes, s.
 const RESPONSE_S: f64 = 0.7;
 
-/// A response without a form.
+/// A frequency response without a form.
 #[derive(Debug, Clone)]
 pub(super) struct ArxResponse {
-    /// The points with their variances.
+    /// Points of the response with their variances.
     pub points: Vec<MeasuredResponse>,
-    /// Share of the innovations in the power of u.
+    /// Innovation variance relative to the power of u.
     innovations: f64,
 }
 
 impl ArxResponse {
-    /// Estimates the response from all records together: a smooth record determines fewer coefficients.
+    /// Estimates the response from all records together. The orders are halved until the records determine the
+    /// coefficients; a smooth record determines fewer of them.
     ///
     /// # Errors
-    /// The errors of the regression with the fewest coefficients.
+    /// The errors of the regression with the lowest orders.
     pub fn of(records: &[Record]) -> Result<Self, IdentError> {
         regressed(records, false, MOST_GAINS).map(|(found, _)| found)
     }
 
-    /// The same for almost no noise; `None` if there is more. A u without noise does not determine the coefficients of A
-    /// in a model of high order, and B has to cover the delay, which takes many samples at high rates. But an operator
-    /// without noise is exactly a model of its own order, with the whole samples of its own delay: of both kinds, the
-    /// model with the smallest innovations.
+    /// Estimates the response from records with almost no noise; `None` if there is more noise. A high-order model has
+    /// two problems here: a u without noise does not determine the coefficients of A, and B must cover the delay, which
+    /// takes many samples at high sampling frequencies. However, an operator without noise is exactly an ARX model of
+    /// the order of the operator, with its delay in whole samples. Of both kinds of model, the one with the smallest
+    /// innovation variance is used.
     pub fn without_noise(records: &[Record], longest_delay_s: f64) -> Option<Self> {
         let (high, of_high) = regressed(records, true, MOST_GAINS).ok()?;
-        if high.innovations > PROMISING {
+        if high.innovations > NEARLY_NOISE_FREE {
             return None;
         }
-        // A model whose regressors are among those of the high order leaves at least as much as that.
+        // A model whose regressors are a subset of those of the high-order model has at least the same innovation
+        // variance.
         let is_noise = high.innovations > SAFETY_FACTOR * NONE;
         let contained = |orders: &Orders| {
             let last = |orders: &Orders| orders.nk + orders.nb;
@@ -96,7 +99,7 @@ impl ArxResponse {
     }
 }
 
-/// Frequencies of a response without a form.
+/// Returns the frequencies of a response without a form, in rad/s.
 pub(super) fn frequencies(ts: SampleTime) -> Vec<f64> {
     let highest = BAND_RAD_S.1.min(0.8 * ts.nyquist_rad_s());
     (0..POINTS)
@@ -104,19 +107,19 @@ pub(super) fn frequencies(ts: SampleTime) -> Vec<f64> {
         .collect()
 }
 
-/// Returns (na, nb) of the first regression, with nb for each of this number of inputs.
+/// Returns (na, nb) of the first regression; nb applies to each of the inputs.
 pub(super) fn first_orders(records: &[Record], inputs: usize, most_gains: usize) -> (usize, usize) {
     let shortest = records.iter().map(Record::len).min().unwrap_or(0);
     let nb = gains(records).clamp(FEWEST, most_gains).min(shortest / (8 * inputs));
     (POLES.min(shortest / 12).max(2), nb.max(2))
 }
 
-/// Returns half as many coefficients; `None` below the fewest.
+/// Returns both orders halved; `None` if neither order exceeds [`FEWEST`].
 pub(super) fn halved((na, nb): (usize, usize)) -> Option<(usize, usize)> {
     (na.max(nb) > FEWEST).then(|| (na.div_ceil(2).max(2), nb.div_ceil(2).max(2)))
 }
 
-/// An ARX model with a level: without noise, the removed means have a visible effect.
+/// An ARX estimator with a level: without noise, the removal of the means has a visible effect.
 fn with_level(orders: Orders) -> Estimator {
     Estimator {
         level: true,
@@ -124,13 +127,13 @@ fn with_level(orders: Orders) -> Estimator {
     }
 }
 
-/// Number of coefficients of B that cover a response.
+/// Returns the number of B coefficients that cover a response with the duration [`RESPONSE_S`].
 fn gains(records: &[Record]) -> usize {
     (RESPONSE_S / records[0].sample_time().s()).ceil() as usize
 }
 
-/// Repeats the regression with half as many coefficients, of A only or of both, until the records determine them.
-/// Returns the orders too.
+/// Repeats the regression with half of the order of A, or of both orders, until the records determine the coefficients.
+/// Also returns the orders.
 fn regressed(records: &[Record], of_a_alone: bool, most_gains: usize) -> Result<(ArxResponse, Orders), IdentError> {
     let mut orders = Structure::Arx.operator_orders(1);
     (orders.na, orders.nb) = first_orders(records, 1, most_gains);
@@ -153,7 +156,7 @@ fn regressed(records: &[Record], of_a_alone: bool, most_gains: usize) -> Result<
     }
 }
 
-/// Converts a point of a fit.
+/// Converts a point of the frequency response of a fit.
 pub(super) fn measured(point: &ResponsePoint) -> MeasuredResponse {
     let gain = 10f64.powf(point.magnitude_db.value / 20.0);
     let error = |e: Option<f64>| e.unwrap_or(0.0);
@@ -162,7 +165,7 @@ pub(super) fn measured(point: &ResponsePoint) -> MeasuredResponse {
     MeasuredResponse {
         omega_rad_s: point.omega_rad_s,
         response: Complex64::from_polar(gain, point.phase_deg.value.to_radians()),
-        // The relative error is at least a thousandth: an exact fit has no variance.
+        // The relative error is set to at least 1e-3, because an exact fit has no variance.
         variance: gain * gain * (relative * relative + turn * turn).max(1e-6),
     }
 }

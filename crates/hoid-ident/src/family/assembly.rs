@@ -1,8 +1,8 @@
-//! Assembly of the result from the searches of the forms that count: operators with their errors, averaged over forms;
-//! for the best form the comparison of methods; and the verdict.
+//! Assembly of the result from the searches of the forms with a weight: operators with their errors, averaged over
+//! forms, the comparison of methods for the best form, and the verdict.
 //!
-//! The order matters: both methods are compared with their own errors, and only then does their
-//! difference become a part of the errors of the operator (`Covariances::add_bias`).
+//! The order matters: the methods are first compared with their own errors, and only then is the difference between
+//! them added to the errors of the operator (`Covariances::add_bias`).
 
 use hoid_model::{FamilyOperator, Finding, Form, Record, Verdict, operator_family::Coordinate};
 use hoid_numerics::statistics::mean;
@@ -11,7 +11,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::{
     agreement::{Agreement, AgreementMethod, Side, agreement, with_level},
     channel::ChannelFit,
-    channel_lines::{AtChannelLines, InForm, tells_apart},
+    channel_lines::{AtChannelLines, InForm, have_separate_lines},
     channels::with_responses,
     choice::FormFigures,
     covariances::response_errors,
@@ -38,50 +38,50 @@ use crate::{
     optimize::minimise,
 };
 
-/// Result of the fit at the lines of the excitation for a form.
+/// Result of fitting a form at the lines of the excitation.
 pub(super) struct AtLines<'d> {
     pub describing: Option<&'d DescribingFunction>,
     /// The lines of several inputs, if there are any.
     pub channels: Option<AtChannelLines<'d>>,
-    /// Their forms.
+    /// Further inputs in their forms.
     pub in_form: Vec<InForm>,
     pub fit: Option<LineFit>,
-    /// The reason why there is no fit although one was requested.
+    /// Reason why there is no fit, if one was requested.
     pub why_none: Option<String>,
 }
 
-/// The search of a form that counts, other than the best one.
+/// The search of a form with a weight, other than the best form.
 pub(super) struct OtherForm<'a> {
     pub fit: PredictionFit<'a>,
     pub lines: Option<LineFit>,
     pub weight: f64,
 }
 
-/// The search of the best form, and the other inputs of its result.
+/// The search of the best form, and everything else that the result requires.
 pub(super) struct Chosen<'p, 'a> {
     pub fit: PredictionFit<'a>,
     pub weight: f64,
     pub lines: AtLines<'p>,
-    /// The other forms that count.
+    /// The other forms with a weight.
     pub others: Vec<OtherForm<'a>>,
-    /// All forms of the comparison.
+    /// Criteria of all compared forms.
     pub forms: Vec<FormFigures>,
     pub prediction: &'p Prediction<'a>,
-    /// Results of the inputs in addition to the error.
+    /// Results of the comparison for the inputs in addition to the error.
     pub channels: Vec<ChannelFit>,
     /// The records, detrended.
     pub records: &'p [Record],
     /// Channel of the recorded excitation.
     pub excitation: Option<&'p str>,
-    /// Variation of a person's gain from one run to the next, relative to the gain; zero without noise, which is no
+    /// Relative variation of a person's gain from run to run; zero for records without noise, which are not from a
     /// person.
     pub run_to_run: f64,
-    /// Highest order of the noise models with which the estimate is compared.
+    /// Highest order of the alternative noise models with which the estimate is compared.
     pub highest_order: usize,
 }
 
 impl<'a> Chosen<'_, 'a> {
-    /// Computes the result for the person.
+    /// Assembles the result.
     ///
     /// # Errors
     /// The errors of the model.
@@ -96,7 +96,7 @@ impl<'a> Chosen<'_, 'a> {
         let unseen = self.prediction.little_noise.is_none();
         let mut errors = Errors::of(fit, self.run_to_run, workspace);
         let error_ratio = errors.largest_ratio(fit);
-        // The effect of the noise model: part of its errors, and of the admissible difference of methods.
+        // Effect of the noise model, included in the errors and in the tolerated difference between methods.
         let others = rivals(self.prediction, fit, self.highest_order, workspace);
         let (instrumental, no_instrumental) = match self.instrumental(separate, workspace) {
             None => (None, None),
@@ -160,7 +160,7 @@ impl<'a> Chosen<'_, 'a> {
             cluster_kind: fit.clusters.kind,
             clusters: fit.clusters.parts.len(),
             has_covariance: errors.covariances.is_some(),
-            apart: self.channels.is_empty() || self.prediction.channels.is_empty() || self.tells_apart(),
+            apart: self.channels.is_empty() || self.prediction.channels.is_empty() || self.have_separate_lines(),
             response_error: response_errors(&operators[0].operator, operators[0].covariance.as_deref())
                 .and_then(|errors| errors.into_iter().min_by(f64::total_cmp)),
             weighed: &weighed,
@@ -202,7 +202,8 @@ impl<'a> Chosen<'_, 'a> {
         })
     }
 
-    /// The fit that includes the lines, if there are lines, noise, and one operator of all records.
+    /// Returns the prediction error fit that includes the lines; `None` without lines, without noise, or if the records
+    /// have separate operators.
     fn joint(
         &self,
         fit: &PredictionFit<'a>,
@@ -221,14 +222,14 @@ impl<'a> Chosen<'_, 'a> {
         with_lines(self.prediction, fit, (lines?, &data), workspace)
     }
 
-    /// True if every input has its own lines.
-    fn tells_apart(&self) -> bool {
+    /// True if every further input, and another signal, has lines of its own.
+    fn have_separate_lines(&self) -> bool {
         let names: Vec<String> = self.channels.iter().map(|channel| channel.name.clone()).collect();
         let lines = self.lines.channels.as_ref().map(|at| at.lines.as_ref());
-        tells_apart(lines, &names)
+        have_separate_lines(lines, &names)
     }
 
-    /// Estimates one operator of all records by refined instrumental variables with the recorded excitation.
+    /// Estimates one operator for all records by refined instrumental variables with the recorded excitation.
     fn instrumental(&self, separate: usize, workspace: &mut Workspace) -> Option<Result<InstrumentalFit, IdentError>> {
         let channel = self
             .excitation
@@ -246,7 +247,8 @@ impl<'a> Chosen<'_, 'a> {
         Some(found.and_then(|method| method.fit(&auxiliary, workspace)))
     }
 
-    /// Normalises the remaining weights; returns the figures of all forms with these weights.
+    /// Normalises the weights of the remaining forms to a sum of one, and returns the criteria of all forms with these
+    /// weights.
     fn with_weights_of(&self, weighed: &mut [WeighedForm]) -> Vec<FormFigures> {
         let total: f64 = weighed.iter().map(|form| form.weight).sum();
         weighed.iter_mut().for_each(|form| form.weight /= total);
@@ -263,7 +265,7 @@ impl<'a> Chosen<'_, 'a> {
         figures.collect()
     }
 
-    /// Returns another form with its errors, computed like those of the best form.
+    /// Returns the operators of a form other than the best one, with errors computed like those of the best form.
     fn weighed(
         &self,
         of: &OtherForm<'a>,
@@ -282,9 +284,10 @@ impl<'a> Chosen<'_, 'a> {
     }
 }
 
-/// Adds the bias of the fit to its errors: its difference to the fit at the lines, and, for coordinates that the lines
-/// do not determine or without lines, its differences to fits with other noise models ([`super::sensitivity`]).
-/// `unseen` is false with little noise, for which these additional variances do not apply.
+/// Adds the bias of the fit to its errors. With a fit at the lines the bias is the difference to it. For coordinates
+/// that the lines do not determine, and without lines, it is taken from the differences to fits with other noise models
+/// ([`super::sensitivity`]). `unseen` is false with little noise; the additional variances without lines then do not
+/// apply.
 fn add_bias(
     errors: &mut Errors,
     fit: &PredictionFit<'_>,
@@ -322,8 +325,8 @@ fn add_bias(
     covariances.widen(fit, &mut errors.profiles);
 }
 
-/// Compares all methods over the coordinates whose parameters are determined with a small share of the prior; `None`
-/// for fewer than two methods with errors.
+/// Compares all methods over the gain and the determined coordinates, each with a small prior share; `None` if fewer
+/// than two methods have errors.
 fn agreement_of(
     fit: &PredictionFit<'_>,
     operator: &Estimated,
@@ -384,7 +387,8 @@ fn agreement_of(
     })
 }
 
-/// Fits Box-Jenkins with the same orders and delay, starting from the polynomials of the fit, for one operator.
+/// Fits a Box-Jenkins model with the same orders and delay, starting from the polynomials of the fit; `None` with
+/// several operators or several inputs.
 fn free_model(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> Option<FreeModel> {
     let layout = fit.layout();
     if layout.elements.iter().any(|(_, record)| record.is_some()) || !layout.channels.is_empty() {
@@ -431,7 +435,7 @@ fn residuals(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> ResidualMeas
     ResidualMeasures::of(&pairs, fit.layout().sample_time.s())
 }
 
-/// Returns a doubt if the person is not constant over the records.
+/// Returns a warning if the person changes over the records.
 fn constancy(fit: &PredictionFit<'_>, run_to_run: f64, workspace: &mut Workspace) -> Option<Finding> {
     let (layout, eta, free) = (fit.layout(), fit.eta(), fit.free());
     let blocks = physical_blocks(&fit.criterion, eta, &free, workspace)?;
@@ -466,14 +470,14 @@ fn constancy(fit: &PredictionFit<'_>, run_to_run: f64, workspace: &mut Workspace
     .change()
 }
 
-/// Mean squared coherence of the lines.
+/// Returns the mean squared coherence over the lines.
 fn coherent_share(describing: &DescribingFunction) -> Option<f64> {
     let all: Option<Vec<f64>> = describing.lines.iter().map(|line| line.coherence).collect();
     all.filter(|all| !all.is_empty()).map(|all| mean(&all))
 }
 
-/// True if a form other than the best one determines the response: a form whose parameters compensate each other is as
-/// undetermined as if it had fewer parameters, and its errors carry no information.
+/// True if the frequency response in a form other than the best one has small errors. If the parameters of a form
+/// compensate each other, its response may be undetermined, and its errors are then meaningless.
 fn knows_the_response(of: &OperatorInForm) -> bool {
     let errors = response_errors(&of.operator, of.covariance.as_deref());
     errors.is_some_and(|all| all.iter().sum::<f64>() < LARGEST_RESPONSE_ERROR * all.len() as f64)

@@ -1,4 +1,4 @@
-//! A further input: the request, its form, and the results.
+//! A further input of the person: request, form and results.
 
 use std::{fmt, str::FromStr};
 
@@ -7,7 +7,7 @@ use hoid_model::{Complex64, FamilyOperator, Form, SampleTime, uncertainty::Estim
 use super::{intersample::Intersample, layout::ChannelInLayout, parameter::Parameter};
 use crate::ResponsePoint;
 
-/// Role of a further input for the person.
+/// Role of a further input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ChannelRole {
@@ -31,16 +31,16 @@ hoid_model::named_choice!(ChannelRole, "role of a channel", 3, {
 pub struct SeenChannel {
     /// Name of the channel in the records.
     pub name: String,
-    /// Its role for the person.
+    /// Role of the channel.
     pub role: ChannelRole,
     /// Preview time, s.
     pub preview_s: f64,
-    /// The candidate forms; if there are several, no response is also a candidate.
+    /// Candidate forms. If there are several forms, the absence of a response is also a candidate.
     pub forms: Vec<Form>,
 }
 
 impl SeenChannel {
-    /// A channel with the default options.
+    /// Creates a request with the default options.
     pub fn new(name: impl Into<String>, role: ChannelRole) -> Self {
         Self {
             name: name.into(),
@@ -52,7 +52,7 @@ impl SeenChannel {
 }
 
 impl fmt::Display for SeenChannel {
-    /// Formats it as typed: `r=feedforward:0.5`.
+    /// Formats the request as on the command line: `r=feedforward:0.5`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}={}", self.name, self.role)?;
         if self.preview_s > 0.0 {
@@ -68,7 +68,7 @@ impl fmt::Display for SeenChannel {
 impl FromStr for SeenChannel {
     type Err = String;
 
-    /// `NAME`, `NAME=ROLE`, `NAME=ROLE:PREVIEW`, each optionally followed by `/FORM`.
+    /// Parses `NAME`, `NAME=ROLE` or `NAME=ROLE:PREVIEW`, each optionally followed by `/FORM`.
     fn from_str(text: &str) -> Result<Self, String> {
         let expected = || "NAME=ROLE, such as r=feedforward, r=feedforward:0.5 or r=feedforward/derivative".to_owned();
         let (text, form) = match text.split_once('/') {
@@ -104,43 +104,45 @@ impl FromStr for SeenChannel {
 pub struct ChannelFit {
     /// Name of the channel.
     pub name: String,
-    /// Its role for the person.
+    /// Role of the channel.
     pub role: ChannelRole,
     /// Preview time, s.
     pub preview_s: f64,
-    /// The forms that were compared, including no response.
+    /// The forms that were compared, including the absence of a response.
     pub forms: Vec<ChannelForm>,
-    /// Probability of such a likelihood ratio of the best form without a response, corrected for all forms that were
-    /// tried.
+    /// Probability of a likelihood ratio as large as that of the best form if there is no response, corrected for the
+    /// number of forms.
     pub p_value: f64,
     /// The response; `None` if none was found.
     pub response: Option<ChannelResponse>,
 }
 
-/// A form of a channel, with its criteria.
+/// A candidate form of a channel, with its criteria.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ChannelForm {
-    /// The form; `None` means no response.
+    /// The form; `None` for no response.
     pub form: Option<Form>,
     /// Loss of the prediction error fit, if there is one.
     pub loss: Option<f64>,
-    /// Akaike's criterion in units of the inflation, relative to the best form.
+    /// Akaike's criterion minus that of the best candidate; without lines, the likelihood is divided by the inflation
+    /// kappa.
     pub criterion: Option<f64>,
 }
 
-/// The response to a channel.
+/// The response of the person to a channel.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ChannelResponse {
-    /// The operator; its delay is relative to the end of the preview.
+    /// Operator of the response; its delay is relative to the end of the preview.
     pub operator: FamilyOperator,
-    /// Covariance of its coordinates by rows.
+    /// Covariance of the coordinates of the operator by rows.
     pub covariance: Option<Vec<f64>>,
-    /// Its parameters; the delay `tau_f` is relative to the current value, and negative if the person anticipates.
+    /// Parameters of the operator. The delay `tau_f` is relative to the current value of the channel; it is negative if
+    /// the person anticipates.
     pub parameters: Vec<Parameter>,
 }
 
 impl ChannelFit {
-    /// Gain and phase of the response to the channel at frequencies in rad/s; `None` if there is none.
+    /// Returns gain and phase of the response to the channel at frequencies in rad/s; `None` if there is no response.
     pub fn frequency_response(
         &self,
         omega_rad_s: &[f64],
@@ -169,14 +171,14 @@ impl ChannelFit {
         Some(omega_rad_s.iter().map(point).collect())
     }
 
-    /// Preview time in whole samples, s.
+    /// Returns the preview time in s, rounded to whole samples.
     pub(super) fn lead_s(&self, sample_time: SampleTime) -> f64 {
         lead(self.preview_s, sample_time) as f64 * sample_time.s()
     }
 }
 
 impl ChannelFit {
-    /// Result of the comparison, without the response.
+    /// Creates the result of a comparison, without a response.
     pub(super) fn compared(asked: &SeenChannel, forms: Vec<ChannelForm>, p_value: f64) -> Self {
         Self {
             name: asked.name.clone(),
@@ -189,21 +191,21 @@ impl ChannelFit {
     }
 }
 
-/// Preview in samples.
+/// Returns the preview in samples.
 pub(super) fn lead(preview_s: f64, sample_time: SampleTime) -> usize {
     (preview_s / sample_time.s()).round() as usize
 }
 
-/// A further input in one form, for a prediction.
+/// A further input in one form, as part of a prediction model.
 #[derive(Debug, Clone)]
 pub(super) struct Channel<'a> {
-    /// Index among the requested channels.
+    /// Index of the input among the requested channels.
     pub index: usize,
     pub form: Form,
-    /// Bounds and start of its own coordinates.
+    /// Bounds of the coordinates that only this channel has.
     pub limits: Vec<(f64, f64)>,
     pub start: Vec<f64>,
-    /// Its values in each record.
+    /// Values of the channel in each record.
     pub values: Vec<&'a [f64]>,
 }
 

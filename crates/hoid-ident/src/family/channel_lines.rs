@@ -1,18 +1,19 @@
-//! Several inputs at the lines of the excitations: their responses without a noise model.
+//! Responses to several inputs at the lines of the excitations, without a noise model.
 //!
-//! If a target r and a disturbance d have separate lines, the ratios of the coefficients of a run to that of the
-//! exciting signal, `u_k = U_k/X_k` and `x_ik = X_ik/X_k`, are the same in all runs except for the remnant. Their means
-//! satisfy
+//! Let a target r and a disturbance d have separate lines. In run k, the Fourier coefficients at a line are divided by
+//! the coefficient X_k of the exciting signal: `u_k = U_k/X_k` and `x_ik = X_ik/X_k`. These ratios are the same in all
+//! runs except for the remnant. The means over the runs satisfy
 //!
 //! `mean u = sum_i Y_i(j omega) mean x_i + n`
 //!
-//! at each line: those of d determine the response to the error, those of r the sum of this and the response to r (M.
-//! M. van Paassen and M. Mulder, *Identification of Human Operator Control Behaviour in Multiple-Loop Tracking Tasks*,
+//! at each line. The lines of d determine the response to the error; the lines of r determine the sum of the response
+//! to the error and the response to r (M. M. van Paassen and M. Mulder, *Identification of Human Operator Control
+//! Behaviour in Multiple-Loop Tracking Tasks*, IFAC Man-Machine Systems, 1998). The variance of n follows from
+//! `|u_k - sum_i Y_i x_ik|^2` over the runs, and from the same quantity in the bins next to the line, with the weights
+//! of [`super::lines`].
 //!
-//! `var n = |u_k - sum_i Y_i x_ik|^2` over the runs, and at the bins next to the lines, as [`super::lines`] weighs them.
-//!
-//! The remnant in e, because of which this would be a ratio of two noisy numbers, is averaged over the runs before the
-//! division.
+//! The remnant also enters e, so that a single run would give a ratio of two noisy numbers; averaging over the runs
+//! before the division reduces this error.
 
 use std::sync::Arc;
 
@@ -42,10 +43,10 @@ use crate::{
 const SEARCHES: usize = 4;
 /// Number of neighbouring bins from which the remnant at a line is estimated.
 const NEIGHBOURS: usize = 8;
-/// Rounds in which the variances are updated.
+/// Number of rounds in which the variances are updated.
 const ROUNDS: usize = 2;
 
-/// The coefficients of u and of all inputs, the error first.
+/// Fourier coefficients of u and of all inputs, with the error as the first input.
 #[derive(Debug, Clone)]
 struct Coefficients {
     u: Complex64,
@@ -53,7 +54,7 @@ struct Coefficients {
 }
 
 impl Coefficients {
-    /// The part of u that the responses do not explain.
+    /// Returns the part of u that the responses do not explain.
     fn left(&self, responses: &[Complex64]) -> Complex64 {
         self.inputs
             .iter()
@@ -62,32 +63,33 @@ impl Coefficients {
     }
 }
 
-/// A line of one exciting signal in all runs that contain it.
+/// A line of one exciting signal, in all runs that contain this line.
 #[derive(Debug, Clone)]
 struct Line {
     exciter: usize,
     omega_rad_s: f64,
-    /// Coefficients divided by that of the exciting signal, for each run.
+    /// Fourier coefficients at the line in each run, divided by the coefficient of the exciting signal.
     runs: Vec<Coefficients>,
-    /// The same for the neighbouring bins.
+    /// Fourier coefficients in the neighbouring bins of each run, divided by the coefficient of the exciting signal at
+    /// the line.
     neighbours: Vec<Vec<Coefficients>>,
-    /// Variance of the means over the runs.
+    /// Variance of the mean over the runs.
     variance: f64,
 }
 
-/// The lines of all excitations of the loop.
+/// Lines of all excitations of the loop.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ChannelLines {
     lines: Vec<Line>,
-    /// Largest number of runs of a line.
+    /// Largest number of runs that contain the same line.
     pub runs: usize,
-    /// Names of the signals with lines.
+    /// Names of the signals that have lines.
     pub exciters: Vec<String>,
 }
 
 impl ChannelLines {
-    /// Finds the lines of these records: of the channels, and of the excitation that is given or has a common name.
-    /// `None` if no signal has its own lines.
+    /// Finds the lines of the channels and of the excitation in these records. The excitation is the given one, or any
+    /// channel with a common name of an excitation. `None` if no signal has lines of its own.
     pub fn of(
         records: &[Record],
         channels: &[String],
@@ -137,7 +139,7 @@ impl ChannelLines {
     ) -> Option<()> {
         let n = record.len();
         let span_s = n as f64 * record.sample_time().s();
-        // In bins of the whole record.
+        // Indices of the bins for the whole record.
         let bins = |of: &Excitation| -> Vec<usize> {
             let periods = (span_s / of.period_s()).round() as usize;
             of.harmonics().iter().map(|harmonic| harmonic * periods).collect()
@@ -215,7 +217,7 @@ impl ChannelLines {
         }
     }
 
-    /// Computes the variances of the means over the runs for inputs with these responses.
+    /// Computes the variance of the mean over the runs at each line, given the responses to all inputs.
     fn weigh(&mut self, responses: impl Fn(f64) -> Vec<Complex64>) {
         let of = |line: &Line| {
             let h = responses(line.omega_rad_s);
@@ -245,41 +247,41 @@ impl ChannelLines {
     }
 }
 
-/// chi^2 of the lines over the coordinates of the operator and of its channels.
+/// The criterion chi^2 at the lines, as a function of the coordinates of the operator and its channels.
 #[derive(Debug, Clone)]
 pub(super) struct ChannelCriterion {
     lines: Arc<ChannelLines>,
     layout: FamilyLayout,
-    /// Index of the further input for each channel of the layout.
+    /// Index of the further input that each channel of the layout represents.
     places: Vec<usize>,
-    /// Preview of each of them, s.
+    /// Preview of each channel of the layout, s.
     leads_s: Vec<f64>,
     limits: Vec<(f64, f64)>,
     penalty: Vec<Penalty>,
-    /// Factor by which variances exceed those of the lines.
+    /// Factor by which the variances of the lines are multiplied.
     excess: f64,
 }
 
-/// The best operator and channels at the lines.
+/// The operator and its channels at the minimum of the criterion.
 #[derive(Debug, Clone)]
 pub(super) struct ChannelMinimum {
     /// Coordinates of the operator, followed by those of the channels.
     pub coordinates: Vec<f64>,
     pub chi_squared: f64,
-    /// Number of equations, two per line.
+    /// Number of real equations, two per line.
     pub equations: usize,
     pub minimum: Minimum,
-    /// The covariance of the coordinates; zero at a bound.
+    /// Covariance of the coordinates by rows; zero for coordinates at a bound.
     pub covariance: Option<Vec<f64>>,
 }
 
 impl ChannelMinimum {
-    /// Degrees of freedom: equations minus free coordinates.
+    /// Returns the degrees of freedom: the number of equations minus the number of coordinates.
     pub fn degrees_of_freedom(&self) -> usize {
         self.equations.saturating_sub(self.coordinates.len())
     }
 
-    /// chi^2 per degree of freedom, at least one.
+    /// Returns chi^2 per degree of freedom, at least one.
     pub fn excess(&self) -> f64 {
         match self.degrees_of_freedom() {
             0 => 1.0,
@@ -287,23 +289,23 @@ impl ChannelMinimum {
         }
     }
 
-    /// Akaike's criterion.
+    /// Returns Akaike's criterion, `chi^2 + 2 p`.
     pub fn criterion(&self) -> f64 {
         self.chi_squared + 2.0 * self.coordinates.len() as f64
     }
 }
 
-/// A channel with its form, for a fit at the lines.
+/// A further input in one form, as part of a fit at the lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct InForm {
-    /// Index of the further input.
+    /// Index of the input among the requested channels.
     pub index: usize,
     pub form: Form,
     pub lead_s: f64,
     pub delay_range_s: (f64, f64),
 }
 
-/// Common data of all fits at the lines.
+/// Data and settings common to all fits at the lines.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct AtChannelLines<'l> {
     pub lines: &'l Arc<ChannelLines>,
@@ -315,7 +317,7 @@ pub(super) struct AtChannelLines<'l> {
 }
 
 impl AtChannelLines<'_> {
-    /// Returns the criterion of these forms, with the prior.
+    /// Returns the criterion for these forms, including the prior.
     pub fn criterion(&self, form: Form, channels: &[InForm]) -> ChannelCriterion {
         let (sample_time, _) = self.sampling;
         let limits = coordinates::limits(form, self.neuromuscular, self.delay_range_s, sample_time);
@@ -342,8 +344,8 @@ impl AtChannelLines<'_> {
         }
     }
 
-    /// Returns the lines with their variances: first those about these responses, then those about the best fit of
-    /// these forms.
+    /// Returns the lines with their variances. The deviations are first taken from the responses `begun`, then from the
+    /// best fit of these forms.
     pub fn weighed(
         &self,
         (form, channels): (Form, &[InForm]),
@@ -365,7 +367,7 @@ impl AtChannelLines<'_> {
         Arc::new(lines)
     }
 
-    /// Responses of a fit of these forms to the error and to this number of further inputs.
+    /// Returns the responses of a fit to the error and to `inputs` further inputs at the frequency `omega`.
     fn responses(
         &self,
         (form, channels): (Form, &[InForm]),
@@ -387,7 +389,7 @@ impl AtChannelLines<'_> {
         all
     }
 
-    /// Returns the best result of searches from the best points of a grid.
+    /// Runs the search from the best points of a grid, and returns the best result.
     pub fn fit(&self, form: Form, channels: &[InForm]) -> Option<ChannelMinimum> {
         let criterion = self.criterion(form, channels);
         let mut starts: Vec<(f64, Vec<f64>)> = (criterion.grid().into_iter())
@@ -407,7 +409,8 @@ impl AtChannelLines<'_> {
     }
 }
 
-/// Indices of the coordinates that only one channel has.
+/// Returns the indices of the coordinates that a channel does not share with other channels: all except those of the
+/// neuromuscular system.
 pub(super) fn own_places(form: Form, neuromuscular: bool) -> Vec<usize> {
     let all = form.coordinates(neuromuscular);
     let own = |i: &usize| !matches!(all[*i], Coordinate::LogOmega | Coordinate::LogZeta);
@@ -415,7 +418,7 @@ pub(super) fn own_places(form: Form, neuromuscular: bool) -> Vec<usize> {
 }
 
 impl ChannelCriterion {
-    /// Largest number of runs of a line.
+    /// Returns the largest number of runs that contain the same line.
     pub fn runs(&self) -> usize {
         self.lines.runs
     }
@@ -425,22 +428,22 @@ impl ChannelCriterion {
         &self.penalty
     }
 
-    /// Returns the operator for the error at x.
+    /// Returns the operator from e to u at the coordinates x.
     ///
     /// # Errors
-    /// Those of the operator.
+    /// The errors of [`FamilyOperator::new`].
     pub fn operator(&self, x: &[f64]) -> Result<FamilyOperator, ModelError> {
         self.layout.operator(x, 0)
     }
 
-    /// Returns the same without a prior, with variances larger by this factor.
+    /// Returns the criterion without a prior, with the variances multiplied by `excess`.
     pub fn of_lines_alone(mut self, excess: f64) -> Self {
         self.penalty.clear();
         self.excess = excess;
         self
     }
 
-    /// Starting points of the searches.
+    /// Returns the starting points of the searches.
     fn grid(&self) -> Vec<Vec<f64>> {
         let (form, muscles) = (self.layout.form, self.layout.neuromuscular);
         let of_operator = &self.limits[..self.layout.operator_elements()];
@@ -463,7 +466,7 @@ impl ChannelCriterion {
         grid
     }
 
-    /// Returns the operators at x: that of the error, followed by those of the channels.
+    /// Returns the operators at x: that from the error to u, followed by those of the channels.
     fn operators(&self, x: &[f64]) -> Result<Vec<FamilyOperator>, ModelError> {
         let mut all = vec![self.layout.operator(x, 0)?];
         for channel in &self.layout.channels {
@@ -472,7 +475,8 @@ impl ChannelCriterion {
         Ok(all)
     }
 
-    /// For each operator at one line: the sum of its input over the runs, with the phase of preview and hold.
+    /// Returns the mean of u at one line over the runs, and the mean input of each operator, with the response of the
+    /// hold and the phase of the preview.
     fn inputs(&self, line: &Line) -> (Complex64, Vec<Complex64>) {
         let n = line.runs.len() as f64;
         let omega = line.omega_rad_s;
@@ -484,8 +488,8 @@ impl ChannelCriterion {
         (u, std::iter::once(mean(0)).chain(of_channels).collect())
     }
 
-    /// Sets the gains that are best for the other coordinates, which is a linear problem, and returns the criterion
-    /// there.
+    /// Sets the gains to their best values for the other coordinates, a linear problem, and returns the value of the
+    /// criterion.
     fn best_gains(&self, x: &mut [f64]) -> Option<f64> {
         let places: Vec<usize> = std::iter::once(0)
             .chain(self.layout.channels.iter().map(|c| c.place))
@@ -590,9 +594,9 @@ impl Objective for ChannelCriterion {
     }
 }
 
-/// True if every further input has its own lines and another signal has lines too: then no form is necessary to
-/// distinguish the responses.
-pub(super) fn tells_apart(lines: Option<&ChannelLines>, channels: &[String]) -> bool {
+/// True if every further input has lines of its own and another signal has lines too. The responses can then be
+/// distinguished without assuming a form.
+pub(super) fn have_separate_lines(lines: Option<&ChannelLines>, channels: &[String]) -> bool {
     lines.is_some_and(|lines| {
         let has = |name: &String| lines.exciters.contains(name);
         channels.iter().all(has) && lines.exciters.len() > channels.len()

@@ -1,19 +1,20 @@
-//! Further inputs of a person in addition to the error: a target with preview, the output of the machine, its motion.
+//! Further inputs of a person in addition to the error: a target with preview, the output of the machine, or its
+//! motion.
 //!
-//! `u = Y e + sum_i Y_i x_i + (C/D) eps`: a human is a multichannel controller (D. T. McRuer and H. R. Jex, *IEEE
+//! `u = Y e + sum_i Y_i x_i + (C/D) eps`: the human is a multichannel controller (D. T. McRuer and H. R. Jex, *IEEE
 //! Trans. Human Factors in Electronics* 8 (1967) 231-249, section II; M. Mulder et al., *IEEE Trans. Human-Machine
-//! Systems* 48 (2018) 457-469). Each channel has its own form, gains and delay, and the neuromuscular system of the
-//! operator, through which all of them move the hand. All are fitted together by prediction error: in a closed loop the
-//! response to e of a person who also sees the target is not `U/E`, at its lines or elsewhere.
+//! Systems* 48 (2018) 457-469). Each channel has a separate form, gain and delay; all channels share the neuromuscular
+//! system of the operator, which moves the hand. All responses are fitted together by prediction error: if a person in
+//! a closed loop also sees the target, `U/E` is not the response to e, neither at the lines nor at other frequencies.
 //!
-//! **Starts.** An ARX model of high order with all inputs is one linear regression and consistent in a closed loop
-//! (L. Ljung, *System Identification*, 1999, sections 13.4 and 13.5). Each form is fitted to its responses; searches from
-//! elsewhere end in other minima.
+//! **Starts.** A high-order ARX model with all inputs is estimated by one linear regression and is consistent in a
+//! closed loop (L. Ljung, *System Identification*, 1999, sections 13.4 and 13.5). Each form is fitted to the responses
+//! of this model; searches from other starts end in other minima.
 //!
-//! **Forms** of a channel are compared in [`choice`].
+//! **Forms** of each channel are compared in [`choice`].
 //!
-//! **A preview** makes delays negative: x is advanced by the samples of the preview, and the fitted delay is relative
-//! to that.
+//! **Preview** allows negative delays: the channel x is advanced by the preview in samples, and the fitted delay is
+//! relative to the advanced signal.
 
 pub(super) mod choice;
 
@@ -48,29 +49,30 @@ use crate::{
     several_inputs::SeveralInputs,
 };
 
-/// Least part of an input that the others must not explain.
+/// Smallest part of the power of an input that the other inputs must not explain.
 const LEAST_OWN_PART: f64 = 1e-9;
-/// Part of its diagonal that is added to the normal matrix.
+/// Relative increase of the diagonal of the normal matrix.
 const RIDGE: f64 = 1e-7;
 /// Longest delay of a channel relative to the end of the preview, s.
 const LONGEST_DELAY_S: f64 = 0.8;
 
-/// The channels of the records, with the trend removed as from e and u.
+/// Channels of the records, with the same kind of trend removed as from e and u.
 #[derive(Debug)]
-pub(super) struct Seen<'s> {
+pub(super) struct FurtherInputs<'s> {
     all: &'s [SeenChannel],
     /// Values of each channel in each record.
     values: Vec<Vec<Vec<f64>>>,
     leads: Vec<usize>,
-    /// The original records of whole periods, with the trend that was removed from e and u.
+    /// The records with whole periods, before truncation by the preview, with the trend of e and u removed.
     whole: Vec<Record>,
 }
 
-impl<'s> Seen<'s> {
-    /// Returns the channels, and the records truncated to the samples that all of them have.
+impl<'s> FurtherInputs<'s> {
+    /// Returns the channels, and the records truncated to the samples at which every previewed channel has a value.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a channel that a record lacks.
+    /// [`IdentError::BadOption`] if a record lacks a channel or is not longer than the preview, or if a preview is out
+    /// of range.
     pub fn of(
         records: Vec<Record>,
         all: &'s [SeenChannel],
@@ -145,11 +147,11 @@ impl<'s> Seen<'s> {
         self.all.is_empty()
     }
 
-    /// Checks for inputs that are constant, or combinations of previous ones: `r = e + y` of the three signals of one
-    /// loop.
+    /// Returns an error for an input that is constant or a linear combination of the previous inputs, such as r = e + y
+    /// if all three signals of a loop are inputs.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] with the input.
+    /// [`IdentError::BadOption`] with the name of the input.
     pub fn check(&self, records: &[Record]) -> Result<(), IdentError> {
         let refuse = |found: String, expected: String| {
             Err(IdentError::BadOption {
@@ -168,12 +170,12 @@ impl<'s> Seen<'s> {
                 return refuse(
                     format!("{} is constant", channel.name),
                     format!(
-                        "inputs that vary; drop {}: a response to it cannot be seen",
+                        "inputs that vary; drop {}: a response to a constant input cannot be identified",
                         channel.name
                     ),
                 );
             }
-            // Twice: the second time removes the rounding error of the first.
+            // Orthogonalised twice: the second pass removes the rounding error of the first.
             let mut left = own;
             for _ in 0..2 {
                 for known in &basis {
@@ -188,7 +190,7 @@ impl<'s> Seen<'s> {
                 return refuse(
                     format!("{} is a sum of {}", channel.name, names.join(" and ")),
                     format!(
-                        "inputs none of which follows from the others, as r = e + y does; drop one of {}, {}",
+                        "inputs of which none is a sum of others (as r = e + y is); drop one of {}, {}",
                         names.join(", "),
                         channel.name
                     ),
@@ -200,7 +202,7 @@ impl<'s> Seen<'s> {
         Ok(())
     }
 
-    /// First sample for which no channel needs samples before the record, without the noise model.
+    /// Returns the first sample at which no channel needs samples from before the record, not counting the noise model.
     pub fn first_regressed_sample(&self, neuromuscular: bool, sampling: (SampleTime, Intersample)) -> usize {
         let (sample_time, intersample) = sampling;
         let muscles = if neuromuscular { 2 } else { 0 };
@@ -212,12 +214,12 @@ impl<'s> Seen<'s> {
         self.all.iter().zip(&self.leads).map(of).max().unwrap_or(0)
     }
 
-    /// Names of the channels.
+    /// Returns the names of the channels.
     pub fn names(&self) -> Vec<String> {
         self.all.iter().map(|channel| channel.name.clone()).collect()
     }
 
-    /// Returns the lines of the excitations of the loop; `None` if there are none.
+    /// Returns the lines of all excitations of the loop; `None` if there are no lines.
     pub fn lines(&self, excitation: Option<&str>, period_s: Option<f64>) -> Option<Arc<ChannelLines>> {
         ChannelLines::of(&self.whole, &self.names(), (excitation, period_s)).map(Arc::new)
     }
@@ -233,7 +235,7 @@ impl<'s> Seen<'s> {
         }
     }
 
-    /// Returns the lines with their variances, from the responses without a form.
+    /// Returns the lines with their variances, starting from the responses without a form.
     pub fn weighed(
         &self,
         at: &AtChannelLines<'_>,
@@ -260,7 +262,7 @@ impl<'s> Seen<'s> {
         })
     }
 
-    /// Estimates the responses to e and to each channel by one regression, without a form.
+    /// Estimates the responses to e and to each channel, without a form, by one regression.
     ///
     /// # Errors
     /// [`IdentError::SingularRegressors`] if the records do not distinguish the inputs.
@@ -284,7 +286,7 @@ impl<'s> Seen<'s> {
             nk: 1,
             ..hoid_model::Orders::default()
         };
-        // The delay relative to the end of the preview is longer by the preview.
+        // The preview adds to the delay relative to the end of the preview.
         let own = |lead: &usize| InputOrders {
             nb: (nb + lead).min(2 * MOST_GAINS),
             nf: 0,
@@ -319,18 +321,19 @@ impl<'s> Seen<'s> {
         if criterion.residuals() <= 2 * criterion.parameters() {
             return None;
         }
-        // A sum of few sines determines as few combinations of its past: the response at its lines, and no more.
+        // A sum of few sinusoids determines only as many combinations of its past values: the response at its lines and
+        // nothing else.
         let fit = model.ridge(&criterion, RIDGE, sample_time)?;
         let omega = frequencies(sample_time);
         let of = |input| fit.frequency_response(input, &omega).iter().map(measured).collect();
         Some((0..model.inputs.len()).map(of).collect())
     }
 
-    /// Returns each channel with the form that is nearest to its response.
+    /// Returns each channel in all its forms, the form closest to the response of the channel first.
     ///
     /// # Errors
     /// [`IdentError::NoFiniteLoss`] if no form could be fitted to a response.
-    pub fn begun(
+    pub fn starting_forms(
         &self,
         responses: &[Vec<MeasuredResponse>],
         neuromuscular: bool,
@@ -343,7 +346,7 @@ impl<'s> Seen<'s> {
             let range = (sampling.1.shortest_delay_s(sampling.0), shown_s + LONGEST_DELAY_S);
             let mut forms: Vec<(f64, Channel<'_>)> = Vec::new();
             for &form in channel.forms.iter().filter(|form| form.is_proper(neuromuscular)) {
-                let prior = OperatorPrior::population().of_muscles();
+                let prior = OperatorPrior::population().neuromuscular_only();
                 let points = &responses[k + 1];
                 let criterion = ResponseCriterion::new(form, neuromuscular, points, &prior, range, sampling);
                 let Ok(found) = criterion.fit_from_grid(search, Grid::Default) else {
@@ -373,10 +376,10 @@ impl<'s> Seen<'s> {
     }
 }
 
-/// Inserts the responses of the final fit into the comparison.
+/// Adds the responses of the final fit to the results of the comparison.
 ///
 /// # Errors
-/// The errors of the operator.
+/// The errors of [`hoid_model::FamilyOperator::new`].
 pub(super) fn with_responses(
     mut compared: Vec<ChannelFit>,
     prediction: &Prediction<'_>,
@@ -415,7 +418,7 @@ pub(super) fn with_responses(
                     name: "tau_f".to_owned(),
                     value: delay(parameter.value),
                     interval: parameter.interval.map(|(low, high)| (delay(low), delay(high))),
-                    // Zero is an ordinary value of this delay.
+                    // Zero is an ordinary value of this delay, so its interval may include zero.
                     determined: parameter.standard_error.is_some(),
                     ..parameter
                 }
@@ -433,10 +436,10 @@ pub(super) fn with_responses(
 }
 
 impl FamilyFit {
-    /// Returns a record whose u is without the responses to the further inputs, computed from rest.
+    /// Returns a record with the responses to the further inputs, computed from rest, subtracted from u.
     ///
     /// # Errors
-    /// [`IdentError`] if a record lacks one of them.
+    /// [`IdentError`] if the record lacks one of these inputs.
     pub fn without_channels(&self, record: &Record, detrend: Detrend) -> Result<Record, IdentError> {
         let (channels, intersample) = (self.channels.as_slice(), self.intersample);
         let asked: Vec<SeenChannel> = (channels.iter())
@@ -446,7 +449,7 @@ impl FamilyFit {
             })
             .collect();
         let label = record.label().to_owned();
-        let (mut cut, seen) = Seen::of(vec![record.clone()], &asked, detrend)?;
+        let (mut cut, seen) = FurtherInputs::of(vec![record.clone()], &asked, detrend)?;
         let Some(record) = cut.pop() else {
             return Ok(record.clone());
         };

@@ -1,10 +1,11 @@
-//! Forms that the data do not reject, and the best of them.
+//! Selection of the forms that the data do not reject, and of the best form.
 //!
-//! Each form has Akaike's criterion, `chi^2 + 2 p` at the lines of an excitation, or `n ln V/kappa + 2 p` of the
-//! prediction error, kappa the inflation of variances; with little noise Schwarz's ([`super::comparison`]). Estimates
-//! are averaged over forms by their weights ([`super::mixture`]); parameters have the names of the best form, the
-//! simplest within 2 of the least (K. P. Burnham and D. R. Anderson, *Model Selection and Multimodel Inference*, 2002,
-//! section 2.6: no evidence against it).
+//! Each form has a value of Akaike's criterion: `chi^2 + 2 p` at the lines of an excitation, or `n ln V/kappa + 2 p`
+//! from the prediction error, where kappa is the inflation of variances. With little noise Schwarz's criterion is used
+//! instead ([`super::comparison`]). Estimates are averaged over forms with weights that follow from the criterion
+//! ([`super::mixture`]). The reported parameters are those of the best form: the simplest form within 2 of the smallest
+//! value, since such a difference is no evidence against a form (K. P. Burnham and D. R. Anderson, *Model Selection and
+//! Multimodel Inference*, 2002, section 2.6).
 
 use hoid_model::Form;
 
@@ -15,30 +16,30 @@ pub struct FormFigures {
     pub form: Form,
     /// Loss of the prediction error fit.
     pub loss: Option<f64>,
-    /// Akaike's criterion: `chi^2 + 2 p` at the lines, or `n ln V/kappa + 2 p`; with little noise Schwarz's, `ln n` in
-    /// place of 2.
+    /// Akaike's criterion: `chi^2 + 2 p` at the lines, or `n ln V/kappa + 2 p`. With little noise Schwarz's criterion,
+    /// with `ln n` in place of 2.
     pub criterion: Option<f64>,
-    /// Weight in averages over forms; zero for a form that the data do not determine, or reject.
+    /// Weight in averages over forms; zero for a form that the data reject or do not determine.
     pub weight: f64,
-    /// chi^2 at the lines of held-out runs, each for the fit to the other runs, summed over runs.
+    /// chi^2 at the lines of each held-out run for the fit to the other runs, summed over all runs.
     pub held_out: Option<f64>,
-    /// chi^2 at the lines.
+    /// chi^2 of the fit at the lines.
     pub chi_squared: Option<f64>,
-    /// Its degrees of freedom.
+    /// Degrees of freedom of chi^2.
     pub degrees_of_freedom: Option<usize>,
-    /// True if the prediction error search converged inside the search range.
+    /// True if the prediction error search converged within the search range.
     pub converged: bool,
 }
 
-/// Difference of Akaike's criterion that counts as no evidence.
+/// Difference in Akaike's criterion up to which there is no evidence against a form.
 pub const NO_EVIDENCE: f64 = 2.0;
-/// Weight below which a form is left out: its contribution to a mean is less than the error of the mean.
+/// Weight below which a form is omitted: its contribution to a mean is smaller than the error of the mean.
 pub const LEAST_WEIGHT: f64 = 0.02;
-/// Largest number of forms that are averaged.
+/// Maximum number of forms that are averaged.
 const MOST_FORMS: usize = 4;
 
-/// Returns the best form and the weight of each, from their criteria, simplest form first; a criterion of `None`
-/// excludes a form. `None` if no form has a criterion.
+/// Returns the index of the best form and the weight of each form, given their criteria in the order from the simplest
+/// form. A criterion of `None` excludes a form. `None` if all forms are excluded.
 pub(super) fn weigh(criteria: &[Option<f64>]) -> Option<(usize, Vec<f64>)> {
     let least = criteria.iter().flatten().copied().min_by(f64::total_cmp)?;
     let front = criteria

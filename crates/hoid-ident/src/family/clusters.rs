@@ -1,12 +1,12 @@
-//! Scores and information of runs, or of blocks of them.
+//! Scores and information matrices of clusters: runs, or blocks of runs.
 //!
-//! `g_c = sum psi eps` and `G_c = sum psi psi'` over cluster c.
+//! `g_c = sum psi eps` and `G_c = sum psi psi'`, with sums over the samples of cluster c.
 //!
-//! **Clusters** are the records if there are five or more. Fewer records are cut into blocks of equal length, about
-//! eight in all, none shorter than four seconds: longer than the memory of residuals and of the loop. Variances
-//! estimated from so few blocks are themselves uncertain; blocks therefore give one number, the inflation kappa of all
-//! variances (`covariances`), at least one. The variation from one run to the next cannot be determined from one run:
-//! the variation of people's gain is added with the value observed in other data (`covariances`).
+//! **Clusters** are the records if there are at least five. Fewer records are divided into blocks of equal length,
+//! about eight in total and at least four seconds each, which is longer than the memory of the residuals and of the
+//! loop. Variances estimated from so few blocks are themselves uncertain. The blocks therefore determine only one
+//! number, the inflation kappa of all variances (`covariances`), which is at least one. Since a few records cannot show
+//! how people vary from run to run, the variation of the gain is added with a value from other data.
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -18,19 +18,20 @@ use crate::{
     linalg::least_squares::dot,
 };
 
-/// Number of records from which on each record is a cluster.
+/// Minimum number of records for which each record is a cluster.
 const FEWEST_RECORDS: usize = 5;
-/// Blocks into which fewer records are cut.
+/// Approximate total number of blocks into which fewer records are divided.
 const BLOCKS: usize = 8;
-/// Shortest block, s.
+/// Duration of the shortest block, s.
 const SHORTEST_BLOCK_S: f64 = 4.0;
 
-/// Degrees of freedom of standard errors from the scatter of n clusters.
+/// Returns the degrees of freedom of standard errors that are based on the scatter of n clusters.
 pub(super) fn freedom(clusters: usize) -> f64 {
     clusters.saturating_sub(1).max(1) as f64
 }
 
-/// Quantile of Student's distribution for 95 % with n clusters.
+/// Returns the 97.5 % quantile of Student's distribution for n clusters, the half-width of a 95 % interval in standard
+/// errors.
 pub(super) fn quantile(clusters: usize) -> f64 {
     StudentsT::new(0.0, 1.0, freedom(clusters)).map_or(1.96, |t| t.inverse_cdf(0.975))
 }
@@ -40,15 +41,15 @@ pub(super) fn quantile(clusters: usize) -> f64 {
 pub enum ClusterKind {
     /// Each record is a cluster.
     Runs,
-    /// Blocks of records.
+    /// Each cluster is a block of a record.
     Blocks,
 }
 
-/// Scores and information of each cluster.
+/// Scores and information matrices of the clusters.
 #[derive(Debug, Clone)]
 pub(super) struct Clusters {
     pub kind: ClusterKind,
-    /// `(g_c, G_c)`.
+    /// Score g_c and information matrix G_c of each cluster.
     pub parts: Vec<(Vec<f64>, Vec<f64>)>,
 }
 
@@ -90,7 +91,7 @@ impl Clusters {
                         gram[j * q + i] = gram[i * q + j];
                     }
                 }
-                // Chain rule: psi_eta = psi_theta dtheta/deta, summed into the elements of eta that the record uses.
+                // Chain rule: psi_eta = psi_theta dtheta/deta, added to the elements of eta that the record depends on.
                 let (mut g, mut big) = (vec![0.0; p], vec![0.0; p * p]);
                 for (column, &place) in mapped.columns.iter().zip(positions) {
                     g[place] += dot(column, &scores);

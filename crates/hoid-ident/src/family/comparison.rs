@@ -1,10 +1,10 @@
-//! Comparison of the forms that were tried: the basis of their weights in [`super::choice`].
+//! Comparison of the candidate forms, the basis of their weights in [`super::choice`].
 //!
-//! If an excitation was recorded, forms are compared at its lines; otherwise by their prediction errors, all in units
-//! of one inflation kappa, so that a large variance is no advantage for its form. With little noise
-//! ([`super::low_noise`]) there is a true form to be identified, and a parameter costs Schwarz's `ln n` (G. Schwarz,
-//! *Annals of Statistics* 6 (1978) 461-464) instead of Akaike's 2. A form with parameters that the data do not
-//! determine counts only if all forms have such parameters.
+//! If an excitation was recorded, the forms are compared at its lines, otherwise by their prediction errors. All forms
+//! share one inflation kappa, so that a form does not profit from a large variance. With little noise
+//! ([`super::low_noise`]) one form is assumed to be true, and a parameter costs Schwarz's `ln n` (G. Schwarz, *Annals
+//! of Statistics* 6 (1978) 461-464) instead of Akaike's 2. A form with undetermined parameters counts only if all forms
+//! have undetermined parameters.
 
 use hoid_model::{FamilyOperator, Form, operator_family::Coordinate};
 use hoid_numerics::statistics::upper_median;
@@ -19,11 +19,11 @@ use super::{
 };
 use crate::IdentError;
 
-/// Difference of criteria up to which two forms count as equal.
-const THE_SAME: f64 = 0.05;
-/// Ratio of sums of squares, without noise, up to which a form counts as equally good.
-const NO_BETTER: f64 = 1.1;
-/// Standard errors from zero of a gain that counts as known.
+/// Difference of the criteria below which two forms count as equal.
+const EQUAL_CRITERIA: f64 = 0.05;
+/// Ratio of sums of squares up to which forms without noise count as equally good.
+const EQUAL_FIT_RATIO: f64 = 1.1;
+/// Number of standard errors by which a known gain differs from zero.
 const LEAST_ERRORS: f64 = 2.0;
 
 /// A form with its fits.
@@ -35,22 +35,22 @@ pub(super) struct Tried<'a> {
 
 /// Criteria of all forms, and the best form.
 pub(super) struct Comparison {
-    /// Index of the best form; `None` if none could be fitted.
+    /// Index of the best form; `None` if no form could be fitted.
     pub front: Option<usize>,
-    /// Criteria of each form, in the order of the forms.
+    /// Criteria of each form, in the order in which the forms were given.
     pub figures: Vec<FormFigures>,
 }
 
 impl Comparison {
-    /// Compares the forms, which are ordered from the simplest.
+    /// Compares the forms, given in the order from the simplest.
     pub fn of(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> Self {
         let criteria = criteria(tried, prediction);
         let mut counting = criteria.clone();
-        // A form that lacks an existing lag uses the neuromuscular poles for it.
-        retain(&mut counting, |i| !has_lost_its_muscles(&tried[i]));
-        retain(&mut counting, |i| tried[i].fit.as_ref().is_ok_and(|fit| !is_open(fit)));
+        // If a form lacks a lag that the person has, the neuromuscular poles replace this lag.
+        retain(&mut counting, |i| !neuromuscular_poles_are_lags(&tried[i]));
+        retain(&mut counting, |i| tried[i].fit.as_ref().is_ok_and(|fit| !is_undetermined(fit)));
         if prediction.noise_free().is_some() {
-            simplest_alone(&mut counting, tried, prediction.equal());
+            keep_simplest(&mut counting, tried, prediction.equal());
         }
         count_once(&mut counting, tried);
         let (front, weights) = weigh(&counting).map_or((None, Vec::new()), |(front, weights)| (Some(front), weights));
@@ -64,32 +64,32 @@ impl Comparison {
     }
 }
 
-/// A lead with a droop is the quadratic numerator over s with real zeros: if both converge to the same operator, they
-/// are one form with two names, and count once.
+/// Excludes the quadratic form if it is equivalent to the lead with a droop. The latter is the quadratic numerator over
+/// s with real zeros, so that both forms can converge to the same operator, which must count only once.
 fn count_once(counting: &mut [Option<f64>], tried: &[Tried<'_>]) {
     let place = |form: Form| tried.iter().position(|t| t.form == form);
     if let (Some(quadratic), Some(droop)) = (place(Form::QuadraticIntegral), place(Form::LeadDroop))
         && let (Some(one), Some(two)) = (counting[quadratic], counting[droop])
-        && (one - two).abs() < THE_SAME
+        && (one - two).abs() < EQUAL_CRITERIA
     {
         counting[quadratic] = None;
     }
 }
 
-/// Without noise, a wrong form leaves a multiple of the residual of a right one: among forms with an equal fit, only
-/// the simplest are kept. Sums of squares below `equal` count as equal.
-fn simplest_alone(counting: &mut [Option<f64>], tried: &[Tried<'_>], equal: f64) {
+/// Keeps only the simplest of the forms that fit equally well. Without noise, the residual of a wrong form is a
+/// multiple of the residual of the right form. Sums of squares below `equal` count as equal.
+fn keep_simplest(counting: &mut [Option<f64>], tried: &[Tried<'_>], equal: f64) {
     let fit = |i: usize| tried[i].fit.as_ref().ok();
     let squares = |i: usize| fit(i).map_or(f64::INFINITY, |fit| (fit.loss * fit.residuals as f64).max(equal));
     let size = |i: usize| fit(i).map_or(usize::MAX, |fit| fit.layout().operator_elements());
     let those = |counting: &[Option<f64>]| (0..tried.len()).filter(|i| counting[*i].is_some()).collect::<Vec<_>>();
     let least = those(counting).into_iter().map(squares).fold(f64::INFINITY, f64::min);
-    retain(counting, |i| squares(i) <= NO_BETTER * least);
+    retain(counting, |i| squares(i) <= EQUAL_FIT_RATIO * least);
     let fewest = those(counting).into_iter().map(size).min();
     retain(counting, |i| Some(size(i)) == fewest);
 }
 
-/// Keeps only the forms that satisfy the condition, if any form that counts satisfies it.
+/// Keeps only the forms that satisfy a condition; keeps all forms if none of the remaining forms satisfies it.
 fn retain(counting: &mut [Option<f64>], is_good: impl Fn(usize) -> bool) {
     let good: Vec<bool> = (0..counting.len())
         .map(|i| counting[i].is_some() && is_good(i))
@@ -103,9 +103,9 @@ fn retain(counting: &mut [Option<f64>], is_good: impl Fn(usize) -> bool) {
     }
 }
 
-/// True if a combination of parameters is undetermined, or the gain does not differ from zero: the other parameters of
-/// the form then have no meaning, and a form with fewer of them is equivalent.
-fn is_open(fit: &PredictionFit<'_>) -> bool {
+/// True if a combination of parameters is undetermined or a gain does not differ significantly from zero. The other
+/// parameters of the form are then meaningless, and a form with fewer parameters is equivalent.
+fn is_undetermined(fit: &PredictionFit<'_>) -> bool {
     let p = fit.parameters();
     let known = |covariances: Covariances| {
         let mut gains = fit
@@ -119,8 +119,9 @@ fn is_open(fit: &PredictionFit<'_>) -> bool {
     fit.ridge > 0.0 || !covariances::covariances(fit).is_some_and(known)
 }
 
-/// True if the neuromuscular poles have become two lags, by prediction error or at the lines.
-fn has_lost_its_muscles(tried: &Tried<'_>) -> bool {
+/// True if the neuromuscular poles have become two separate lags, in the prediction error fit or in the fit at the
+/// lines.
+fn neuromuscular_poles_are_lags(tried: &Tried<'_>) -> bool {
     let lags = |operator: &FamilyOperator| operator.neuromuscular().is_some_and(|(_, zeta)| zeta > MOST_DAMPED);
     let of_fit = tried
         .fit
@@ -130,18 +131,18 @@ fn has_lost_its_muscles(tried: &Tried<'_>) -> bool {
     of_fit.is_some_and(|operator| lags(&operator)) || tried.lines.as_ref().is_some_and(|l| lags(&l.operator))
 }
 
-/// Returns one kappa for all forms, the median, so that their criteria are comparable.
+/// Returns the median of kappa over the forms, used for all forms so that their criteria are comparable.
 fn common_inflation(tried: &[Tried<'_>]) -> f64 {
     let fits = tried.iter().filter_map(|t| t.fit.as_ref().ok());
     let mut all: Vec<f64> = fits.map(|fit| fit.inflation).collect();
     upper_median(&mut all).unwrap_or(1.0)
 }
 
-/// Returns the criterion of each form; `None` if it could not be fitted.
+/// Returns the criterion of each form; `None` for a form that could not be fitted.
 fn criteria(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> Vec<Option<f64>> {
     let little_noise = prediction.little_noise.is_some();
     let inflation = if little_noise {
-        // The value for others is their misfit.
+        // The inflation of the other forms results from their misfit.
         let fits = tried.iter().filter_map(|t| t.fit.as_ref().ok());
         let least = fits.min_by(|a, b| a.loss.total_cmp(&b.loss));
         least.map_or(1.0, |fit| fit.inflation)

@@ -5,20 +5,20 @@ use hoid_model::{
     operator_family::{Coordinate, Form},
 };
 
-/// Longest lead time, s: for records of people a longer one is equivalent to a pure derivative.
+/// Longest lead time, s. In records of people a longer lead is equivalent to a pure derivative.
 const LONGEST_LEAD_S: f64 = 30.0;
-/// Bounds of `1/T_I`, 1/s: a pure integration at the lower bound, no lag at the upper.
+/// Bounds of `1/T_I`, 1/s: the lower bound is equivalent to a pure integration, the upper bound to no lag.
 pub(super) const LAG_RATE: (f64, f64) = (1e-3, 30.0);
-/// Largest droop, rad/s.
+/// Largest droop frequency, rad/s.
 const LARGEST_DROOP: f64 = 10.0;
-/// Bounds of the damping ratio: nearly undamped at the lower bound, two separate lags at the upper.
+/// Bounds of the damping ratio: almost no damping at the lower bound, two separate lags at the upper bound.
 const DAMPING: (f64, f64) = (0.02, 5.0);
-/// Lowest neuromuscular frequency, rad/s: a lower one does not describe a muscle.
+/// Lowest neuromuscular frequency, rad/s; a lower frequency would not describe a muscle.
 const LOWEST_FREQUENCY: f64 = 2.0;
-/// Largest omega_nm relative to pi/Ts.
+/// Largest omega_nm relative to the Nyquist frequency pi/Ts.
 const HIGHEST_FREQUENCY: f64 = 0.95;
 
-/// Lower and upper bound of each coordinate.
+/// Returns the lower and upper bound of each coordinate.
 pub(crate) fn limits(
     form: Form,
     neuromuscular: bool,
@@ -41,13 +41,13 @@ pub(crate) fn limits(
 /// Density of the grid of starting points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Grid {
-    /// For people: the prior keeps their neuromuscular system near the default.
+    /// Grid for people, whose neuromuscular system is kept near the default by the prior.
     Default,
-    /// For a response that is known exactly, of any operator.
+    /// Grid for a response that is known exactly and may belong to any operator.
     Dense,
 }
 
-/// Starting values of a coordinate.
+/// Returns the starting values of a coordinate.
 fn start_values(coordinate: Coordinate, (low, high): (f64, f64), grid: Grid) -> Vec<f64> {
     let values: &[f64] = match coordinate {
         // The gain is computed from the other coordinates.
@@ -72,7 +72,7 @@ fn start_values(coordinate: Coordinate, (low, high): (f64, f64), grid: Grid) -> 
     values.iter().map(|v| v.clamp(low, high)).collect()
 }
 
-/// All combinations of the starting values of a form.
+/// Returns all combinations of the starting values for the coordinates of a form.
 pub(super) fn start_grid(form: Form, neuromuscular: bool, limits: &[(f64, f64)], density: Grid) -> Vec<Vec<f64>> {
     let mut grid: Vec<Vec<f64>> = vec![Vec::new()];
     for (coordinate, bounds) in form.coordinates(neuromuscular).into_iter().zip(limits) {

@@ -1,18 +1,18 @@
-//! Error bars that are valid even if the model is not: from the scores of runs, or of blocks of runs.
+//! Error bars that remain valid if the model is wrong, from the scores of runs or of blocks of runs.
 //!
-//! With `g_c = sum psi eps` and `G_c = sum psi psi'` over cluster c, the estimate without it is, in
-//! one Gauss-Newton step from the whole,
+//! With `g_c = sum psi eps` and `G_c = sum psi psi'` over cluster c, one Gauss-Newton step from the estimate of all
+//! data gives the estimate without this cluster:
 //!
 //! `eta_(c) = eta - (G + P - G_c)^-1 g_c`
 //!
-//! and the jackknife over n clusters, `(n-1)/n sum (eta_(c) - mean)^2`, is the covariance (the
-//! estimator CR3 of the sandwich: R. M. Bell and D. F. McCaffrey, *Survey Methodology* 28 (2002)
-//! 169-181; J. G. MacKinnon, M. O. Nielsen and M. D. Webb, *J. Econometrics* 232 (2023) 272-299).
-//! It holds whatever the residuals are within a cluster, and is not too small with few of them.
-//! Its quantiles are Student's with n - 1 degrees of freedom.
+//! The covariance is the jackknife over n clusters, `(n-1)/n sum (eta_(c) - mean)^2` (the estimator CR3 of the
+//! sandwich: R. M. Bell and D. F. McCaffrey, *Survey Methodology* 28 (2002) 169-181; J. G. MacKinnon, M. O. Nielsen and
+//! M. D. Webb, *J. Econometrics* 232 (2023) 272-299). It is valid for any correlation of the residuals within a
+//! cluster, and not too small if there are few clusters. Intervals use Student's distribution with n - 1 degrees of
+//! freedom.
 //!
-//! **The prior** P is a measurement that no cluster contains; its contribution is added, `kappa sigma^2 H^-1 P H^-1`, H
-//! = G + P.
+//! **The prior** P is a measurement that no cluster contains. Its contribution `kappa sigma^2 H^-1 P H^-1`, with
+//! `H = G + P`, is added.
 
 use hoid_model::{Complex64, FamilyOperator, uncertainty::variance_along};
 use hoid_numerics::statistics::mean;
@@ -31,37 +31,38 @@ use crate::{
 
 /// Number of frequencies at which two responses are compared.
 const POINTS: usize = 24;
-/// Frequencies at which the response is compared, rad/s.
+/// Frequencies at which the errors of the response are averaged, rad/s.
 pub(super) const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
 
-/// Covariances of eta: from clusters, with the contribution of the prior, and from the model.
+/// Covariances of eta: from clusters, including the contribution of the prior, and from the model.
 #[derive(Debug, Clone)]
 pub(super) struct Covariances {
     pub clustered: Vec<f64>,
     pub model_based: Vec<f64>,
-    /// Additional variances of single elements. They are not part of the covariance: the response is known better than
-    /// single elements, since the errors of the elements are correlated.
+    /// Additional variances of single elements. They are not part of the covariance, since the response is known more
+    /// accurately than single elements, whose errors are correlated.
     pub extra_variance: Vec<f64>,
 }
 
 impl Covariances {
-    /// Extracts the covariance of the coordinates of a record's operator from that of eta.
+    /// Extracts the covariance of the operator coordinates in one record from the covariance of eta.
     pub fn of_operator(of_eta: &[f64], layout: &FamilyLayout, record: usize) -> Vec<f64> {
         let (p, places) = (layout.limits().len(), &layout.positions(record)[..layout.coordinates()]);
         let pairs = places.iter().flat_map(|&i| places.iter().map(move |&j| i * p + j));
         pairs.map(|at| of_eta[at]).collect()
     }
 
-    /// Adds the bias relative to another estimate: `d d'`, d the difference to it.
+    /// Adds the squared bias `d d'`, where d is the difference to another estimate.
     ///
-    /// The prediction error fit is biased if its noise model is wrong, by an amount that no scatter shows; an estimate
-    /// without that noise model shows it. The errors are then computed from the mean squared error, variance plus
-    /// squared bias, with d for the bias: all of it, and not `d d'/3`, which would hold for a true value anywhere
-    /// between the two, since the bias is on one side. Elements at a bound remain unchanged.
+    /// The prediction error fit is biased if its noise model is wrong. No scatter between runs shows this bias, but an
+    /// estimate without that noise model does. The errors are then computed from the mean squared error, variance plus
+    /// squared bias, with d as the bias. The full `d d'` is used, and not `d d'/3`, which would apply to a true value
+    /// anywhere between the two estimates, since only one of them is biased. Elements at a bound remain unchanged.
     ///
-    /// Errors are to first order, and the other estimate may be far along a ridge of the criterion, as with a gain and
-    /// a lag that increase together: `J d`, J the gradient of the response, is then not the difference of the
-    /// responses. In this case d is replaced by the [difference](responding) that explains that of the responses.
+    /// The errors are linearised, but the other estimate may be far along a ridge of the criterion, for example if gain
+    /// and lag increase together. The linearised change `J d`, where J is the gradient of the response, is then not the
+    /// difference of the responses. In this case d is replaced by the [least squares difference](responding) that
+    /// explains the difference of the responses.
     pub fn add_bias(&mut self, fit: &PredictionFit<'_>, other: &[f64]) {
         let p = fit.parameters();
         let mut difference = vec![0.0; p];
@@ -79,7 +80,8 @@ impl Covariances {
         }
     }
 
-    /// Adds `weight d^2` to the variances of the single elements to which it applies.
+    /// Adds `weight d^2` to the variances of the elements for which `counts` is true; d is the difference to another
+    /// estimate.
     pub fn add_extra_variance(
         &mut self,
         fit: &PredictionFit<'_>,
@@ -94,8 +96,8 @@ impl Covariances {
         }
     }
 
-    /// Intervals by profile likelihood include only kappa: if variances are larger, the ends are moved outwards in the
-    /// ratio of the standard errors.
+    /// Widens intervals by profile likelihood, which include only kappa. If the variances are larger, the ends are
+    /// moved outwards by the ratio of the standard errors.
     pub fn widen(&self, fit: &PredictionFit<'_>, profiles: &mut [Option<(f64, f64)>]) {
         let p = fit.parameters();
         for (i, profile) in profiles.iter_mut().enumerate() {
@@ -111,7 +113,7 @@ impl Covariances {
     }
 }
 
-/// Relative standard errors of the response over the band of manual control.
+/// Returns the relative standard errors of the response at [`BAND_RAD_S`], the band of manual control.
 pub(super) fn response_errors(
     operator: &FamilyOperator,
     covariance: Option<&[f64]>,
@@ -123,8 +125,8 @@ pub(super) fn response_errors(
     }))
 }
 
-/// Differences of the elements of the operator and of its channels that are off their bounds to another estimate, as
-/// far as it contains them.
+/// Returns the differences to another estimate for the elements of the operator and of its channels that are not at a
+/// bound and that the other estimate contains.
 fn differences(fit: &PredictionFit<'_>, other: &[f64]) -> Vec<(usize, f64)> {
     let elements = fit.layout().noise_begins();
     let free = fit.free().into_iter().filter(|place| *place < elements);
@@ -132,13 +134,14 @@ fn differences(fit: &PredictionFit<'_>, other: &[f64]) -> Vec<(usize, f64)> {
         .collect()
 }
 
-/// Factor by which `J d` may exceed the difference of two responses before it is replaced.
-const MOST_OVERSTATED: f64 = 2.0;
-/// Relative part of its diagonal that is added to `J' J` to make it regular.
+/// Largest ratio of `J d` to the difference of two responses at which d is not replaced.
+const LARGEST_OVERSTATEMENT: f64 = 2.0;
+/// Relative increase of the diagonal of `J' J`, which makes it regular.
 const RIDGE: f64 = 1e-9;
 
-/// Least squares solution of `J d = H - H_other` over the band of manual control and an adjacent octave on each side,
-/// relative to |H|; `None` if the differences of the elements explain it, or elements belong to single records.
+/// Returns the least squares solution of `J d = H - H_other`, relative to |H|, over the band of manual control and an
+/// octave on each side. `None` if the given differences already explain the difference of the responses, or if some
+/// elements belong to single records.
 fn responding(fit: &PredictionFit<'_>, other: &[f64], differences: &[(usize, f64)]) -> Option<Vec<(usize, f64)>> {
     let layout = fit.layout();
     let places = &layout.positions(0)[..layout.coordinates()];
@@ -159,7 +162,7 @@ fn responding(fit: &PredictionFit<'_>, other: &[f64], differences: &[(usize, f64
     )
 }
 
-/// The same for two operators, with these coordinates and their differences.
+/// As [`responding`], for two operators and the differences `d` of these coordinates.
 fn explaining(here: &FamilyOperator, there: &FamilyOperator, coordinates: &[usize], d: &[f64]) -> Option<Vec<f64>> {
     let q = coordinates.len();
     let (mut total, mut linear) = (Linearisation::empty(q), 0.0);
@@ -174,20 +177,20 @@ fn explaining(here: &FamilyOperator, there: &FamilyOperator, coordinates: &[usiz
         linear += slopes.iter().zip(d).map(|(g, d)| g * d).sum::<Complex64>().norm_sqr();
         total.add_complex(1.0, off, &slopes);
     }
-    if linear <= MOST_OVERSTATED * MOST_OVERSTATED * total.sum_of_squares {
+    if linear <= LARGEST_OVERSTATEMENT * LARGEST_OVERSTATEMENT * total.sum_of_squares {
         return None;
     }
     (0..q).for_each(|i| total.gram[i * q + i] *= 1.0 + RIDGE);
     solve_symmetric(&total.gram, &total.descent)
 }
 
-/// Inverse of `G + P` by rows, over all elements of the search.
+/// Returns the inverse of `G + P` by rows, over all elements that are not fixed.
 ///
-/// If an element is at its bound, such as `1/T_I = 0`, holding it there would make the errors of the others too small:
-/// the true value may be off the bound, and a lead and a gain depend on it.
+/// Elements at a bound, such as `1/T_I = 0`, are included. Holding them there would make the errors of the other
+/// elements too small, since the true value may be off the bound, and lead and gain depend on it.
 fn inverse(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
     let p = fit.parameters();
-    let sought = fit.sought();
+    let sought = fit.not_fixed();
     let mut inverse = vec![0.0; p * p];
     for &i in &sought {
         let mut unit = vec![0.0; p];
@@ -203,7 +206,7 @@ pub(super) fn is_regular(fit: &PredictionFit<'_>) -> bool {
     inverse(fit).is_some()
 }
 
-/// Returns the covariances of a fit; `None` if its information is singular.
+/// Returns the covariances of a fit; `None` if its information matrix is singular.
 pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
     let p = fit.parameters();
     let inverse = inverse(fit)?;
@@ -211,19 +214,20 @@ pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
     let scale = fit.innovation_variance * fit.inflation;
     let mut clustered: Vec<f64> = match fit.clusters.kind {
         ClusterKind::Runs => {
-            // H^-1 P H^-1: the prior has the same weight as the inflated data.
+            // H^-1 P H^-1, scaled like the inflated data.
             let mut open = vec![0.0; p * p];
             add_open_part(&mut open, 1.0, &fit.criterion.penalty, fit.eta(), &inverse);
             match over_clusters(fit) {
                 Some(by_runs) => by_runs.iter().zip(&open).map(|(j, open)| j + scale * open).collect(),
-                // A combination that only one run determines: its scatter is not known.
+                // Only one run determines some combination of elements; the scatter of this combination is unknown.
                 None => inverse.iter().map(|g| scale * g).collect(),
             }
         }
-        // H^-1 G H^-1 + H^-1 P H^-1 = H^-1, all of it inflated.
+        // H^-1 G H^-1 + H^-1 P H^-1 = H^-1, with both terms inflated.
         ClusterKind::Blocks => inverse.iter().map(|g| scale * g).collect(),
     };
-    // H^-1 L H^-1 for lines with the weight w, L their part of H. The scatter of runs does not contain it.
+    // H^-1 L H^-1 for lines with the weight w, where L is their part of H. The scatter between runs does not include
+    // this term.
     let counted = if fit.clusters.kind == ClusterKind::Runs {
         0.0
     } else {
@@ -240,7 +244,7 @@ pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
     })
 }
 
-/// Adds `factor H^-1 L H^-1`.
+/// Adds `factor H^-1 L H^-1`, where L is the information of the lines.
 fn add_lines_part(covariance: &mut [f64], factor: f64, fit: &PredictionFit<'_>, inverse: &[f64]) {
     let p = fit.parameters();
     let l = fit.criterion.additional_at(fit.eta(), &mut Workspace::default()).gram;
@@ -248,7 +252,7 @@ fn add_lines_part(covariance: &mut [f64], factor: f64, fit: &PredictionFit<'_>, 
         DMatrix::from_row_slice(p, p, inverse),
         DMatrix::from_row_slice(p, p, &l),
     );
-    // Symmetric: by columns as by rows.
+    // The product is symmetric, so that the storage order does not matter.
     let part = &inverse * l * &inverse;
     covariance
         .iter_mut()
@@ -256,24 +260,24 @@ fn add_lines_part(covariance: &mut [f64], factor: f64, fit: &PredictionFit<'_>, 
         .for_each(|(c, part)| *c += factor * part);
 }
 
-/// Computes the jackknife covariance over clusters.
+/// Returns the jackknife covariance over clusters.
 fn over_clusters(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
-    let (parts, sought) = (&fit.clusters.parts, fit.sought());
+    let (parts, sought) = (&fit.clusters.parts, fit.not_fixed());
     let steps: Option<Vec<Vec<f64>>> = (parts.iter())
         .map(|(g, big)| fit.solve(&sought, Some(big), g))
         .collect();
     jackknife(&steps?)
 }
 
-/// Computes kappa: the ratio of clustered to model-based variance of the frequency response, gain and phase, averaged
-/// over the band of manual control; at least one. `None` for fewer than two clusters.
+/// Returns kappa: the ratio of the variance from clusters to the model-based variance of gain and phase, averaged over
+/// the band of manual control, at least one. `None` for fewer than two clusters.
 ///
-/// The ratio for single coordinates would depend on the chance of a few clusters, and on coordinates that the data
-/// hardly determine, whereas they determine the response.
+/// The data determine the response but hardly determine some coordinates. The ratio for single coordinates would depend
+/// on these, and on the chance scatter of a few clusters.
 pub(super) fn inflation(fit: &PredictionFit<'_>) -> Option<f64> {
     let p = fit.parameters();
     let (clustered, inverse) = (over_clusters(fit)?, inverse(fit)?);
-    // The model's own variance without what the prior adds to the information: H^-1 G H^-1.
+    // The model-based variance without the contribution of the prior: H^-1 G H^-1.
     let mut by_model = inverse.clone();
     add_open_part(&mut by_model, -1.0, &fit.criterion.penalty, fit.eta(), &inverse);
     let operator = fit.layout().operator(fit.eta(), 0).ok()?;

@@ -1,7 +1,7 @@
-//! Findings for and against a fit of the family.
+//! Findings for and against a fit of an operator of the family.
 //!
-//! Each rule is one observation with its own kind ([`hoid_model::Finding`]); the limits are defined where they are
-//! used; those of residuals are common to all fits.
+//! Each rule yields one observation with its own kind ([`hoid_model::Finding`]). The limits are defined next to the
+//! rules; the limits for residuals are common to all fits.
 
 use hoid_model::Finding;
 
@@ -16,22 +16,23 @@ use super::{
 };
 use crate::{Termination, diagnostics::residuals::ResidualMeasures};
 
-/// chi^2 per degree of freedom at the lines above which the operator misses the describing function.
+/// chi^2 per degree of freedom at the lines above which the operator does not fit the describing function.
 const LARGEST_REDUCED_CHI_SQUARED: f64 = 3.0;
-/// Significance level of the tests of agreement between methods and of the form against a free model.
+/// Significance level of two tests: agreement between methods, and the form against a free model.
 const LEVEL: f64 = 0.01;
-/// Excess of the loss over that of a free model above which a rejected form is reported.
+/// Relative excess of the loss over that of a free model above which a rejected form is reported.
 const LARGEST_EXCESS_LOSS: f64 = 0.01;
-/// Smallest relative error of the response over frequency above which nothing is known about the person.
+/// Relative error of the response, at the frequency with the smallest error, above which the response counts as
+/// unknown.
 pub(super) const LARGEST_RESPONSE_ERROR: f64 = 0.5;
-/// Damping ratio above which the two neuromuscular poles are separate lags, far apart: no muscle has such a damping.
+/// Damping ratio above which the two neuromuscular poles count as separate lags: no muscle is so strongly damped.
 pub(super) const MOST_DAMPED: f64 = 1.5;
-/// Weight above which a form counts as settled.
+/// Weight of the best form from which the form counts as determined.
 const SETTLED_WEIGHT: f64 = 0.95;
-/// Ratio of clustered to model-based standard errors above which a note is made.
+/// Ratio of standard errors from clusters to model-based standard errors above which a note is added.
 const NOTED_ERROR_RATIO: f64 = 1.5;
 
-/// Shift of a parameter by the prior, in standard errors, above which it is reported.
+/// Shift of a parameter by the prior, in standard errors, above which the shift is reported.
 const NOTED_PULL: f64 = 0.5;
 
 /// Inputs of the diagnostics.
@@ -41,9 +42,9 @@ pub(super) struct DiagnosticInputs<'a> {
     pub parameters: &'a [Parameter],
     pub prior: &'a OperatorPrior,
     pub residuals: ResidualMeasures,
-    /// Share of the power of u that is left, if it is not noise.
+    /// Power of the residual relative to the power of u, if the residual is not noise.
     pub noise_free: Option<f64>,
-    /// A doubt if the person is not constant.
+    /// A warning if the person changes over the records.
     pub not_constant: Option<Finding>,
     pub lines: Option<&'a LineFit>,
     pub no_lines: Option<&'a str>,
@@ -58,7 +59,7 @@ pub(super) struct DiagnosticInputs<'a> {
     pub has_covariance: bool,
     /// Smallest relative standard error of the response over the band of manual control.
     pub response_error: Option<f64>,
-    /// True if the inputs are distinguished by their excitations, and not by their supposed forms.
+    /// True if separate excitations distinguish the inputs; false if only their assumed forms do.
     pub apart: bool,
     /// The forms that the data do not reject, the best one first.
     pub weighed: &'a [WeighedForm],
@@ -84,7 +85,7 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
         all.push(Finding::doubt(
             "delay-at-bound",
             format!(
-                "the delay {tau:.3} s lies at the end of the range {low} to {high} s in which it was searched for; widen it"
+                "the delay {tau:.3} s lies at an end of its search range, {low} to {high} s; widen this range"
             ),
         ));
     }
@@ -98,7 +99,7 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
     determined(judged, &mut all);
     all.extend(unsettled(judged.weighed));
     if let Some(share) = judged.noise_free {
-        // The residuals are rounding of the data, for which no residual test and no other method is meant.
+        // The residuals are rounding errors of the data; residual tests and other methods do not apply to them.
         all.push(Finding::note(
             "no-noise",
             format!(
@@ -121,7 +122,7 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
             "clustered-errors",
             format!(
                 "error bars are computed from the scatter between {what}, and are up to {ratio:.1} times those of the \
-                 model, which assumes white residuals and a constant person"
+                 model, which assumes white residuals and a person who does not change"
             ),
         ));
     }
@@ -144,12 +145,13 @@ fn unsettled(weighed: &[WeighedForm]) -> Option<Finding> {
     ))
 }
 
-/// True if the parameter is at the end of the search range: it has no standard error.
+/// True if the parameter is at the end of its search range and therefore has no standard error.
 fn at_bound(parameter: &Parameter) -> bool {
     parameter.standard_error.is_none()
 }
 
-/// A parameter that the data determine and the prior moves: its values without and with the prior.
+/// Formats the values without and with the prior of a parameter that the data determine but the prior shifts
+/// noticeably; `None` for other parameters.
 fn pulled(parameter: &Parameter, prior: &OperatorPrior) -> Option<String> {
     let pull = prior.pull(parameter)?;
     let errors = pull.abs() * parameter.value / parameter.standard_error?;
@@ -179,7 +181,8 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
         all.push(Finding::undetermined(
             "response",
             format!(
-                "the response of the person is not determined: its error is {:.0} % even at the frequency at which it is known best",
+                "the response of the person is not determined: its error is {:.0} % even at the frequency where it is \
+                 smallest",
                 100.0 * error
             ),
         ));
@@ -189,7 +192,7 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
         all.push(Finding::note(
             "gain",
             format!(
-                "{} is not determined, the response in the middle of the band is",
+                "{} is not determined, but the response in the middle of the band is",
                 gain.name
             ),
         ));
@@ -199,14 +202,14 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
             true => "tau_e is determined by the prior alone".to_owned(),
             false => "tau_e is not determined".to_owned(),
         };
-        // As with other parameters: without a standard error it has no digits.
+        // As for other parameters, no value is printed without a standard error.
         all.push(Finding::note("delay", words));
     }
     if let Some((t_i, (low, high))) = find("T_I").and_then(|t| Some((t, t.interval?)))
         && !t_i.determined
     {
         let words = if high.is_infinite() {
-            format!("T_I and K are not determined, K/T_I is: T_I is longer than {low:.2} s (95 %)")
+            format!("T_I and K are not determined, only K/T_I is: T_I is longer than {low:.2} s (95 %)")
         } else {
             format!("T_I is not determined: {low:.2} to {high:.2} s (95 %)")
         };
@@ -216,8 +219,8 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
         all.push(Finding::doubt(
             "neuromuscular-lag",
             format!(
-                "zeta_nm = {:.1}: the neuromuscular poles have become lags and carry no information about muscles; \
-                 choose a form with a lag, or --neuromuscular no",
+                "zeta_nm = {:.1}: the neuromuscular poles have become lags and carry no information about the \
+                 neuromuscular system; choose a form with a lag, or --neuromuscular no",
                 zeta.value
             ),
         ));
@@ -247,7 +250,7 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
     if !pulled.is_empty() {
         all.push(Finding::note(
             "prior-pull",
-            format!("the prior shifts {}; --prior none omits it", pulled.join(" and ")),
+            format!("the prior shifts {}; --prior none omits the prior", pulled.join(" and ")),
         ));
     }
     if !open.is_empty() {
@@ -302,7 +305,7 @@ fn methods(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
         all.push(Finding::doubt(
             "form-refuted",
             format!(
-                "a Box-Jenkins model of the same orders has a loss {:.1} % smaller (likelihood ratio {:.0} with {} \
+                "a Box-Jenkins model of the same orders has a {:.1} % smaller loss (likelihood ratio {:.0} with {} \
                  degrees of freedom): the form is rejected",
                 100.0 * (judged.loss / free.loss - 1.0),
                 free.likelihood_ratio,

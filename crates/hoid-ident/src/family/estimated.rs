@@ -1,4 +1,4 @@
-//! The operator of a record with its errors, from eta and its prior.
+//! The operator of a record with its errors, from the estimate of eta and the prior.
 
 use hoid_model::{FamilyOperator, NotConvertible, PolynomialModel, Structure, operator_family::Coordinate};
 
@@ -17,15 +17,15 @@ use crate::{
     grey_box::parametrisation::Parametrisation,
 };
 
-/// Errors of eta.
+/// Errors of the estimate of eta.
 pub(super) struct Errors {
-    /// `None` if the information is singular.
+    /// Covariances of eta; `None` if the information matrix is singular.
     pub covariances: Option<Covariances>,
-    /// Intervals by profile likelihood, if there are any.
+    /// Interval by profile likelihood of each element of the operator; `None` if it was not computed.
     pub profiles: Vec<Option<(f64, f64)>>,
-    /// Quantile of Student's distribution for 95 %.
+    /// 97.5 % quantile of Student's distribution, for 95 % intervals.
     quantile: f64,
-    /// Variation of the person's gain that these runs do not show, relative to the gain.
+    /// Relative standard deviation of the person's gain that the scatter of these runs does not show.
     pub run_to_run: f64,
 }
 
@@ -33,7 +33,7 @@ impl Errors {
     pub fn of(fit: &PredictionFit<'_>, run_to_run: f64, workspace: &mut Workspace) -> Self {
         let covariances = covariances::covariances(fit);
         let quantile = quantile(fit.clusters.parts.len());
-        // The scatter between runs includes their variation; blocks of few runs cannot show it.
+        // The scatter between runs includes the variation of the gain; blocks of few runs cannot show it.
         let gain = fit.layout().elements.iter().find(|(c, _)| *c == Coordinate::Gain);
         let runs = match gain {
             Some((_, Some(_))) => 1,
@@ -50,12 +50,12 @@ impl Errors {
         }
     }
 
-    /// Quantile of Student's distribution for 95 %.
+    /// Returns the 97.5 % quantile of Student's distribution, for 95 % intervals.
     pub fn quantile(&self) -> f64 {
         self.quantile
     }
 
-    /// Largest ratio of a clustered to a model-based standard error.
+    /// Returns the largest ratio of a standard error from clusters to a model-based standard error.
     pub fn largest_ratio(&self, fit: &PredictionFit<'_>) -> Option<f64> {
         let (c, p) = (self.covariances.as_ref()?, fit.parameters());
         let ratios = (0..fit.layout().operator_elements())
@@ -65,8 +65,8 @@ impl Errors {
     }
 }
 
-/// Intervals by profile likelihood for elements whose interval reaches the end of the search range: there the criterion
-/// is not a parabola.
+/// Returns intervals by profile likelihood for elements whose interval reaches the lower end of the search range, where
+/// the criterion is not parabolic.
 fn profiles(
     fit: &PredictionFit<'_>,
     covariances: Option<&Covariances>,
@@ -95,7 +95,7 @@ fn profiles(
     profiles
 }
 
-/// The operator of a record with its errors, extracted from eta.
+/// The estimated operator of a record with its errors, extracted from the estimate of eta.
 pub(super) struct Estimated {
     pub operator: FamilyOperator,
     pub covariance: Option<Vec<f64>>,
@@ -112,7 +112,7 @@ impl Estimated {
         let covariances = errors.covariances.as_ref();
         let covariance = covariances.map(|c| part(&c.clustered));
         let model_based = covariances.map(|c| part(&c.model_based));
-        // Errors of single parameters, with their additional uncertainty.
+        // The errors of single parameters include the additional variances.
         let of_parameters = covariances.zip(covariance.clone()).map(|(c, mut of_all)| {
             for (i, &place) in places.iter().enumerate() {
                 of_all[i * places.len() + i] += c.extra_variance[place];
@@ -142,7 +142,7 @@ impl Estimated {
     }
 }
 
-/// Ratio of the variance of an element of eta after the data to that before.
+/// Returns the ratio of the posterior to the prior variance of an element of eta; zero without a prior.
 fn prior_share(fit: &PredictionFit<'_>, model_based: Option<&[f64]>, places: &[usize], place: usize) -> f64 {
     let Some(penalty) = fit.criterion.penalty.iter().find(|p| p.place == place) else {
         return 0.0;
@@ -150,11 +150,12 @@ fn prior_share(fit: &PredictionFit<'_>, model_based: Option<&[f64]>, places: &[u
     let Some((i, c)) = places.iter().position(|&q| q == place).zip(model_based) else {
         return 1.0;
     };
-    // The weight is kappa sigma^2/s^2, the covariance sigma^2 H^-1: both are inflated by kappa.
+    // The weight is kappa sigma^2/s^2 and the covariance sigma^2 H^-1; multiplied by kappa, the latter is the posterior
+    // variance.
     let precision = penalty.curvature(fit.eta()) / fit.innovation_variance;
     let variance = c[i * places.len() + i];
     let ((low, high), x) = (fit.criterion.limits[place], fit.eta()[place]);
-    // At a bound, nothing but the bound is known about it.
+    // At a bound only the bound itself is known about the element.
     if variance > 0.0 && low < x && x < high {
         (variance * precision).min(1.0)
     } else {
@@ -162,7 +163,7 @@ fn prior_share(fit: &PredictionFit<'_>, model_based: Option<&[f64]>, places: &[u
     }
 }
 
-/// Returns the operator of a record, also as polynomials, with its parameters averaged over the forms.
+/// Returns the operator of a record, also in polynomial form, with its parameters averaged over the forms.
 pub(super) fn operator_of(
     fit: &PredictionFit<'_>,
     errors: &Errors,
@@ -181,12 +182,12 @@ pub(super) fn operator_of(
     let layout = fit.layout();
     let p = fit.parameters();
     let mut mapped = fit.criterion.model_of(fit.eta(), record)?;
-    // From e to u: without the coefficients of further channels.
+    // The polynomials describe the response from e to u, without the coefficients of further inputs.
     mapped.theta.truncate(mapped.orders.parameters());
     let of_theta =
         (errors.covariances.as_ref()).map(|c| mapped.covariance_of_theta(&c.clustered, p, layout.positions(record)));
     let polynomial_fit = Fit {
-        held: vec![false; mapped.theta.len()],
+        is_fixed_or_bounded: vec![false; mapped.theta.len()],
         model: PolynomialModel::new(Structure::BoxJenkins, mapped.orders, layout.sample_time, mapped.theta)?,
         covariance: of_theta,
         loss: fit.loss,
@@ -219,7 +220,7 @@ pub(super) fn operator_of(
     })
 }
 
-/// Average of the parameters with the same name over the forms.
+/// Returns the average over the forms of the parameters with the same name.
 fn averaged(own: &Parameter, weighed: &[WeighedForm], record: usize, clusters: usize) -> Option<Parameter> {
     let each = weighed.iter().filter_map(|form| {
         let mut all = form.of(record)?.parameters.iter();
@@ -228,7 +229,7 @@ fn averaged(own: &Parameter, weighed: &[WeighedForm], record: usize, clusters: u
     Parameter::averaged(&each.collect::<Vec<_>>(), clusters)
 }
 
-/// Returns the operators of a fit, from its form only.
+/// Returns the operators of a fit in its own form, without averaging over forms.
 pub(super) fn in_form(
     fit: &PredictionFit<'_>,
     errors: &Errors,

@@ -1,5 +1,5 @@
-//! Estimation of a person's operator from records: the searches of each form. The steps are those of the
-//! [module](super).
+//! Estimation of a person's operator from records: the searches over all forms. The [family module](super) describes
+//! the steps.
 
 use std::sync::Arc;
 
@@ -9,8 +9,8 @@ use super::{
     arx_response::ArxResponse,
     assembly::{AtLines, Chosen, OtherForm},
     channel::{ChannelFit, SeenChannel},
-    channel_lines::{AtChannelLines, ChannelLines, InForm, tells_apart},
-    channels::{Seen, choice::Compared},
+    channel_lines::{AtChannelLines, ChannelLines, InForm, have_separate_lines},
+    channels::{FurtherInputs, choice::Compared},
     comparison::{Comparison, Tried},
     coordinates::Grid,
     intersample::Intersample,
@@ -31,41 +31,41 @@ use crate::{
     informative_data, progress,
 };
 
-/// Largest number of pairs (nc, nd) that are compared if nc is searched.
+/// Maximum number of pairs (nc, nd) that are compared if nc is searched.
 const MOST_NOISE_PAIRS: usize = 60;
 
-/// The reason why nothing is fitted to the lines if there is little noise.
+/// Reason why the lines are not used if there is little noise.
 const TOO_LITTLE_NOISE: &str = "there is less noise than leakage";
 
-/// Starts of the searches of a form.
+/// Starts of the searches for one form.
 struct Start {
     form: Form,
-    /// The fit at the lines.
+    /// Fit at the lines, if there are lines.
     lines: Option<LineFit>,
-    /// Starting coordinates.
+    /// Starting coordinates, one set per search.
     coordinates: Vec<Vec<f64>>,
 }
 
-/// Starts of the searches of all forms.
-struct Begun<'a> {
+/// Prepared searches of all forms.
+struct PreparedSearches<'a> {
     prediction: Prediction<'a>,
     starts: Vec<Start>,
     noise: NoiseOrders,
-    /// The further inputs, with the forms that were compared.
+    /// Comparison of the forms of each further input.
     channels: Vec<ChannelFit>,
     channel_lines: Option<Arc<ChannelLines>>,
-    /// The channels with a response at the lines.
+    /// Further inputs with a response, in the forms selected at the lines.
     in_form: Vec<InForm>,
-    /// The reason why no line is used.
+    /// Reason why the lines are not used.
     no_lines: Option<String>,
 }
 
 impl FamilyEstimator {
-    /// Fits all records together.
+    /// Fits one model to all records.
     ///
     /// # Errors
-    /// [`IdentError`] for invalid records or options, and if no form could be fitted. Findings that make a result
-    /// doubtful are part of it ([`FamilyFit::verdict`]).
+    /// [`IdentError`] for invalid records or options, and if no form could be fitted. Findings against a result are not
+    /// errors but part of the result ([`FamilyFit::verdict`]).
     pub fn fit(&self, records: &[Record]) -> Result<FamilyFit, IdentError> {
         let described = self.excitation.as_ref().map(|channel| {
             let options = DescriptionOptions {
@@ -78,8 +78,9 @@ impl FamilyEstimator {
         self.fit_with_response(records, described)
     }
 
-    /// As [`FamilyEstimator::fit`], with a describing function computed elsewhere, or the reason why there is none: for
-    /// example one from other spans of the same runs, or with an offset that is not an integer number of samples.
+    /// As [`FamilyEstimator::fit`], but with a given describing function or the reason why there is none. The
+    /// describing function may, for example, come from other spans of the same runs, or include a time offset that is
+    /// not a whole number of samples.
     ///
     /// # Errors
     /// As [`FamilyEstimator::fit`].
@@ -89,14 +90,14 @@ impl FamilyEstimator {
         describing: Option<Result<DescribingFunction, IdentError>>,
     ) -> Result<FamilyFit, IdentError> {
         let (records, seen) = self.prepared(records)?;
-        // With inputs in addition to e, the ratio of u and e at a line is a sum of responses.
+        // With further inputs, the ratio of u to e at a line depends on several responses.
         let (describing, no_lines) = match describing.filter(|_| seen.is_empty()) {
             None => (None, None),
             Some(Ok(found)) => (Some(found), None),
             Some(Err(error)) => (None, Some(error.to_string())),
         };
         let mut workspace = Workspace::of_thread();
-        let Begun {
+        let PreparedSearches {
             prediction,
             starts,
             noise,
@@ -162,8 +163,8 @@ impl FamilyEstimator {
         chosen.result(&mut workspace)
     }
 
-    /// Returns whether u responds to a channel in addition to the error, by the forms of this estimator, and whether
-    /// target and error are excited at separate lines.
+    /// Tests whether u responds to a channel in addition to the error, with the forms of this estimator. Also returns
+    /// whether the channel and another signal are excited at separate lines.
     ///
     /// # Errors
     /// As [`FamilyEstimator::fit`].
@@ -176,21 +177,21 @@ impl FamilyEstimator {
         let (records, seen) = with_channel.prepared(records)?;
         let mut workspace = Workspace::of_thread();
         let mut begun = with_channel.begin(&records, &seen, None, &mut workspace)?;
-        let apart = tells_apart(begun.channel_lines.as_deref(), &names);
+        let apart = have_separate_lines(begun.channel_lines.as_deref(), &names);
         let found = begun.channels.pop().ok_or(IdentError::NoFiniteLoss)?;
         Ok((found, apart))
     }
 
-    /// Returns the records with the trend of e and u removed, and the further inputs.
-    fn prepared(&self, records: &[Record]) -> Result<(Vec<Record>, Seen<'_>), IdentError> {
+    /// Returns the records with the trend of e and u removed, together with the further inputs.
+    fn prepared(&self, records: &[Record]) -> Result<(Vec<Record>, FurtherInputs<'_>), IdentError> {
         informative_data::common_sample_time(records)?;
         let records: Vec<Record> = records.iter().map(|r| r.clone().detrended(self.detrend)).collect();
-        let (records, seen) = Seen::of(records, &self.channels, self.detrend)?;
+        let (records, seen) = FurtherInputs::of(records, &self.channels, self.detrend)?;
         seen.check(&records)?;
         Ok((records, seen))
     }
 
-    /// Returns the common data of fits at the lines of several inputs.
+    /// Returns the data and settings common to all fits at the lines of several inputs.
     fn at_lines<'l>(&'l self, lines: &'l Arc<ChannelLines>, prediction: &Prediction<'_>) -> AtChannelLines<'l> {
         AtChannelLines {
             lines,
@@ -202,14 +203,15 @@ impl FamilyEstimator {
         }
     }
 
-    /// Prepares the searches of all forms: starts, orders of the noise model, and the further inputs with a response.
+    /// Prepares the searches of all forms: determines the starts, the orders of the noise model, and the further inputs
+    /// with a response.
     fn begin<'a>(
         &self,
         records: &'a [Record],
-        seen: &'a Seen<'_>,
+        seen: &'a FurtherInputs<'_>,
         describing: Option<&DescribingFunction>,
         workspace: &mut Workspace,
-    ) -> Result<Begun<'a>, IdentError> {
+    ) -> Result<PreparedSearches<'a>, IdentError> {
         let forms = self.sorted_forms()?;
         let mut prediction = self.prediction(self.intersample, records, &forms)?;
         if self.initial_state != InitialState::Zero && !seen.is_empty() {
@@ -221,7 +223,7 @@ impl FamilyEstimator {
         let lines = describing.map(LineData::new);
         let mut begun = Vec::new();
         let mut channel_lines = None;
-        // It is used only for starts, for which the lines are sufficient.
+        // The response is used only for starts; if this fit fails, the lines suffice.
         let response = if seen.is_empty() {
             match ArxResponse::of(records) {
                 Err(error) if lines.is_none() => return Err(error),
@@ -230,7 +232,7 @@ impl FamilyEstimator {
         } else {
             let mut responses = seen.responses(records)?;
             let sampling = (prediction.sample_time, prediction.intersample);
-            begun = seen.begun(&responses, self.neuromuscular, sampling, &self.search)?;
+            begun = seen.starting_forms(&responses, self.neuromuscular, sampling, &self.search)?;
             prediction.channels = begun.iter().filter_map(|forms| forms.first().cloned()).collect();
             let found = seen.lines(self.excitation.as_deref(), self.period_s);
             channel_lines = found.map(|lines| seen.weighed(&self.at_lines(&lines, &prediction), &begun, &responses));
@@ -266,7 +268,7 @@ impl FamilyEstimator {
         let mut no_lines = None;
         let noise = match little_noise {
             Some(found) => {
-                // The lines contain more leakage of the record and of its aliases than such noise.
+                // At the lines, leakage and aliasing exceed so little noise.
                 starts.iter_mut().for_each(|start| start.lines = None);
                 no_lines = lines.map(|_| TOO_LITTLE_NOISE.to_owned());
                 prediction = found;
@@ -281,7 +283,7 @@ impl FamilyEstimator {
             let from = starts[least].coordinates.as_slice();
             channels = seen.choose(&mut prediction, begun, (form, from), noise, workspace)?;
         }
-        Ok(Begun {
+        Ok(PreparedSearches {
             prediction,
             starts,
             noise,
@@ -292,9 +294,9 @@ impl FamilyEstimator {
         })
     }
 
-    /// Returns an operator of the first form from the response of an ARX model of high order, and the autoregression of
-    /// the rest of u, of the best order up to `highest`: a start for other estimators of this form. `None` if the
-    /// records do not give one.
+    /// Returns starting values for other estimators of the first form: an operator fitted to the response of a
+    /// high-order ARX model, and an autoregression of the rest of u. The order of the autoregression is the best order
+    /// up to `highest`. `None` if the records do not determine these values.
     pub(crate) fn first_guess(&self, records: &[Record], highest: usize) -> Option<(Vec<f64>, Autoregression)> {
         let form = *self.forms.first()?;
         let prediction = self.prediction(self.intersample, records, &[form]).ok()?;
@@ -321,14 +323,14 @@ impl FamilyEstimator {
             return Err(IdentError::BadOption {
                 option: "the forms of the operator".to_owned(),
                 found: self.forms.iter().map(|f| f.name()).collect::<Vec<_>>().join(", "),
-                expected: "a form that is not a pure derivative without neuromuscular dynamics: gain, lag or lead-lag"
+                expected: "gain, lag or lead-lag, because a pure derivative needs neuromuscular dynamics"
                     .to_owned(),
             });
         }
         Ok(forms)
     }
 
-    /// Returns the records for this intersample behaviour of the error, with the common settings of all forms.
+    /// Returns the records and the settings common to all forms, for this intersample behaviour of the error.
     fn prediction<'a>(
         &self,
         intersample: Intersample,
@@ -362,8 +364,9 @@ impl FamilyEstimator {
         })
     }
 
-    /// For little noise: returns the records with the intersample behaviour of the error that they show, with a level
-    /// if one was removed, and starts at the ends of output error searches. `None` if there is more noise.
+    /// Handles records with little noise; `None` if there is more noise. Determines the intersample behaviour of the
+    /// error from the records, adds a level if the mean was removed, and replaces the starts by the results of output
+    /// error searches.
     fn with_little_noise<'a>(
         &self,
         smooth: &Prediction<'_>,
@@ -438,7 +441,7 @@ impl FamilyEstimator {
             return refuse(
                 "the variation from run to run",
                 found,
-                "a part of the gain, zero or more",
+                "a nonnegative fraction of the gain",
             );
         }
         let most = HIGHEST_NOISE_ORDER;
@@ -457,7 +460,7 @@ impl FamilyEstimator {
             return refuse(
                 "the noise orders",
                 format!("{pairs} pairs of nc and nd"),
-                "60 or fewer where nc is searched: narrow nc or nd",
+                "60 or fewer pairs if nc is searched: narrow nc or nd",
             );
         }
         let orders = hoid_model::Orders {
@@ -478,7 +481,7 @@ impl FamilyEstimator {
         Ok(())
     }
 
-    /// Returns the fit at the lines, and starting coordinates.
+    /// Returns the fit of a form at the lines and the starting coordinates of its searches.
     fn start(
         &self,
         form: Form,
@@ -513,7 +516,7 @@ impl FamilyEstimator {
         Ok(start)
     }
 
-    /// Returns the start with the smallest residual after whitening by an autoregression of this order.
+    /// Returns the index of the start whose residual is smallest after whitening by an autoregression of this order.
     fn least_left(
         &self,
         prediction: &Prediction<'_>,
@@ -538,7 +541,7 @@ impl FamilyEstimator {
         least.map(|(_, i)| i).ok_or(IdentError::NoFiniteLoss)
     }
 
-    /// Returns the orders of the noise model, by Akaike's criterion, for the form with the smallest residual.
+    /// Selects the orders of the noise model by Akaike's criterion, for the form with the smallest residual.
     fn noise_orders(
         &self,
         prediction: &Prediction<'_>,
@@ -591,7 +594,7 @@ impl FamilyEstimator {
         least.map(|(_, orders)| orders).ok_or(IdentError::NoFiniteLoss)
     }
 
-    /// Returns the best result of searches from the starts of a form.
+    /// Searches from all starts of a form and returns the best result.
     fn best_of<'a>(
         &self,
         prediction: &Prediction<'a>,

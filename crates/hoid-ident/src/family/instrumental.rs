@@ -1,33 +1,34 @@
-//! The operator by refined instrumental variables, with the recorded excitation as the instrument.
+//! Estimation of the operator by refined instrumental variables, with the recorded excitation as the instrument.
 //!
-//! RIV-BJ ([`crate::iv`]) for `u = Y e + v`, `D v = eps`, with Y an operator of the family instead of free polynomials.
-//! In its nonlinear form (T. Söderström and P. Stoica, *Instrumental Variable Methods for System Identification*, 1983,
-//! ch. 6; P. C. Young, *Automatica* 52 (2015) 35-46) it is the zero x of
+//! The method is RIV-BJ ([`crate::iv`]) for `u = Y e + v`, `D v = eps`, where Y is an operator of the family instead of
+//! a ratio of free polynomials. In its nonlinear form (T. Söderström and P. Stoica, *Instrumental Variable Methods for
+//! System Identification*, 1983, ch. 6; P. C. Young, *Automatica* 52 (2015) 35-46) the estimate x is the root of
 //!
 //! `g(x) = Z' eps(x) + sum_i w_i g_i'(x) (m_i - g_i(x))`,  `eps(x) = D (u - Y(x) e)`,  `Z = D dY/dx xi`,
 //!
-//! with xi the part of e that follows the excitation ([`crate::iv`]), D the autoregression of the part of u that Y
-//! leaves unexplained, and the second term the prior. Z and D belong to an auxiliary operator; for given Z and D,
-//! Newton's step is `(Z' Psi + P)^-1 g`, `Psi = D dY/dx e`, halved until `g' (Z'Z + P)^-1 g` falls; a coordinate that
-//! would leave the search range is set to its bound.
+//! where xi is the part of e that follows the excitation ([`crate::iv`]), D is the autoregression of the part of u that
+//! Y does not explain, and the second term is the prior. Z and D are computed from an auxiliary operator. For given Z
+//! and D, Newton's step is `(Z' Psi + P)^-1 g` with `Psi = D dY/dx e`. It is halved until `g' (Z'Z + P)^-1 g`
+//! decreases. A coordinate that would leave the search range is set to its bound.
 //!
-//! **The auxiliary operator** is that of the fit at the lines or, if its instruments lead to no zero, that of the
-//! prediction error fit, or the mean of both. The common form of RIV-BJ uses the last estimate: if the lines end below
-//! the neuromuscular resonance, the estimates from two sets of instruments alternate indefinitely, each being the
-//! other's auxiliary operator (for four in ten virtual people). Any auxiliary operator gives a consistent estimate, and
-//! the instruments of a fixed one are optimal except for its own error.
+//! **The auxiliary operator** is taken from the fit at the lines. If its instruments do not lead to a root, the
+//! prediction error fit is used, and then the mean of the two. RIV-BJ usually takes the previous estimate as the
+//! auxiliary operator. If the lines end below the neuromuscular resonance, two estimates may then alternate
+//! indefinitely, each as the auxiliary operator of the other; this occurred for four in ten virtual people. Any
+//! auxiliary operator gives a consistent estimate. The instruments of a fixed auxiliary operator are optimal except for
+//! its error.
 //!
-//! Free polynomials are less robust: their poles are not determined, since the lag is below the lines and the resonance
-//! above, and move to the unit circle. Here the prior prevents this.
+//! Free polynomials are less robust: the lag is below the lines and the resonance above them, so that the poles are not
+//! determined and move to the unit circle. Here the prior prevents this.
 //!
-//! **Assumptions.** If the excitation does not reach the noise, x is unbiased whatever D is. The method shares the
-//! instrument with the fit at the lines, but neither weights nor periods, and the samples with the prediction error
-//! fit, but no part of e that follows the remnant.
+//! **Assumptions.** If the excitation is independent of the noise, x is consistent for any D. The method shares the
+//! excitation with the fit at the lines, but neither its weights nor its need for whole periods. It shares the samples
+//! with the prediction error fit, but its instruments contain no part of e that follows the remnant.
 //!
-//! **Errors.** x minus the true value is `A^-1 Z' eps`, `A = Z' Psi + P`, to first order: the covariance is
-//! `kappa sigma^2 A^-1 Z'Z A^-T` with the kappa of the prediction error fit, plus the contribution of the prior. If
-//! most of e is the person's own remnant, instruments are weak and the first order is inaccurate: with virtual people,
-//! one in 24 had a gain and lead off by five standard errors.
+//! **Errors.** To first order, x minus the true value is `A^-1 Z' eps` with `A = Z' Psi + P`. The covariance is
+//! `kappa sigma^2 A^-1 Z'Z A^-T` with kappa from the prediction error fit, plus the contribution of the prior. If most
+//! of e is the person's own remnant, the instruments are weak and the first order is inaccurate: among virtual people,
+//! one in 24 had a gain and a lead with errors of five standard errors.
 
 use std::ops::Range;
 
@@ -47,30 +48,30 @@ use crate::{
     optimize::Linearisation,
 };
 
-/// Number of steps for given instruments.
+/// Maximum number of steps for given instruments.
 const STEPS: usize = 25;
-/// A step shorter than this share of the standard errors ends the iteration.
-const SETTLED: f64 = 0.01;
-/// Largest number of halvings of a step.
+/// Length of a step, in standard errors, below which the iteration ends.
+const CONVERGED: f64 = 0.01;
+/// Maximum number of halvings of a step.
 const HALVINGS: usize = 6;
 
-/// The operator by refined instrumental variables.
+/// The operator estimated by refined instrumental variables.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct InstrumentalFit {
     /// The operator.
     pub operator: FamilyOperator,
-    /// Covariance of its coordinates by rows: from runs or blocks, with the contribution of the prior.
+    /// Covariance of the coordinates by rows, inflated by kappa, with the contribution of the prior.
     pub covariance: Option<Vec<f64>>,
     /// Order of the autoregression D.
     pub noise_order: usize,
-    /// How the iteration ended.
+    /// Termination of the iteration.
     pub termination: Termination,
-    /// Ratio of the variance after the data to that before, for each coordinate: 0 without a prior, 1 at a bound.
+    /// Ratio of the posterior to the prior variance of each coordinate: 0 without a prior, 1 at a bound.
     pub prior_shares: Vec<f64>,
 }
 
 impl InstrumentalFit {
-    /// Returns the parameters by name, with their errors to first order.
+    /// Returns names, values and first-order standard errors of the parameters.
     pub fn parameters(&self) -> Vec<(&'static str, Estimate)> {
         let all = self.operator.named_estimates(self.covariance.as_deref());
         all.into_iter()
@@ -79,15 +80,15 @@ impl InstrumentalFit {
     }
 }
 
-/// Instruments and noise model of an auxiliary operator.
-struct Held {
+/// Instruments and noise model computed from an auxiliary operator.
+struct Instruments {
     z: Vec<Vec<f64>>,
     d: Vec<f64>,
     /// `Z'Z` by rows.
     products: Vec<f64>,
 }
 
-/// A zero of g for given instruments.
+/// Result of the search for a root of g with given instruments.
 struct Zero {
     x: Vec<f64>,
     covariance: Option<Vec<f64>>,
@@ -95,10 +96,10 @@ struct Zero {
     steps: usize,
 }
 
-/// Data that all iterations use.
+/// Data common to all iterations.
 pub(super) struct Instrumental<'p, 'a> {
     prediction: &'p Prediction<'a>,
-    /// The prediction error fit, with its weighted prior, its limits and its clusters.
+    /// The prediction error fit, which supplies the weighted prior, the limits and kappa.
     fit: &'p PredictionFit<'a>,
     inputs: Vec<NoiseFreeInput>,
     order: usize,
@@ -106,7 +107,7 @@ pub(super) struct Instrumental<'p, 'a> {
 
 impl<'p, 'a> Instrumental<'p, 'a> {
     /// # Errors
-    /// The errors of the channel: it is missing, constant, or a signal of the loop.
+    /// The errors of [`noise_free_inputs`]: the channel is missing, constant, or a signal of the loop.
     pub fn new(
         prediction: &'p Prediction<'a>,
         fit: &'p PredictionFit<'a>,
@@ -122,7 +123,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         })
     }
 
-    /// Returns the fit with the first of these auxiliary operators, given as coordinates, that leads to a zero.
+    /// Returns the fit with the first of these auxiliary operators (given as coordinates) that leads to a root.
     ///
     /// # Errors
     /// [`IdentError::NoFiniteLoss`].
@@ -133,7 +134,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
             let within = x.iter().zip(self.limits());
             let x: Vec<f64> = within.map(|(v, (low, high))| v.clamp(*low, *high)).collect();
             let zero = self
-                .held(&x, workspace)
+                .instruments_of(&x, workspace)
                 .and_then(|held| self.zero(&x, &held, workspace));
             iterations += zero.as_ref().map_or(0, |zero| zero.steps);
             let found = zero.as_ref().is_ok_and(|zero| zero.found);
@@ -179,7 +180,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
             .criterion((layout.form, layout.neuromuscular), (0, self.order))
     }
 
-    /// Computes `eps` and `Psi` of one record with these signals.
+    /// Computes `eps` and `Psi` of one record, with the signals `data`.
     fn of_record(
         &self,
         eta: &[f64],
@@ -211,8 +212,8 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         Ok((eps, psi))
     }
 
-    /// Computes Z and D of an auxiliary operator.
-    fn held(&self, x: &[f64], workspace: &mut Workspace) -> Result<Held, IdentError> {
+    /// Computes Z and D from an auxiliary operator.
+    fn instruments_of(&self, x: &[f64], workspace: &mut Workspace) -> Result<Instruments, IdentError> {
         let d = self.noise(x, workspace)?;
         let (eta, p, first) = ([x, &d].concat(), x.len(), self.prediction.first);
         let mut z = vec![Vec::new(); p];
@@ -223,7 +224,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
             let begun = z[0].len();
             z.iter_mut().for_each(|column| column.resize(begun + rows, 0.0));
             for input in &self.inputs {
-                // Samples of this input in this record, as rows.
+                // Samples of this input in this record, as rows of Z.
                 let inside = |s: usize| s.clamp(sample + first, sample + n) - sample - first;
                 let own: Range<usize> = inside(input.samples.start)..inside(input.samples.end);
                 if own.is_empty() {
@@ -239,10 +240,10 @@ impl<'p, 'a> Instrumental<'p, 'a> {
             sample += n;
         }
         let products = (z.iter()).flat_map(|a| z.iter().map(move |b| dot(a, b))).collect();
-        Ok(Held { z, d, products })
+        Ok(Instruments { z, d, products })
     }
 
-    /// Computes `eps` and `Psi` of all records; `None` if there is no model.
+    /// Computes `eps` and `Psi` of all records; `None` if the operator has no discrete-time model or eps is not finite.
     fn equation(&self, x: &[f64], d: &[f64], workspace: &mut Workspace) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
         let eta = [x, d].concat();
         let (mut eps, mut psi) = (Vec::new(), vec![Vec::new(); x.len()]);
@@ -254,7 +255,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         eps.iter().all(|e| e.is_finite()).then_some((eps, psi))
     }
 
-    /// Contribution of the prior to g and P.
+    /// Returns the contribution of the prior to g and to P.
     fn prior(&self, x: &[f64]) -> Linearisation {
         let mut total = Linearisation::empty(x.len());
         for penalty in &self.fit.criterion.penalty {
@@ -263,8 +264,8 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         total
     }
 
-    /// Finds the zero of g for given instruments, starting at x.
-    fn zero(&self, x: &[f64], held: &Held, workspace: &mut Workspace) -> Result<Zero, IdentError> {
+    /// Searches for the root of g with given instruments, starting at x.
+    fn zero(&self, x: &[f64], held: &Instruments, workspace: &mut Workspace) -> Result<Zero, IdentError> {
         let (limits, p) = (self.limits(), x.len());
         let mut x = x.to_vec();
         let mut at = self.equation(&x, &held.d, workspace).ok_or(IdentError::NoFiniteLoss)?;
@@ -282,8 +283,8 @@ impl<'p, 'a> Instrumental<'p, 'a> {
             let covariance = self.covariance(&x, &a, &held.products, variance);
             let (free, step) = self.step(&x, &a, &g).ok_or(IdentError::NoFiniteLoss)?;
             let moved = length(&step, &metric, variance);
-            if moved <= SETTLED || steps == STEPS {
-                let found = moved <= SETTLED;
+            if moved <= CONVERGED || steps == STEPS {
+                let found = moved <= CONVERGED;
                 return Ok(Zero {
                     x,
                     covariance,
@@ -315,7 +316,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
                 }
             };
             let Some((there, next)) = next else {
-                // No step decreases the distance: there is no zero in this direction.
+                // No step decreases the merit function: there is no root in this direction.
                 return Ok(Zero {
                     x,
                     covariance,
@@ -327,8 +328,8 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         }
     }
 
-    /// Computes Newton's step and its free coordinates. A coordinate that would cross its bound is moved to the bound,
-    /// and the others take that into account; one that is at its bound stays there.
+    /// Returns the free coordinates and Newton's step. A coordinate that would cross its bound is set to the bound, and
+    /// the step of the other coordinates accounts for this. A coordinate already at the bound stays there.
     fn step(&self, x: &[f64], a: &DMatrix<f64>, score: &[f64]) -> Option<(Vec<usize>, Vec<f64>)> {
         let limits = self.limits();
         let mut free: Vec<usize> = (0..x.len()).filter(|&i| limits[i].0 < limits[i].1).collect();
@@ -354,12 +355,12 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         }
     }
 
-    /// Computes `kappa sigma^2 A^-1 Z'Z A^-T` plus the contribution of the prior; zero at bounds.
+    /// Returns `kappa sigma^2 A^-1 Z'Z A^-T` plus the contribution of the prior; zero for coordinates at a bound.
     fn covariance(&self, x: &[f64], a: &DMatrix<f64>, products: &[f64], variance: f64) -> Option<Vec<f64>> {
         let p = x.len();
         let scale = variance * self.fit.inflation;
         let inner = |i: usize| self.limits()[i].0 < x[i] && x[i] < self.limits()[i].1;
-        // At a bound an element does not move: its row of A is that of the identity matrix.
+        // A coordinate at a bound is held: its row of A is that of the identity matrix.
         let held = DMatrix::from_fn(p, p, |i, j| match (inner(i) && inner(j), i == j) {
             (true, _) => a[(i, j)],
             (false, same) => f64::from(u8::from(same)),
@@ -377,7 +378,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         let penalty: Vec<_> = (self.fit.criterion.penalty.iter().copied())
             .filter(|penalty| inner(penalty.place))
             .collect();
-        // The weights are kappa sigma^2/s^2: the square of one over it is kappa sigma^2 times it.
+        // The weights of the prior are w = kappa sigma^2/s^2, and w^2 s^2 = kappa sigma^2 w.
         add_open_part(&mut covariance, scale, &penalty, x, &by_rows(&inverse));
         covariance.iter().all(|v| v.is_finite()).then_some(covariance)
     }
@@ -396,7 +397,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
     }
 }
 
-/// `|s|` in units of the standard deviation, by this metric.
+/// Returns the length of a step in standard deviations, for this metric.
 fn length(step: &[f64], metric: &DMatrix<f64>, variance: f64) -> f64 {
     let s = DVector::from_column_slice(step);
     ((s.transpose() * metric * &s)[(0, 0)].max(0.0) / variance).sqrt()
@@ -502,7 +503,7 @@ mod tests {
         let d = fit.eta()[fit.layout().noise_begins()..].to_vec();
         let (_, z) = method.equation(&minimum, &d, &mut workspace).unwrap();
         let products = z.iter().flat_map(|a| z.iter().map(move |b| dot(a, b))).collect();
-        let of_held = method.held(&minimum, &mut workspace).unwrap();
+        let of_held = method.instruments_of(&minimum, &mut workspace).unwrap();
         // The autoregression of the remainder of u is that of the fit except for what the prior
         // moves, the instruments Psi except for the states before the record.
         for (own, of_fit) in of_held.d.iter().zip(&d) {
@@ -511,7 +512,7 @@ mod tests {
         for (a, b) in of_held.z.iter().zip(&z) {
             assert!(dot(a, b) / (dot(a, a) * dot(b, b)).sqrt() > 0.98);
         }
-        let held = Held { z, d, products };
+        let held = Instruments { z, d, products };
         let zero = method.zero(&minimum, &held, &mut workspace).unwrap();
         assert!(zero.found && zero.steps == 0 && zero.x == minimum);
         let covariance = zero.covariance.unwrap();
@@ -522,7 +523,7 @@ mod tests {
         for i in 0..p {
             let error = covariance[i * p + i].sqrt();
             assert!(
-                (zero.x[i] - minimum[i]).abs() < SETTLED * error,
+                (zero.x[i] - minimum[i]).abs() < CONVERGED * error,
                 "{:?} {minimum:?}",
                 zero.x
             );

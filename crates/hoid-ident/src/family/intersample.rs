@@ -1,15 +1,15 @@
-//! Intersample behaviour of the error, which the samples do not show and on which the delay depends.
+//! Intersample behaviour of the error, which the samples do not show but which affects the estimated delay.
 //!
-//! | name | the error | response of the samples to the operator's | tau_e |
+//! | name | behaviour of the error | factor on the operator's response | tau_e |
 //! |---|---|---|---|
-//! | `zoh` | is held: a simulation or a display with the same rate | `sin(x)/x e^{-jx}` | as simulated |
-//! | `foh` | is piecewise linear: logged from a faster or continuous signal | `(sin(x)/x)^2` | Ts/2 longer |
-//! | `auto` | is smooth, and the delay is that for a held error | `(sin(x)/x)^2 e^{-jx}` | as after a hold |
+//! | `zoh` | held: a simulation, or a display with the same sampling frequency | `sin(x)/x e^{-jx}` | as simulated |
+//! | `foh` | piecewise linear: logged from a continuous or faster-sampled signal | `(sin(x)/x)^2` | Ts/2 longer |
+//! | `auto` | smooth, with the delay for a held error | `(sin(x)/x)^2 e^{-jx}` | as for a held error |
 //!
 //! with `x = omega Ts/2` (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, 1997, sections 3.2 and 3.4).
-//! `foh` and `auto` are one model with two names of its delay, so that no data decide between them. `zoh` differs from
-//! both by the factor `sin(x)/x`, 0.5 % at 20 rad/s and 60 Hz, which only a recording without noise can show
-//! ([`super::low_noise`]).
+//! `foh` and `auto` are the same model with two definitions of its delay, so that no data can distinguish them. `zoh`
+//! differs from both by the factor `sin(x)/x`, which is 0.5 % below one at 20 rad/s and 60 Hz; only a recording without
+//! noise can show this ([`super::low_noise`]).
 
 use hoid_model::{Complex64, FamilyOperator, ModelError, SampleTime, named_choice, operator_family::HeldFamily};
 
@@ -17,12 +17,13 @@ use hoid_model::{Complex64, FamilyOperator, ModelError, SampleTime, named_choice
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Intersample {
-    /// Smooth, with the delay for a held error; held or linear if data without noise show it.
+    /// Smooth, with the delay defined as for a held error; replaced by held or linear if data with little noise show
+    /// it.
     #[default]
     Auto,
     /// Held until the next sample.
     Zoh,
-    /// Linear from sample to sample.
+    /// Linear between samples.
     Foh,
 }
 
@@ -33,7 +34,7 @@ named_choice!(Intersample, "course between samples", 3, {
 });
 
 impl Intersample {
-    /// Returns the response of the intersample behaviour to a sinusoid.
+    /// Returns the factor by which the intersample behaviour multiplies the response of the operator at a frequency.
     pub(super) fn response(self, omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
         let half = 0.5 * omega_rad_s * sample_time.s();
         let sinc = if half.abs() < 1e-8 { 1.0 } else { half.sin() / half };
@@ -44,7 +45,7 @@ impl Intersample {
         }
     }
 
-    /// Returns the shortest delay in s for which there is a model: linear interpolation needs the next sample.
+    /// Returns the shortest delay in s for which there is a causal model; linear interpolation needs the next sample.
     pub(super) fn shortest_delay_s(self, sample_time: SampleTime) -> f64 {
         match self {
             Self::Auto | Self::Zoh => 0.0,
@@ -52,7 +53,7 @@ impl Intersample {
         }
     }
 
-    /// Returns the number of coefficients of B for a form of this order and degree of its numerator.
+    /// Returns the number of coefficients of B for a form with this order and with a numerator of this degree.
     pub(super) fn gains(self, order: usize, degree: usize) -> usize {
         match self {
             Self::Auto | Self::Foh => order + 2,
@@ -61,8 +62,8 @@ impl Intersample {
         }
     }
 
-    /// Returns the discrete model; `sample` is the sample that contains the delay (for a smooth error, the delay plus
-    /// half a sample), if the caller has chosen one.
+    /// Returns the discrete-time model of an operator. `sample` fixes the whole samples of the delay (for a smooth
+    /// error, of the delay plus half a sample); `None` computes them from the delay.
     pub(super) fn discrete(
         self,
         operator: &FamilyOperator,

@@ -1,15 +1,16 @@
-//! Covariances from the estimates without each of several parts of the data, and from a prior.
+//! Covariances from estimates that each omit one part of the data, and from a prior.
 //!
 //! **The jackknife** over n estimates `x_(i)`, each without one part of the data, is
-//! `(n-1)/n sum (x_(i) - mean)(x_(i) - mean)'` (B. Efron and C. Stein, *Annals of Statistics* 9 (1981) 586-596). It is
-//! the same for their differences to any fixed point.
+//! `(n-1)/n sum (x_(i) - mean)(x_(i) - mean)'` (B. Efron and C. Stein, *Annals of Statistics* 9 (1981) 586-596). It
+//! does not change if the same fixed point is subtracted from all estimates.
 //!
-//! **A prior** is a measurement that no part of the data contains. With P its curvature and H that of the whole
-//! criterion, its contribution is `H^-1 P H^-1`, in units of the variance of the residuals.
+//! **A prior** is a measurement that no part of the data contains. If P is the curvature of the prior and H the
+//! curvature of the whole criterion, its contribution is `H^-1 P H^-1`, in units of the variance of the residuals.
 
 use crate::grey_box::objective::Penalty;
 
-/// Returns the jackknife covariance by rows; `None` for fewer than two estimates.
+/// Returns the jackknife covariance by rows, given estimates that each omit one part of the data; `None` for fewer than
+/// two estimates.
 pub(super) fn jackknife(others: &[Vec<f64>]) -> Option<Vec<f64>> {
     if others.len() < 2 {
         return None;
@@ -27,7 +28,7 @@ pub(super) fn jackknife(others: &[Vec<f64>]) -> Option<Vec<f64>> {
     Some(covariance)
 }
 
-/// Adds `factor H^-1 P H^-1` at x; `inverse` is `H^-1` by rows.
+/// Adds `factor H^-1 P H^-1` to the covariance, with P evaluated at x; `inverse` is `H^-1` by rows.
 pub(super) fn add_open_part(covariance: &mut [f64], factor: f64, prior: &[Penalty], x: &[f64], inverse: &[f64]) {
     let p = x.len();
     for penalty in prior {

@@ -1,24 +1,24 @@
 //! The prediction error fit with the lines of the excitation as additional measurements of the response.
 //!
 //! In a closed loop an error of the noise model biases the prediction error fit; the fit at the lines has no such bias,
-//! but larger errors. With H_P and H_L their responses, V_P and V_L the variances of these, the difference
-//! `d = (H_L - H_P)/H_P` has the variance `V_L - V_P` if there is no bias, because an efficient estimate is not
-//! correlated with it (J. A. Hausman, *Econometrica* 46 (1978) 1251-1271). If d also contains a bias of variance
-//! `tau^2`, the share of d that minimises the mean square error is
+//! but larger errors. Let H_P and H_L be the responses of the two fits, and V_P and V_L the variances of these
+//! responses. Without bias the difference `d = (H_L - H_P)/H_P` has the variance `V_L - V_P`, because an efficient
+//! estimate is uncorrelated with d (J. A. Hausman, *Econometrica* 46 (1978) 1251-1271). If d also contains a bias of
+//! variance `tau^2`, the fraction s of d that minimises the mean squared error is
 //!
-//! `s = tau^2/(tau^2 + V_L - V_P)`, `tau^2 = max(0, D - (V_L - V_P))`, so that `s = max(0, 1 - 1/q)`,
-//! `q = mean of |d|^2/(V_L - V_P)`
+//! `s = tau^2/(tau^2 + V_L - V_P)` with `tau^2 = max(0, D - (V_L - V_P))`, where D is the mean of |d|^2; hence
+//! `s = max(0, 1 - 1/q)` with `q = mean of |d|^2/(V_L - V_P)`
 //!
 //! over the band of manual control (E. J. Green and W. E. Strawderman, *J. American Statistical Association* 86 (1991)
-//! 1001-1006: an unbiased estimate is shrunk towards a biased one to the extent that they agree).
+//! 1001-1006). The unbiased estimate is thus shrunk towards the biased estimate to the extent that the two agree.
 //!
-//! A share of the difference of the coordinates is not suitable: a gain, a lead and a lag compensate each other along a
-//! curve. Therefore the lines become a part of the criterion,
+//! The fraction cannot be applied to the difference of the coordinates, since a gain, a lead and a lag compensate each
+//! other along a curve. Instead, the lines are included in the criterion,
 //!
-//! `sum eps^2 + kappa sigma^2 w chi^2`, `w = s/(1 - s) V_L/V_P`:
+//! `sum eps^2 + kappa sigma^2 w chi^2`, `w = s/(1 - s) V_L/V_P`.
 //!
-//! with one coordinate, its minimum is at the share s of the difference. Parameters that the lines do not determine are
-//! determined by the samples.
+//! For a single coordinate the minimum of this criterion is at the fraction s of the difference. Parameters that the
+//! lines do not determine are determined by the samples.
 
 use std::{borrow::Cow, sync::Arc};
 
@@ -37,16 +37,16 @@ use super::{
 };
 use crate::{criterion::Workspace, grey_box::objective::AdditionalTerm, optimize::Objective};
 
-/// Lower bound of `V_L - V_P` relative to V_L: both are estimates.
+/// Lower bound of `V_L - V_P` relative to V_L, needed because V_L and V_P are estimates.
 const LEAST_DIFFERENCE: f64 = 0.25;
-/// Number of runs from which on their scatter gives the variances of the lines: the deviation of one run may be chance.
+/// Minimum number of runs for a joint fit: the scatter of fewer runs does not determine the variances of the lines.
 const FEWEST_RUNS: usize = 3;
-/// Largest share of the difference to the lines.
+/// Upper bound of the fraction s.
 const LARGEST_SHARE: f64 = 0.9;
 
 /// The lines that are used together with the samples.
 pub(super) enum Lines<'d> {
-    /// The response to the error.
+    /// Describing function: the response to the error as the only input.
     Response(LineData<'d>),
     /// The responses to several inputs.
     Channels(Box<ChannelCriterion>),
@@ -60,7 +60,8 @@ impl Lines<'_> {
         }
     }
 
-    /// Computes chi^2 over the elements of eta before the noise, with all variances larger by this factor.
+    /// Returns chi^2 of the lines as a criterion over the elements of eta before the noise model, with all variances
+    /// multiplied by `excess`.
     fn criterion(
         &self,
         layout: &FamilyLayout,
@@ -91,7 +92,8 @@ impl Lines<'_> {
     }
 }
 
-/// Returns the fit that includes the lines; `None` if both agree, or it does not converge.
+/// Returns the fit that includes the lines; `None` if the two fits agree, if the search fails, or with fewer than three
+/// runs.
 pub(super) fn with_lines<'a>(
     prediction: &Prediction<'a>,
     fit: &PredictionFit<'a>,
@@ -102,7 +104,7 @@ pub(super) fn with_lines<'a>(
         return None;
     }
     let layout = fit.layout();
-    // If no operator of the form fits the lines, their errors exceed their variances.
+    // If chi^2 of the best fit is too large, the variances of the lines are too small.
     let excess = lines.reduced_chi_squared().unwrap_or(1.0).max(1.0);
     let weight = weight(fit, lines, excess)?;
     let mut criterion = fit.criterion.clone();
@@ -112,12 +114,12 @@ pub(super) fn with_lines<'a>(
         weight: weight * fit.innovation_variance * fit.inflation,
     });
     let minimum = criterion.search(fit.eta().to_vec(), &prediction.search, None, workspace)?;
-    let mut found = prediction.judged(criterion, minimum, workspace).ok()?;
+    let mut found = prediction.fit_at_minimum(criterion, minimum, workspace).ok()?;
     (found.inflation, found.weight_of_lines) = (fit.inflation, weight);
     Some(found)
 }
 
-/// Returns w; `None` if it is zero, or a variance is not known.
+/// Returns the weight w; `None` if it is zero or a variance is unknown.
 fn weight(fit: &PredictionFit<'_>, lines: &LineFit, excess: f64) -> Option<f64> {
     let operator = fit.layout().operator(fit.eta(), 0).ok()?;
     let own = Covariances::of_operator(&covariances(fit)?.clustered, fit.layout(), 0);

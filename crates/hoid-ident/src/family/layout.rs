@@ -1,8 +1,9 @@
-//! Places of the coordinates of an operator and of the coefficients of its noise model in eta.
+//! Layout of eta: the coordinates of an operator and the coefficients of its noise model.
 //!
 //! `eta = [coordinates.., of channels.., c_1 .. c_nc, d_1 .. d_nd]`: the coordinates of the operator, those of further
-//! inputs, and those of the noise `v = (C/D) eps`. A coordinate that is individual to each record occurs once for each
-//! of them; channels and noise are common to all. All channels share the neuromuscular part of the operator.
+//! inputs, and the coefficients of the noise model `v = (C/D) eps`. A coordinate that is individual to each record
+//! occurs once per record; the coordinates of channels and the noise model are common to all records. All channels
+//! share the neuromuscular part of the operator.
 
 use std::ops::Range;
 
@@ -18,7 +19,7 @@ use crate::{
     grey_box::parametrisation::{HeldSamples, Mapped, Parametrisation},
 };
 
-/// Places of the parameters of each record.
+/// Indices in eta of the parameters of each record.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct FamilyLayout {
     pub form: Form,
@@ -28,10 +29,11 @@ pub(super) struct FamilyLayout {
     pub sample_time: SampleTime,
     /// Intersample behaviour of the error.
     pub intersample: Intersample,
-    /// Place in eta of each slot, for each record.
+    /// Index in eta of each parameter of a record, for each record.
     positions: Vec<Vec<usize>>,
     limits: Vec<(f64, f64)>,
-    /// Coordinate and record of each element of the operator in eta; the record is `None` for a common element.
+    /// Coordinate and record of each element of the operator in eta; the record is `None` for an element common to all
+    /// records.
     pub elements: Vec<(Coordinate, Option<usize>)>,
     /// The further inputs.
     pub channels: Vec<ChannelInLayout>,
@@ -41,10 +43,10 @@ pub(super) struct FamilyLayout {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ChannelInLayout {
     pub form: Form,
-    /// Bounds and start of its own coordinates: all except those of the neuromuscular part.
+    /// Bounds of the coordinates that only this channel has: all except those of the neuromuscular part.
     pub limits: Vec<(f64, f64)>,
     pub start: Vec<f64>,
-    /// Place of its first coordinate in eta.
+    /// Index in eta of the first of these coordinates.
     pub place: usize,
 }
 
@@ -87,7 +89,7 @@ impl FamilyLayout {
         layout
     }
 
-    /// Returns the same layout with further inputs.
+    /// Returns the layout with further inputs added.
     pub fn with_channels(mut self, channels: &[ChannelInLayout]) -> Self {
         let noise = self.limits.split_off(self.elements.len());
         for positions in &mut self.positions {
@@ -113,7 +115,7 @@ impl FamilyLayout {
         self
     }
 
-    /// Returns the index in eta of each coordinate of a channel.
+    /// Returns the index in eta of each coordinate of a channel, including the shared neuromuscular ones.
     pub fn places_of(&self, channel: &ChannelInLayout, record: usize) -> Vec<usize> {
         let of_operator = self.form.coordinates(self.neuromuscular);
         let mut own = channel.place..;
@@ -128,7 +130,7 @@ impl FamilyLayout {
         all.filter_map(place).collect()
     }
 
-    /// Returns the operator of a channel in a record.
+    /// Returns the operator from a channel to u in a record.
     pub fn channel(&self, eta: &[f64], channel: &ChannelInLayout, record: usize) -> Result<FamilyOperator, ModelError> {
         let x: Vec<f64> = (self.places_of(channel, record).iter())
             .map(|&place| eta[place])
@@ -136,28 +138,28 @@ impl FamilyLayout {
         FamilyOperator::new(channel.form, self.neuromuscular, &x)
     }
 
-    /// Place of the first coefficient of the noise.
+    /// Returns the index in eta of the first coefficient of the noise model.
     pub fn noise_begins(&self) -> usize {
         self.elements.len() + self.channels.iter().map(|channel| channel.limits.len()).sum::<usize>()
     }
 
-    /// Number of coordinates of one operator.
+    /// Returns the number of coordinates of one operator.
     pub fn coordinates(&self) -> usize {
         self.form.coordinates(self.neuromuscular).len()
     }
 
-    /// Number of elements of eta that are coordinates.
+    /// Returns the number of elements in eta that are coordinates of operators from e to u.
     pub fn operator_elements(&self) -> usize {
         self.elements.len()
     }
 
-    /// The coordinates of a record.
+    /// Returns the coordinates of the operator of a record.
     pub fn coordinates_of(&self, eta: &[f64], record: usize) -> Vec<f64> {
         let own = &self.positions[record][..self.coordinates()];
         own.iter().map(|&place| eta[place]).collect()
     }
 
-    /// Returns an eta with the same operator for all records.
+    /// Returns eta with the same operator for all records.
     pub fn spread(&self, coordinates: &[f64], noise: &[f64]) -> Vec<f64> {
         let all = self.form.coordinates(self.neuromuscular);
         let value = |(coordinate, _): &(Coordinate, Option<usize>)| {
@@ -169,12 +171,12 @@ impl FamilyLayout {
         operators.chain(of_channels.chain(noise).copied()).collect()
     }
 
-    /// The operator of a record.
+    /// Returns the operator of a record.
     pub fn operator(&self, eta: &[f64], record: usize) -> Result<FamilyOperator, ModelError> {
         FamilyOperator::new(self.form, self.neuromuscular, &self.coordinates_of(eta, record))
     }
 
-    /// Returns the longest possible nk.
+    /// Returns the nk of the longest delay within the bounds.
     pub fn longest_nk(&self) -> Result<usize, ModelError> {
         let longest = self.delays().into_iter().map(|i| self.limits[i].1).fold(0.0, f64::max);
         Ok(whole_samples(longest, self.sample_time)? + 1)
@@ -258,7 +260,7 @@ impl Parametrisation for FamilyLayout {
         let mut theta = found.b.clone();
         theta.extend_from_slice(noise);
         theta.extend_from_slice(&found.f);
-        // Each slot: its derivatives, and the index in theta of the first of them.
+        // For each parameter: its derivatives, and the index in theta of the first of them.
         let mut slopes: Vec<Vec<(usize, f64)>> = Vec::new();
         let (nb, behind) = (found.b.len(), found.b.len() + noise.len());
         for i in 0..self.coordinates() {

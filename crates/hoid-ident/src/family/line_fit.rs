@@ -1,4 +1,4 @@
-//! The operator fitted to the lines of the excitation, with its errors from the jackknife over runs.
+//! Fit of the operator to the lines of the excitation, with errors from a jackknife over runs.
 
 use hoid_model::{FamilyOperator, Form, uncertainty::Estimate};
 
@@ -10,26 +10,27 @@ use super::{
 };
 use crate::{IdentError, SearchOptions, Termination, grey_box::objective::Penalty};
 
-/// Number of runs from which on the covariance is that of the jackknife over them.
+/// Minimum number of runs for a covariance from the jackknife over runs.
 const FEWEST_RUNS: usize = 5;
 
-/// A fit of one form at the lines.
+/// Fit of one form at the lines of the excitation.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LineFit {
     /// The operator.
     pub operator: FamilyOperator,
-    /// Covariance of its coordinates by rows: from the jackknife over five or more runs, otherwise from the variances
-    /// of the lines; with the contribution of the prior.
+    /// Covariance of the coordinates by rows, with the contribution of the prior: from the jackknife over runs if there
+    /// are at least five runs and a single input, otherwise from the variances of the lines.
     pub covariance: Option<Vec<f64>>,
-    /// Ratio of the variance after the lines to that before, for each coordinate: 0 without a prior, 1 at a bound.
+    /// Ratio of the posterior to the prior variance of each coordinate: 0 without a prior, 1 at a bound.
     pub prior_shares: Vec<f64>,
     /// chi^2 of the lines.
     pub chi_squared: f64,
-    /// Number of real equations (two per line) minus the number of free parameters.
+    /// Number of real equations (two per line) minus the number of coordinates; with a single input, coordinates at a
+    /// bound are not subtracted.
     pub degrees_of_freedom: usize,
-    /// chi^2 of each run for the fit without it; `None` for fewer than three runs.
+    /// chi^2 of each run for the fit to the other runs; `None` for fewer than three runs or several inputs.
     pub held_out: Option<Vec<f64>>,
-    /// How the search ended.
+    /// Termination of the search.
     pub termination: Termination,
     /// Covariance from the variances of the lines.
     pub(super) by_lines: Option<Vec<f64>>,
@@ -39,17 +40,17 @@ pub struct LineFit {
 }
 
 impl LineFit {
-    /// chi^2 per degree of freedom; `None` for zero degrees of freedom.
+    /// Returns chi^2 per degree of freedom; `None` for zero degrees of freedom.
     pub fn reduced_chi_squared(&self) -> Option<f64> {
         (self.degrees_of_freedom > 0).then(|| self.chi_squared / self.degrees_of_freedom as f64)
     }
 
-    /// Sum of chi^2 of the held-out runs.
+    /// Returns the sum of chi^2 over the held-out runs.
     pub fn held_out_total(&self) -> Option<f64> {
         self.held_out.as_ref().map(|runs| runs.iter().sum())
     }
 
-    /// Converts the operator of a fit with several inputs.
+    /// Creates the fit of the operator from a fit with several inputs.
     pub(super) fn of_channels(operator: FamilyOperator, found: &ChannelMinimum, penalty: &[Penalty]) -> Self {
         let (p, q) = (operator.coordinates().len(), found.coordinates.len());
         let by_lines = found.covariance.as_ref().map(|c| -> Vec<f64> {
@@ -78,12 +79,12 @@ impl LineFit {
         }
     }
 
-    /// Returns the coordinates of the operator and of its channels, in the order of eta.
+    /// Returns the coordinates of the operator and of the further inputs, in the order of eta.
     pub(super) fn elements(&self) -> Vec<f64> {
         [self.operator.coordinates(), &self.of_channels].concat()
     }
 
-    /// Returns the parameters by name, with their errors to first order; without an error for infinite values.
+    /// Returns names, values and first-order standard errors of the parameters; infinite values have no standard error.
     pub fn parameters(&self) -> Vec<(&'static str, Estimate)> {
         let all = self.operator.named_estimates(self.covariance.as_deref());
         all.into_iter()
@@ -92,7 +93,7 @@ impl LineFit {
     }
 }
 
-/// Fits one form.
+/// Fits one form to the lines.
 ///
 /// # Errors
 /// [`IdentError::NoFiniteLoss`].
@@ -107,7 +108,7 @@ pub(super) fn line_fit(
     let runs = lines.runs();
     let (mut others, mut held_out) = (Vec::new(), Vec::new());
     if runs >= 3 {
-        // The fits without one run are used twice: as held-out predictions, and as replications of the jackknife.
+        // Each fit without one run serves as a held-out prediction and as a replication of the jackknife.
         for run in 0..runs {
             let points = lines.without(run);
             let Some(without) = criterion.with_points(&points).fit_from(&found.coordinates, search) else {
@@ -124,7 +125,7 @@ pub(super) fn line_fit(
         .flatten();
     let by_lines = criterion.covariance(&found);
     let covariance = by_lines.clone().map(|by_lines| match by_runs {
-        // The prior is the same in all replications, so that their scatter lacks its contribution.
+        // All replications use the same prior, so that their scatter does not include its contribution.
         Some(mut covariance) => {
             add_open_part(&mut covariance, 1.0, &criterion.penalty, &found.coordinates, &by_lines);
             covariance
@@ -148,7 +149,8 @@ pub(super) fn line_fit(
     Ok((fit, found))
 }
 
-/// Sorts the forms by preference for equal fits: fewer coordinates first, the family before its rivals.
+/// Sorts the forms in the order of preference for equal fits: fewer coordinates first, and of equally many the forms of
+/// the family before alternative forms.
 pub(super) fn by_simplicity(forms: &mut [Form]) {
     forms.sort_by_key(|form| (form.simplicity(), *form));
 }

@@ -1,10 +1,11 @@
-//! The describing function at the lines of a periodic excitation, with variances that are reliable for few runs.
+//! The describing function at the lines of a periodic excitation, with variances that are reliable even for few runs.
 //!
-//! The scatter of n runs gives the variance of a line with 2(n - 1) degrees of freedom, and the smallest of few such
-//! variances would dominate the fit. The relative variances `r_j = v_j/|H_j|^2` are shrunk towards those of the remnant
-//! near the line, which are computed from many bins: `r_j <- (nu r_j + nu_0 c b_j)/(nu + nu_0)`, `nu = 2(n - 1)`, b_j
-//! from the remnant and c the median of `r_j/b_j`, the difference of runs in excess of their remnant (moderated
-//! variances; G. K. Smyth, *Statistical Applications in Genetics and Molecular Biology* 3 (2004), article 3).
+//! The scatter of n runs gives the variance of each line with 2(n - 1) degrees of freedom. For small n the smallest of
+//! these variances would dominate the fit. The relative variances `r_j = v_j/|H_j|^2` are therefore shrunk towards the
+//! relative variance b_j of the remnant near the line, which is computed from many bins:
+//! `r_j <- (nu r_j + nu_0 c b_j)/(nu + nu_0)` with `nu = 2(n - 1)`. The factor c is the median of `r_j/b_j`, at least
+//! one, and represents differences between runs in excess of the remnant (moderated variances; G. K. Smyth,
+//! *Statistical Applications in Genetics and Molecular Biology* 3 (2004), article 3).
 
 use hoid_model::Complex64;
 use hoid_numerics::statistics::upper_median;
@@ -12,17 +13,18 @@ use hoid_numerics::statistics::upper_median;
 use super::response_fit::MeasuredResponse;
 use crate::frequency::DescribingFunction;
 
-/// Degrees of freedom nu_0 of the variance towards which another is shrunk.
+/// Degrees of freedom nu_0 of the variance from neighbouring bins.
 const PRIOR_FREEDOM: f64 = 8.0;
-/// Number of runs from which on their scatter determines c.
+/// Minimum number of runs whose scatter is used.
 pub(super) const FEWEST_RUNS: usize = 3;
 
-/// Variance from the scatter of this number of runs, shrunk towards that of the remnant next to the line.
-pub(super) fn moderated(runs: usize, of_runs: Option<f64>, beside: f64, excess: f64) -> f64 {
+/// Returns the variance of a line: the variance from the scatter of the runs, shrunk towards the variance of the
+/// remnant in neighbouring bins times `excess`.
+pub(super) fn moderated(runs: usize, of_runs: Option<f64>, neighbour_variance: f64, excess: f64) -> f64 {
     let nu = 2.0 * (runs as f64 - 1.0);
     match of_runs {
-        Some(v) if runs >= FEWEST_RUNS => (nu * v + PRIOR_FREEDOM * excess * beside) / (nu + PRIOR_FREEDOM),
-        _ => beside,
+        Some(v) if runs >= FEWEST_RUNS => (nu * v + PRIOR_FREEDOM * excess * neighbour_variance) / (nu + PRIOR_FREEDOM),
+        _ => neighbour_variance,
     }
 }
 
@@ -37,18 +39,18 @@ impl<'d> LineData<'d> {
     pub fn new(describing: &'d DescribingFunction) -> Self {
         let runs = describing.runs.len();
         let lines = &describing.lines;
-        let beside = |i: usize| lines[i].neighbour_error.powi(2);
+        let neighbour_variance = |i: usize| lines[i].neighbour_error.powi(2);
         let mut ratios: Vec<f64> = (0..lines.len())
-            .filter_map(|i| Some(lines[i].standard_error?.powi(2) / beside(i)))
+            .filter_map(|i| Some(lines[i].standard_error?.powi(2) / neighbour_variance(i)))
             .filter(|r| r.is_finite())
             .collect();
-        // A scatter of runs below their remnant is due to chance.
+        // A scatter between runs that is smaller than their remnant is due to chance.
         let excess = match upper_median(&mut ratios) {
             Some(median) if runs >= FEWEST_RUNS => median.max(1.0),
             _ => 1.0,
         };
         let of_runs = |i: usize| lines[i].standard_error.map(|s| s * s);
-        let variance = |i: usize| moderated(runs, of_runs(i), beside(i), excess);
+        let variance = |i: usize| moderated(runs, of_runs(i), neighbour_variance(i), excess);
         let point = |i: usize| MeasuredResponse {
             omega_rad_s: lines[i].omega_rad_s,
             response: lines[i].response,
@@ -64,7 +66,7 @@ impl<'d> LineData<'d> {
         self.describing.runs.len()
     }
 
-    /// Returns the points of all runs except one; their variances are those of the remaining number of runs.
+    /// Returns the points averaged over all runs except one, with the variances for this smaller number of runs.
     pub fn without(&self, run: usize) -> Vec<MeasuredResponse> {
         let n = self.runs() as f64;
         let fewer = |(point, line): (&MeasuredResponse, &crate::frequency::Line)| MeasuredResponse {
@@ -75,14 +77,14 @@ impl<'d> LineData<'d> {
         self.points.iter().zip(&self.describing.lines).map(fewer).collect()
     }
 
-    /// Returns chi^2 of one run for the sampled response of an operator that was fitted without it.
+    /// Returns chi^2 of one run for an operator that was fitted without this run; `sampled` is its sampled response.
     pub fn chi_squared_of_run(&self, run: usize, sampled: impl Fn(f64) -> Complex64) -> f64 {
         let n = self.runs() as f64;
         let of = |(point, line): (&MeasuredResponse, &crate::frequency::Line)| {
             let (a, b) = line.ratio.0[run];
             let whole: Complex64 = line.ratio.0.iter().map(|(_, b)| b).sum();
             let model = sampled(point.omega_rad_s);
-            // An error with n times the variance of the mean.
+            // The error of a single run has n times the variance of the mean.
             2.0 * ((a - model * b) * n / whole).norm_sqr() / (n * point.variance)
         };
         self.points.iter().zip(&self.describing.lines).map(of).sum()

@@ -1,13 +1,15 @@
-//! Open loop with its controlled element: all crossings with their errors, and the stability of the closed loop.
+//! The open loop of an operator and its controlled element: all crossings with their errors, and the stability of the
+//! closed loop.
 //!
-//! `L = Y Y_c`, Y the sampled response of the estimate, Y_c exact. With the covariance of real and imaginary part of
-//! `dL/L = dY/Y` at a frequency, a crossing of `|L| = 1` and the phase there change as in [`super::open_loop`], and a
-//! crossing of the negative real axis by `d omega = -Im(dL/L)/Im(d ln L/d omega)`, so that the gain margin changes by
+//! The open loop is `L = Y Y_c`, where Y is the sampled response of the estimate and Y_c is exact. The errors follow
+//! from the covariance of the real and imaginary part of `dL/L = dY/Y`. A crossing of `|L| = 1` and the phase at this
+//! crossing change as in [`super::open_loop`]. A crossing of the negative real axis changes by
+//! `d omega = -Im(dL/L)/Im(d ln L/d omega)`, so that the gain margin changes by
 //! `-(20/ln 10) (Re(dL/L) + Re(d ln L/d omega) d omega)` dB.
 //!
-//! An unstable closed loop becomes stable only if L passes through -1 at some frequency. Its distance from this, in
-//! standard errors, is the minimum of `(1 + L)' C_L^-1 (1 + L)` over frequency, chi-squared with two degrees of freedom
-//! for a loop at the limit of stability.
+//! An unstable closed loop can become stable only if L passes through -1 at some frequency. The squared distance of L
+//! from -1, in standard errors, is the minimum of `(1 + L)' C_L^-1 (1 + L)` over frequency. For a loop at the stability
+//! limit it has a chi-squared distribution with two degrees of freedom.
 
 use std::f64::consts::LN_10;
 
@@ -19,42 +21,43 @@ use hoid_model::{
 
 use super::open_loop::{Crossover, followed_margin_deg};
 
-/// Range in which crossings are searched for, rad/s.
+/// Frequency range in which crossings are searched, rad/s.
 const RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
 /// Largest plausible phase margin of a person, deg.
-const FARTHEST_MARGIN_DEG: f64 = 120.0;
+const LARGEST_MARGIN_DEG: f64 = 120.0;
 /// 95 % quantile of chi-squared with two degrees of freedom.
 const CHI_SQUARED: f64 = 5.991_464_547_107_979;
-/// Number of points at which the distance from -1 is computed.
+/// Number of frequencies at which the distance from -1 is computed.
 const POINTS: usize = 400;
 
-/// An operator at a frequency: its sampled response, and the covariance of the real and imaginary part of its relative
-/// error.
+/// An operator at one frequency: its sampled response, and the covariance of the real and imaginary part of its
+/// relative error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KnownResponse {
-    /// Y.
+    /// Sampled response Y.
     pub value: Complex64,
-    /// Covariance of `dY/Y`; `None` if not known.
+    /// Covariance of the real and imaginary part of `dY/Y`; `None` if unknown.
     pub relative: Option<[[f64; 2]; 2]>,
 }
 
 /// All crossings of an open loop, and the stability of the closed loop.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoopShape {
-    /// All frequencies in rad/s at which `|L| = 1`, the lowest first, each with its phase margin in deg.
+    /// All frequencies in rad/s at which `|L| = 1`, in ascending order, each with the phase margin in deg.
     pub crossovers: Vec<(Estimate, Estimate)>,
-    /// The frequency in rad/s at which L crosses the negative real axis nearest to -1, with the gain margin in dB.
+    /// Frequency in rad/s at which L crosses the negative real axis closest to -1, with the gain margin in dB.
     pub gain_margin: Option<(Estimate, Estimate)>,
-    /// Closed-loop poles in the right half plane; `None` if that cannot be determined.
+    /// Number of closed-loop poles in the right half plane; `None` if it cannot be determined.
     pub unstable_poles: Option<usize>,
-    /// Least chi-squared of a loop at the limit of stability; `None` without a covariance.
+    /// Smallest chi-squared of a change to a loop at the stability limit; `None` without a covariance or for a loop
+    /// that is not unstable.
     distance: Option<f64>,
-    /// Phase margin in deg at the lowest crossover, with the phase followed from low frequencies.
+    /// Phase margin in deg at the lowest crossover, with the phase unwrapped from low frequencies.
     followed_deg: Option<f64>,
 }
 
 impl LoopShape {
-    /// Computes the crossings of an operator with its controlled element.
+    /// Computes the open loop of an operator and a controlled element: crossings, margins and stability.
     pub fn of(
         operator: impl Fn(f64) -> KnownResponse,
         element: &ContinuousTransferFunction,
@@ -104,7 +107,7 @@ impl LoopShape {
         }
     }
 
-    /// The phase margin nearest to zero in deg, with its frequency in rad/s.
+    /// Returns the phase margin in deg that is closest to zero, preceded by its crossover frequency in rad/s.
     pub fn smallest_margin(&self) -> Option<(Estimate, Estimate)> {
         let nearest = |held: &(Estimate, Estimate), next: &(Estimate, Estimate)| {
             held.1.value.abs().total_cmp(&next.1.value.abs())
@@ -112,23 +115,23 @@ impl LoopShape {
         self.crossovers.iter().copied().min_by(nearest)
     }
 
-    /// True if the closed loop is stable; `None` if that cannot be determined.
+    /// True if the closed loop is stable; `None` if its stability cannot be determined.
     pub fn is_stable(&self) -> Option<bool> {
         self.unstable_poles.map(|count| count == 0)
     }
 
-    /// Returns evidence against the operator: a record that remains bounded was made in a stable loop, which has a
-    /// crossover and a positive phase margin, and the margin of a person is at most 120 deg. `reach_deg` is half of the
-    /// 95 % interval of the margin at the lowest crossover. `None` if there is no such evidence.
+    /// Returns evidence against the operator; `None` if there is no such evidence. A record that remains bounded must
+    /// come from a stable loop, which has a crossover and a positive phase margin, and a person's phase margin is at
+    /// most 120 deg. `reach_deg` is half the width of the 95 % interval of the margin at the lowest crossover.
     pub fn doubt(&self, reach_deg: f64) -> Option<Finding> {
         let remedy = "check the controlled element, the signs and units of e and u and the time shift between them";
         let (Some((crossover, _)), Some(margin)) = (self.crossovers.first(), self.followed_deg) else {
             return Some(Finding::doubt(
                 "no-crossover",
-                format!("the gain of the loop with this controlled element does not cross one from above: {remedy}"),
+                format!("the gain of the loop with this controlled element does not cross 1 from above: {remedy}"),
             ));
         };
-        if margin + reach_deg <= 0.0 || margin > FARTHEST_MARGIN_DEG {
+        if margin + reach_deg <= 0.0 || margin > LARGEST_MARGIN_DEG {
             return Some(Finding::doubt(
                 "unstable-loop",
                 format!(
@@ -146,7 +149,8 @@ impl LoopShape {
             Finding::note(
                 "unstable-loop",
                 format!(
-                    "the loop with this controlled element is not stable at the estimates ({at}), but may be within their errors"
+                    "the loop with this controlled element is not stable at the estimates ({at}), but may be stable \
+                     within their errors"
                 ),
             )
         } else {
@@ -160,7 +164,7 @@ impl LoopShape {
         })
     }
 
-    /// Formats every crossover with its margin.
+    /// Formats every crossover with its phase margin.
     fn as_text(&self) -> String {
         let each = self.crossovers.iter();
         let each =
@@ -169,7 +173,7 @@ impl LoopShape {
     }
 }
 
-/// Least chi-squared of a change of the operator for which L passes through -1.
+/// Returns the smallest chi-squared of a change of the operator for which L passes through -1.
 fn distance_from_the_limit(
     operator: &impl Fn(f64) -> KnownResponse,
     element: &ContinuousTransferFunction,
@@ -180,10 +184,10 @@ fn distance_from_the_limit(
         let omega = at(i);
         let known = operator(omega);
         let [[a, b], [_, c]] = known.relative?;
-        // (1 + L)/L: the necessary relative change of Y.
+        // Relative change of Y that moves L to -1: (1 + L)/L.
         let open_loop = known.value * element.response(omega);
         let d = (Complex64::new(1.0, 0.0) + open_loop) / open_loop;
-        // With a single parameter the covariance has rank one.
+        // For a single parameter the covariance has rank one.
         let (a, c) = (a + 1e-9 * (a + c), c + 1e-9 * (a + c));
         let distance = (c * d.re * d.re - 2.0 * b * d.re * d.im + a * d.im * d.im) / (a * c - b * b);
         distance.is_finite().then_some(distance)

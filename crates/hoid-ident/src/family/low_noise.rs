@@ -1,15 +1,17 @@
-//! Recordings with little noise, or none: simulations, and first trials of users.
+//! Recordings with little or no noise: simulations, and first attempts of new users.
 //!
-//! The error of the frequency response from which searches start exceeds such noise, so that an autoregression of the
-//! residual part of u would model the operator instead of the noise. If a form leaves a small residual, all forms are
-//! first fitted by output error, `u = c + Y e + v` with v assumed white and without a prior (L. Ljung, *System
-//! Identification*, 1999, section 8.4: it is consistent in a closed loop if v vanishes): the result is near the true
-//! operator, and the noise model is fitted from there. Without any noise it is the true operator, to the precision of
-//! the data, including the intersample behaviour of the error ([`Intersample`]).
+//! In such recordings the error of the frequency response that supplies the starts exceeds the noise. An autoregression
+//! of the residual part of u would then model the operator instead of the noise. If a form leaves a small residual, all
+//! forms are therefore first fitted by output error, `u = c + Y e + v` with v assumed white and without a prior (L.
+//! Ljung, *System Identification*, 1999, section 8.4: the estimate is consistent in a closed loop if v vanishes). The
+//! result is close to the true operator, and the fit with a noise model starts from there. Without any noise, the
+//! result is the true operator to the precision of the data, including the intersample behaviour of the error
+//! ([`Intersample`]).
 //!
-//! **Level.** The means that were removed from e and u are those of a steady state, which a record is not: the effect
-//! of the time before its first sample remains in u as a constant. If a mean was removed, c is an unknown of each
-//! record, eliminated with the initial states ([`crate::criterion::Data::level`]).
+//! **Level.** Removing the means of e and u is correct for a steady state. A record is not in a steady state: the
+//! effect of the time before its first sample remains in u as a constant. If a mean was removed, a constant c is
+//! therefore estimated for each record and eliminated together with the initial states
+//! ([`crate::criterion::Data::level`]).
 
 use hoid_model::Form;
 
@@ -20,49 +22,52 @@ use super::{
 };
 use crate::{SearchOptions, criterion::Workspace, optimize::Objective};
 
-/// Share of the power of u that a start may leave if an output error search follows.
+/// Residual power of a start, relative to the power of u, below which output error searches are run.
 const LARGEST_AT_START: f64 = 0.05;
-/// Share that the best of them may leave if there is little noise: no operator explains this much of a person's u.
-const LITTLE: f64 = 5e-3;
-/// Share below which the residual is rounding, at which a search ends.
+/// Relative residual power of the best form below which there is little noise: no operator explains u of a person so
+/// well.
+const LOW_NOISE_SHARE: f64 = 5e-3;
+/// Relative residual power below which the residual is rounding error and the search ends.
 const ROUNDING: f64 = 1e-25;
-/// Number of grid points from which the search of a form is repeated if it has not been found without noise, and number
-/// of repetitions: the second uses the best form of the first.
+/// Number of grid points for further searches of a form whose residual is not yet small, and number of rounds of such
+/// searches. The second round uses the best form of the first round.
 const MORE_STARTS: usize = 4;
 const ROUNDS: usize = 2;
-/// Relative difference of the shares of two intersample behaviours that is decisive. For a continuous error the model
-/// of a hold misses `x^2/6` and that of linear interpolation `x^2/3`: a quarter of the squares, and neither is right.
-const DECIDES: f64 = 0.02;
-/// Ratio of a share to the smallest above which a form may not have been found.
-const WORSE: f64 = 1.1;
-/// Largest number of steps of a search.
+/// Ratio of the residual powers for two intersample behaviours below which the difference is decisive. For a continuous
+/// error neither model is right: the hold has the relative error `x^2/6` and linear interpolation `x^2/3` with
+/// `x = omega Ts/2`, so that the ratio of the residual powers is only 1/4.
+const DECISIVE_RATIO: f64 = 0.02;
+/// Ratio of the residual power of a form to the smallest residual power, above which the search may have ended in
+/// another minimum.
+const OTHER_MINIMUM_RATIO: f64 = 1.1;
+/// Maximum number of steps of a search.
 const MOST_STEPS: usize = 200;
 
 /// A form with the starting coordinates of its searches.
 pub(super) type Starts = (Form, Vec<Vec<f64>>);
 
-/// Result of the search of a form.
+/// Result of the searches for one form.
 #[derive(Debug, Clone)]
 pub(super) struct End {
     pub coordinates: Vec<f64>,
-    /// Share of the power of u that is left.
+    /// Residual power relative to the power of u.
     share: f64,
 }
 
-/// Results of all forms if there is little noise.
+/// Results of the output error searches of all forms, if there is little noise.
 #[derive(Debug, Clone)]
 pub(super) struct LittleNoise {
-    /// The result of each form; `None` if its search failed.
+    /// Result of each form; `None` if its searches failed.
     pub ends: Vec<Option<End>>,
-    /// The smallest share of the power of u that is left.
+    /// Smallest residual power over all forms, relative to the power of u.
     pub share: f64,
-    /// The smallest value of Schwarz's criterion.
+    /// Smallest value of Schwarz's criterion over all forms.
     criterion: f64,
 }
 
 impl LittleNoise {
-    /// Searches all forms; `None` if there is more noise. If an ARX model of high order finds almost no noise
-    /// (`clean`), the starts may be far off.
+    /// Searches all forms by output error; `None` if there is more noise. `clean` is true if a high-order ARX model
+    /// leaves almost no noise; the searches are then run even from starts with a large residual.
     pub fn of(
         prediction: &Prediction<'_>,
         neuromuscular: bool,
@@ -93,17 +98,17 @@ impl LittleNoise {
             .map(|(form, starts)| search.least(*form, starts, workspace));
         let mut ends: Vec<Option<End>> = ends.collect();
         for round in 0..ROUNDS {
-            let Some((best, share)) = least_of(&ends).filter(|(_, share)| clean || *share < LITTLE) else {
+            let Some((best, share)) = least_of(&ends).filter(|(_, share)| clean || *share < LOW_NOISE_SHARE) else {
                 break;
             };
-            // A response without noise is exactly that of a form: if no form fits, the best form is not reported
-            // either.
+            // A response without noise belongs exactly to some form. If no form fits exactly, the minimum of the best
+            // form is also wrong, and this form is searched again.
             let none_is_found = clean && round > 0 && share >= NONE;
-            // If the residual is noise, there is nothing more to find.
+            // A form whose residual is close to the smallest one is not searched again.
             let beside = (starts[best].0, ends[best].clone()?.coordinates);
             for ((form, _), end) in starts.iter().zip(&mut ends) {
                 let known = end.as_ref().map_or(f64::INFINITY, |end| end.share);
-                if known < NONE || (known < WORSE * share && !none_is_found) {
+                if known < NONE || (known < OTHER_MINIMUM_RATIO * share && !none_is_found) {
                     continue;
                 }
                 let more = search.more_starts(*form, &beside, workspace);
@@ -113,7 +118,7 @@ impl LittleNoise {
                     .or(end.take());
             }
         }
-        let (_, share) = least_of(&ends).filter(|(_, share)| *share < LITTLE)?;
+        let (_, share) = least_of(&ends).filter(|(_, share)| *share < LOW_NOISE_SHARE)?;
         let n = prediction.samples() as f64;
         let criterion = (ends.iter().zip(starts)).filter_map(|(end, (form, _))| {
             let size = form.coordinates(neuromuscular).len() as f64;
@@ -123,7 +128,7 @@ impl LittleNoise {
         Some(Self { ends, share, criterion })
     }
 
-    /// Moves the starts to these results, with delays longer by `later_s`.
+    /// Replaces the starts by the results of these searches, with delays longer by `later_s`.
     pub fn move_to_ends(&self, starts: &mut [Starts], later_s: f64) {
         for ((_, coordinates), end) in starts.iter_mut().zip(&self.ends) {
             if let Some(end) = end {
@@ -136,19 +141,19 @@ impl LittleNoise {
         }
     }
 
-    /// Returns the intersample behaviour with the better fit, for searches with a smooth and a held error, and whether
-    /// the difference is decisive.
+    /// Returns the intersample behaviour that fits better, given the searches with a smooth and with a held error, and
+    /// whether the difference is decisive.
     pub fn course(smooth: &Self, held: &Self) -> (Intersample, bool) {
         match held.share.max(ROUNDING) / smooth.share.max(ROUNDING) {
-            ratio if ratio < DECIDES => (Intersample::Zoh, true),
-            ratio if ratio > 1.0 / DECIDES => (Intersample::Foh, true),
+            ratio if ratio < DECISIVE_RATIO => (Intersample::Zoh, true),
+            ratio if ratio > 1.0 / DECISIVE_RATIO => (Intersample::Foh, true),
             _ if held.criterion < smooth.criterion => (Intersample::Zoh, false),
             _ => (Intersample::Auto, false),
         }
     }
 }
 
-/// Returns the form with the smallest residual, and its share.
+/// Returns the index and the relative residual power of the form with the smallest residual.
 fn least_of(ends: &[Option<End>]) -> Option<(usize, f64)> {
     let shares = ends
         .iter()
@@ -157,7 +162,7 @@ fn least_of(ends: &[Option<End>]) -> Option<(usize, f64)> {
     shares.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Output error searches with one intersample behaviour of the error.
+/// Output error searches for one intersample behaviour of the error.
 struct Search<'p, 'a> {
     prediction: &'p Prediction<'a>,
     neuromuscular: bool,
@@ -165,7 +170,7 @@ struct Search<'p, 'a> {
 }
 
 impl Search<'_, '_> {
-    /// Returns the best result of searches from these coordinates.
+    /// Searches from these coordinates and returns the best result.
     fn least(&self, form: Form, starts: &[Vec<f64>], workspace: &mut Workspace) -> Option<End> {
         let criterion = self.prediction.criterion((form, self.neuromuscular), (0, 0));
         let search = SearchOptions {
@@ -190,15 +195,15 @@ impl Search<'_, '_> {
         best
     }
 
-    /// Returns the grid points of a form with the smallest residuals, each with its best gain, by themselves and with
-    /// the neuromuscular system and the delay of another operator. u is linear in the gain, so that one step from a
-    /// gain of zero gives the best.
+    /// Returns the grid points of a form with the smallest residuals, each with its best gain. The grid is used as it
+    /// is, and also with the neuromuscular system and the delay of another operator. Since u is linear in the gain, one
+    /// step from a gain of zero gives the best gain.
     fn more_starts(&self, form: Form, beside: &(Form, Vec<f64>), workspace: &mut Workspace) -> Vec<Vec<f64>> {
         let (prediction, neuromuscular) = (self.prediction, self.neuromuscular);
         let criterion = prediction.criterion((form, neuromuscular), (0, 0));
         let limits = coordinates::limits(form, neuromuscular, prediction.delay_range_s, prediction.sample_time);
         let mut grid = coordinates::start_grid(form, neuromuscular, &limits, Grid::Default);
-        // These are the last coordinates of all forms.
+        // The neuromuscular system and the delay are the last coordinates of every form.
         let tail = 1 + if neuromuscular { 2 } else { 0 };
         let of_other = &beside.1[beside.1.len() - tail..];
         let mut moved: Vec<Vec<f64>> = (grid.iter())
@@ -221,7 +226,7 @@ impl Search<'_, '_> {
         all.into_iter().take(MORE_STARTS).map(|(_, point)| point).collect()
     }
 
-    /// Returns the share of the power of u that an operator leaves.
+    /// Returns the power of the part of u that an operator does not explain, relative to the power of u.
     fn left(&self, form: Form, coordinates: &[f64], workspace: &mut Workspace) -> Option<f64> {
         let left = self
             .prediction

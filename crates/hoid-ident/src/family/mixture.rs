@@ -1,28 +1,28 @@
 //! An estimate averaged over the forms that the data do not reject.
 //!
-//! Form f has the weight `w_f = exp(-Delta_f/2)/sum exp(-Delta_g/2)`, Delta its difference in Akaike's
-//! criterion to the least (H. Akaike, *J. Econometrics* 16 (1981) 3-14). A quantity x that forms have in
-//! common is
+//! Form f has the weight `w_f = exp(-Delta_f/2)/sum exp(-Delta_g/2)`, where Delta_f is its value of Akaike's criterion
+//! minus the smallest value (H. Akaike, *J. Econometrics* 16 (1981) 3-14). The estimate of a quantity x that several
+//! forms have in common is
 //!
-//! `x = sum w_f x_f`,  `s^2 = sum w_f (s_f^2 + (x_f - x)^2)`,
+//! `x = sum w_f x_f`,  `s^2 = sum w_f (s_f^2 + (x_f - x)^2)`
 //!
-//! the unconditional standard error (K. P. Burnham and D. R. Anderson, *Sociological Methods and Research* 33 (2004)
-//! 261-304, eq. 9): the uncertainty of the choice of a form is a part of the error. A form without x is left out, and
-//! the other weights are scaled to a sum of one. The 95 % interval is that of the mixture of the distributions of the
-//! forms, each composed of two halves of Student's distribution that meet at `x_f` and end at its own interval, which
-//! need not be symmetric.
+//! with s the unconditional standard error (K. P. Burnham and D. R. Anderson, *Sociological Methods and Research* 33
+//! (2004) 261-304, eq. 9), which includes the uncertainty in the choice of the form. A form without x is omitted, and
+//! the other weights are scaled to a sum of one. The 95 % interval is computed for the mixture of the distributions of
+//! all forms. Each distribution consists of two halves of Student's distribution that meet at `x_f` and are scaled to
+//! the ends of the interval of that form, which may be asymmetric.
 
 use hoid_model::uncertainty::Estimate;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::clusters::{freedom, quantile};
 
-/// Halvings of a bracket.
+/// Number of bisection steps for each end of an interval.
 const HALVINGS: usize = 80;
 /// Distance from the intervals, in widths of their union, beyond which Student's distribution leaves less than a
 /// hundredth of [`TAIL`].
 const FAR: f64 = 50.0;
-/// Probability in each tail.
+/// Probability in each tail outside the interval.
 const TAIL: f64 = 0.025;
 
 /// Estimate of a quantity in one form.
@@ -30,13 +30,13 @@ const TAIL: f64 = 0.025;
 pub(super) struct Component {
     /// Weight of the form.
     pub weight: f64,
-    /// Its estimate.
+    /// Estimate of the quantity.
     pub estimate: Estimate,
-    /// Its 95 % interval.
+    /// 95 % interval of the quantity.
     pub interval: Option<(f64, f64)>,
 }
 
-/// Estimate over all forms.
+/// Estimate of a quantity, averaged over the forms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Mixture {
     pub estimate: Estimate,
@@ -44,7 +44,8 @@ pub(super) struct Mixture {
 }
 
 impl Mixture {
-    /// Averages over these forms; `None` if there are none. Errors are based on this number of clusters.
+    /// Averages an estimate over forms; `None` without forms. `clusters` is the number of clusters on which the errors
+    /// are based.
     pub fn of(components: &[Component], clusters: usize) -> Option<Self> {
         let total: f64 = components.iter().map(|c| c.weight).sum();
         if let [only] = components {
@@ -58,7 +59,7 @@ impl Mixture {
         }
         let over = |of: &dyn Fn(&Component) -> f64| components.iter().map(|c| c.weight / total * of(c)).sum::<f64>();
         let value = over(&|c| c.estimate.value);
-        // A missing error is not an error of zero.
+        // A missing standard error must not count as zero.
         let known = components.iter().all(|c| c.estimate.standard_error.is_some()) && value.is_finite();
         let variance = over(&|c| {
             let s = c.estimate.standard_error.unwrap_or(0.0);
@@ -77,7 +78,7 @@ impl Mixture {
 /// Weight, estimate and interval of a form.
 type Part = (f64, f64, (f64, f64));
 
-/// Returns the interval of the mixture; `None` if a form has none.
+/// Returns the 95 % interval of the mixture; `None` if a form has no interval.
 fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f64, f64)> {
     let student = StudentsT::new(0.0, 1.0, freedom(clusters)).ok()?;
     let quantile = quantile(clusters);
@@ -85,12 +86,12 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
         .map(|c| Some((c.weight / total, c.estimate.value, c.interval?)))
         .collect();
     let parts = parts?;
-    // Probability below x, for one form.
+    // Probability of a value below x in one form.
     let below = |x: f64, value: f64, (low, high): (f64, f64)| -> f64 {
         let reach = if x < value { value - low } else { high - value };
         match (x - value) / reach {
             z if z.is_finite() => student.cdf(quantile * z),
-            // A form without an error, and one whose estimate itself is infinite.
+            // The form has no error, or its estimate is infinite.
             _ if x < value => 0.0,
             _ => 1.0,
         }
@@ -101,7 +102,7 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
         all.filter(|x| x.is_finite()).fold(from, pick)
     };
     let (least, most) = (finite(f64::min, f64::INFINITY), finite(f64::max, f64::NEG_INFINITY));
-    // Far out: a form with an infinite end keeps half of its probability there.
+    // Far beyond the finite ends, only forms with an infinite end have any remaining probability.
     let reach = FAR * (most - least).max(most.abs().max(least.abs()) * f64::EPSILON);
     let place = |wanted: f64| {
         let (mut low, mut high) = (least - reach, most + reach);
@@ -114,7 +115,7 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
             }
         }
         let found = 0.5 * (low + high);
-        // An end at zero, such as a time constant at its bound, is zero and not its rounding error.
+        // An end that is zero except for rounding is set to zero, for example for a time constant at its bound.
         if found.abs() < 1e-12 * (most - least) {
             0.0
         } else {
@@ -134,7 +135,8 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
     Some((low, high))
 }
 
-/// Returns the interval for a larger standard error: its ends are moved outwards in the ratio to the old one.
+/// Returns estimate and interval for a larger standard error: the distances of the ends from the estimate grow in
+/// proportion to the standard error.
 pub(super) fn widened(
     of: Estimate,
     interval: Option<(f64, f64)>,

@@ -1,58 +1,61 @@
-//! Operators of recorded people: the family of operators with reliable errors.
+//! Operators of recorded people: the family of operators, with robust errors.
 //!
-//! `u = Y e + (C/D) eps` with Y an operator of the family ([`hoid_model::operator_family`]). People differ from a
-//! simulation in three ways that are decisive for their parameters: they integrate slow errors (the operator needs a
-//! lag), their remnant is not a filter of first order (the noise model must be rich), and they vary (error bars must be
-//! based on the scatter between runs). Parameters that the data do not determine are reported as such.
+//! `u = Y e + (C/D) eps`, where Y is an operator of the family ([`hoid_model::operator_family`]). Three differences
+//! between people and a simulation affect the parameters. People integrate slow errors, so that the operator needs a
+//! lag. Their remnant is not a first-order filter, so that the noise model must be flexible. They also vary, so that
+//! error bars must be based on the scatter between runs. Parameters that the data do not determine are reported as
+//! undetermined.
 //!
-//! 1. The describing function at the lines of a periodic excitation, if one was recorded ([`crate::frequency`]); each
-//!    form is fitted to it ([`LineFit`]). Without one, the response of an ARX model of high order gives the starts.
-//! 2. Each form by prediction error, with an autoregressive (or ARMA) noise model whose order Akaike's criterion
-//!    chooses, and a weak prior on parameters that seconds of tracking do not determine ([`OperatorPrior`]).
-//! 3. Forms have weights by Akaike's criterion ([`FormFigures`]), and estimates are averaged over those that the data
-//!    do not reject ([`WeighedForm`]).
-//! 4. Errors from the scatter of runs or blocks; intervals in coordinates that are nearly normal, and by profile
-//!    likelihood if they are not ([`Parameter`]).
-//! 5. The operator by refined instrumental variables, if an excitation was recorded ([`InstrumentalFit`]); the
-//!    comparison of all methods ([`Agreement`]), a free model of the same orders ([`FreeModel`]), and the
-//!    [`Verdict`](hoid_model::Verdict) on all of it.
+//! 1. If a periodic excitation was recorded, the describing function is computed at its lines ([`crate::frequency`]),
+//!    and each form is fitted to it ([`LineFit`]). Without an excitation, the response of a high-order ARX model
+//!    supplies the starts.
+//! 2. Each form is fitted by prediction error, with an autoregressive (or ARMA) noise model whose order is selected by
+//!    Akaike's criterion, and with a weak prior on parameters that a short tracking record does not determine
+//!    ([`OperatorPrior`]).
+//! 3. The forms are weighted by Akaike's criterion ([`FormFigures`]), and estimates are averaged over the forms that
+//!    the data do not reject ([`WeighedForm`]).
+//! 4. Errors are computed from the scatter of runs or blocks. Intervals are computed in coordinates that are nearly
+//!    normally distributed, or by profile likelihood otherwise ([`Parameter`]).
+//! 5. The operator is also estimated by refined instrumental variables if an excitation was recorded
+//!    ([`InstrumentalFit`]). All methods are compared ([`Agreement`]), the form is tested against a free model of the
+//!    same orders ([`FreeModel`]), and the [`Verdict`](hoid_model::Verdict) summarises the findings.
 //!
 //! | file | contents |
 //! |---|---|
-//! | `options` | [`FamilyEstimator`]: the options, by fields and by names |
+//! | `options` | [`FamilyEstimator`]: options as fields and by name |
 //! | `estimator` | the searches of all forms |
-//! | `channel` | a further input: the request, its form, the results |
-//! | `channels` | further inputs of a person in addition to the error; `choice`: their forms |
+//! | `channel` | a further input: request, form, results |
+//! | `channels` | inputs of a person in addition to the error; `choice`: selection of their forms |
 //! | `channel_lines` | the responses to all inputs at the lines |
 //! | `comparison` | comparison of the forms |
-//! | `assembly` | from the searches of the forms that count to the result |
+//! | `assembly` | assembly of the result from the searches of the forms |
 //! | `estimated` | the operator of a record with its errors |
 //! | `result` | [`FamilyFit`] |
-//! | `parameter` | a parameter with its interval, its prior share, and whether it is determined |
-//! | `prior` | prior knowledge |
-//! | `coordinates` | bounds and starting values of the coordinates |
-//! | `lines`, `line_fit` | the lines with their variances; the operator through them |
+//! | `parameter` | a parameter with its interval, its prior share, and a flag if it is determined |
+//! | `prior` | prior knowledge of people |
+//! | `coordinates` | bounds and starting values of coordinates |
+//! | `lines`, `line_fit` | the lines with their variances; the operator fitted to the lines |
 //! | `response_fit` | least squares on a frequency response |
 //! | `instrumental` | the operator by refined instrumental variables |
-//! | `arx_response` | a response without a form |
-//! | `layout` | places of coordinates and noise coefficients |
-//! | `noise` | autoregressions: starts and orders of the noise model |
+//! | `arx_response` | a frequency response without a form |
+//! | `layout` | indices of coordinates and noise coefficients in eta |
+//! | `noise` | autoregressions for starts and orders of the noise model |
 //! | `prediction` | the prediction error fit of one form |
-//! | `prediction_fit` | the result of its search |
+//! | `prediction_fit` | result of the prediction error search |
 //! | `joint` | the prediction error fit that includes the lines |
-//! | `clusters`, `covariances` | runs or blocks; the covariance from them |
-//! | `jackknife` | covariances from estimates without each part, and from a prior |
+//! | `clusters`, `covariances` | runs or blocks of runs; covariances from their scatter |
+//! | `jackknife` | covariances from estimates that omit one part of the data, and from a prior |
 //! | `sensitivity` | effect of the noise model on the estimate |
 //! | `profile` | intervals by profile likelihood |
-//! | `choice` | the weights of the forms, and the best form |
-//! | `mixture` | an estimate over several forms |
-//! | `agreement` | agreement of the methods |
+//! | `choice` | weights of the forms, and the best form |
+//! | `mixture` | estimates averaged over several forms |
+//! | `agreement` | agreement of the estimation methods |
 //! | `intersample` | intersample behaviour of the error |
 //! | `low_noise` | starts by output error, for little or no noise |
 //! | `open_loop` | crossover and phase margin |
-//! | `loop_shape` | every crossing, and the stability of the closed loop |
-//! | `of_polynomials`, `pole_reading` | conversion of polynomials to an operator; interpretation of poles |
-//! | `diagnostics` | reasons to doubt a result |
+//! | `loop_shape` | all crossings of the open loop, and the stability of the closed loop |
+//! | `of_polynomials`, `pole_reading` | conversion of polynomials to an operator; assignment of the poles |
+//! | `diagnostics` | findings for and against a result |
 
 mod agreement;
 mod arx_response;

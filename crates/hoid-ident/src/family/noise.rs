@@ -1,34 +1,35 @@
-//! Starts and orders of the noise model: an autoregression of the part of u that the operator does not explain.
+//! Starting values and orders of the noise model: an autoregression of the part of u that the operator does not
+//! explain.
 //!
-//! `v(t) = -d_1 v(t-1) - ... - d_nd v(t-nd) + eps(t)` by least squares over all records together,
-//! from sample nd on in each (the covariance method), for all orders from the same products. The
-//! order is that of Akaike's criterion `n ln V + 2 nd`: the remnant of people is not an
-//! autoregression of any order, and the operator's bias depends on how well the order predicts (R. Shibata, *Annals of
-//! Statistics* 8 (1980) 147-164).
+//! `v(t) = -d_1 v(t-1) - ... - d_nd v(t-nd) + eps(t)` is fitted by least squares over all records together (the
+//! covariance method). All orders use the same sums of products, which start in each record at the sample that the
+//! highest order permits. The order minimises Akaike's criterion `n ln V + 2 nd`: the remnant of people is not an
+//! autoregression of any order, and the bias of the operator depends on how well the noise model predicts (R. Shibata,
+//! *Annals of Statistics* 8 (1980) 147-164).
 
 use crate::linalg::{gram::Gram, least_squares::solve_symmetric};
 
-/// Largest modulus of a root of C in a start.
+/// Largest modulus of a root of C in a starting value.
 const LARGEST_ROOT: f64 = 0.999;
-/// Factor by which larger roots are moved inwards, and the largest number of times.
-const DRAWN_BY: f64 = 0.98;
-const MOST_DRAWN: usize = 200;
+/// Factor by which larger roots are moved inwards, and maximum number of times that this is done.
+const ROOT_SHRINK_FACTOR: f64 = 0.98;
+const MAX_SHRINKS: usize = 200;
 
-/// Coefficients d of the order nd, and the loss.
+/// Coefficients d of an autoregression, and its loss.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Autoregression {
     pub d: Vec<f64>,
     pub loss: f64,
 }
 
-/// Decrease of `n ln V` that a coefficient must achieve: 2 (Akaike), `ln n` (Schwarz).
+/// Cost of a coefficient in the criterion `n ln V`: 2 (Akaike) or `ln n` (Schwarz).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Penalty {
     Akaike,
     Schwarz,
 }
 
-/// Products of v and its past, `sum v(t-i) v(t-j)` for i, j from 0 to the highest order.
+/// Sums of products of v and its past, `sum v(t-i) v(t-j)` for i, j from 0 to the highest order.
 pub(crate) struct NoiseProducts {
     highest: usize,
     count: usize,
@@ -36,7 +37,7 @@ pub(crate) struct NoiseProducts {
 }
 
 impl NoiseProducts {
-    /// Computes the products of these series up to an order.
+    /// Computes the sums of products of these series up to the order `highest`.
     pub fn new(series: &[Vec<f64>], highest: usize) -> Self {
         let mut products = Gram::new(highest + 1);
         let mut count = 0;
@@ -51,7 +52,7 @@ impl NoiseProducts {
         }
     }
 
-    /// Returns the autoregression of this order; `None` if it does not exist.
+    /// Returns the autoregression of this order; `None` if the normal equations are singular or no residual is left.
     pub fn fit(&self, order: usize) -> Option<Autoregression> {
         let power = self.products.at(0, 0);
         if self.count == 0 || power <= 0.0 {
@@ -71,15 +72,15 @@ impl NoiseProducts {
         })
     }
 
-    /// Returns the autoregression of this order, or of the highest lower order that exists, padded with zeros: a smooth
-    /// v without noise is predicted to rounding by fewer coefficients.
+    /// Returns the autoregression of this order or, if it does not exist, of the highest possible lower order, padded
+    /// with zeros. Fewer coefficients suffice to predict a smooth v without noise to rounding.
     pub fn fit_up_to(&self, order: usize) -> Option<Autoregression> {
         let mut found = (0..=order).rev().find_map(|order| self.fit(order))?;
         found.d.resize(order, 0.0);
         Some(found)
     }
 
-    /// Returns the best of these orders by a criterion.
+    /// Returns the order with the smallest value of the criterion.
     pub fn best_order(&self, orders: impl Iterator<Item = usize>, penalty: Penalty) -> Option<usize> {
         let n = self.count as f64;
         let of_one = match penalty {
@@ -95,9 +96,9 @@ impl NoiseProducts {
     }
 }
 
-/// Start of an ARMA noise model, `[c.., d..]`: with the innovations of a long autoregression, v is regressed on its own
-/// past and on the past innovations (E. J. Hannan and J. Rissanen, *Biometrika* 69 (1982) 81-94). The roots of a C that
-/// is not invertible are moved inwards, `c_k rho^k`.
+/// Returns starting values `[c.., d..]` of an ARMA noise model: a long autoregression estimates the innovations, and v
+/// is regressed on its own past and on the past innovations (E. J. Hannan and J. Rissanen, *Biometrika* 69 (1982)
+/// 81-94). If C is not invertible, its roots are moved inwards, `c_k rho^k`.
 pub(crate) fn hannan_rissanen(series: &[Vec<f64>], (nc, nd): (usize, usize), long: usize) -> Option<Vec<f64>> {
     let d = NoiseProducts::new(series, long).fit(long)?.d;
     let q = nc + nd;
@@ -118,14 +119,14 @@ pub(crate) fn hannan_rissanen(series: &[Vec<f64>], (nc, nd): (usize, usize), lon
     }
     let (gram, right) = products.system(0..q, q);
     let mut found = solve_symmetric(&gram, &right)?;
-    // c_k rho^k moves all roots of C by the factor rho.
-    for _ in 0..MOST_DRAWN {
+    // The coefficients c_k rho^k multiply all roots of C by rho.
+    for _ in 0..MAX_SHRINKS {
         if hoid_core::stability::roots_inside(&found[..nc], LARGEST_ROOT) {
             return Some(found);
         }
         let mut factor = 1.0;
         for c in &mut found[..nc] {
-            factor *= DRAWN_BY;
+            factor *= ROOT_SHRINK_FACTOR;
             *c *= factor;
         }
     }

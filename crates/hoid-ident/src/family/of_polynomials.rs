@@ -4,15 +4,16 @@
 //! The poles determine the lag and the neuromuscular system ([`super::pole_reading`]).
 //!
 //! The exact model of an operator ([`FamilyOperator::zoh`]) has fewer parameters than B has coefficients, so that
-//! estimated polynomials are near but not on it. The operator is the one whose exact model M(x) is nearest to the
-//! response H of the polynomials over the band of manual control,
+//! estimated polynomials do not exactly correspond to an operator. The conversion finds the operator whose exact model
+//! M(x) is closest to the response H of the polynomials over the band of manual control,
 //!
-//! `min_x sum_j |H(omega_j) - M(omega_j, x)|^2 / |H(omega_j)|^2`,
+//! `min_x sum_j |H(omega_j) - M(omega_j, x)|^2 / |H(omega_j)|^2`.
 //!
-//! which returns an operator from its own exact model. Its covariance follows from that of theta to first order,
-//! `dx = (J'J)^-1 J' dH`, J the derivatives of M over |H| (the implicit function theorem without the second derivative,
-//! which vanishes if M equals H). The residual of the fit, [`FamilyConversion::mismatch`], is the distance of the
-//! polynomials from the form; if it is large, they have no such form.
+//! For the exact model of an operator this returns the operator itself. The covariance of x follows from the covariance
+//! of theta to first order, `dx = (J'J)^-1 J' dH`, where J contains the derivatives of M divided by |H| (the implicit
+//! function theorem without the second derivative, which vanishes if M equals H). The residual of the fit,
+//! [`FamilyConversion::mismatch`], is the distance of the polynomials from the form; if it is large, the polynomials do
+//! not have this form.
 
 use hoid_model::{
     Complex64, FamilyOperator, Form, NotConvertible, PolynomialModel, SampleTime,
@@ -22,7 +23,7 @@ use hoid_model::{
 
 use super::{
     coordinates,
-    pole_reading::{Reading, RealPole, readings},
+    pole_reading::{PoleAssignment, RealPole, pole_assignments},
 };
 use crate::{
     Fit, SearchOptions,
@@ -31,7 +32,7 @@ use crate::{
     optimize::{Linearisation, Minimum, Objective, minimise},
 };
 
-/// The candidate forms, the simplest first.
+/// Candidate forms, in the order from the simplest.
 const FORMS: [Form; 6] = [
     Form::Gain,
     Form::Lag,
@@ -40,15 +41,15 @@ const FORMS: [Form; 6] = [
     Form::Lead2,
     Form::Lead2Lag,
 ];
-/// Range in which responses are compared, rad/s, evenly over the logarithm.
+/// Frequency range in which responses are compared, rad/s; the points are evenly spaced on a logarithmic scale.
 const BAND_RAD_S: (f64, f64) = (0.2, 30.0);
 const POINTS: usize = 30;
-/// Largest relative deviation of the response of an operator from that of its polynomials.
+/// Largest relative deviation of an operator's response from the response of the polynomials.
 const LARGEST_MISMATCH: f64 = 0.1;
 /// Relative deviation up to which a form counts as exact.
 const EXACT: f64 = 1e-6;
-/// Delays from which searches start, in samples relative to nk.
-const LATER: [f64; 6] = [0.02, 0.5, 0.98, 2.5, 5.0, 10.0];
+/// Delays from which searches start, in samples relative to nk - 1.
+const DELAY_OFFSETS: [f64; 6] = [0.02, 0.5, 0.98, 2.5, 5.0, 10.0];
 /// Lead times from which searches start, s.
 const LEADS_S: [f64; 3] = [0.1, 0.5, 2.0];
 
@@ -57,16 +58,17 @@ const LEADS_S: [f64; 3] = [0.1, 0.5, 2.0];
 pub struct FamilyConversion {
     /// The operator.
     pub operator: FamilyOperator,
-    /// Covariance of its coordinates by rows, if that of the coefficients is known.
+    /// Covariance of the coordinates by rows; `None` if the covariance of the coefficients is unknown or the conversion
+    /// fails.
     pub covariance: Option<Vec<f64>>,
-    /// The real poles, the slowest first.
+    /// Real poles, in ascending order of their rate.
     pub real_poles: Vec<RealPole>,
     /// Largest `|H - M|/|H|` over .2 to 30 rad/s.
     pub mismatch: f64,
 }
 
 impl FamilyConversion {
-    /// Returns the parameters with their names, units and errors to first order.
+    /// Returns names, units, values and first-order standard errors of the parameters.
     pub fn parameters(&self) -> Vec<(&'static str, &'static str, Estimate)> {
         let all = self.operator.named_estimates(self.covariance.as_deref());
         all.into_iter()
@@ -76,8 +78,8 @@ impl FamilyConversion {
 }
 
 impl Fit {
-    /// Returns the operator of the family that the polynomials of this fit represent, of this form or, for `None`, of
-    /// the nearest form.
+    /// Returns the operator of the family that the polynomials of this fit represent, in the given form or, for `None`,
+    /// in the closest form.
     ///
     /// # Errors
     /// As [`family_of_polynomials`].
@@ -86,12 +88,12 @@ impl Fit {
     }
 }
 
-/// Returns the operator of the family that polynomials represent, of this form or, for `None`, of the simplest exact
-/// form or else the nearest one. `covariance` is that of theta, by rows.
+/// Returns the operator of the family that the polynomials represent, in the given form. For `None` this is the
+/// simplest form that is exact, or else the closest form. `covariance` is the covariance of theta by rows.
 ///
 /// # Errors
-/// [`NotConvertible`]: poles in A and in F; more than three or none of them; an unstable pole; a
-/// pole on the negative real axis of z; nk = 0; no form whose response is within a tenth.
+/// [`NotConvertible`] for a nonfinite coefficient, poles in both A and F, no poles or more than three, an unstable
+/// pole, a pole on the negative real axis of z, nk = 0, or if no form is within a tenth of the response.
 pub fn family_of_polynomials(
     model: &PolynomialModel,
     covariance: Option<&[f64]>,
@@ -112,19 +114,19 @@ pub fn family_of_polynomials(
         return Err(NotConvertible::NoDelay);
     }
     let sample_time = model.sample_time();
-    let readings = readings(if orders.na > 0 { model.a() } else { model.f() }, sample_time)?;
+    let pole_assignments = pole_assignments(if orders.na > 0 { model.a() } else { model.f() }, sample_time)?;
     let points = points(model);
     let forms: Vec<Form> = match form {
         Some(form) => vec![form],
         None => FORMS.to_vec(),
     };
-    let mut best: Option<(f64, Minimum, Form, &Reading)> = None;
+    let mut best: Option<(f64, Minimum, Form, &PoleAssignment)> = None;
     for form in forms {
-        for reading in &readings {
+        for reading in &pole_assignments {
             let Some((mismatch, found)) = nearest(form, reading, &points, orders.nk, sample_time) else {
                 continue;
             };
-            // A simpler exact form is not rejected because of rounding.
+            // Rounding must not replace a simple exact form by a more complex one.
             if best.as_ref().is_none_or(|known| known.0 > EXACT && mismatch < known.0) {
                 best = Some((mismatch, found, form, reading));
             }
@@ -167,7 +169,7 @@ pub fn family_of_polynomials(
 struct Point {
     omega_rad_s: f64,
     response: Complex64,
-    /// Its derivatives with respect to theta.
+    /// Derivatives of the response with respect to theta.
     gradient: Vec<Complex64>,
 }
 
@@ -186,16 +188,17 @@ fn points(model: &PolynomialModel) -> Vec<Point> {
         .collect()
 }
 
-/// Returns the nearest operator of a form with these poles, and its mismatch.
+/// Returns the closest operator of a form with these poles, and its mismatch; `None` if the form does not have these
+/// poles.
 fn nearest(
     form: Form,
-    reading: &Reading,
+    reading: &PoleAssignment,
     points: &[Point],
     nk: usize,
     sample_time: SampleTime,
 ) -> Option<(f64, Minimum)> {
     let neuromuscular = reading.neuromuscular.is_some();
-    // A form has a lag exactly if the polynomials have one, and no pure derivative.
+    // The form must have a lag if and only if the polynomials have one, and must not be a pure derivative.
     if form.has_pole() != reading.lag.is_some() || !form.is_proper(neuromuscular) {
         return None;
     }
@@ -216,10 +219,10 @@ fn nearest(
     Some((criterion.mismatch(&found.theta)?, found))
 }
 
-/// The criterion over the coordinates of a form.
+/// The criterion as a function of the coordinates of a form.
 struct Nearest<'a> {
     form: Form,
-    reading: &'a Reading,
+    reading: &'a PoleAssignment,
     points: &'a [Point],
     nk: usize,
     sample_time: SampleTime,
@@ -227,12 +230,12 @@ struct Nearest<'a> {
 }
 
 impl<'a> Nearest<'a> {
-    fn new(form: Form, reading: &'a Reading, points: &'a [Point], nk: usize, sample_time: SampleTime) -> Self {
+    fn new(form: Form, reading: &'a PoleAssignment, points: &'a [Point], nk: usize, sample_time: SampleTime) -> Self {
         let neuromuscular = reading.neuromuscular.is_some();
         let ts = sample_time.s();
-        let reach = (nk as f64 + 2.0 * LATER[LATER.len() - 1]) * ts;
+        let reach = (nk as f64 + 2.0 * DELAY_OFFSETS[DELAY_OFFSETS.len() - 1]) * ts;
         let mut limits = coordinates::limits(form, neuromuscular, (0.0, reach), sample_time);
-        // The poles are known: they are free only within the information of B.
+        // The poles are known approximately; the search may change them only within these bounds.
         for (limit, coordinate) in limits.iter_mut().zip(form.coordinates(neuromuscular)) {
             match coordinate {
                 Coordinate::LagRate | Coordinate::LogOmega | Coordinate::LogZeta => {
@@ -264,7 +267,7 @@ impl<'a> Nearest<'a> {
         let before = (self.nk as f64 - 1.0) * self.sample_time.s();
         let each = leads
             .iter()
-            .flat_map(|&lead| LATER.iter().map(move |&later| (lead, later)));
+            .flat_map(|&lead| DELAY_OFFSETS.iter().map(move |&later| (lead, later)));
         each.filter_map(|(lead, later)| {
             let mut start: Vec<f64> = coordinates
                 .iter()
@@ -275,7 +278,7 @@ impl<'a> Nearest<'a> {
                     other => self.reading.coordinate(*other),
                 })
                 .collect();
-            // The gain is linear: the best one.
+            // The response is linear in the gain, so that the best gain is computed directly.
             let (mut cross, mut power) = (0.0, 0.0);
             for (point, m) in self.points.iter().zip(self.responses(&start)?) {
                 let weight = point.response.norm_sqr().recip();
@@ -288,7 +291,7 @@ impl<'a> Nearest<'a> {
         .collect()
     }
 
-    /// Returns responses of the exact model with their derivatives with respect to the coordinates.
+    /// Returns the response of the exact model at each point, with its derivatives with respect to the coordinates.
     fn responses(&self, x: &[f64]) -> Option<Vec<(Complex64, Vec<Complex64>)>> {
         let operator = FamilyOperator::new(self.form, self.reading.neuromuscular.is_some(), x).ok()?;
         let held = operator.zoh(self.sample_time).ok()?;
@@ -302,7 +305,8 @@ impl<'a> Nearest<'a> {
         Some(self.points.iter().zip(all).map(off).fold(0.0, f64::max))
     }
 
-    /// `(J'J)^-1 J' dH/dtheta C (...)'`, zero for coordinates at a bound.
+    /// Returns the covariance of the coordinates, `S C S'` with `S = (J'J)^-1 J' dH/dtheta` and C the covariance of
+    /// theta; zero for coordinates at a bound.
     fn covariance(&self, found: &Minimum, of_theta: &[f64]) -> Option<Vec<f64>> {
         let p = found.theta.len();
         let n = self.points.first()?.gradient.len();
@@ -315,7 +319,7 @@ impl<'a> Nearest<'a> {
             .map(|at| found.at.gram[at])
             .collect();
         let responses = self.responses(&found.theta)?;
-        // dx/dtheta, one column for each coefficient.
+        // S = dx/dtheta, one column per coefficient.
         let mut slopes = vec![0.0; p * n];
         for k in 0..n {
             let right: Vec<f64> = free
@@ -343,7 +347,7 @@ impl<'a> Nearest<'a> {
     }
 }
 
-/// Returns `z^-nk B/F` at `z = e^{j theta}` and its derivatives with respect to the first `p` coordinates.
+/// Returns `z^-nk B/F` at `z = e^{j angle}`, and its derivatives with respect to the first `p` coordinates.
 fn response(held: &HeldFamily, angle: f64, p: usize) -> (Complex64, Vec<Complex64>) {
     let back = |k: usize| Complex64::from_polar(1.0, -angle * k as f64);
     let (mut b, mut f) = (Complex64::new(0.0, 0.0), Complex64::new(1.0, 0.0));

@@ -1,8 +1,9 @@
-//! Crossover frequency and phase margin of an operator of the family with its controlled element.
+//! Crossover frequency and phase margin of an operator of the family with a controlled element.
 //!
-//! `L(omega) = Y(j omega) Z(omega) Y_c(j omega)`, Z the hold of the error. The crossover is the lowest frequency at
-//! which `|L|` falls through one, as for a describing function ([`crate::frequency`]): a neuromuscular resonance may
-//! raise `|L|` above one again. If the coordinates x change and `|L| = 1` still holds,
+//! The open loop is `L(omega) = Y(j omega) Z(omega) Y_c(j omega)`, where Z represents the intersample behaviour of the
+//! error. The crossover is the lowest frequency at which `|L|` falls below one, as for a describing function
+//! ([`crate::frequency`]); a neuromuscular resonance may raise `|L|` above one again. If the coordinates x change,
+//! omega_c and phi_m follow from the condition `|L| = 1`:
 //!
 //! `d omega_c = -(d ln|L|/dx)/(d ln|L|/d omega)`,
 //! `d phi_m = d arg L/dx + (d arg L/d omega) d omega_c`.
@@ -20,11 +21,11 @@ use super::{
     mixture::{Component, Mixture, widened},
 };
 
-/// Range in which crossovers are searched for, rad/s.
+/// Frequency range in which crossovers are searched, rad/s.
 const RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
 /// 97.5 % quantile of the normal distribution.
 const NORMAL: f64 = 1.959_963_984_540_054;
-/// Number of points of the scan.
+/// Number of frequencies in the scan for a crossover.
 const POINTS: usize = 150;
 
 /// Crossover and phase margin with their standard errors.
@@ -32,15 +33,15 @@ const POINTS: usize = 150;
 pub struct LoopMeasures {
     /// Crossover frequency omega_c, rad/s.
     pub crossover_rad_s: Estimate,
-    /// Its 95 % interval.
+    /// 95 % interval of the crossover frequency, rad/s.
     pub crossover_interval: Option<(f64, f64)>,
     /// Phase margin phi_m, deg, between -180 and 180.
     pub phase_margin_deg: Estimate,
-    /// Its 95 % interval.
+    /// 95 % interval of the phase margin, deg.
     pub phase_margin_interval: Option<(f64, f64)>,
-    /// Derivatives of both with respect to the logarithm of the gain, `d/d ln K`.
+    /// Derivatives of crossover frequency and phase margin with respect to the logarithm of the gain, `d/d ln K`.
     by_gain: [f64; 2],
-    /// Standard errors of both for the person, whose gain varies from run to run.
+    /// Standard errors of crossover frequency and phase margin for the person, whose gain varies from run to run.
     pub of_person: [Option<f64>; 2],
 }
 
@@ -57,8 +58,9 @@ impl LoopMeasures {
         }
     }
 
-    /// Returns the same with Student's intervals for errors from this number of clusters.
-    pub(super) fn of_few(self, clusters: usize) -> Self {
+    /// Returns the measures with intervals from Student's distribution, for standard errors that are based on this
+    /// number of clusters.
+    pub(super) fn with_student_intervals(self, clusters: usize) -> Self {
         Self {
             crossover_interval: reaching(self.crossover_rad_s, quantile(clusters)),
             phase_margin_interval: reaching(self.phase_margin_deg, quantile(clusters)),
@@ -66,7 +68,8 @@ impl LoopMeasures {
         }
     }
 
-    /// Returns the same with the variation of the person's gain that these runs do not show, relative to the gain.
+    /// Returns the measures with standard errors for the person, which include a relative variation `share` of the gain
+    /// that these runs do not show.
     pub(super) fn with_run_to_run(self, share: f64) -> Self {
         let both = [self.crossover_rad_s, self.phase_margin_deg];
         let wider = |k: usize| {
@@ -79,7 +82,7 @@ impl LoopMeasures {
         }
     }
 
-    /// Returns the same with the errors and intervals for the person.
+    /// Returns the measures with the standard errors and intervals for the person instead of those for these runs.
     #[must_use]
     pub fn as_of_person(self) -> Self {
         let [crossover, margin] = self.of_person;
@@ -95,7 +98,7 @@ impl LoopMeasures {
         }
     }
 
-    /// Average over forms with their weights; `None` if there are none.
+    /// Returns the weighted average over forms; `None` without forms.
     pub(super) fn averaged(each: &[(f64, Self)], clusters: usize) -> Option<Self> {
         let [_, _, ..] = each else {
             return each.first().map(|(_, only)| *only);
@@ -128,25 +131,26 @@ impl LoopMeasures {
     }
 }
 
-/// Interval of a given number of standard errors to both sides.
+/// Returns the interval that extends `quantile` standard errors to each side of an estimate.
 fn reaching(of: Estimate, quantile: f64) -> Option<(f64, f64)> {
     let reach = quantile * of.standard_error?;
     Some((of.value - reach, of.value + reach))
 }
 
-/// Frequency at which the gain of an open loop falls through one.
+/// Crossover: a frequency at which the gain of an open loop is one, with the phase margin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossover {
     /// Crossover frequency, rad/s.
     pub omega_rad_s: f64,
     /// Phase margin, deg, between -180 and 180.
     pub margin_deg: f64,
-    /// `d ln L/d omega`.
+    /// The derivative `d ln L/d omega` at the crossover.
     slope: Complex64,
 }
 
 impl Crossover {
-    /// Returns the lowest crossover of a sampled open loop; `None` if `|L|` does not fall through one.
+    /// Returns the lowest crossover of a sampled open loop at which `|L|` falls below one; `None` if there is no such
+    /// crossover.
     pub fn lowest(open_loop: impl Fn(f64) -> Complex64, sample_time: SampleTime) -> Option<Self> {
         let highest = RANGE_RAD_S.1.min(0.9 * sample_time.nyquist_rad_s());
         let at = |i: usize| RANGE_RAD_S.0 * (highest / RANGE_RAD_S.0).powf(i as f64 / (POINTS as f64 - 1.0));
@@ -165,9 +169,9 @@ impl Crossover {
         Some(Self::at(&open_loop, zero_between(gain, low, high)))
     }
 
-    /// Returns the crossover at a frequency where `|L| = 1`.
+    /// Creates the crossover at a frequency where `|L| = 1`.
     pub(super) fn at(open_loop: impl Fn(f64) -> Complex64, omega_rad_s: f64) -> Self {
-        // d ln L / d omega by a central difference of a smooth function.
+        // d ln L / d omega by a central difference; L is smooth.
         let h = 1e-5 * omega_rad_s;
         Self {
             omega_rad_s,
@@ -181,19 +185,20 @@ impl Crossover {
         self.slope
     }
 
-    /// Returns the changes of the crossover in rad/s and of the margin in deg for a relative change `dL/L`.
+    /// Returns the changes of the crossover frequency in rad/s and of the phase margin in deg for a relative change
+    /// `dL/L`.
     pub fn moved_by(&self, relative: Complex64) -> [f64; 2] {
         let by_crossover = -relative.re / self.slope.re;
         [by_crossover, (relative.im + self.slope.im * by_crossover).to_degrees()]
     }
 }
 
-/// Phase margin in deg at a crossover, with the phase followed from low frequencies: it is unbounded, and a negative
-/// one means an unstable loop.
+/// Returns the phase margin in deg at a crossover, with the phase unwrapped from low frequencies. The margin is not
+/// limited to a range of 360 deg; a negative value means an unstable loop.
 pub fn followed_margin_deg(open_loop: impl Fn(f64) -> Complex64, crossover_rad_s: f64) -> f64 {
     let at = |i: usize| RANGE_RAD_S.0 * (crossover_rad_s / RANGE_RAD_S.0).powf(i as f64 / POINTS as f64);
     let mut last = open_loop(RANGE_RAD_S.0.min(crossover_rad_s));
-    // A double integrator starts at -180 deg, on either side of the cut.
+    // The phase of a double integrator starts at -180 deg, where its principal value may have either sign.
     let mut phase = last.arg();
     if phase > FRAC_PI_3 {
         phase -= TAU;
@@ -206,8 +211,8 @@ pub fn followed_margin_deg(open_loop: impl Fn(f64) -> Complex64, crossover_rad_s
     180.0 + phase.to_degrees()
 }
 
-/// Returns the zero of a function that is positive at `low` and negative at `high`, to rounding, by regula falsi with
-/// halving of a retained end (M. Dowell and P. Jarratt, *BIT* 11 (1971) 168-174).
+/// Returns the root of a function that is positive at `low` and negative at `high`, to rounding accuracy. Regula falsi,
+/// with halving of the function value at a retained end (M. Dowell and P. Jarratt, *BIT* 11 (1971) 168-174).
 fn zero_between(of: impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f64)) -> f64 {
     let (mut last, mut was_positive) = (low.0, None);
     for _ in 0..80 {
@@ -235,8 +240,8 @@ fn zero_between(of: impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f6
     last
 }
 
-/// Returns the measures of an operator with this covariance of its coordinates, for an error with this sample time in s
-/// and this intersample behaviour; `None` if `|L|` does not fall through one.
+/// Returns crossover and phase margin of an operator with this controlled element, given the covariance of its
+/// coordinates and the sample time and intersample behaviour of the error. `None` if `|L|` does not fall below one.
 pub fn loop_measures(
     operator: &FamilyOperator,
     covariance: Option<&[f64]>,

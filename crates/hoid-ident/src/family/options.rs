@@ -1,29 +1,30 @@
-//! Options of the operator of a person: the fields of [`FamilyEstimator`], and the names under which texts set them.
-//! Each option is declared only here.
+//! Options of the estimator of a person's operator: the fields of [`FamilyEstimator`], and the names under which text
+//! input sets them. Each option is defined only here.
 
 use hoid_model::{Detrend, Form, operator_family::Coordinate};
 
 use super::{channel::SeenChannel, intersample::Intersample, prior::OperatorPrior};
 use crate::{
     IdentError, InitialState, SearchOptions,
-    order_selection::{NamedOrders, written},
+    order_selection::{NamedOrders, range_text},
     settings::{BatchOption, BatchOptions, Bounds, Kind, Setting},
     shared_options as shared,
 };
 
 /// Highest order of the noise model.
 pub const HIGHEST_NOISE_ORDER: usize = 24;
-/// Highest nd that is searched together with an nc: an ARMA model needs few coefficients.
+/// Highest nd that is searched if nc is above zero: an ARMA model needs few coefficients.
 const HIGHEST_BESIDE_NC: usize = 8;
 
 /// Estimator of the operator of a person, with its options.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FamilyEstimator {
-    /// The candidate forms; a single one is fitted without a choice. Default: all that are proper.
+    /// Candidate forms; those that are not proper are skipped, and a single form is fitted without a comparison.
+    /// Default: all forms of a response to the error.
     pub forms: Vec<Form>,
-    /// True with the neuromuscular part. Default true.
+    /// True if the operator has a neuromuscular part. Default true.
     pub neuromuscular: bool,
-    /// Prior knowledge before the data. Default [`OperatorPrior::population`].
+    /// Prior knowledge of the person. Default [`OperatorPrior::population`].
     pub prior: OperatorPrior,
     /// Shortest and longest delay tau_e in s. Default 0.02 to 0.8.
     pub delay_range_s: (f64, f64),
@@ -37,16 +38,16 @@ pub struct FamilyEstimator {
     pub channels: Vec<SeenChannel>,
     /// Channel of the recorded disturbance or target, for the fit at its lines.
     pub excitation: Option<String>,
-    /// Period of the excitation in s; `None` determines it from the lines.
+    /// Period of the excitation in s; `None` determines the period from the lines.
     pub period_s: Option<f64>,
-    /// Coordinates that are individual to each record; all others are common to the records.
+    /// Coordinates that are individual to each record; all other coordinates are common to all records.
     pub individual: Vec<Coordinate>,
-    /// Variation of a person's gain from one run to the next, relative to the gain. It is included in the error bars
-    /// for fewer than five records, whose blocks cannot show it. Default 0.06: between 4 and 9 % in repeated runs of
-    /// three people, each left out in turn.
+    /// Relative variation of a person's gain from run to run. For fewer than five records it is added to the error
+    /// bars, since blocks of these records cannot show it. Default 0.06; in repeated runs of three people, estimates
+    /// that omit one person at a time were between 4 and 9 %.
     pub run_to_run: f64,
-    /// Trend removed from e and u of each record beforehand: an operator with a lag integrates an offset. Default: the
-    /// mean.
+    /// Trend that is removed from e and u of each record before the fit, because an operator with a lag integrates an
+    /// offset. Default: the mean.
     pub detrend: Detrend,
     /// Initial states of each record. Default: estimated.
     pub initial_state: InitialState,
@@ -80,21 +81,21 @@ impl Default for FamilyEstimator {
 }
 
 impl FamilyEstimator {
-    /// Sets the given orders nc and nd of the noise; an nd that is not given is searched, together with an nc from 0 to
-    /// 8.
+    /// Sets the orders nc and nd of the noise model. If nc is not given it is zero. If nd is not given it is searched
+    /// up to 24, or up to 8 if nc is above zero.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for other orders, and for orders that are too high.
+    /// [`IdentError::BadOption`] for the name of any other order, and for an order above [`HIGHEST_NOISE_ORDER`].
     pub fn with_noise_orders(self, named: &NamedOrders) -> Result<Self, IdentError> {
         for (name, range) in named {
             let refuse = |expected: String| IdentError::BadOption {
                 option: format!("order {name}"),
-                found: written(range),
+                found: range_text(range),
                 expected,
             };
             if !matches!(name.as_str(), "nc" | "nd") {
                 return Err(refuse(
-                    "only the orders nc and nd of the noise: the form determines the others".to_owned(),
+                    "only the orders nc and nd of the noise model: the form determines the other orders".to_owned(),
                 ));
             }
             if *range.end() > HIGHEST_NOISE_ORDER {
@@ -130,7 +131,7 @@ impl BatchOptions for FamilyEstimator {
             shared::prior("population", |how: &mut Self| &mut how.prior)
                 .printed("prior", |how, _| Some(how.prior.to_string())),
             BatchOption::new(
-                shared::orders("nc=0,nd=0..24 of its noise"),
+                shared::orders("nc=0,nd=0..24 of its noise model"),
                 |how: &mut Self, option, text| {
                     let mut named: NamedOrders = option.read(text)?;
                     if *how.nc.end() > 0 {
@@ -209,19 +210,22 @@ impl FamilyEstimator {
 }
 
 fn intersample() -> Setting {
-    let help = "Behaviour of e between samples: zoh held; foh linear (logged from a faster or continuous signal; \
-     tau_e is half a sample longer); auto smooth, with the delay for a held e, unless noise-free data show zoh \
-     or foh";
+    let help = "Behaviour of e between samples: held (zoh), linear (foh: e was logged from a faster or continuous \
+                signal; tau_e is half a sample longer), or smooth with the delay for a held e, unless noise-free data \
+                show zoh or foh (auto)";
     Setting::new("intersample", Kind::Choice(&Intersample::NAMES), help).default("auto")
 }
 
 fn role() -> Setting {
-    let help = "Role of each input other than the error: r=feedforward (displayed target; r=feedforward:0.5 with 0.5 s of preview), motion, output; a single form as r=feedforward/derivative";
+    let help = "Role of each input other than the error: r=feedforward (displayed target; r=feedforward:0.5 with 0.5 s \
+                of preview), motion, output; /FORM restricts the response to one form, such as \
+                r=feedforward/derivative";
     Setting::new("role", Kind::Names, help)
 }
 
 fn run_to_run(default: f64) -> Setting {
-    let help = "Run-to-run variation of a person's gain, relative to it; included in the error bars for fewer than five records";
+    let help = "Run-to-run variation of a person's gain, relative to the gain; included in the error bars for fewer \
+                than five records";
     Setting::new("run_to_run", Kind::Number, help)
         .default(&default.to_string())
         .bounds(Bounds::AtLeast(0.0))

@@ -1,12 +1,13 @@
-//! A reported parameter: with its interval, its share of prior, and whether the data determine it.
+//! A reported parameter: its interval, its prior share, and whether the data determine it.
 //!
-//! Estimates are nearly normal in the coordinates of the family, not in the parameters: for a long lag, `1/T_I` has a
-//! symmetric error and T_I has none. Intervals are computed in the coordinates and transformed; an interval that
-//! reaches `1/T_I = 0` has no upper limit in T_I and in K.
+//! Estimates are nearly normally distributed in the coordinates of the family, but not in the parameters: for a long
+//! lag, the error of `1/T_I` is symmetric, but that of T_I is not. Intervals are therefore computed in the coordinates
+//! and then transformed. If an interval of `1/T_I` includes zero, those of T_I and K have no upper limit.
 //!
-//! **Determined** means determined by the data: less than half of the variance before the data remains
-//! ([`Parameter::prior_share`]), the parameter is not at a bound of the search range, and its interval excludes zero;
-//! for omega_nm and zeta_nm, whose prior has a scale, it has to be known within a factor of two.
+//! **Determined** means determined by the data. The posterior variance must be at most half of the prior variance
+//! ([`Parameter::prior_share`]), the parameter must not be at a bound of the search range, and its interval must
+//! exclude zero. For omega_nm and zeta_nm, which are positive by definition, the interval must instead be within a
+//! factor of two of the estimate.
 
 use hoid_model::{
     FamilyOperator, Form,
@@ -16,9 +17,9 @@ use hoid_model::{
 
 use super::mixture::{Component, Mixture, widened};
 
-/// Weight of the forms with a parameter below which it counts as undetermined.
+/// Total weight of the forms with a parameter, up to which the parameter counts as undetermined.
 const LEAST_WEIGHT: f64 = 0.5;
-/// Largest ratio of the variance after to that before the data for a determined parameter.
+/// Largest ratio of the posterior to the prior variance of a determined parameter.
 const LARGEST_PRIOR_SHARE: f64 = 0.5;
 /// Largest standard error of the logarithm of a determined parameter.
 const LARGEST_LOG_ERROR: f64 = 0.35;
@@ -26,29 +27,29 @@ const LARGEST_LOG_ERROR: f64 = 0.35;
 /// One parameter of an operator.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Parameter {
-    /// K, K_over_T_I, T_L, T_I, omega_nm, zeta_nm, tau_e ...
+    /// Name of the parameter: K, K_over_T_I, T_L, T_I, omega_nm, zeta_nm, tau_e, ...
     pub name: String,
-    /// Its unit.
+    /// Unit of the parameter.
     #[serde(deserialize_with = "hoid_model::interned::name")]
     pub unit: hoid_model::interned::Name,
-    /// Its value; infinite for T_I of a pure integration.
+    /// Value of the parameter; infinite for T_I of a pure integration.
     pub value: f64,
-    /// Standard error, to first order, for the operator of these runs; `None` if there is none.
+    /// First-order standard error for the operator in these runs; `None` at a bound or without a covariance.
     pub standard_error: Option<f64>,
-    /// Standard error for the person, whose gain varies from one run to the next.
+    /// Standard error for the person, whose gain varies from run to run.
     pub standard_error_person: Option<f64>,
     /// The 95 % interval; an open end is infinite.
     pub interval: Option<(f64, f64)>,
-    /// Ratio of the variance after the data to that before; 0 without a prior.
+    /// Ratio of the posterior to the prior variance; 0 without a prior.
     pub prior_share: f64,
-    /// True if the data determine it.
+    /// True if the data determine the parameter.
     pub determined: bool,
     /// The forms over which the estimate is averaged; empty for a single form.
     pub averaged_over: Vec<Form>,
 }
 
 impl Parameter {
-    /// Returns the same with standard error and interval for the person.
+    /// Returns the parameter with the standard error and interval for the person instead of those for these runs.
     #[must_use]
     pub fn as_of_person(&self) -> Self {
         let (estimate, interval) = widened(self.estimate(), self.interval, self.standard_error_person);
@@ -59,7 +60,7 @@ impl Parameter {
         }
     }
 
-    /// Its value with its standard error.
+    /// Returns the value with its standard error.
     pub fn estimate(&self) -> Estimate {
         Estimate {
             value: self.value,
@@ -67,10 +68,10 @@ impl Parameter {
         }
     }
 
-    /// Mean over forms of the parameters with this name, by their weights, the best form first.
+    /// Returns the weighted mean over forms of the parameters with the same name, given with the best form first.
     pub(super) fn averaged(each: &[(Form, f64, &Self)], clusters: usize) -> Option<Self> {
         let (_, _, front) = *each.first()?;
-        // At a bound a parameter has no error, and is left out of the mean of those that have.
+        // A parameter at a bound has no error and is omitted from the mean.
         let with_error: Vec<_> = each
             .iter()
             .filter(|(_, _, p)| p.standard_error.is_some())
@@ -102,7 +103,8 @@ impl Parameter {
             })
             .collect();
         let share = |of: &dyn Fn(&Self) -> f64| each.iter().map(|(_, w, p)| w / total * of(p)).sum::<f64>();
-        // The same sign, and within the factor for a scale: in the mean as in a form.
+        // As in a single form, the interval must exclude zero, and omega_nm and zeta_nm must be known within the
+        // factor.
         let one_sign = interval.is_some_and(|(low, high)| low * high > 0.0);
         let known = match estimate.standard_error {
             Some(s) if matches!(front.name.as_str(), "omega_nm" | "zeta_nm") => s < LARGEST_LOG_ERROR * estimate.value,
@@ -114,7 +116,7 @@ impl Parameter {
             standard_error_person: Mixture::of(&of_person, clusters)?.estimate.standard_error,
             interval,
             prior_share: share(&|p| p.prior_share),
-            // A parameter of forms that are less likely than those without it is not determined.
+            // The parameter is not determined if the forms without it are more likely than those with it.
             determined: total > LEAST_WEIGHT && share(&|p| f64::from(p.determined)) > 0.5 && one_sign && known,
             averaged_over: each.iter().map(|(form, ..)| *form).collect(),
             ..front.clone()
@@ -126,15 +128,15 @@ impl Parameter {
 pub(super) struct CoordinateEstimate<'a> {
     pub operator: &'a FamilyOperator,
     pub covariance: Option<&'a [f64]>,
-    /// Share of prior of each coordinate.
+    /// Prior share of each coordinate.
     pub prior_share: &'a [f64],
     /// Search range of each coordinate.
     pub limits: &'a [(f64, f64)],
-    /// Intervals by profile likelihood, if there are any.
+    /// Interval of each coordinate by profile likelihood; `None` if it was not computed.
     pub profile: &'a [Option<(f64, f64)>],
     /// 97.5 % quantile of Student's distribution.
     pub quantile: f64,
-    /// Variation of the person's gain that these runs do not show, relative to the gain.
+    /// Relative standard deviation of the person's gain that the scatter of these runs does not show.
     pub run_to_run: f64,
 }
 
@@ -142,7 +144,7 @@ impl CoordinateEstimate<'_> {
     pub fn parameters(&self) -> Vec<Parameter> {
         let made = |named: &NamedParameter| {
             let made = self.parameter(named);
-            // All gains, and products with a gain, are proportional to it.
+            // The variation applies to all gains and to products that contain a gain.
             let scales = matches!(named.coordinate, None | Some(Coordinate::Gain));
             let share = if scales {
                 self.run_to_run * made.value.abs()
@@ -162,7 +164,7 @@ impl CoordinateEstimate<'_> {
         all.iter().position(|c| *c == wanted)
     }
 
-    /// Standard error of a coordinate; `None` at a bound.
+    /// Returns the standard error of a coordinate; `None` at a bound.
     fn error(&self, i: usize) -> Option<f64> {
         let x = self.operator.coordinates();
         let (low, high) = self.limits[i];
@@ -171,7 +173,7 @@ impl CoordinateEstimate<'_> {
         (inside && c[i * x.len() + i] > 0.0).then(|| c[i * x.len() + i].sqrt())
     }
 
-    /// 95 % interval of a coordinate, within the search range.
+    /// Returns the 95 % interval of a coordinate, limited to the search range.
     fn interval(&self, i: usize) -> Option<(f64, f64)> {
         let x = self.operator.coordinates()[i];
         if let Some(profile) = self.profile[i] {
@@ -223,7 +225,7 @@ impl CoordinateEstimate<'_> {
         let interval = self.interval(i);
         match coordinate {
             Coordinate::LagRate => {
-                // Below the bound of the search range, it is a pure integration.
+                // At or below the lower bound of the search range, the lag is a pure integration.
                 let end = |rate: f64| {
                     if rate <= self.limits[i].0 {
                         f64::INFINITY
@@ -248,7 +250,7 @@ impl CoordinateEstimate<'_> {
         made
     }
 
-    /// K = (K/T_I) T_I, or K_e_dot = K_e T_L.
+    /// Completes a parameter that is a product of two others: K = (K/T_I) T_I, or K_e_dot = K_e T_L.
     fn product(&self, mut made: Parameter) -> Parameter {
         let x = self.operator.coordinates();
         let p = x.len();
@@ -266,7 +268,7 @@ impl CoordinateEstimate<'_> {
             }
             return made;
         }
-        // For the logarithm: d ln y = dx_g/x_g +- dx_o/x_o.
+        // Logarithm of the product: d ln y = dx_g/x_g +- dx_o/x_o.
         let variance = c[gain * p + gain] / (x[gain] * x[gain])
             + c[other * p + other] / (x[other] * x[other])
             + 2.0 * sign * c[gain * p + other] / (x[gain] * x[other]);
@@ -283,7 +285,7 @@ impl CoordinateEstimate<'_> {
             && sign < 0.0
             && rate <= self.limits[other].0
         {
-            // K grows without bound as 1/T_I goes to zero.
+            // K grows without bound as 1/T_I approaches zero.
             if made.value > 0.0 {
                 high = f64::INFINITY;
             } else {
@@ -294,10 +296,11 @@ impl CoordinateEstimate<'_> {
         made
     }
 
-    /// Distances of the ends of the interval of `ln|x_g| +- ln x_o` below and above its estimate, from the intervals of
-    /// the two, which need not be symmetric (G. Y. Zou and A. Donner, *Statistics in Medicine* 27 (2008) 1693-1702):
-    /// with a below and b above, `sqrt(a_g^2 + a_o^2 + 2 r a_g a_o)` for the sum, `sqrt(a_g^2 + b_o^2 - 2 r a_g b_o)`
-    /// for the difference, r their correlation. Infinite if an interval reaches zero.
+    /// Returns the distances by which the interval of `ln|x_g| +- ln x_o` extends below and above the estimate. They
+    /// are computed from the intervals of x_g and x_o, which may be asymmetric (G. Y. Zou and A. Donner, *Statistics in
+    /// Medicine* 27 (2008) 1693-1702). With the distances a below and b above and the correlation r, the lower distance
+    /// is `sqrt(a_g^2 + a_o^2 + 2 r a_g a_o)` for the sum and `sqrt(a_g^2 + b_o^2 - 2 r a_g b_o)` for the difference. A
+    /// distance is infinite if one of the intervals reaches zero.
     fn product_interval(&self, gain: usize, other: usize, sign: f64) -> Option<(f64, f64)> {
         let x = self.operator.coordinates();
         let p = x.len();

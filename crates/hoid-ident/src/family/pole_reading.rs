@@ -1,8 +1,8 @@
-//! Assignment of the poles of a discrete model to the lag and to the neuromuscular system.
+//! Assignment of the poles of a discrete-time model to the lag and to the neuromuscular system.
 //!
-//! The poles are `s_i = ln z_i / Ts`: a pair of complex poles is the neuromuscular system, the remaining real one is
-//! the lag. Of three real poles each may be the lag; callers try all three assignments, and the one used is reported
-//! ([`RealPole`]).
+//! The continuous-time poles are `s_i = ln z_i / Ts`. A pair of complex poles is the neuromuscular system, and the
+//! remaining real pole is the lag. If there are three real poles, each of them may be the lag; callers try all three
+//! assignments and report the one that they use ([`RealPole`]).
 
 use hoid_model::{NotConvertible, SampleTime, operator_family::Coordinate, polynomial, polynomial_model::monic};
 
@@ -18,24 +18,24 @@ pub enum PoleRole {
 /// A real pole `s = -rate`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RealPole {
-    /// Its rate, 1/s.
+    /// Rate of the pole, 1/s.
     pub rate: f64,
-    /// Its role.
+    /// Interpretation of the pole.
     pub role: PoleRole,
 }
 
-/// An assignment of the poles.
+/// One possible assignment of the poles.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Reading {
-    /// Rate of the lag, 1/s.
+pub(super) struct PoleAssignment {
+    /// Rate of the lag, 1/s; `None` without a lag.
     pub lag: Option<f64>,
-    /// omega and zeta.
+    /// omega_nm in rad/s and zeta_nm; `None` without a neuromuscular system.
     pub neuromuscular: Option<(f64, f64)>,
-    /// Rates of the neuromuscular poles if they are real.
+    /// Rates of the neuromuscular poles if these are real, 1/s.
     real: Vec<f64>,
 }
 
-impl Reading {
+impl PoleAssignment {
     pub fn real_poles(&self) -> Vec<RealPole> {
         let lag = self.lag.iter().map(|&rate| RealPole {
             rate,
@@ -50,7 +50,7 @@ impl Reading {
         all
     }
 
-    /// Returns a coordinate that the poles determine; zero for others.
+    /// Returns the value of a coordinate that the poles determine; zero for other coordinates.
     pub fn coordinate(&self, wanted: Coordinate) -> f64 {
         let (omega, zeta) = self.neuromuscular.unwrap_or((1.0, 1.0));
         match wanted {
@@ -63,7 +63,7 @@ impl Reading {
 }
 
 /// Returns all possible assignments of the poles of F.
-pub(super) fn readings(f: &[f64], sample_time: SampleTime) -> Result<Vec<Reading>, NotConvertible> {
+pub(super) fn pole_assignments(f: &[f64], sample_time: SampleTime) -> Result<Vec<PoleAssignment>, NotConvertible> {
     let other = |reason: String| NotConvertible::NotOfTheFamily { reason };
     let roots = polynomial::roots(&monic(f)).unwrap_or_default();
     if roots.len() != f.len() || !(1..=3).contains(&roots.len()) {
@@ -92,17 +92,17 @@ pub(super) fn readings(f: &[f64], sample_time: SampleTime) -> Result<Vec<Reading
     }
     let overdamped = |a: f64, b: f64| Some(((a * b).sqrt(), 0.5 * (a + b) / (a * b).sqrt()));
     Ok(match (pair, rates.as_slice()) {
-        (neuromuscular, &[]) => vec![Reading {
+        (neuromuscular, &[]) => vec![PoleAssignment {
             lag: None,
             neuromuscular,
             real: Vec::new(),
         }],
-        (neuromuscular, &[rate]) => vec![Reading {
+        (neuromuscular, &[rate]) => vec![PoleAssignment {
             lag: Some(rate),
             neuromuscular,
             real: Vec::new(),
         }],
-        (_, &[a, b]) => vec![Reading {
+        (_, &[a, b]) => vec![PoleAssignment {
             lag: None,
             neuromuscular: overdamped(a, b),
             real: vec![a, b],
@@ -110,7 +110,7 @@ pub(super) fn readings(f: &[f64], sample_time: SampleTime) -> Result<Vec<Reading
         (_, three) => (0..three.len())
             .map(|i| {
                 let rest: Vec<f64> = (0..three.len()).filter(|j| *j != i).map(|j| three[j]).collect();
-                Reading {
+                PoleAssignment {
                     lag: Some(three[i]),
                     neuromuscular: overdamped(rest[0], rest[1]),
                     real: rest,

@@ -1,12 +1,12 @@
-//! An operator of the family with its noise model, by prediction error.
+//! Prediction error fit of an operator of the family with its noise model.
 //!
-//! The model is `u = Y e + (C/D) eps` with Y the operator after a hold, exactly discretised, and
-//! the criterion that of the general model ([`crate::criterion`]) in the coordinates of the family.
-//! A prior is added to the data as `kappa sigma^2 sum_i (g_i - m_i)^2/s_i^2`. Its weight is in units of the innovation
-//! variance sigma^2, and of kappa, the ratio of the variances of clusters (runs, or blocks of one) to those for white
-//! residuals: people vary in ways that no stationary noise describes, so that their samples contain less information
-//! than as many samples of a simulation (M. Ribatet, D. Cooley and A. C. Davison, *Statistica Sinica* 22 (2012)
-//! 813-845, the magnitude adjustment).
+//! The model is `u = Y e + (C/D) eps`, where Y is the exact discretisation of the operator for the intersample
+//! behaviour of the error. The criterion of the general model ([`crate::criterion`]) is used as a function of the
+//! coordinates of the family. A prior is added to the sum of squares as `kappa sigma^2 sum_i (g_i - m_i)^2/s_i^2`. Here
+//! sigma^2 is the innovation variance, and kappa is the ratio of the variances from clusters (runs, or blocks of runs)
+//! to those for white residuals. People vary in ways that no stationary noise describes, so that their samples contain
+//! less information than as many samples of a simulation (M. Ribatet, D. Cooley and A. C. Davison, *Statistica Sinica*
+//! 22 (2012) 813-845, the magnitude adjustment).
 
 use hoid_model::{
     SampleTime,
@@ -20,7 +20,7 @@ use super::{
     intersample::Intersample,
     layout::FamilyLayout,
     noise::{Autoregression, NoiseProducts},
-    prediction_fit::{OPEN, PredictionFit},
+    prediction_fit::{UNDETERMINED_RIDGE, PredictionFit},
     prior::OperatorPrior,
 };
 use crate::{
@@ -34,16 +34,16 @@ use crate::{
     optimize::Minimum,
 };
 
-/// Share of the power of u below which the residual is not noise, but rounding in a file.
+/// Residual power relative to the power of u below which the residual is not noise but rounding errors of the file.
 pub(super) const NONE: f64 = 1e-8;
-/// Share below which differences of forms do not count: the end of a search without noise is due to chance.
+/// Relative residual power below which forms count as equal: where a search without noise ends is then due to chance.
 pub(super) const EQUAL: f64 = 1e-18;
-/// Rounds in which sigma^2 and kappa of the prior are updated.
+/// Maximum number of rounds in which the weight kappa sigma^2 of the prior is updated.
 const ROUNDS: usize = 3;
-/// Relative change of the weight of the prior below which no further round is necessary.
-const SETTLED: f64 = 0.05;
+/// Relative change of this weight below which no further round is needed.
+const CONVERGED: f64 = 0.05;
 
-/// The records and the common settings of all forms.
+/// The records, and the settings common to all forms.
 #[derive(Debug, Clone)]
 pub(super) struct Prediction<'a> {
     pub data: Vec<Data<'a>>,
@@ -52,12 +52,12 @@ pub(super) struct Prediction<'a> {
     pub sample_time: SampleTime,
     /// Intersample behaviour of the error.
     pub intersample: Intersample,
-    /// True if the data show the intersample behaviour, or the user has given it.
+    /// True if the intersample behaviour was given by the user or determined from the data.
     pub course_is_known: bool,
-    /// Share of the power of u that an output error fit leaves, if it is little.
+    /// Residual power of an output error fit relative to the power of u, if there is little noise.
     pub little_noise: Option<f64>,
     pub initial: InitialState,
-    /// First residual that counts, the same for all forms.
+    /// First sample of each record whose residual counts, the same for all forms.
     pub first: usize,
     pub delay_range_s: (f64, f64),
     pub prior: OperatorPrior,
@@ -69,7 +69,7 @@ pub(super) struct Prediction<'a> {
 pub(super) type NoiseOrders = (usize, usize);
 
 impl<'a> Prediction<'a> {
-    /// Returns the smallest first residual that is valid for all these forms and orders.
+    /// Returns the first sample whose residual can be computed for all these forms and orders.
     pub fn first_residual(
         forms: &[(Form, bool)],
         (nc, nd): NoiseOrders,
@@ -108,8 +108,8 @@ impl<'a> Prediction<'a> {
         }
     }
 
-    /// Returns the part of u that an operator does not explain in each record: `v = u - Y e`, with the states of Y
-    /// estimated.
+    /// Returns the part of u in each record that an operator does not explain: `v = u - Y e`, with the initial states
+    /// of Y estimated.
     pub fn unexplained(
         &self,
         form: (Form, bool),
@@ -128,10 +128,10 @@ impl<'a> Prediction<'a> {
             .collect()
     }
 
-    /// Fits a form from these coordinates, and from the best noise model for them.
+    /// Fits a form, starting from these coordinates and from the noise model that fits best with them.
     ///
     /// # Errors
-    /// [`IdentError::NoFiniteLoss`], and the errors of the model.
+    /// [`IdentError::NoFiniteLoss`], and the errors of the discrete-time model.
     pub fn fit(
         &self,
         form: (Form, bool),
@@ -143,7 +143,7 @@ impl<'a> Prediction<'a> {
         let products = NoiseProducts::new(&series, noise.1);
         let start_of_noise = match products.fit_up_to(noise.1) {
             Some(found) => found,
-            // Only rounding is left: there is nothing to model.
+            // Only rounding errors remain: no noise model is needed.
             None if self.noise_free().is_some() => Autoregression {
                 d: vec![0.0; noise.1],
                 loss: self.rounding(),
@@ -154,7 +154,7 @@ impl<'a> Prediction<'a> {
         let coefficients = [vec![0.0; noise.0], start_of_noise.d].concat();
         let mut eta = criterion.layout.spread(start, &coefficients);
         let unit = self.penalties(&criterion.layout);
-        // The prior is weighted by kappa sigma^2, which is known only after a fit: a few rounds make both
+        // The weight kappa sigma^2 of the prior is known only after a fit; a few rounds make the fit and the weight
         // consistent.
         let mut weight = start_of_noise.loss;
         let mut found = None;
@@ -163,15 +163,15 @@ impl<'a> Prediction<'a> {
             let mut minimum = criterion
                 .search(eta, &self.search, None, workspace)
                 .ok_or(IdentError::NoFiniteLoss)?;
-            // If nothing is left, no step decreases the loss.
+            // Without a residual no step can decrease the loss.
             if minimum.at.sum_of_squares < self.equal() {
                 minimum.termination.reason = Reason::ExactFit;
             }
-            let fit = self.judged(criterion.clone(), minimum, workspace)?;
+            let fit = self.fit_at_minimum(criterion.clone(), minimum, workspace)?;
             let next = fit.innovation_variance * fit.inflation;
             eta = fit.minimum.theta.clone();
             found = Some(fit);
-            if unit.is_empty() || (next / weight - 1.0).abs() < SETTLED || round + 1 == ROUNDS {
+            if unit.is_empty() || (next / weight - 1.0).abs() < CONVERGED || round + 1 == ROUNDS {
                 break;
             }
             weight = next;
@@ -179,8 +179,8 @@ impl<'a> Prediction<'a> {
         found.ok_or(IdentError::NoFiniteLoss)
     }
 
-    /// Returns the result of the search with another noise model, from the operator of a fit and with its weight of the
-    /// prior; `None` if it fails.
+    /// Repeats the search with another noise model, starting from the operator of a fit and with the same weight of the
+    /// prior. Returns eta; `None` if the search fails.
     pub fn refit(
         &self,
         fit: &PredictionFit<'_>,
@@ -202,7 +202,7 @@ impl<'a> Prediction<'a> {
         found.theta.iter().all(|x| x.is_finite()).then_some(found.theta)
     }
 
-    /// Returns the prior for each element of eta, in units of one standard deviation.
+    /// Returns the prior on each element of eta, in units of one standard deviation.
     fn penalties(&self, layout: &FamilyLayout) -> Vec<Penalty> {
         let all = layout.form.coordinates(layout.neuromuscular);
         let unit = self.prior.penalties(layout.form, layout.neuromuscular);
@@ -219,34 +219,34 @@ impl<'a> Prediction<'a> {
         unit.into_iter().flat_map(places).collect()
     }
 
-    /// Number of samples that count.
+    /// Returns the number of samples that count.
     pub fn samples(&self) -> usize {
         self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()
     }
 
-    /// Sum of squares of u, of the samples that count.
+    /// Returns the sum of squares of u over the samples that count.
     pub fn power(&self) -> f64 {
         let of = |d: &Data<'_>| d.u.get(self.first..).map_or(0.0, |u| dot(u, u));
         self.data.iter().map(of).sum()
     }
 
-    /// Returns the share of the power of u that is left, if it is not noise.
+    /// Returns the residual power relative to the power of u if the residual is not noise; `None` if there is noise.
     pub fn noise_free(&self) -> Option<f64> {
         self.little_noise.filter(|share| *share < NONE)
     }
 
-    /// Sum of squares below which differences of forms do not count; zero if there is noise.
+    /// Returns the sum of squares below which forms count as equal; zero if there is noise.
     pub fn equal(&self) -> f64 {
         self.noise_free().map_or(0.0, |_| EQUAL * self.power())
     }
 
-    /// A mean square of residuals far below rounding, instead of zero, whose logarithm does not exist.
+    /// Returns a mean square far below rounding errors, used in place of zero, whose logarithm does not exist.
     fn rounding(&self) -> f64 {
         f64::EPSILON.powi(2) * self.power() / self.samples().max(1) as f64
     }
 
-    /// Loss, innovation variance, clusters and their inflation at a minimum.
-    pub(super) fn judged(
+    /// Returns the fit at a minimum: loss, innovation variance, clusters and their inflation.
+    pub(super) fn fit_at_minimum(
         &self,
         criterion: PhysicalCriterion<'a, FamilyLayout>,
         minimum: Minimum,
@@ -255,7 +255,7 @@ impl<'a> Prediction<'a> {
         let (n, states) = (criterion.residuals(), criterion.states());
         let penalty: f64 = criterion.penalty.iter().map(|p| p.at(&minimum.theta)).sum();
         let beside = criterion.additional_at(&minimum.theta, workspace).sum_of_squares;
-        // The noise variance comes from the residuals alone, without the prior and without the lines.
+        // The noise variance is computed from the residuals alone, without the prior and the lines.
         let mut squares = minimum.at.sum_of_squares - penalty - beside;
         if self.noise_free().is_some() {
             squares = squares.max(self.rounding() * n as f64);
@@ -279,7 +279,7 @@ impl<'a> Prediction<'a> {
             clusters,
         };
         if !covariances::is_regular(&fit) {
-            fit.ridge = OPEN;
+            fit.ridge = UNDETERMINED_RIDGE;
         }
         fit.inflation = covariances::inflation(&fit).unwrap_or(1.0);
         Ok(fit)

@@ -6,7 +6,7 @@ use crate::{
     optimize::Minimum,
 };
 
-/// A fit of one form.
+/// Prediction error fit of one form.
 #[derive(Debug, Clone)]
 pub(super) struct PredictionFit<'a> {
     pub criterion: PhysicalCriterion<'a, FamilyLayout>,
@@ -18,18 +18,18 @@ pub(super) struct PredictionFit<'a> {
     pub residuals: usize,
     pub states: usize,
     pub clusters: Clusters,
-    /// kappa.
+    /// Inflation kappa of the variances.
     pub inflation: f64,
-    /// Relative part of the diagonal of `G + P` that is added to it: zero, or [`OPEN`] if a combination of parameters
-    /// is undetermined. This combination then has a very large error, and quantities that do not depend on it are not
-    /// affected.
+    /// Relative increase of the diagonal of `G + P`: zero, or [`UNDETERMINED_RIDGE`] if a combination of parameters is
+    /// undetermined. This combination then has a very large error; quantities that do not depend on it are unaffected.
     pub ridge: f64,
-    /// The weight w of [`super::joint`]; zero if the lines are not a part of the criterion.
+    /// Weight w of the lines ([`super::joint`]); zero if the criterion does not include lines.
     pub weight_of_lines: f64,
 }
 
-/// The ridge that makes `G + P` regular: errors of 3e4 times those of a single parameter count as undetermined.
-pub(super) const OPEN: f64 = 1e-9;
+/// Ridge that makes `G + P` regular. A combination whose error would be more than 3e4 times the error of a single
+/// parameter counts as undetermined.
+pub(super) const UNDETERMINED_RIDGE: f64 = 1e-9;
 
 impl PredictionFit<'_> {
     pub fn layout(&self) -> &FamilyLayout {
@@ -40,12 +40,12 @@ impl PredictionFit<'_> {
         &self.minimum.theta
     }
 
-    /// Minimum of the objective: the sum of squares with the prior.
+    /// Returns the minimum of the criterion: the sum of squares plus the prior.
     pub fn objective(&self) -> f64 {
         self.minimum.at.sum_of_squares
     }
 
-    /// Residuals of one record.
+    /// Returns the residuals of one record.
     pub fn residuals_of(&self, record: usize, workspace: &mut Workspace) -> Option<Vec<f64>> {
         let mapped = self.criterion.model_of(self.eta(), record).ok()?;
         Some(
@@ -55,12 +55,13 @@ impl PredictionFit<'_> {
         )
     }
 
-    /// Number of free parameters.
+    /// Returns the number of elements of eta.
     pub fn parameters(&self) -> usize {
         self.minimum.theta.len()
     }
 
-    /// Solves with `G + P`, reduced by `less`, for a right-hand side over these elements; zero for the others.
+    /// Solves the linear system of `G + P` minus `less` for the elements in `free`; all other elements of the solution
+    /// are zero.
     pub fn solve(&self, free: &[usize], less: Option<&[f64]>, rhs: &[f64]) -> Option<Vec<f64>> {
         let p = self.parameters();
         let gram = |i: usize, j: usize| {
@@ -80,7 +81,7 @@ impl PredictionFit<'_> {
         Some(whole)
     }
 
-    /// Elements of eta that are not at their bounds.
+    /// Returns the indices in eta of the elements that are not at a bound.
     pub fn free(&self) -> Vec<usize> {
         let limits = &self.criterion.limits;
         let eta = self.eta();
@@ -89,9 +90,9 @@ impl PredictionFit<'_> {
             .collect()
     }
 
-    /// Elements of eta that were free in the search, including those at a bound: their uncertainty contributes to that
-    /// of others, as the true value need not be at the bound.
-    pub fn sought(&self) -> Vec<usize> {
+    /// Returns the indices in eta of the elements that are not fixed, including those at a bound. Their uncertainty
+    /// contributes to that of other elements, since the true value need not be at the bound.
+    pub fn not_fixed(&self) -> Vec<usize> {
         let limits = &self.criterion.limits;
         (0..limits.len()).filter(|&i| limits[i].0 < limits[i].1).collect()
     }

@@ -1,14 +1,14 @@
 //! Prior knowledge of people.
 //!
-//! Some seconds of tracking carry little information about the neuromuscular system: its resonance is above the
-//! frequencies at which people are excited. A weak prior keeps its parameters in the range of people, and has no effect
-//! if the data determine them. A positive parameter x has a log-normal prior, `ln x ~ N(ln centre, spread)`, so that
-//! the spread is relative. In the criterion it is an additional measurement of the parameter (a maximum a posteriori
-//! estimate; L. Ljung, *System Identification*, 1999, section 7.4).
+//! A short tracking record carries little information about the neuromuscular system, whose resonance is above the
+//! excited frequencies. A weak prior keeps the parameters in the range of people, and has almost no effect if the data
+//! determine them. A positive parameter x has a log-normal prior, `ln x ~ N(ln centre, spread)`, so that the spread is
+//! relative. In the criterion the prior is an additional measurement of the parameter (a maximum a posteriori estimate;
+//! L. Ljung, *System Identification*, 1999, section 7.4).
 //!
-//! The share of prior in a result is the ratio of its variance after the data to that before
-//! ([`prior share`](super::Parameter::prior_share)): one means that the data carried no information. It determines the
-//! shift of the estimate by the prior ([`OperatorPrior::pull`]).
+//! The prior share of a result is the ratio of the posterior to the prior variance
+//! ([`prior_share`](super::Parameter::prior_share)); a share of one means that the data carried no information. It
+//! determines how far the prior has shifted the estimate ([`OperatorPrior::pull`]).
 
 use std::{fmt, str::FromStr};
 
@@ -20,20 +20,20 @@ use hoid_model::{
 use super::Parameter;
 use crate::{IdentError, grey_box::objective::Penalty};
 
-/// Spread below which a parameter is practically fixed; it is rejected, as `--fix` does this openly. A smaller error of
-/// another fit is replaced by this value.
-const LEAST_SPREAD: f64 = 1e-3;
+/// Smallest spread. A smaller spread would practically fix the parameter and is rejected, since `--fix` does this
+/// explicitly. A smaller standard error from another fit is replaced by this value.
+const MIN_SPREAD: f64 = 1e-3;
 
 /// Prior of one parameter.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ParameterPrior {
-    /// `omega_nm`, `zeta_nm`, `tau_e`, `T_L` or `T_I`.
+    /// Name of the parameter: `omega_nm`, `zeta_nm`, `tau_e`, `T_L` or `T_I`.
     pub parameter: String,
-    /// The median, in the unit of the parameter.
+    /// Median, in the unit of the parameter.
     pub centre: f64,
-    /// Standard deviation of its natural logarithm.
+    /// Standard deviation of the natural logarithm of the parameter.
     pub spread: f64,
-    /// Source of this knowledge.
+    /// Source of the prior knowledge.
     pub source: String,
 }
 
@@ -43,7 +43,7 @@ pub struct OperatorPrior {
     entries: Vec<ParameterPrior>,
 }
 
-/// The coordinates whose parameters can have a prior.
+/// Coordinates whose parameters can have a prior.
 const KNOWN: [Coordinate; 5] = [
     Coordinate::LogOmega,
     Coordinate::LogZeta,
@@ -57,7 +57,7 @@ fn coordinate_of(parameter: &str) -> Option<Coordinate> {
     KNOWN.into_iter().find(|c| c.parameter() == parameter)
 }
 
-/// Source of the neuromuscular part of the population.
+/// Source of the population prior.
 const NEUROMUSCULAR: &str = "published pilots: D. T. McRuer et al., IEEE Trans. Man-Machine Systems 9 (1968) 61-71; P. M. T. Zaal et al., \
                              J. Guidance, Control, and Dynamics 32 (2009) 1089-1099";
 
@@ -67,8 +67,8 @@ impl OperatorPrior {
         Self::default()
     }
 
-    /// Returns the prior for people in manual control: omega_nm 10.5 rad/s within a third, zeta_nm 0.3 within a factor
-    /// of 1.6, tau_e 0.2 s within a factor of two.
+    /// Returns the prior for people in manual control: omega_nm 10.5 rad/s within 30 %, zeta_nm 0.3 within a factor of
+    /// 1.6, tau_e 0.2 s within a factor of two, each for one standard deviation.
     pub fn population() -> Self {
         let entry = |parameter: &str, centre, spread| ParameterPrior {
             parameter: parameter.to_owned(),
@@ -88,8 +88,8 @@ impl OperatorPrior {
     /// Creates a prior from these entries.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a parameter that cannot have a prior or has two, and for a centre or spread that
-    /// is not positive.
+    /// [`IdentError::BadOption`] for a parameter that cannot have a prior or has two priors, for a nonpositive centre,
+    /// and for a spread below 0.001.
     pub fn new(entries: Vec<ParameterPrior>) -> Result<Self, IdentError> {
         for (i, entry) in entries.iter().enumerate() {
             let refuse = |found: String, expected: &str| {
@@ -112,7 +112,7 @@ impl OperatorPrior {
                     "a positive centre, such as omega_nm=10.5:0.3",
                 );
             }
-            if !(entry.spread.is_finite() && entry.spread >= LEAST_SPREAD) {
+            if !(entry.spread.is_finite() && entry.spread >= MIN_SPREAD) {
                 return refuse(
                     format!("{}={}:{}", entry.parameter, entry.centre, entry.spread),
                     "a spread (standard deviation of the logarithm) of 0.001 or more, such as omega_nm=10.5:0.3",
@@ -122,9 +122,9 @@ impl OperatorPrior {
         Ok(Self { entries })
     }
 
-    /// Creates a prior from another fit, given name, estimate, and whether it is determined: it contains the determined
-    /// parameters that can have a prior and have an error, with `standard error/value` as the spread of the logarithm
-    /// to first order. It may be empty.
+    /// Creates a prior from the parameters of another fit, each given by its name, its estimate, and whether it is
+    /// determined. The prior contains the determined parameters that can have a prior and have a standard error. The
+    /// spread of the logarithm is `standard error/value`, to first order. The prior may be empty.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] for a parameter that occurs twice.
@@ -138,7 +138,7 @@ impl OperatorPrior {
             counts.then(|| ParameterPrior {
                 parameter: name.to_owned(),
                 centre: value,
-                spread: (error / value).max(LEAST_SPREAD),
+                spread: (error / value).max(MIN_SPREAD),
                 source: source.to_owned(),
             })
         };
@@ -146,7 +146,7 @@ impl OperatorPrior {
     }
 
     /// Keeps only the entries of the neuromuscular system.
-    pub(super) fn of_muscles(mut self) -> Self {
+    pub(super) fn neuromuscular_only(mut self) -> Self {
         self.entries.retain(|entry| {
             matches!(
                 coordinate_of(&entry.parameter),
@@ -156,15 +156,15 @@ impl OperatorPrior {
         self
     }
 
-    /// Returns the prior of each parameter.
+    /// Returns the priors of the parameters.
     pub fn entries(&self) -> &[ParameterPrior] {
         &self.entries
     }
 
-    /// Shift of the logarithm of an estimate by the prior of the parameter. Two normal measurements of x with the
-    /// shares 1 - w and w of the information have the mean `(1 - w) x_data + w m`, so that
-    /// `x - x_data = w (m - x)/(1 - w)`; other priors are unchanged. `None` if the parameter has no prior, or nothing
-    /// but the prior.
+    /// Returns the shift in the logarithm of an estimate that is due to the prior of this parameter, with all other
+    /// priors unchanged. Two normally distributed measurements of x with the fractions 1 - w and w of the information
+    /// have the mean `x = (1 - w) x_data + w m`, so that `x - x_data = w (m - x)/(1 - w)`. `None` if the parameter has
+    /// no prior, or is determined by the prior alone.
     pub fn pull(&self, parameter: &Parameter) -> Option<f64> {
         let name = parameter.name.split('[').next();
         let entry = self.entries.iter().find(|e| Some(e.parameter.as_str()) == name)?;
@@ -193,7 +193,7 @@ impl OperatorPrior {
 }
 
 impl fmt::Display for OperatorPrior {
-    /// Formats it as typed: `omega_nm=10.5:0.3,zeta_nm=0.3:0.5`, or `none`.
+    /// Formats the prior as on the command line: `omega_nm=10.5:0.3,zeta_nm=0.3:0.5`, or `none`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.entries.is_empty() {
             return f.write_str("none");
@@ -206,7 +206,7 @@ impl fmt::Display for OperatorPrior {
 impl FromStr for OperatorPrior {
     type Err = IdentError;
 
-    /// `population`, `none`, or `NAME=CENTRE:SPREAD,...`.
+    /// Parses `population`, `none`, or `NAME=CENTRE:SPREAD,...`.
     fn from_str(text: &str) -> Result<Self, IdentError> {
         match text.trim() {
             "population" => return Ok(Self::population()),

@@ -1,22 +1,22 @@
 //! Intervals by profile likelihood.
 //!
-//! With `S(x) = min over all else of the criterion at coordinate x`, the 95 % interval is the set with
-//! `S(x) - S_min <= kappa sigma^2 t^2`, t the quantile, kappa the inflation of variances (D. M. Bates and D. G. Watts,
-//! *Nonlinear Regression Analysis and Its Applications*, 1988, section 6.1). Near the estimate it equals the interval
-//! of the standard error; if the criterion is not a parabola (a lag that is nearly an integration), only the profile
-//! interval is valid.
+//! Let `S(x)` be the minimum of the criterion over all other elements at the coordinate x. The 95 % interval is the set
+//! with `S(x) - S_min <= kappa sigma^2 t^2`, where t is the quantile of Student's distribution and kappa the inflation
+//! of variances (D. M. Bates and D. G. Watts, *Nonlinear Regression Analysis and Its Applications*, 1988, section 6.1).
+//! If the criterion is nearly parabolic, this interval equals the one from the standard error. Otherwise, as for a lag
+//! that is nearly an integration, only the profile interval is valid.
 
 use super::prediction_fit::PredictionFit;
 use crate::{SearchOptions, criterion::Workspace};
 
-/// Halvings of the bracket of an end.
+/// Number of bisection steps for each end of an interval.
 const HALVINGS: usize = 7;
-/// Doublings of the step towards an end.
+/// Maximum number of doublings of the step towards an end.
 const DOUBLINGS: usize = 8;
-/// Limits of the search: the profile need not be more accurate than the interval.
+/// Maximum number of steps and tolerance of the searches; the accuracy of the interval suffices.
 const SEARCH: (usize, f64) = (15, 1e-7);
 
-/// Returns the interval of one element of eta, within the search range; `None` if a search fails.
+/// Returns the interval of one element of eta, limited to the search range; `None` if a search fails.
 pub(super) fn profile_interval(
     fit: &PredictionFit<'_>,
     place: usize,
@@ -24,7 +24,7 @@ pub(super) fn profile_interval(
     quantile: f64,
     workspace: &mut Workspace,
 ) -> Option<(f64, f64)> {
-    // Rise of the criterion at the ends of the interval: t^2 in units of the inflated innovation variance.
+    // Increase of the criterion at the ends of the interval: t^2 times the inflated innovation variance.
     let level = fit.inflation * fit.innovation_variance * quantile * quantile;
     let least = fit.minimum.at.sum_of_squares;
     let search = SearchOptions {
@@ -42,7 +42,8 @@ pub(super) fn profile_interval(
             held.limits[place] = (at, at);
             eta[place] = at;
             let found = held.search(eta.clone(), &search, None, workspace)?;
-            // The next point starts from the conditional minimum of this one: few iterations, and the same valley.
+            // The next search starts from the conditional minimum at this point, which takes few iterations and stays
+            // in the same valley.
             eta.copy_from_slice(&found.theta);
             Some(found.at.sum_of_squares - least > level)
         };

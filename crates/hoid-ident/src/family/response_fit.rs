@@ -1,13 +1,13 @@
 //! Fit of an operator of the family to a measured frequency response.
 //!
-//! With `H_j` the response at omega_j and `v_j = E|dH_j|^2` its variance (real and imaginary part
-//! have half of it each), the fit minimises
+//! For the measured response `H_j` at omega_j with the variance `v_j = E|dH_j|^2` (half in the real and half in the
+//! imaginary part), the fit minimises
 //!
 //! `chi^2 = sum_j 2 |H_j - Y(j omega_j) Z(omega_j)|^2 / v_j + sum_i (g_i - m_i)^2 / s_i^2`
 //!
-//! where Z is the intersample behaviour of the error and the second sum is the prior. Source: R. Pintelon and J.
-//! Schoukens, *System Identification: A Frequency Domain Approach*, 2012, chapter 9 (the sample maximum likelihood
-//! estimator; the errors of input and output together are those of their ratio).
+//! where Z represents the intersample behaviour of the error and the second sum is the prior. Source: R. Pintelon and
+//! J. Schoukens, *System Identification: A Frequency Domain Approach*, 2012, chapter 9 (the sample maximum likelihood
+//! estimator, with the errors of input and output combined into the error of their ratio).
 
 use std::borrow::Cow;
 
@@ -31,21 +31,22 @@ use crate::{
 
 /// Number of starts from which the search runs to completion.
 const SEARCHES: usize = 6;
-/// The same for a response that is known exactly, which has more minima near zero.
+/// Number of completed searches for a response that is known exactly, whose criterion has more minima with small
+/// values.
 const SEARCHES_OF_EXACT: usize = 30;
 
-/// A response at one frequency, with its variance.
+/// A measured response at one frequency, with its variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasuredResponse {
     /// Frequency, rad/s.
     pub omega_rad_s: f64,
-    /// H from e to u, as sampled.
+    /// Sampled response H from e to u.
     pub response: Complex64,
-    /// `E|dH|^2`.
+    /// Variance `E|dH|^2` of the response.
     pub variance: f64,
 }
 
-/// The criterion over the coordinates of a form.
+/// The criterion as a function of the coordinates of a form.
 #[derive(Debug, Clone)]
 pub(super) struct ResponseCriterion<'p> {
     pub form: Form,
@@ -62,9 +63,9 @@ pub(super) struct ResponseCriterion<'p> {
 #[derive(Debug, Clone)]
 pub(super) struct ResponseMinimum {
     pub coordinates: Vec<f64>,
-    /// chi^2 without the prior.
+    /// Value of chi^2 without the prior.
     pub chi_squared: f64,
-    /// Half the second derivative of chi^2 with the prior, by rows: the inverse covariance.
+    /// Half the Gauss-Newton Hessian of chi^2 with the prior, by rows: the inverse covariance.
     pub information: Vec<f64>,
     pub termination: Termination,
 }
@@ -89,7 +90,7 @@ impl<'p> ResponseCriterion<'p> {
         }
     }
 
-    /// Returns the same criterion with other points.
+    /// Returns the criterion with other points.
     pub fn with_points<'q>(&self, points: &'q [MeasuredResponse]) -> ResponseCriterion<'q> {
         ResponseCriterion {
             points: Cow::Borrowed(points),
@@ -102,7 +103,7 @@ impl<'p> ResponseCriterion<'p> {
         }
     }
 
-    /// Returns the best result of searches from the best points of a grid.
+    /// Searches from the best points of a grid and returns the best result.
     ///
     /// # Errors
     /// [`IdentError::NoFiniteLoss`].
@@ -110,7 +111,7 @@ impl<'p> ResponseCriterion<'p> {
         self.fit_from_grid(search, Grid::Default)
     }
 
-    /// As [`Self::fit`], from the best points of another grid.
+    /// As [`Self::fit`], with the grid of the given density.
     ///
     /// # Errors
     /// [`IdentError::NoFiniteLoss`].
@@ -127,8 +128,8 @@ impl<'p> ResponseCriterion<'p> {
             .collect();
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut best: Option<Minimum> = None;
-        // chi^2 has local minima in delay and poles: the best points of a grid are searched from, each with its best
-        // gain.
+        // chi^2 has local minima in delay and poles. The searches therefore start from the best points of a grid, each
+        // with its best gain.
         for (_, start) in starts.into_iter().take(searches) {
             let known = best.as_ref().map(|b| b.at.sum_of_squares);
             if let Some(found) = minimise(self, start, search, None, &mut Workspace::default())
@@ -140,13 +141,13 @@ impl<'p> ResponseCriterion<'p> {
         best.map(|minimum| self.result(minimum)).ok_or(IdentError::NoFiniteLoss)
     }
 
-    /// Searches from one point.
+    /// Searches from one starting point.
     pub fn fit_from(&self, start: &[f64], search: &SearchOptions) -> Option<ResponseMinimum> {
         minimise(self, start.to_vec(), search, None, &mut Workspace::default()).map(|minimum| self.result(minimum))
     }
 
-    /// Covariance of the coordinates for the variances of the points, `information^-1`; zero for those at a bound.
-    /// `None` if it does not exist.
+    /// Returns the covariance of the coordinates, `information^-1`; zero for coordinates at a bound. `None` if the
+    /// information matrix is singular.
     pub fn covariance(&self, minimum: &ResponseMinimum) -> Option<Vec<f64>> {
         let p = minimum.coordinates.len();
         let free = self.inner(&minimum.coordinates);
@@ -165,8 +166,8 @@ impl<'p> ResponseCriterion<'p> {
         Some(covariance)
     }
 
-    /// Ratio of the variance of each coordinate with the points to that of its prior: 0 without a prior, 1 at a bound
-    /// or without a covariance.
+    /// Returns the ratio of the posterior to the prior variance of each coordinate: 0 without a prior, 1 at a bound or
+    /// without a covariance.
     pub fn prior_shares(&self, minimum: &ResponseMinimum) -> Vec<f64> {
         let x = &minimum.coordinates;
         let (p, inner, covariance) = (x.len(), self.inner(x), self.covariance(minimum));
@@ -181,7 +182,7 @@ impl<'p> ResponseCriterion<'p> {
         shares
     }
 
-    /// Coordinates that are not at their bounds.
+    /// Returns the indices of the coordinates that are not at a bound.
     fn inner(&self, x: &[f64]) -> Vec<usize> {
         (0..x.len())
             .filter(|&i| self.limits[i].0 < x[i] && x[i] < self.limits[i].1)
@@ -212,7 +213,7 @@ impl<'p> ResponseCriterion<'p> {
         }
     }
 
-    /// Sets the gain that is best for the other coordinates, and returns the criterion there.
+    /// Sets the gain to its best value for the other coordinates, and returns the value of the criterion.
     fn best_gain(&self, x: &mut [f64]) -> Option<f64> {
         debug_assert_eq!(self.form.coordinates(self.neuromuscular)[0], Coordinate::Gain);
         x[0] = 1.0;
@@ -223,7 +224,7 @@ impl<'p> ResponseCriterion<'p> {
             cross += (model.conj() * point.response).re / point.variance;
             power += model.norm_sqr() / point.variance;
         }
-        // The response is linear in the gain: weighted least squares in one unknown.
+        // The response is linear in the gain: weighted least squares with one unknown.
         x[0] = cross / power;
         let value = self.linearise(x, &mut Workspace::default()).sum_of_squares;
         (value.is_finite() && x[0] != 0.0).then_some(value)
@@ -244,8 +245,8 @@ impl Objective for ResponseCriterion<'_> {
         for point in self.points.iter() {
             let hold = self.intersample.response(point.omega_rad_s, self.sample_time);
             let model = operator.response_and_gradient(point.omega_rad_s);
-            // `variance` is E|error|^2 of the complex response, half of it in each part: chi^2 = 2 |error|^2/variance
-            // has two degrees of freedom per line.
+            // `variance` is E|error|^2 of the complex response, with half of it in each part. Therefore chi^2 = 2
+            // |error|^2/variance has two degrees of freedom per line.
             let weight = 2.0 / point.variance;
             let off = point.response - model.value * hold;
             let slopes: Vec<Complex64> = model.gradient.iter().map(|g| g * hold).collect();

@@ -1,4 +1,4 @@
-//! Result of a fit of the family.
+//! Result of the estimation of a person's operator.
 
 use std::f64::consts::{LN_10, PI};
 
@@ -23,19 +23,19 @@ use super::{
 };
 use crate::{Fit, ResponsePoint, Termination};
 
-/// An operator of one or several records.
+/// The operator of one record, or of all records.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OperatorOfRecord {
-    /// The operator.
+    /// The operator in the best form.
     pub operator: FamilyOperator,
-    /// Covariance of its coordinates by rows: clustered, with the contribution of the prior. `None` if the information
-    /// is singular.
+    /// Covariance of the coordinates by rows, from clusters and with the contribution of the prior. `None` if the
+    /// information matrix is singular.
     pub covariance: Option<Vec<f64>>,
-    /// The same from the model only, as if residuals were white and nothing varied.
+    /// Model-based covariance of the coordinates by rows, valid for white residuals and a person who does not vary.
     pub model_based: Option<Vec<f64>>,
-    /// Its parameters, averaged over the forms that the data do not reject ([`FamilyFit::weighed`]).
+    /// Parameters of the operator, averaged over the forms that the data do not reject ([`FamilyFit::weighed`]).
     pub parameters: Vec<Parameter>,
-    /// The same model as polynomials, for prediction and simulation.
+    /// The same model in polynomial form, for prediction and simulation.
     pub polynomial_fit: Fit,
 }
 
@@ -44,9 +44,9 @@ pub struct OperatorOfRecord {
 pub struct WeighedForm {
     /// The form.
     pub form: Form,
-    /// Its weight; the weights of all forms have the sum one.
+    /// Weight of the form; the weights of all forms have the sum one.
     pub weight: f64,
-    /// One for all records, or one for each record.
+    /// Operators in this form: one for all records, or one for each record.
     pub operators: Vec<OperatorInForm>,
 }
 
@@ -55,69 +55,69 @@ pub struct WeighedForm {
 pub struct OperatorInForm {
     /// The operator.
     pub operator: FamilyOperator,
-    /// Covariance of its coordinates by rows.
+    /// Covariance of the coordinates by rows.
     pub covariance: Option<Vec<f64>>,
-    /// Its parameters.
+    /// Parameters of the operator.
     pub parameters: Vec<Parameter>,
 }
 
 /// Test of the form against a Box-Jenkins model of the same orders.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FreeModel {
-    /// Loss of Box-Jenkins with the orders and the delay of the fit.
+    /// Loss of a Box-Jenkins model with the orders and the delay of the fit.
     pub loss: f64,
-    /// `n ln(V/V_bj)/kappa`: the likelihood ratio, in units of the inflated variance.
+    /// Likelihood ratio `n ln(V/V_bj)/kappa`, based on the inflated variance.
     pub likelihood_ratio: f64,
-    /// Number of additional parameters of Box-Jenkins.
+    /// Number of parameters that the Box-Jenkins model has in addition.
     pub degrees_of_freedom: usize,
-    /// Probability of a ratio at least as large if the form is right.
+    /// Probability of a likelihood ratio at least as large if the form is right.
     pub p_value: f64,
 }
 
-/// The result of [`super::FamilyEstimator::fit`].
+/// Result of [`super::FamilyEstimator::fit`].
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct FamilyFit {
     /// The best form, or the given one.
     pub form: Form,
-    /// True with the neuromuscular part.
+    /// True if the operator has a neuromuscular part.
     pub neuromuscular: bool,
     /// Orders nc and nd of the noise model.
     pub noise_orders: (usize, usize),
     /// Coefficients c and d of the noise model `v = (C/D) eps`.
     pub noise: (Vec<f64>, Vec<f64>),
-    /// The operator: one for all records, or one for each if some parameters are individual.
+    /// Estimated operators: one for all records, or one for each record if some parameters are individual.
     pub operators: Vec<OperatorOfRecord>,
-    /// The prior.
+    /// Prior knowledge that was used.
     pub prior: OperatorPrior,
-    /// The forms that were compared, simplest first.
+    /// Criteria of the forms that were compared, simplest form first.
     pub forms: Vec<FormFigures>,
-    /// The forms that the data do not reject, over which estimates are averaged: the best one first.
+    /// The forms that the data do not reject, best form first; estimates are averaged over these forms.
     pub weighed: Vec<WeighedForm>,
     /// Results of the further inputs, in the order in which they were requested.
     #[serde(default)]
     pub channels: Vec<ChannelFit>,
-    /// Variation of the person's gain that these runs do not show, relative to the gain: the standard deviation of
-    /// their mean. Zero if the errors are those of the scatter between runs, which includes it.
+    /// Relative standard deviation of the person's gain that these runs do not show, for the mean over the runs. Zero
+    /// if the errors are computed from the scatter between runs, which includes this variation.
     pub run_to_run: f64,
-    /// The fit at the lines of the excitation, of the same form.
+    /// Fit of the best form at the lines of the excitation.
     pub lines: Option<LineFit>,
-    /// The reason why there is no such fit.
+    /// Reason why there is no fit at the lines.
     pub no_lines: Option<String>,
-    /// The operator of the same form by refined instrumental variables, if an excitation was recorded.
+    /// Operator of the best form by refined instrumental variables, if an excitation was recorded.
     pub instrumental: Option<InstrumentalFit>,
-    /// The reason why there is no such operator.
+    /// Reason why there is no operator by instrumental variables.
     pub no_instrumental: Option<String>,
-    /// Comparison of the methods.
+    /// Comparison of the estimation methods.
     pub agreement: Option<Agreement>,
-    /// Box-Jenkins of the same orders.
+    /// Test against a Box-Jenkins model of the same orders.
     pub free_model: Option<FreeModel>,
     /// Type of the clusters from which the error bars are computed.
     pub cluster_kind: ClusterKind,
     /// Number of clusters.
     pub clusters: usize,
-    /// kappa: ratio of clustered to model-based variances.
+    /// Inflation kappa: ratio of the variances from clusters to the model-based variances.
     pub inflation: f64,
-    /// Largest ratio of a clustered to a model-based standard error.
+    /// Largest ratio of a standard error from clusters to a model-based standard error.
     pub error_ratio: Option<f64>,
     /// Loss `V = sum eps^2/n`.
     pub loss: f64,
@@ -125,34 +125,34 @@ pub struct FamilyFit {
     pub innovation_variance: f64,
     /// Number n of residuals.
     pub residuals: usize,
-    /// Share of the power of u at the lines that the excitation explains: mean squared coherence.
+    /// Mean squared coherence at the lines: the fraction of the power of u that the excitation explains there.
     pub coherent_share: Option<f64>,
-    /// How the search ended.
+    /// Termination of the search.
     pub termination: Termination,
-    /// Intersample behaviour of the error in the fit.
+    /// Intersample behaviour of the error that the fit assumes.
     #[serde(default)]
     pub intersample: Intersample,
-    /// True if the data show it, or it was given; otherwise the delay may be half a sample longer
-    /// ([`FamilyFit::delay_if_straight_s`]).
+    /// True if the intersample behaviour was given or determined from the data. Otherwise the delay may be half a
+    /// sample longer ([`FamilyFit::delay_if_straight_s`]).
     #[serde(default)]
     pub course_is_known: bool,
-    /// Time in s by which e was advanced when its rate was lowered, because the new hold is longer than the recorded
-    /// one.
+    /// Time in s by which e was advanced when the sampling frequency was lowered, because the new hold is longer than
+    /// that of the recording.
     #[serde(default)]
     pub lead_s: f64,
-    /// Share of the power of u that the operator leaves, if it is not noise.
+    /// Power of the residual relative to the power of u, if the residual is not noise.
     #[serde(default)]
     pub noise_free: Option<f64>,
-    /// True if there is so little noise that errors of the model would exceed it.
+    /// True if there is so little noise that model errors would exceed it.
     #[serde(default)]
     pub little_noise: bool,
-    /// Time between two samples.
+    /// Sample time of the records.
     pub sample_time: SampleTime,
     /// Verdict on the result.
     pub verdict: Verdict,
 }
 
-/// Returns an operator with its noise model as one line of text.
+/// Formats an operator and its noise model as one line of text.
 pub(super) fn title(form: Form, neuromuscular: bool, (nc, nd): (usize, usize)) -> String {
     let muscles = if neuromuscular {
         " with neuromuscular dynamics"
@@ -163,12 +163,12 @@ pub(super) fn title(form: Form, neuromuscular: bool, (nc, nd): (usize, usize)) -
 }
 
 impl FamilyFit {
-    /// Returns form and noise model as one line of text, the same as [`Fit::title`] of its polynomials.
+    /// Returns form and noise model as one line of text, equal to [`Fit::title`] of the polynomial form.
     pub fn title(&self) -> String {
         title(self.form, self.neuromuscular, self.noise_orders)
     }
 
-    /// Returns the channels with a response, each in the form that was found.
+    /// Returns the channels with a response, each in the form that was selected.
     pub fn channels_in_use(&self) -> Vec<SeenChannel> {
         let of = |channel: &ChannelFit| {
             Some(SeenChannel {
@@ -181,13 +181,13 @@ impl FamilyFit {
         self.channels.iter().filter_map(of).collect()
     }
 
-    /// Returns the operator of a record; beyond the last record, that of the last.
+    /// Returns the operator of a record; for an index beyond the last operator, the last operator.
     pub fn operator(&self, record: usize) -> &OperatorOfRecord {
         &self.operators[record.min(self.operators.len() - 1)]
     }
 
-    /// Returns crossover frequency and phase margin of a record with a controlled element, averaged over the forms;
-    /// `None` if the loop of the best form has no crossover.
+    /// Returns crossover frequency and phase margin of the operator of a record with a controlled element, averaged
+    /// over the forms. `None` if the loop has no crossover in the best form.
     pub fn loop_measures(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let each = self.weighed.iter().map(|form| {
             let of = form.of(record)?;
@@ -199,14 +199,15 @@ impl FamilyFit {
         LoopMeasures::averaged(&each.into_iter().flatten().collect::<Vec<_>>(), self.clusters)
     }
 
-    /// Returns the same from the best form only.
+    /// As [`Self::loop_measures`], for the best form only.
     pub fn loop_measures_in_front(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let of = self.operator(record);
         self.measured(&of.operator, of.covariance.as_deref(), element)
     }
 
-    /// Returns the delay tau_e in s of a record if its error is linear from sample to sample, logged from a faster or
-    /// continuous signal: half a sample longer. `None` if the intersample behaviour is known.
+    /// Returns the delay tau_e in s of a record for an error that is linear between samples, logged from a continuous
+    /// signal or one with a higher sampling frequency; this delay is half a sample longer. `None` if the intersample
+    /// behaviour is known.
     pub fn delay_if_straight_s(&self, record: usize) -> Option<f64> {
         let of = self.operator(record);
         let averaged = of.parameters.iter().find(|p| p.name == Coordinate::Delay.parameter());
@@ -214,13 +215,15 @@ impl FamilyFit {
         (!self.course_is_known).then(|| tau + 0.5 * self.sample_time.s() - self.lead_s)
     }
 
-    /// Returns gain and phase of the operator of a record from e to u at frequencies in rad/s, held over a sample,
-    /// averaged over the forms: the mean of `ln H`, and its error including the differences of the forms.
+    /// Returns gain and phase from e to u of the operator of a record, at frequencies in rad/s, including the
+    /// intersample behaviour of the error. The result is the mean of `ln H` over the forms, and its error includes the
+    /// differences between the forms.
     pub fn frequency_response(&self, record: usize, omega_rad_s: &[f64]) -> Vec<ResponsePoint> {
         let front = &self.operator(record).operator;
         let point = |&omega: &f64| {
             let middle = front.response(omega);
-            // For each form ln of its response over that of the best form, with variances of gain and phase.
+            // For each form: ln of its response relative to the response of the best form, with the variances of gain
+            // and phase.
             let of = |form: &WeighedForm| {
                 let of = form.of(record)?;
                 let found = of.operator.response_and_gradient(omega);
@@ -255,9 +258,9 @@ impl FamilyFit {
         omega_rad_s.iter().map(point).collect()
     }
 
-    /// Returns a finding about the loop of a record with a controlled element: a record that remains bounded was made
-    /// in a stable loop, which has a crossover and a positive phase margin, and the margin of a person is at most 120
-    /// deg. `None` if there is no evidence against the operator.
+    /// Returns evidence against the operator from the loop of a record with a controlled element; `None` if there is no
+    /// such evidence. A record that remains bounded must come from a stable loop, which has a crossover and a positive
+    /// phase margin, and a person's phase margin is at most 120 deg.
     pub fn loop_finding(&self, record: usize, element: &ContinuousTransferFunction) -> Option<Finding> {
         let reach = (self.loop_measures_in_front(record, element))
             .and_then(|found| found.phase_margin_interval)
@@ -265,7 +268,7 @@ impl FamilyFit {
         self.loop_shape(record, element).doubt(reach)
     }
 
-    /// Returns every crossing of the loop of a record with a controlled element, and its stability, for the best form.
+    /// Returns all crossings and the stability of the loop of a record with a controlled element, for the best form.
     pub fn loop_shape(&self, record: usize, element: &ContinuousTransferFunction) -> LoopShape {
         let of = self.operator(record);
         let known = |omega: f64| {
@@ -278,13 +281,13 @@ impl FamilyFit {
         LoopShape::of(known, element, self.sample_time)
     }
 
-    /// Returns crossover frequency and phase margin of the fit at the lines.
+    /// Returns crossover frequency and phase margin of the operator fitted at the lines.
     pub fn loop_measures_at_lines(&self, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let lines = self.lines.as_ref()?;
         self.measured(&lines.operator, lines.covariance.as_deref(), element)
     }
 
-    /// Returns crossover frequency and phase margin by refined instrumental variables.
+    /// Returns crossover frequency and phase margin of the operator estimated by refined instrumental variables.
     pub fn loop_measures_by_instruments(&self, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let found = self.instrumental.as_ref()?;
         self.measured(&found.operator, found.covariance.as_deref(), element)
@@ -297,10 +300,10 @@ impl FamilyFit {
         element: &ContinuousTransferFunction,
     ) -> Option<LoopMeasures> {
         let measures = loop_measures(operator, covariance, element, (self.sample_time, self.intersample))?;
-        Some(measures.of_few(self.clusters).with_run_to_run(self.run_to_run))
+        Some(measures.with_student_intervals(self.clusters).with_run_to_run(self.run_to_run))
     }
 
-    /// Returns a coordinate of a record with its standard error.
+    /// Returns a coordinate of the operator of a record with its standard error.
     pub fn coordinate(&self, record: usize, wanted: Coordinate) -> Option<Estimate> {
         let of = self.operator(record);
         let all = self.form.coordinates(self.neuromuscular);
@@ -314,7 +317,7 @@ impl FamilyFit {
 }
 
 impl WeighedForm {
-    /// Returns the operator of a record; beyond the last record, that of the last.
+    /// Returns the operator of a record; for an index beyond the last operator, the last operator.
     pub fn of(&self, record: usize) -> Option<&OperatorInForm> {
         self.operators.get(record).or(self.operators.last())
     }

@@ -1,35 +1,35 @@
-//! Prediction of a channel from its own past, by a fit that faults cannot dominate.
+//! Prediction of a channel from its own past, by a fit that is robust to faults.
 //!
-//! `x(t) = -a_1 x(t-1) - ... - a_p x(t-p) + eps(t)` by least squares with bounded influence: a row
-//! counts only where neither x(t) nor any of its p past values lies beyond [`FAR`] robust deviations
-//! (the weights of Mallows on the regressors), and, in the following rounds, where eps lies within [`BEYOND`] of its
-//! robust scale (R. A. Maronna, R. D. Martin, V. J. Yohai, *Robust Statistics*, 2006, sections 5.11 and 8.4). A small
-//! white part is added to x, of [`FLOOR`] of its deviation: it keeps the normal equations of a smooth channel regular,
-//! and smaller deviations are not faults.
+//! `x(t) = -a_1 x(t-1) - ... - a_p x(t-p) + eps(t)` is fitted by least squares with bounded influence: a row counts
+//! only if neither x(t) nor any of its p past values exceeds [`FAR`] robust deviations (Mallows' weights on the
+//! regressors) and, in later rounds, if eps does not exceed [`LARGEST_RESIDUAL`] times its robust scale (R. A. Maronna,
+//! R. D. Martin, V. J. Yohai, *Robust Statistics*, 2006, sections 5.11 and 8.4). White noise of [`FLOOR`] deviations of
+//! x is assumed in addition: it keeps the normal equations of a smooth channel regular, and smaller deviations are not
+//! faults.
 
 use super::robust::quantile;
 use crate::linalg::{gram::Gram, least_squares::solve_symmetric};
 
 /// Order of the autoregression.
 pub(super) const ORDER: usize = 16;
-/// Deviations of the channel above which a row does not count.
+/// A row does not count if a value exceeds this number of deviations of the channel.
 const FAR: f64 = 6.0;
-/// Deviations of the residuals above which a row does not count.
-const BEYOND: f64 = 4.0;
-/// White part, relative to the deviation of the channel.
+/// A row does not count if its residual exceeds this number of deviations of the residuals.
+const LARGEST_RESIDUAL: f64 = 4.0;
+/// Standard deviation of the additional white noise, relative to the deviation of the channel.
 pub(super) const FLOOR: f64 = 1e-3;
 const ROUNDS: usize = 3;
-/// Number of rows that suffices for the coefficients.
+/// Number of rows that is sufficient for estimating the coefficients.
 const MOST_ROWS: usize = 40_000;
 
-/// `1, a_1 .. a_p`.
+/// Coefficients `1, a_1 .. a_p` of the autoregression.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Autoregression {
     pub a: Vec<f64>,
 }
 
 impl Autoregression {
-    /// Fits a centred channel with this deviation; `None` if it is too short or constant.
+    /// Fits a centred channel with the given robust deviation; `None` if the channel is too short or constant.
     pub fn of(x: &[f64], deviation: f64) -> Option<Self> {
         let p = ORDER.min(x.len() / 20);
         if p == 0 || deviation <= 0.0 {
@@ -54,7 +54,7 @@ impl Autoregression {
             let all: Vec<f64> = rows.iter().map(|t| found.residual(x, *t)).collect();
             let scale = quantile(&mut all.iter().map(|e| e.abs()).collect::<Vec<_>>(), 0.5) / 0.674_489_75;
             let scale = scale.max(FLOOR * deviation);
-            let kept = rows.iter().zip(&all).filter(|(_, e)| e.abs() <= BEYOND * scale);
+            let kept = rows.iter().zip(&all).filter(|(_, e)| e.abs() <= LARGEST_RESIDUAL * scale);
             let kept: Vec<usize> = kept.map(|(t, _)| *t).collect();
             if kept.len() < 5 * p {
                 break;
@@ -68,17 +68,17 @@ impl Autoregression {
         self.a.len() - 1
     }
 
-    /// Returns `|a|`.
+    /// Returns the Euclidean norm `|a|`.
     pub fn norm(&self) -> f64 {
         self.a.iter().map(|a| a * a).sum::<f64>().sqrt()
     }
 
-    /// Returns eps(t), for t of at least the order.
+    /// Returns eps(t); t must not be less than the order.
     pub fn residual(&self, x: &[f64], t: usize) -> f64 {
         self.a.iter().enumerate().map(|(i, a)| a * x[t - i]).sum()
     }
 
-    /// Returns eps over the channel, zero before the order.
+    /// Returns eps for all samples of the channel, with zeros for t less than the order.
     pub fn residuals(&self, x: &[f64]) -> Vec<f64> {
         (0..x.len())
             .map(|t| if t < self.order() { 0.0 } else { self.residual(x, t) })

@@ -1,20 +1,21 @@
 //! Test of which of two channels responds to the other, and with which sign.
 //!
-//! Both are averaged over blocks of [`BLOCK_S`], and each is regressed on its own past and on that of
-//! the other,
+//! Both channels are averaged over blocks of [`BLOCK_S`]. Each channel is regressed on its own past and on the past of
+//! the other channel,
 //!
 //! `u(k) = sum_{i=1..P} a_i u(k-i) + sum_{j=1..L} b_j e(k-j) + c + v(k)`
 //!
-//! and e on u likewise; P = [`OWN`], L = [`OTHER`] blocks. In a closed loop such a prediction is consistent whatever
-//! the loop is (L. Ljung, *System Identification*, 1999, section 13.4).
+//! and likewise e on u, with P = [`OWN_LAGS`] and L = [`OTHER_LAGS`] blocks. In a closed loop such a prediction is
+//! consistent for any feedback (L. Ljung, *System Identification*, 1999, section 13.4).
 //!
 //! **Exchanged.** A person responds only after a delay of a tenth of a second or more; a controlled element responds
-//! immediately. The significance of a lag j is the growth of the loss without it: for b_1, `R = (V_without - V)/V`. If
-//! e responds to u late and u responds to e at once, with `R` of u above [`AT_ONCE`] and [`TIMES`] times that of e,
-//! input and output are exchanged. If neither responds at once, nothing is reported.
+//! immediately. The significance of lag j is the relative increase of the loss without it: for b_1,
+//! `R = (V_without - V)/V`. If e responds to u with a delay and u responds to e immediately, i.e. if `R` of u exceeds
+//! both [`IMMEDIATE_INCREASE`] and [`TIMES`] times `R` of e, input and output are exchanged. If neither responds
+//! immediately, nothing is reported.
 //!
-//! **Sign.** The response of a person to an error starts in its direction: `sum_j b_j` is positive. The sign is wrong
-//! if the sum is [`WRONG`] standard errors below zero.
+//! **Sign.** A person's response to an error initially has the sign of the error: `sum_j b_j` is positive. The sign is
+//! wrong if the sum is more than [`SIGNIFICANTLY_NEGATIVE`] standard errors below zero.
 
 use hoid_model::{FaultKind, Record};
 use hoid_numerics::statistics::mean;
@@ -23,19 +24,21 @@ use crate::linalg::least_squares::solve_symmetric;
 
 /// Length of a block, s.
 const BLOCK_S: f64 = 0.05;
-/// Length of the own past and of that of the other channel, in blocks.
-const OWN: usize = 8;
-const OTHER: usize = 12;
-/// Growth of the loss without the first lag that counts as an immediate response.
-const AT_ONCE: f64 = 0.1;
-/// Least ratio to that of the other direction.
+/// Number of past blocks of the channel itself and of the other channel.
+const OWN_LAGS: usize = 8;
+const OTHER_LAGS: usize = 12;
+/// Relative increase of the loss without the first lag above which a response counts as immediate.
+const IMMEDIATE_INCREASE: f64 = 0.1;
+/// Minimum ratio of this increase to that of the other direction.
 const TIMES: f64 = 20.0;
-/// Standard errors below zero from which on the sum of a response counts as negative.
-const WRONG: f64 = 4.0;
-/// Number of blocks below which nothing is reported.
+/// The sum of a response counts as negative if it is more than this number of standard errors below zero.
+const SIGNIFICANTLY_NEGATIVE: f64 = 4.0;
+/// Minimum number of blocks for a test.
 const FEWEST: usize = 200;
 
-/// A wrong direction, with its statistic: the ratio of the growths, or the number of standard errors.
+/// Returns a wrong direction and its statistic: the ratio of the increases of the loss for exchanged channels, the
+/// number of standard errors for a wrong sign. `None` if no fault is found or the record is too short or too slow for
+/// the test.
 pub(super) fn wrong_direction(record: &Record) -> Option<(FaultKind, f64)> {
     let block = ((BLOCK_S / record.sample_time().s()).round() as usize).max(1);
     if record.input().is_empty() || record.sample_time().s() > 0.1 {
@@ -48,36 +51,36 @@ pub(super) fn wrong_direction(record: &Record) -> Option<(FaultKind, f64)> {
     }
     let of_output = CrossResponse::of(&u, &e)?;
     let of_input = CrossResponse::of(&e, &u)?;
-    if of_output.at_once > AT_ONCE && of_output.at_once > TIMES * of_input.at_once {
+    if of_output.at_once > IMMEDIATE_INCREASE && of_output.at_once > TIMES * of_input.at_once {
         return Some((FaultKind::Exchanged, of_output.at_once / of_input.at_once));
     }
-    (of_output.sum < -WRONG).then_some((FaultKind::Sign, -of_output.sum))
+    (of_output.sum < -SIGNIFICANTLY_NEGATIVE).then_some((FaultKind::Sign, -of_output.sum))
 }
 
-/// Response of a channel to another.
+/// Response of one channel to another.
 struct CrossResponse {
-    /// Growth of the loss without the first lag.
+    /// Relative increase of the loss without the first lag.
     at_once: f64,
-    /// Sum of the coefficients in standard errors.
+    /// Sum of the coefficients of the other channel, in standard errors.
     sum: f64,
 }
 
 impl CrossResponse {
-    /// Response of y to x; `None` if the regression is singular.
+    /// Estimates the response of y to x; `None` if the regression is singular.
     fn of(y: &[f64], x: &[f64]) -> Option<Self> {
-        let first = OWN.max(OTHER);
-        let size = OWN + OTHER + 1;
+        let first = OWN_LAGS.max(OTHER_LAGS);
+        let size = OWN_LAGS + OTHER_LAGS + 1;
         let n = y.len() - first;
         let mut gram = vec![0.0; size * size];
         let mut product = vec![0.0; size];
         let mut power = 0.0;
         let mut row = vec![1.0; size];
         for k in first..y.len() {
-            for i in 0..OWN {
+            for i in 0..OWN_LAGS {
                 row[i] = y[k - 1 - i];
             }
-            for j in 0..OTHER {
-                row[OWN + j] = x[k - 1 - j];
+            for j in 0..OTHER_LAGS {
+                row[OWN_LAGS + j] = x[k - 1 - j];
             }
             for i in 0..size {
                 product[i] += row[i] * y[k];
@@ -91,7 +94,7 @@ impl CrossResponse {
             for j in i + 1..size {
                 gram[i * size + j] = gram[j * size + i];
             }
-            // Rounding, for a smooth channel.
+            // This keeps the matrix of a smooth channel regular in spite of rounding.
             gram[i * size + i] *= 1.0 + 1e-9;
         }
         let without = |left_out: Option<usize>| -> Option<(f64, Vec<f64>)> {
@@ -107,9 +110,9 @@ impl CrossResponse {
             Some((power - explained, solution))
         };
         let (loss, solution) = without(None)?;
-        let (other, _) = without(Some(OWN))?;
-        let of_sum: Vec<f64> = (0..size).map(|i| f64::from((OWN..OWN + OTHER).contains(&i))).collect();
-        let sum: f64 = solution[OWN..OWN + OTHER].iter().sum();
+        let (other, _) = without(Some(OWN_LAGS))?;
+        let of_sum: Vec<f64> = (0..size).map(|i| f64::from((OWN_LAGS..OWN_LAGS + OTHER_LAGS).contains(&i))).collect();
+        let sum: f64 = solution[OWN_LAGS..OWN_LAGS + OTHER_LAGS].iter().sum();
         let along = solve_symmetric(&gram, &of_sum)?;
         let variance = loss / (n - size) as f64 * along.iter().zip(&of_sum).map(|(a, b)| a * b).sum::<f64>();
         let answer = Self {

@@ -1,14 +1,16 @@
-//! Stretches with a constant channel: frozen, dropped out, idle.
+//! Stretches in which a channel is constant: frozen channels, dropouts and idle stretches.
 //!
-//! A *hold* is a run of equal values. A channel in full precision has none, except at its largest or smallest value (a
-//! rail, which is treated separately): [`FROZEN`] equal samples are frozen. A quantised channel, or a resting hand,
-//! holds by its nature: there a hold is frozen if it is longer than [`LONGER`] times the length that nine of ten holds
-//! do not exceed, [`RESTING_S`] at least, and e moves meanwhile by half of its deviation or more. At the
-//! [rest](super::rest) of a stick, only the holds at the rest are compared. A hold that the channel jumps to and back
-//! from, by more than it moves from one sample to the next in 999 of 1000, is a dropout.
+//! A *hold* is a run of equal values. A channel in full precision has no holds except at its largest or smallest value
+//! (a rail, which is treated separately), so that [`FROZEN`] equal samples already count as frozen. A quantised channel
+//! or a resting hand has holds in normal operation. There a hold is frozen if it lasts at least [`RESTING_S`] and
+//! [`LONGER`] times the length that nine of ten holds do not exceed, and if the other channel moves by more than half
+//! of its deviation in the meantime. Holds at the [rest](super::rest) of a stick are compared only with each other. A
+//! hold is a dropout if the channel jumps to its value and back, each time by more than twice the change that 999 of
+//! 1000 changes do not exceed.
 //!
-//! *Idle* is a stretch of [`IDLE_S`] or more in which e and u stay both within [`QUIET`] of their deviations, in each
-//! half second: before a run starts, or after its end. No one who tracks can do that: e is never at rest.
+//! *Idle* is a stretch of [`IDLE_S`] or more in which both e and u stay within [`IDLE_RANGE`] of their deviations in
+//! each half second, such as before the start or after the end of a run. Nobody can do so while tracking, because e is
+//! never at rest.
 
 use std::ops::Range;
 
@@ -17,28 +19,28 @@ use super::{
     robust::{level_and_deviation, quantile, quantum},
 };
 
-/// Number of equal samples that are frozen, in full precision.
+/// Number of equal samples that count as frozen in full precision.
 const FROZEN: usize = 6;
-/// Multiple of the typical hold of a channel in steps from which on it is frozen.
+/// A hold of a quantised channel can be frozen if it lasts this multiple of its typical hold.
 const LONGER: f64 = 20.0;
-/// Shortest frozen hold of a channel in steps, s.
+/// Minimum duration of a frozen hold of a quantised channel, s.
 const RESTING_S: f64 = 3.0;
 /// Shortest idle stretch, s.
 const IDLE_S: f64 = 1.5;
-/// Length in s of the blocks in which the range of an idle channel is examined.
+/// Length of the blocks in which the range of an idle channel is examined, s.
 const BLOCK_S: f64 = 0.5;
-/// Range of an idle channel, relative to its deviation.
-const QUIET: f64 = 0.05;
+/// Largest range of an idle channel, relative to its deviation.
+const IDLE_RANGE: f64 = 0.05;
 
-/// A hold of a channel.
+/// A faulty hold of a channel.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Hold {
     pub samples: Range<usize>,
-    /// The size of the jump if the channel jumps there and back.
+    /// Size of the jump, if the channel jumps to the held value and back.
     pub jump: Option<f64>,
 }
 
-/// Returns the holds of one channel that are faults, depending on the behaviour of the other.
+/// Returns the faulty holds of one channel, depending on the movement of the other channel.
 pub(super) fn frozen(values: &[f64], other: Option<&[f64]>, sample_time_s: f64) -> Vec<Hold> {
     let n = values.len();
     let (low, high) = values
@@ -91,7 +93,7 @@ fn range_of(values: &[f64]) -> f64 {
     high - low
 }
 
-/// Returns stretches in which all channels are idle, apart from those that are `out` of use.
+/// Returns the stretches in which all channels are idle, without the samples marked in `out`.
 pub(super) fn idle(channels: &[&[f64]], out: &[bool], sample_time_s: f64) -> Vec<Range<usize>> {
     let n = channels.first().map_or(0, |c| c.len());
     let block = ((BLOCK_S / sample_time_s).round() as usize).max(5);
@@ -101,7 +103,7 @@ pub(super) fn idle(channels: &[&[f64]], out: &[bool], sample_time_s: f64) -> Vec
         return Vec::new();
     }
     let quiet = |rows: Range<usize>| {
-        let one = |(channel, scale): (&&[f64], &f64)| range_of(&channel[rows.clone()]) <= QUIET * scale;
+        let one = |(channel, scale): (&&[f64], &f64)| range_of(&channel[rows.clone()]) <= IDLE_RANGE * scale;
         channels.iter().zip(&scales).all(one)
     };
     let mut all: Vec<Range<usize>> = Vec::new();
@@ -117,12 +119,12 @@ pub(super) fn idle(channels: &[&[f64]], out: &[bool], sample_time_s: f64) -> Vec
     }
     let least = ((IDLE_S / sample_time_s).ceil() as usize).max(2 * block);
     let whole = |stretch: Range<usize>| {
-        // To the sample: as long as no channel leaves the range of the stretch.
+        // Extends the stretch sample by sample, as long as no channel leaves its range in the stretch.
         let stays = |t: usize, stretch: &Range<usize>| {
             channels.iter().zip(&scales).all(|(channel, scale)| {
                 let inside = &channel[stretch.clone()];
                 let middle = inside[inside.len() / 2];
-                (channel[t] - middle).abs() <= QUIET * scale
+                (channel[t] - middle).abs() <= IDLE_RANGE * scale
             })
         };
         let (mut start, mut end) = (stretch.start, stretch.end);

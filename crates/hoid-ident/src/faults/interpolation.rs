@@ -1,27 +1,28 @@
 //! Interpolation of samples from their neighbours on both sides.
 //!
-//! With the innovations `eps = A x` of the autoregression, the most likely values of the m samples from s on, given the
-//! others, minimise `sum eps(t)^2` over all rows that contain one of them (A. J. E. M. Janssen, R. N. J. Veldhuis and
-//! L. B. Vries, *IEEE Trans. Acoustics, Speech and Signal Processing* 34 (1986) 317-330). A change delta of them
-//! changes eps by `A delta`, so that
+//! Let `eps = A x` be the innovations of the autoregression. The most likely values of m samples from sample s on,
+//! given all other samples, minimise `sum eps(t)^2` over all rows that contain one of the m samples (A. J. E. M.
+//! Janssen, R. N. J. Veldhuis and L. B. Vries, *IEEE Trans. Acoustics, Speech and Signal Processing* 34 (1986)
+//! 317-330). A change delta of the samples changes eps by `A delta`, so that
 //!
 //! `G delta = -g`, `G_ij = sum_t a(t-s-i) a(t-s-j)`, `g_i = sum_t a(t-s-i) eps(t)`
 //!
-//! and with the Cholesky factor L of G and `y = L^-1 g` the sum of squares falls by `|y|^2`. L and y
-//! of fewer samples are the first rows of those of more: one pass gives the fall for every m.
+//! With the Cholesky factor L of G and `y = L^-1 g`, the sum of squares falls by `|y|^2`. L and y for fewer samples are
+//! the first rows of L and y for more samples, so that one pass gives the decrease for every m.
 
 use super::autoregression::Autoregression;
 
-/// Changes of the samples from `start` on, for every number of them up to `most`.
+/// Interpolations of the samples from `start` on, for every number of samples up to `most`.
 pub(super) struct Interpolation {
-    /// Lower triangular matrix by rows, `most` by `most`.
+    /// Cholesky factor: lower triangular matrix by rows, `most` by `most`.
     factor: Vec<f64>,
     y: Vec<f64>,
     size: usize,
 }
 
 impl Interpolation {
-    /// Computes the changes for the innovations of a channel; fewer than `most` samples at its end.
+    /// Computes the interpolations from the innovations of a channel; at the end of the channel for fewer than `most`
+    /// samples.
     pub fn new(ar: &Autoregression, eps: &[f64], start: usize, most: usize) -> Self {
         let p = ar.order();
         let n = eps.len();
@@ -49,7 +50,7 @@ impl Interpolation {
                 };
             }
             let pivot = factor[i * size + i];
-            // Samples that no row contains cannot be determined.
+            // Samples that appear in no row cannot be determined.
             if pivot.is_nan() || pivot < 1e-9 {
                 break;
             }
@@ -63,17 +64,17 @@ impl Interpolation {
         Self { factor, y, size }
     }
 
-    /// Largest number of samples that can be determined.
+    /// Returns the largest number of samples that can be determined.
     pub fn most(&self) -> usize {
         self.y.len()
     }
 
-    /// Decrease of the sum of squares with m samples.
+    /// Returns the decrease of the sum of squares if m samples are interpolated.
     pub fn fall(&self, m: usize) -> f64 {
         self.y[..m].iter().map(|y| y * y).sum()
     }
 
-    /// Returns delta of m samples.
+    /// Returns delta, the changes of m samples.
     pub fn change(&self, m: usize) -> Vec<f64> {
         let mut delta = vec![0.0; m];
         for i in (0..m).rev() {
@@ -84,7 +85,7 @@ impl Interpolation {
     }
 }
 
-/// Updates the innovations for a change of the samples from `start` on, at the rows that contain them.
+/// Updates the innovations after a change of the samples from `start` on.
 pub(super) fn apply(ar: &Autoregression, eps: &mut [f64], start: usize, delta: &[f64]) {
     let p = ar.order();
     for (i, change) in delta.iter().enumerate() {

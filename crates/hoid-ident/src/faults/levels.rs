@@ -1,21 +1,21 @@
 //! Jumps of a level: wraps, steps, and stretches in other units.
 //!
-//! A *large* change from one sample to the next is beyond [`LARGE`] times the 99 % quantile of all
-//! changes.
+//! A change from one sample to the next is *large* if it exceeds [`LARGE`] times the 99 % quantile of all changes.
 //!
-//! **Wrap.** A channel that is kept within a range of the modulus M leaves it at one end and re-enters at the other:
-//! large changes that are all M within that quantile, and without which no large change remains. M is 360, 2 pi, 180,
-//! pi or 65536 (or one less, or 4096), or a common value of four changes or more. For the latter a pair of changes less
-//! than [`BRIDGED_S`](super::limits::BRIDGED_S) apart is a spike; for a known modulus it is a turn there and back, and
-//! unwrapping repairs either.
+//! **Wrap.** A channel with the modulus M leaves its range at one end and re-enters at the other: the size of every
+//! large change equals M to within twice that quantile. M is 360, 2 pi, 180, pi, 65536, 65535 or 4096, or the common
+//! size of four or more changes. In the last case, large changes less than [`BRIDGED_S`](super::limits::BRIDGED_S)
+//! apart are a spike; for a known modulus they are a turn there and back, and unwrapping repairs the channel in either
+//! case.
 //!
-//! **Step.** At one large change the medians of [`BESIDE_S`] before and after differ by more than [`STEPPED`] times the
-//! deviation within each of the two, and by four fifths of the change: the person has not compensated it, as for a step
-//! of the target.
+//! **Step.** At a large change, the medians of [`SPAN_S`] before and after differ by more than [`STEPPED`] times the
+//! larger deviation within the two spans, and by more than four fifths of the change: the person has not compensated
+//! for the change, as they would for a step of the target.
 //!
-//! **Scale.** The deviation from the level in each second, over its median over all seconds, beyond
-//! [`UNITS`], of a stick with a [rest](super::rest) that of the samples away from it: no person grows by that much from one second to the next. Edges are those samples beyond
-//! [`OUTSIDE`] deviations of the rest.
+//! **Scale.** In one second the deviation from the level exceeds the median of this deviation over all seconds by the
+//! factor [`UNITS`]. For a stick with a [rest](super::rest) only the samples away from the rest count. No person
+//! increases the signal by this factor from one second to the next. The edges of the stretch are its outermost samples
+//! beyond [`OUTSIDE`] deviations of the remaining samples.
 
 use std::{f64::consts::PI, ops::Range};
 
@@ -25,23 +25,23 @@ use super::{
 };
 
 const LARGE: f64 = 6.0;
-/// Span on each side of a step, s.
-const BESIDE_S: f64 = 5.0;
-/// Least step, relative to the deviation on each side.
+/// Length of the spans before and after a step, s.
+const SPAN_S: f64 = 5.0;
+/// Minimum step, relative to the larger deviation in the two spans.
 const STEPPED: f64 = 6.0;
-/// Ratio of the deviations of seconds above which the unit has changed.
+/// Ratio of the deviation in one second to the typical deviation above which the unit has changed.
 const UNITS: f64 = 100.0;
-/// Deviations of the rest above which a sample belongs to such a stretch.
+/// A sample belongs to a stretch in other units if it exceeds this number of deviations of the remaining samples.
 const OUTSIDE: f64 = 15.0;
 const MODULI: [f64; 7] = [360.0, 2.0 * PI, 180.0, PI, 65_536.0, 65_535.0, 4096.0];
-/// Number of changes that must agree on an unknown modulus.
-const AGREE: usize = 4;
+/// Number of large changes that must agree on an unknown modulus.
+const MIN_AGREEING_CHANGES: usize = 4;
 
 /// A channel that wraps around.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Wrap {
     pub modulus: f64,
-    /// Samples from the first to the last turn.
+    /// Samples from the first to the last wrap.
     pub samples: Range<usize>,
     pub unwrapped: Vec<f64>,
 }
@@ -53,7 +53,7 @@ fn typical_change(values: &[f64]) -> f64 {
     )
 }
 
-/// Returns the wraps of a channel.
+/// Returns the modulus, the wrapped samples and the unwrapped channel; `None` if the channel does not wrap.
 pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
     let typical = typical_change(values);
     if values.len() < 100 || typical <= 0.0 {
@@ -78,7 +78,7 @@ pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
         let size = median(&jumps.iter().map(|(_, c)| c.abs()).collect::<Vec<_>>());
         let apart = jumps.windows(2).map(|w| (w[1].0 - w[0].0) as f64 * sample_time_s);
         let spike = apart.fold(f64::INFINITY, f64::min) <= super::limits::BRIDGED_S;
-        (jumps.len() >= AGREE && near(size) && !spike).then_some(size)
+        (jumps.len() >= MIN_AGREEING_CHANGES && near(size) && !spike).then_some(size)
     };
     let modulus = known.or_else(own)?;
     let mut turns = 0.0;
@@ -98,23 +98,23 @@ pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
     })
 }
 
-/// Returns the steps of the level: the first sample after each, and its size.
+/// Returns the steps of the level: the first sample after each step, its size, and its size in deviations.
 pub(super) fn steps(values: &[f64], sample_time_s: f64) -> Vec<(usize, f64, f64)> {
-    let beside = (BESIDE_S / sample_time_s) as usize;
+    let span = (SPAN_S / sample_time_s) as usize;
     let typical = typical_change(values);
     let n = values.len();
-    if beside < 10 || n < 2 * beside || typical <= 0.0 {
+    if span < 10 || n < 2 * span || typical <= 0.0 {
         return Vec::new();
     }
     let mut found: Vec<(usize, f64, f64)> = Vec::new();
-    for t in beside..n - beside {
+    for t in span..n - span {
         let change = values[t] - values[t - 1];
-        if change.abs() <= LARGE * typical || found.last().is_some_and(|(last, ..)| t - last < beside) {
+        if change.abs() <= LARGE * typical || found.last().is_some_and(|(last, ..)| t - last < span) {
             continue;
         }
-        let (before, one) = level_and_deviation(&values[t - beside..t]);
-        let (behind, other) = level_and_deviation(&values[t..t + beside]);
-        let (shift, noise) = (behind - before, one.max(other));
+        let (before, one) = level_and_deviation(&values[t - span..t]);
+        let (after, other) = level_and_deviation(&values[t..t + span]);
+        let (shift, noise) = (after - before, one.max(other));
         if shift * change > 0.0 && shift.abs() > STEPPED * noise && shift.abs() > 0.8 * change.abs() {
             found.push((t, shift, shift.abs() / noise.max(f64::MIN_POSITIVE)));
         }
@@ -122,7 +122,7 @@ pub(super) fn steps(values: &[f64], sample_time_s: f64) -> Vec<(usize, f64, f64)
     found
 }
 
-/// Returns stretches in which a channel is larger by orders of magnitude, with the ratio.
+/// Returns the stretches in which a channel is larger by orders of magnitude, and the ratio to its typical size.
 pub(super) fn scales(values: &[f64], sample_time_s: f64) -> Vec<(Range<usize>, f64)> {
     let block = ((1.0 / sample_time_s) as usize).max(10);
     let n = values.len();
@@ -163,7 +163,7 @@ pub(super) fn scales(values: &[f64], sample_time_s: f64) -> Vec<(Range<usize>, f
     let rest: Vec<f64> = (0..n).filter(|t| !inside(*t)).map(|t| values[t]).collect();
     let limit = OUTSIDE * level_and_deviation(&rest).1;
     let outside = |t: usize| (values[t] - level).abs() > limit;
-    // A single sample of the stretch may be small, ten in a row are not.
+    // A single sample of the stretch may be small, but not ten in a row.
     let last_outside = |mut rows: Box<dyn Iterator<Item = usize>>| {
         let (mut last, mut calm) = (None, 0);
         while calm < 10 {

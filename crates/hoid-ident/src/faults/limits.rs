@@ -1,8 +1,8 @@
-//! Limits that several files of this folder share.
+//! Limits that are used in several files of this folder.
 
 /// Longest fault that is bridged, s.
 pub const BRIDGED_S: f64 = 0.1;
 /// Shortest segment between cuts that is used, s.
 pub const SHORTEST_S: f64 = 2.0;
-/// Share of spikes in a channel above which none is bridged.
+/// Share of spikes in a channel above which no spike is bridged.
 pub const MOST_SPIKES: f64 = 0.05;

@@ -1,30 +1,31 @@
-//! Faults of recorded data: found by stated statistics, and bridged or cut out before a fit.
+//! Faults of recorded data, which are detected by documented statistics and bridged or cut out before a fit.
 //!
-//! An estimator by prediction error uses every sample: one sample of e that is off by 20 deviations enters the
-//! criterion through the operator with more weight than a thousand good samples. Faults are searched in this order:
+//! A prediction error estimator uses every sample: one sample of e that is off by 20 deviations enters the criterion
+//! through the operator with more weight than a thousand good samples. The files of this folder detect and repair
+//! faults:
 //!
 //! | file | fault | statistic |
 //! |---|---|---|
-//! | `levels` | wraps, stretches in other units, steps | changes and deviations against their quantiles |
-//! | `rest` | | the value at which a stick with a dead zone rests, which is not a fault |
+//! | `levels` | wraps, stretches in other units, steps | changes and deviations, relative to their quantiles |
+//! | `rest` | | value at which a stick with a dead zone rests, which is not a fault |
 //! | `holds` | frozen channels, dropouts, idle stretches | lengths of runs of equal values, ranges |
-//! | `spikes` | spikes | two explanations of a large innovation: fault or push |
-//! | `interpolation` | | the most likely values of samples given their neighbours, and the gain in likelihood |
+//! | `spikes` | spikes | comparison of two explanations of a large innovation: fault or push |
+//! | `interpolation` | | most likely values of samples given their neighbours, and the gain in likelihood |
 //! | `direction` | input and output exchanged, wrong sign | lags at which each channel responds to the other |
-//! | `resistant` | | a record in which no single sample can dominate a fit, for a second opinion |
-//! | `slow` | | a record without drifts and steps of a sensor, for a second opinion |
+//! | `resistant` | | record in which no single sample can dominate a fit, for a second opinion |
+//! | `slow` | | record without drifts and steps of a sensor, for a second opinion |
 //! | `search`, `repairing`, `limits` | | order of the searches, and repair of the record |
-//! | `autoregression`, `robust` | | fits and scales that faults cannot dominate |
+//! | `autoregression`, `robust` | | prediction and scales that are robust to faults |
 //!
-//! Each channel is examined by itself, since its own neighbours predict a sample better than any other channel; only
+//! Each channel is examined separately, since its own neighbours predict a sample better than any other channel; only
 //! *idle* stretches are determined from e and u together. No model of the person is needed. Normal control activity is
-//! not a fault: the remnant of people comes in pulses and bursts, but through their muscles, and the statistics of the
-//! spikes distinguish pushes from faults.
+//! not a fault: the remnant of people has pulses and bursts, but these are filtered by the muscles, and the statistics
+//! for spikes distinguish such pushes from faults.
 //!
-//! [`repair`] inspects a record and follows [`FaultHandling`](hoid_model::FaultHandling): by default it bridges faults
-//! of up to [`BRIDGED_S`], cuts the record at longer ones, and returns segments of [`SHORTEST_S`] or more, each as a
-//! record. Faults of more than [`MOST_SPIKES`] of the samples of a channel are reported and not bridged: the
-//! assumptions about the channel are then invalid.
+//! [`repair`] inspects a record and follows [`FaultHandling`](hoid_model::FaultHandling). By default it bridges faults
+//! of up to [`BRIDGED_S`], cuts the record at longer faults, and returns each segment of [`SHORTEST_S`] or more as a
+//! record. If more than [`MOST_SPIKES`] of the samples of a channel are spikes, they are reported and not bridged,
+//! because the assumptions about the channel are then invalid.
 
 mod autoregression;
 mod direction;

@@ -12,24 +12,24 @@ use super::{
 };
 use crate::frequency::COMMON_EXCITATIONS;
 
-/// Sample time in s above which no person can be identified.
+/// Sample time in s above which a person cannot be identified.
 pub const SLOWEST_S: f64 = 0.5;
 
-/// A record without its faults, in one or more segments, with the actions.
+/// A record after the repair, in one or more segments, with its faults and findings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RepairedRecord {
-    /// The usable segments, in their order; the original record if nothing usable would be left.
+    /// Usable segments, in order of time; the original record if nothing usable is left.
     pub segments: Vec<Record>,
-    /// The faults, in the order of time.
+    /// Faults with the action taken, in order of time.
     pub faults: Vec<Fault>,
-    /// Findings about the faults for the verdict of any result.
+    /// Findings about the faults, for the verdict on any result.
     pub findings: Vec<Finding>,
 }
 
-/// Finds the faults of e and u of a record, repaired as specified, and the spikes of its excitation.
+/// Finds the faults of e and u of a record and the spikes of its excitation, and repairs them as specified.
 ///
 /// # Errors
-/// None for a valid record; [`ModelError`] is that of creating a record.
+/// There are no errors for a valid record; otherwise the [`ModelError`] from creating a repaired record is returned.
 pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord, ModelError> {
     let all_of_it = |record: &Record, kind: FaultKind, size: f64| Fault {
         kind,
@@ -49,7 +49,7 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
     if handling == FaultHandling::Keep {
         return Ok(untouched(Vec::new()));
     }
-    // The other statistics use times in seconds, and would find a fault in every second record.
+    // The other statistics use fixed times in seconds and would give many false alarms at such a sample time.
     let ts = record.sample_time().s();
     if ts > SLOWEST_S {
         return Ok(untouched(vec![all_of_it(record, FaultKind::TimeUnit, ts)]));
@@ -85,7 +85,7 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
         nothing.findings.push(Finding::undetermined(
             "faults",
             format!(
-                "no {SHORTEST_S} s of {} are left between its faults: nothing is usable",
+                "{} has no {SHORTEST_S} s without a fault: none of it is usable",
                 record.label()
             ),
         ));
@@ -99,7 +99,7 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
     let whole = match (first, second) {
         (Some(input), Some(output)) => Record::new(record.sample_time(), input, output)?,
         (Some(output), None) => Record::of_output(record.sample_time(), output)?,
-        // A record has an output.
+        // A record always has an output.
         _ => record.clone(),
     };
     let whole = whole.labelled(record.label()).starting_at(record.time_s(0));
@@ -111,7 +111,7 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
             .map(|s| whole.span(whole.time_s(s.start), whole.time_s(s.end)))
             .collect::<Result<_, _>>()?,
     };
-    // After the repair: faults would be mistaken for a response.
+    // The direction is tested after the repair, because faults could be mistaken for a response.
     let longest = segments.iter().max_by_key(|segment: &&Record| segment.len());
     faults.extend(
         longest
@@ -125,8 +125,8 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
     })
 }
 
-/// Finds the spikes of channels with the name of an excitation; they are bridged, since nothing is fitted to such a
-/// channel: only its lines are used.
+/// Finds the spikes of channels that have the name of an excitation. The spikes are bridged: no model is fitted to such
+/// a channel, and only its lines are used.
 fn excitations(others: &mut [Channel], record: &Record) -> Vec<Fault> {
     let ts = record.sample_time().s();
     let mut all = Vec::new();
@@ -159,7 +159,7 @@ fn excitations(others: &mut [Channel], record: &Record) -> Vec<Fault> {
     all
 }
 
-/// Returns the segments between cuts.
+/// Returns the segments between cuts that have at least `shortest` samples.
 fn segments(n: usize, places: &[(FaultSpan, FaultAction)], shortest: usize) -> Vec<Range<usize>> {
     let mut out = vec![false; n];
     let mut ends = vec![false; n + 1];

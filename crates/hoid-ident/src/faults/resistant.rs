@@ -1,13 +1,13 @@
 //! A record in which no single sample can dominate a fit, for a second opinion.
 //!
-//! Each sample of e and of u is limited by the values on both sides: with the interpolation error
-//! `r(t) = sum_i a_i eps(t+i)/|a|^2`, whose standard deviation is `s = sigma/|a|`, a sample beyond `c s` is moved to
-//! this limit, `x(t) - r + c s sign(r)` (the filter cleaner of R. D. Martin and D. J. Thomson, *Proc. IEEE* 70 (1982)
-//! 1097-1115, with two sides). The sample with the largest error comes first, and the others are examined again: an
-//! outlier enters the interpolation of its neighbours, which would otherwise be moved instead of it. The effect of any
-//! sample on the filters after it is then bounded, in e as in u, and so is its leverage on theta. c = [`HELD`]: in a
-//! normal channel one sample in 16 000 is moved. A fit to this record that differs from that to the original record
-//! shows that few samples dominate the fit; if no sample is moved, both are identical.
+//! Each sample of e and u is limited by the values on both sides. The interpolation error
+//! `r(t) = sum_i a_i eps(t+i)/|a|^2` has the standard deviation `s = sigma/|a|`; a sample beyond `c s` is moved to this
+//! limit, `x(t) - r + c s sign(r)` (a two-sided version of the filter cleaner of R. D. Martin and D. J. Thomson, *Proc.
+//! IEEE* 70 (1982) 1097-1115). The sample with the largest error is moved first, and its neighbours are then examined
+//! again: an outlier affects the interpolation of its neighbours, which would otherwise be moved instead. This bounds
+//! the effect of any sample of e or u on subsequent filters, and thus its leverage on theta. c = [`LIMIT`]: in a normal
+//! channel one sample in 16 000 is moved. If a fit to this record differs from the fit to the original record, few
+//! samples dominate the fit; if no sample is moved, the two fits are identical.
 
 use std::{cmp::Ordering, collections::BinaryHeap};
 
@@ -19,10 +19,10 @@ use super::{
     spikes::scales,
 };
 
-/// Deviations of the interpolation error to which a sample is limited.
-const HELD: f64 = 4.0;
+/// Limit of the interpolation error of a sample, in standard deviations.
+const LIMIT: f64 = 4.0;
 
-/// Returns the record with limited samples; `None` if none is moved.
+/// Returns the record with limited samples; `None` if no sample is moved.
 pub fn resistant(record: &Record) -> Option<Record> {
     let ts = record.sample_time().s();
     let mut moved = false;
@@ -43,7 +43,7 @@ fn hold(values: &mut [f64], sample_time_s: f64) -> bool {
     let (p, n) = (ar.order(), x.len());
     let error =
         |eps: &[f64], t: usize| -> f64 { ar.a.iter().zip(&eps[t..]).map(|(a, e)| a * e).sum::<f64>() / (norm * norm) };
-    let most = |t: usize| HELD * sigma.at(t) / norm;
+    let most = |t: usize| LIMIT * sigma.at(t) / norm;
     let inside = p..n.saturating_sub(p);
     let mut queue: BinaryHeap<Excess> = inside
         .clone()
@@ -53,7 +53,8 @@ fn hold(values: &mut [f64], sample_time_s: f64) -> bool {
     let mut moves = 0;
     while let Some(Excess { ratio, t }) = queue.pop() {
         let (r, most_here) = (error(&eps, t), most(t));
-        // A sample that another one has moved back into its limit or further out is inserted again.
+        // Skips outdated entries: a sample that has moved because of its neighbours is back within its limit, or is in
+        // the queue again.
         if r.abs() <= most_here || (r.abs() / most_here - ratio).abs() > 1e-9 * ratio {
             continue;
         }
@@ -74,7 +75,7 @@ fn hold(values: &mut [f64], sample_time_s: f64) -> bool {
     moves > 0
 }
 
-/// A sample beyond its limit, with the ratio to the limit.
+/// A sample beyond its limit, and the ratio of its error to the limit.
 struct Excess {
     ratio: f64,
     t: usize,
@@ -106,7 +107,7 @@ impl PartialEq for Excess {
 
 impl Eq for Excess {}
 
-/// Returns the records with limited samples; `None` if none is moved.
+/// Returns the records with limited samples; `None` if no sample is moved.
 pub fn held(records: &[Record]) -> Option<Vec<Record>> {
     let all: Vec<Option<Record>> = records.iter().map(resistant).collect();
     all.iter().any(Option::is_some).then(|| {

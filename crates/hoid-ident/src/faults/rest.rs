@@ -1,12 +1,13 @@
 //! The value at which a stick rests.
 //!
-//! A stick with a dead zone or breakout gives exactly one value as long as the hand force is small; so does a hand that
-//! works in pulses and releases the stick between them. Pilots leave it there in half of the samples and for seconds at
-//! a time. This is normal control and not a fault of the recording.
+//! A stick with a dead zone or breakout gives exactly one value as long as the hand force is small; the same happens if
+//! the hand works in pulses and releases the stick between them. Pilots leave the stick there for up to half of the
+//! samples, and for seconds at a time. This is normal control and not a fault of the recording.
 //!
-//! The rest is the most frequent value, if it makes up [`SHARE`] of the samples or more, is reached [`VISITS`] times or
-//! more, and is [`ALONE`] times as frequent as any other: the levels of a quantised channel have similar frequencies,
-//! and a channel that stops does so only once. The ends of the range are excluded.
+//! The rest is the most frequent value, if it makes up at least [`SHARE`] of the samples, is reached at least
+//! [`VISITS`] times, and is at least [`ALONE`] times as frequent as any other value. The levels of a quantised channel
+//! have similar frequencies, and a channel that stops does so only once. The largest and the smallest value are
+//! excluded.
 
 use std::ops::Range;
 
@@ -19,18 +20,18 @@ const ALONE: f64 = 4.0;
 /// The rest of a stick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rest {
-    /// The value.
+    /// Value of the signal at rest.
     pub value: f64,
-    /// Share of the samples at this value.
+    /// Share of the samples with this value.
     pub share: f64,
-    /// Number of times that it is reached.
+    /// Number of times that the signal reaches the value.
     pub visits: usize,
     /// 90 % quantile of the lengths of the visits, samples.
     pub typical_samples: f64,
 }
 
 impl Rest {
-    /// Returns the rest of a channel; `None` if it has none.
+    /// Returns the rest of a channel; `None` if the channel has no rest.
     pub fn of(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
@@ -59,7 +60,7 @@ impl Rest {
     }
 }
 
-/// Returns the runs of equal values, including those of one sample.
+/// Returns the runs of equal values, including runs of a single sample.
 pub(super) fn runs(values: &[f64]) -> Vec<Range<usize>> {
     let mut all: Vec<Range<usize>> = Vec::new();
     for (t, v) in values.iter().enumerate() {

@@ -1,23 +1,23 @@
-//! Scales that faults cannot change.
+//! Estimates of level and scale that are robust to faults.
 //!
-//! The deviation of a channel is the largest of its median absolute deviation from the median over
-//! 0.6745 and its 90 % quantile over 1.6449, which agree for a normal channel; the second holds where
-//! a hand rests more than half of the time. If both vanish it is the root mean square of all samples except one half of
-//! a per cent (P. J. Huber, *Robust Statistics*, 1981, ch. 5).
+//! The deviation of a channel is the larger of two estimates, which agree for a normal channel: its median absolute
+//! deviation from the median over 0.6745, and the 90 % quantile of the absolute deviation over 1.6449. The second
+//! remains valid if a hand rests more than half of the time. If both vanish, the deviation is the root mean square
+//! deviation without the largest half per cent (P. J. Huber, *Robust Statistics*, 1981, ch. 5).
 
 use hoid_numerics::statistics::{nearest_quantile, upper_median};
 
-/// Returns the quantile, zero for no values; the values are reordered.
+/// Returns the quantile, or zero if there are no values; reorders the values.
 pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
     nearest_quantile(values, share).unwrap_or(0.0)
 }
 
-/// Returns the median, zero for no values.
+/// Returns the median, or zero if there are no values.
 pub(super) fn median(values: &[f64]) -> f64 {
     upper_median(&mut values.to_vec()).unwrap_or(0.0)
 }
 
-/// Returns median and robust deviation.
+/// Returns the median and the robust deviation.
 pub(super) fn level_and_deviation(values: &[f64]) -> (f64, f64) {
     if values.is_empty() {
         return (0.0, 0.0);
@@ -34,7 +34,7 @@ pub(super) fn level_and_deviation(values: &[f64]) -> (f64, f64) {
     (level, (squares / kept.len().max(1) as f64).sqrt())
 }
 
-/// Returns the step of a channel that often holds its value; zero for a channel in full precision.
+/// Returns the quantisation step of a channel that often holds its value; zero for a channel in full precision.
 pub(super) fn quantum(values: &[f64]) -> f64 {
     let changes = || values.windows(2).map(|w| (w[1] - w[0]).abs());
     let held = changes().filter(|c| *c == 0.0).count();

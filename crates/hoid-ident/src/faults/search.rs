@@ -1,8 +1,8 @@
 //! Order of the searches for faults, and the action for each fault.
 //!
-//! Wraps come first, since a channel without them has no jumps; then long faults: stretches in other units, idle and
-//! frozen ones. Between these, on the residual, spikes and steps: an autoregression of a record that is half idle
-//! describes neither half.
+//! Wraps are searched for first, since they look like jumps, and then long faults: stretches in other units, idle
+//! stretches and frozen channels. Spikes and steps are searched for in the remaining stretches, because an
+//! autoregression of a record that is half idle describes neither half.
 
 use std::ops::Range;
 
@@ -14,22 +14,22 @@ use super::{
     spikes,
 };
 
-/// Samples between longer faults below which no spike is searched for.
+/// Minimum length of a stretch between long faults in which spikes are searched for, samples.
 const FEWEST: usize = 100;
 
-/// A fault with its samples.
+/// A fault and the affected samples.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct FaultSpan {
     pub kind: FaultKind,
-    /// Index of the channel, e or u; `None` for both.
+    /// Index of the channel, e or u; `None` if both are affected.
     pub channel: Option<usize>,
     pub samples: Range<usize>,
     pub size: f64,
     pub deviations: Option<f64>,
 }
 
-/// Finds the faults of the channels of one record in the order of time, with the action for each; the channels are
-/// unwrapped, and bridged where this is the action and not all are `cut`.
+/// Finds the faults of the channels of one record and returns them in order of time, each with its action. The channels
+/// are unwrapped; short faults are bridged unless all faults are `cut`.
 pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(FaultSpan, FaultAction)> {
     let n = values.first().map_or(0, Vec::len);
     let long = |samples: &Range<usize>| samples.len() as f64 * ts > BRIDGED_S * (1.0 + 1e-9);
@@ -104,7 +104,7 @@ pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(FaultS
     found
 }
 
-/// Returns stretches in other units, idle and frozen ones.
+/// Returns stretches in other units, idle stretches and frozen channels.
 fn lasting(values: &[Vec<f64>], ts: f64) -> Vec<FaultSpan> {
     let mut all: Vec<FaultSpan> = Vec::new();
     for (channel, values) in values.iter().enumerate() {
@@ -158,7 +158,7 @@ fn lasting(values: &[Vec<f64>], ts: f64) -> Vec<FaultSpan> {
     all
 }
 
-/// Returns the runs of samples in use that are long enough for a search.
+/// Returns the runs of samples outside long faults that are long enough for a search.
 fn stretches(out: &[bool]) -> Vec<Range<usize>> {
     let mut all: Vec<Range<usize>> = Vec::new();
     for t in (0..out.len()).filter(|t| !out[*t]) {

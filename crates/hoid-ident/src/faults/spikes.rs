@@ -1,33 +1,35 @@
-//! Spikes: one or few samples that are inconsistent with their neighbours.
+//! Spikes: one or a few samples that are inconsistent with their neighbours.
 //!
 //! Two explanations of a large innovation are compared (A. J. Fox, *J. Royal Statistical Society B* 34 (1972) 350-363;
-//! I. Chang, G. C. Tiao and C. Chen, *Technometrics* 30 (1988) 193-204). A *push* of the person enters the innovations:
-//! it moves the channel, which then continues with its normal dynamics. A *fault* is added to the samples only: each
-//! innovation after it is off by a coefficient of A, and the channel continues as if nothing had happened. For m
-//! samples from s on,
+//! I. Chang, G. C. Tiao and C. Chen, *Technometrics* 30 (1988) 193-204). A *push* by the person enters the innovations:
+//! it moves the channel, which then continues with its normal dynamics. A *fault* is added only to the samples: each
+//! following innovation is off by a multiple of a coefficient of A, and the channel continues as if nothing had
+//! happened. For m samples from sample s on,
 //!
 //! | explanation | residual sum `S = sum eps^2/sigma^2` |
 //! |---|---|
 //! | m pushes | `S` without the m largest terms |
 //! | m faulty samples | `S` after the [interpolation](super::interpolation) of them |
 //!
-//! Both have m unknowns. The smallest number of samples is faulty if their interpolation
+//! Each explanation has m unknowns. The faulty samples are the smallest set whose interpolation
 //!
-//! 1. reduces the sum by more than [`LARGE`]^2: for normal innovations once in 1e15 samples;
-//! 2. leaves less than m pushes do, by [`BETTER`]^2 and by [`PART`] of the reduction, or leaves less than a part in
-//!    [`DECISIVE`] of what they leave (several faulty samples of a smooth channel give a few more large innovations than
-//!    there are pushes, whose squares are nearly all of S);
-//! 3. leaves nothing beyond [`CLEAN`] sigma (or a twentieth of S);
-//! 4. moves a sample by more than [`SMALLEST`] of the deviation of the channel, and by two of its steps.
+//! 1. reduces the sum by more than [`LARGE`]^2, which happens once in 1e15 samples for normal innovations;
+//! 2. leaves less of the sum than m pushes leave, by more than [`ROOT_OF_MIN_ADVANTAGE`]^2; the advantage is also more
+//!    than [`PART`] of the reduction, or the pushes leave more than [`MIN_SUM_RATIO`] times as much (several faulty
+//!    samples of a smooth channel give a few more large innovations than there are pushes, and their squares make up
+//!    nearly all of S);
+//! 3. leaves no innovation beyond [`LARGEST_INNOVATION`] sigma (or at most a twentieth of S);
+//! 4. moves a sample by more than [`SMALLEST`] deviations of the channel, and by more than two of its quantisation
+//!    steps.
 //!
-//! The first samples of a record are searched in reversed time, in which they come last: a Gaussian autoregression is
-//! the same in both directions.
+//! The first samples of a record are searched in reversed time, where they are the last samples: a Gaussian
+//! autoregression is the same in both directions.
 //!
-//! In a channel without memory, and at the last sample of a record, the two explanations do not differ: there a sample
-//! beyond [`WILD`] deviations is a fault. sigma is the median absolute innovation over 0.6745, of the record or of the
-//! second around the sample, whichever is larger: the remnant is not stationary, and depends on u. Faults that are
-//! found are bridged, the autoregression is fitted again, and the search is repeated (C. Chen and L. M. Liu, *J.
-//! American Statistical Association* 88 (1993) 284-297).
+//! In a channel without memory, and at the last sample of a record, the two explanations do not differ; there a sample
+//! beyond [`IMPOSSIBLE_DEVIATION`] deviations is faulty. sigma is the median absolute innovation over 0.6745, of the
+//! whole record or of the seconds around the sample, whichever is larger: the remnant is not stationary and depends on
+//! u. The faults are bridged, the autoregression is fitted again, and the search is repeated (C. Chen and L. M. Liu,
+//! *J. American Statistical Association* 88 (1993) 284-297).
 
 use std::ops::Range;
 
@@ -37,41 +39,42 @@ use super::{
     robust::{level_and_deviation, median, quantum},
 };
 
-/// Least reduction of the sum of squares, as a multiple of sigma.
+/// Square root of the minimum reduction of S.
 const LARGE: f64 = 8.0;
-/// Least advantage of faults over pushes, as a multiple of sigma.
-const BETTER: f64 = 5.0;
-/// The same relative to the reduction.
+/// Square root of the minimum advantage of faults over pushes in S.
+const ROOT_OF_MIN_ADVANTAGE: f64 = 5.0;
+/// Minimum advantage of faults over pushes, as a share of the reduction of S.
 const PART: f64 = 0.2;
-/// Least ratio of the residual sum of pushes to that of faults, or of noise, if the advantage is a small part.
-const DECISIVE: f64 = 20.0;
-/// Largest remaining innovation, as a multiple of sigma.
-const CLEAN: f64 = 5.0;
-/// Innovation at which a search starts, as a multiple of sigma.
+/// Minimum ratio of the sum that pushes leave to the sum that faults (or noise alone) leave, required if the advantage
+/// is a smaller share.
+const MIN_SUM_RATIO: f64 = 20.0;
+/// Largest innovation that may remain, as a multiple of sigma.
+const LARGEST_INNOVATION: f64 = 5.0;
+/// Innovation at which a search for a fault starts, as a multiple of sigma.
 const SEED: f64 = 4.0;
-/// Least change of a sample, relative to the deviation of the channel.
+/// Minimum change of a sample, relative to the deviation of the channel.
 const SMALLEST: f64 = 1.5;
-/// Number of deviations of the channel by which no person moves it in a few samples.
-const WILD: f64 = 20.0;
+/// Deviation that no person reaches within a few samples, in robust deviations of the channel.
+const IMPOSSIBLE_DEVIATION: f64 = 20.0;
 const ROUNDS: usize = 4;
 
-/// Samples that are not part of the signal.
+/// A spike: samples that are not part of the signal.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Spike {
     pub samples: Range<usize>,
-    /// Largest deviation of its samples.
+    /// Largest deviation of the samples from their interpolation, with its sign.
     pub size: f64,
-    /// Square root of the reduction of the sum of squares.
+    /// Square root of the reduction of S.
     pub deviations: f64,
 }
 
-/// Finds the spikes of a channel, and bridges them.
+/// Finds the spikes of a channel and bridges them.
 pub(super) fn find(values: &mut [f64], sample_time_s: f64) -> Vec<Spike> {
     let (level, deviation) = level_and_deviation(values);
     let mut x: Vec<f64> = values.iter().map(|v| v - level).collect();
     let step = quantum(values);
     let window = ((1.0 / sample_time_s) as usize).clamp(64, 4096);
-    // At least three: tremor of the hand is never a single sample.
+    // Spikes have at most the length of a fault that is bridged, and at most 12 samples.
     let longest = ((super::limits::BRIDGED_S / sample_time_s).round() as usize).clamp(1, 12);
     let mut found: Vec<Spike> = Vec::new();
     for _ in 0..ROUNDS {
@@ -89,7 +92,7 @@ pub(super) fn find(values: &mut [f64], sample_time_s: f64) -> Vec<Spike> {
             reach: reach(&ar),
         };
         let mut new = search.round(&mut x, &mut eps);
-        new.extend(search.beginning(&mut x));
+        new.extend(search.search_start(&mut x));
         if new.is_empty() {
             break;
         }
@@ -103,7 +106,7 @@ pub(super) fn find(values: &mut [f64], sample_time_s: f64) -> Vec<Spike> {
     joined(found)
 }
 
-/// Replaces samples by interpolation between their neighbours.
+/// Replaces samples by an interpolation from their neighbours.
 pub(super) fn bridge(values: &mut [f64], samples: Range<usize>) {
     let (level, deviation) = level_and_deviation(values);
     let x: Vec<f64> = values.iter().map(|v| v - level).collect();
@@ -118,7 +121,7 @@ pub(super) fn bridge(values: &mut [f64], samples: Range<usize>) {
     }
 }
 
-/// Number of lags that contain 95 % of `|a|^2`.
+/// Returns the number of lags that contain 95 % of `|a|^2`.
 fn reach(ar: &Autoregression) -> usize {
     let total = ar.norm().powi(2);
     let mut sum = 0.0;
@@ -129,7 +132,7 @@ fn reach(ar: &Autoregression) -> usize {
     held.unwrap_or(ar.order())
 }
 
-/// Scale of the innovations around each window.
+/// Returns the scale of the innovations around each window.
 pub(super) fn scales(eps: &[f64], window: usize, least: f64) -> Scales {
     let sizes: Vec<f64> = eps.iter().map(|e| e.abs()).collect();
     let of = |part: &[f64]| median(part) / 0.674_489_75;
@@ -166,8 +169,8 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Searches the first samples, backwards.
-    fn beginning(&self, x: &mut [f64]) -> Vec<Spike> {
+    /// Searches the first samples in reversed time.
+    fn search_start(&self, x: &mut [f64]) -> Vec<Spike> {
         let p = self.ar.order();
         let length = x.len().min(8 * p);
         let mut backwards: Vec<f64> = x[..length].iter().rev().copied().collect();
@@ -207,7 +210,7 @@ impl Search<'_> {
         found
     }
 
-    /// Returns the fault that starts at this sample, with the changes of its samples.
+    /// Returns the spike that starts at this sample, with the changes of its samples.
     fn at(&self, x: &[f64], eps: &[f64], start: usize) -> Option<(Spike, Vec<f64>)> {
         let sigma = self.sigma.at(start);
         let all = Interpolation::new(self.ar, eps, start, self.longest);
@@ -235,13 +238,13 @@ impl Search<'_> {
             let left_by_pushes: f64 = before.iter().skip(m).sum();
             let better = left_by_pushes - left_by_faults;
             let largest = left.iter().copied().fold(0.0, f64::max);
-            let clean = largest <= CLEAN * CLEAN || left_by_faults <= 0.05 * total;
-            let decisive = left_by_pushes > DECISIVE * left_by_faults.max(left.len() as f64);
-            let is_fault = clean && better > BETTER * BETTER && (better > PART * fall || decisive);
+            let clean = largest <= LARGEST_INNOVATION * LARGEST_INNOVATION || left_by_faults <= 0.05 * total;
+            let decisive = left_by_pushes > MIN_SUM_RATIO * left_by_faults.max(left.len() as f64);
+            let is_fault = clean && better > ROOT_OF_MIN_ADVANTAGE * ROOT_OF_MIN_ADVANTAGE && (better > PART * fall || decisive);
             let worst = |k: usize| x[start + k].abs();
             let is_wild = m <= 3
-                && (0..m).all(|k| worst(k) > WILD * self.deviation)
-                && size.abs() > WILD * self.deviation
+                && (0..m).all(|k| worst(k) > IMPOSSIBLE_DEVIATION * self.deviation)
+                && size.abs() > IMPOSSIBLE_DEVIATION * self.deviation
                 && left_by_faults <= 0.5 * total;
             if is_fault || is_wild {
                 let spike = Spike {
@@ -255,7 +258,7 @@ impl Search<'_> {
         None
     }
 
-    /// As [`apply`], on rows from `first` on.
+    /// Updates innovations like [`apply`], for an array that starts at row `first`.
     fn apply_from(&self, eps: &mut [f64], first: usize, start: usize, delta: &[f64]) {
         for (i, change) in delta.iter().enumerate() {
             for (lag, a) in self.ar.a.iter().enumerate() {
@@ -268,7 +271,7 @@ impl Search<'_> {
     }
 }
 
-/// Joins adjacent spikes.
+/// Joins adjacent spikes into one.
 fn joined(mut all: Vec<Spike>) -> Vec<Spike> {
     all.sort_by_key(|spike| spike.samples.start);
     let mut joined: Vec<Spike> = Vec::new();

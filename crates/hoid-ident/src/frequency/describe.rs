@@ -1,4 +1,4 @@
-//! Describing function of records: coefficients at the lines of every run, their averages and errors.
+//! Describing function of records: coefficients at the lines of every run, their averages and standard errors.
 
 use hoid_model::{Channel, Complex64, Record, uncertainty::Estimate};
 use hoid_numerics::statistics::root_mean_square;
@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{IdentError, informative_data::common_sample_time};
 
-/// Amplitude of a line, relative to the rms of its channel, below which it is rounding.
+/// Amplitude of a line, relative to the rms of its channel, below which it is only rounding.
 const LEAST_LINE: f64 = 1e-12;
 
 /// Number of bins at non-excited frequencies from which the remnant at a line is estimated.
@@ -21,25 +21,24 @@ const NEIGHBOURS: usize = 8;
 /// The describing function at one line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
-    /// Its frequency, rad/s.
+    /// Frequency of the line, rad/s.
     pub omega_rad_s: f64,
-    /// Its harmonic number of the period.
+    /// Number of the harmonic of the period at which the line lies.
     pub harmonic: usize,
-    /// H, the average over runs.
+    /// H, averaged over runs.
     pub response: Complex64,
-    /// sigma, the root of the mean square of `|dH|`; `None` for one run.
+    /// Standard error sigma, the root mean square of `|dH|`; `None` for one run.
     pub standard_error: Option<f64>,
-    /// Standard deviation of the ratios of single runs, as the root of the mean square modulus;
-    /// `None` for one run.
+    /// Standard deviation of the ratios of single runs, as a root mean square modulus; `None` for one run.
     pub spread: Option<f64>,
-    /// sigma from the remnant near the line: from `N = U - H E` at the nearest non-excited bins, which contain only
-    /// remnant. It does not include differences between runs, and is defined for a single run as well.
+    /// sigma computed from the remnant near the line, `N = U - H E` at the nearest non-excited bins, which contain only
+    /// remnant. It does not include differences between runs and is also defined for a single run.
     pub neighbour_error: f64,
     /// Squared coherence, 0 to 1; `None` for one run, where it is always 1.
     pub coherence: Option<f64>,
-    /// `U_i/E_i`.
+    /// Ratio `U_i/E_i` of each run.
     pub per_run: Vec<Complex64>,
-    /// The controlled element, if it is estimated.
+    /// Frequency response of the controlled element, if it is estimated.
     pub element: Option<Complex64>,
     pub(crate) ratio: Ratio,
     pub(super) element_ratio: Option<Ratio>,
@@ -62,7 +61,7 @@ impl Line {
         }
     }
 
-    /// `sigma/(sqrt(2) |H|)`.
+    /// Returns the relative standard error `sigma/(sqrt(2) |H|)`.
     fn relative_error(&self) -> Option<f64> {
         self.standard_error
             .map(|s| s / (std::f64::consts::SQRT_2 * self.response.norm()))
@@ -73,9 +72,9 @@ impl Line {
         self.ratio.value(Some(run))
     }
 
-    /// Returns centre and radius of the circle in the complex plane that contains the true H with this probability,
-    /// exact for a circular normal remnant even if e is small relative to it; `None` for one run, or if e does not
-    /// differ from zero at this level.
+    /// Returns centre and radius of the circle in the complex plane that contains the true H with this probability. The
+    /// result is exact for a circular normal remnant even if e is small relative to it. `None` for one run, or if e
+    /// does not differ from zero at this level.
     pub fn confidence_circle(&self, probability: f64) -> Option<(Complex64, f64)> {
         self.ratio.confidence_disc(probability)
     }
@@ -84,9 +83,9 @@ impl Line {
 /// Summary of one run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunSummary {
-    /// Label of its record.
+    /// Label of the record.
     pub label: String,
-    /// Number of its periods.
+    /// Number of periods in the run.
     pub periods: usize,
     /// Root mean square of e.
     pub rms_e: f64,
@@ -98,12 +97,12 @@ pub struct RunSummary {
     pub noise_ratio: f64,
 }
 
-/// A describing function with the remnant and the runs of the records.
+/// A describing function, with the remnant and a summary of each run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DescribingFunction {
-    /// The lines, by frequency.
+    /// Lines in ascending order of frequency.
     pub lines: Vec<Line>,
-    /// The runs: records or periods.
+    /// Summaries of the runs, which are records or periods.
     pub runs: Vec<RunSummary>,
     /// Share of the variance of u at non-excited frequencies, mean over runs.
     pub off_line_share: Estimate,
@@ -117,14 +116,14 @@ pub struct DescribingFunction {
     pub rms_u: Estimate,
 }
 
-/// Coefficients of one run.
+/// Fourier coefficients of one run.
 struct Run {
     label: String,
     window: Window,
     e: Vec<Complex64>,
     u: Vec<Complex64>,
     reference: Option<Vec<Complex64>>,
-    /// Output and input of the controlled element.
+    /// Coefficients of the output and of the input of the controlled element.
     element: Option<(Vec<Complex64>, Vec<Complex64>)>,
     rms: (f64, f64),
 }
@@ -212,7 +211,7 @@ fn runs_of(record: &Record, excitation: &Excitation, options: &DescribingOptions
         return refuse(
             &format!("record {}", record.label()),
             "no input",
-            "the tracking error as input, of which u is a function",
+            "the tracking error, to which u responds, as input",
         );
     }
     let span = window.first..window.first + window.samples;
@@ -279,7 +278,7 @@ fn runs_of(record: &Record, excitation: &Excitation, options: &DescribingOptions
 }
 
 impl Run {
-    /// Checks that every line has power in the denominators.
+    /// Checks that no line has zero power in e, u or another channel of the averages.
     fn check_lines(
         &self,
         record: &Record,
@@ -319,7 +318,7 @@ fn line(runs: &[Run], harmonic: usize, omega_rad_s: f64, options: &DescribingOpt
     let (mut cross, mut power_u, mut power_d) = (Complex64::new(0.0, 0.0), 0.0, 0.0);
     for run in runs {
         let (e, u) = (at(run, &run.e), at(run, &run.u));
-        // Reference of the products: ratios have the inverse of their denominator.
+        // Factors of numerator and denominator: for the mean of ratios, the inverse of the denominator.
         let (weight, element_weight, d) = match (&options.averaging, &run.reference) {
             (Averaging::Reference { .. }, Some(reference)) => {
                 let d = at(run, reference);
@@ -345,7 +344,7 @@ fn line(runs: &[Run], harmonic: usize, omega_rad_s: f64, options: &DescribingOpt
     let element = element_ratio.as_ref().map(|r| r.value(None));
     if !(response.is_finite() && element.is_none_or(Complex64::is_finite)) {
         return Err(IdentError::NoLinePower {
-            channel: "the average of all runs".to_owned(),
+            channel: "the average over the runs".to_owned(),
             label: runs.iter().map(|r| r.label.as_str()).collect::<Vec<_>>().join(", "),
             omega_rad_s,
         });
@@ -368,8 +367,8 @@ fn line(runs: &[Run], harmonic: usize, omega_rad_s: f64, options: &DescribingOpt
     })
 }
 
-/// sigma of a line from the neighbouring bins: `sigma^2 = sum_i |D_i|^2 S_i / |sum_i b_i|^2` with S_i the mean of
-/// `|U - H E|^2` over the nearest bins of run i at non-excited frequencies, `b_i = E_i D_i*`.
+/// Returns sigma of a line from the neighbouring bins: `sigma^2 = sum_i |D_i|^2 S_i / |sum_i b_i|^2`, where S_i is the
+/// mean of `|U - H E|^2` over the nearest non-excited bins of run i and `b_i = E_i D_i*`.
 fn neighbour_error(runs: &[Run], line: &Line, harmonics: &[usize]) -> f64 {
     let mut squares = 0.0;
     for (run, (_, b)) in runs.iter().zip(&line.ratio.0) {
@@ -381,7 +380,7 @@ fn neighbour_error(runs: &[Run], line: &Line, harmonics: &[usize]) -> f64 {
         beside.truncate(NEIGHBOURS);
         let power = |k: &usize| (run.u[*k] - line.response * run.e[*k]).norm_sqr();
         let mean = beside.iter().map(power).sum::<f64>() / beside.len() as f64;
-        // |D_i| as the products with it have it.
+        // |D_i|^2, with the scaling used in the products.
         let d = b.norm_sqr() / run.e[at].norm_sqr();
         squares += d * mean;
     }

@@ -1,21 +1,21 @@
-//! Description of records: a describing function with its loop and its verdict, with all choices made from the records.
+//! Description of records: a describing function with its loop and its verdict. All choices are made from the records.
 //!
 //! | choice | rule |
 //! |---|---|
-//! | excitation | the given channel; otherwise the first of the common names whose channel has lines |
-//! | lines | those of the options; otherwise found in that channel |
-//! | average | `sum U_i D_i* / sum E_i D_i*` with D of the channel; the mean of `U_i/E_i` without a channel |
-//! | runs | records, regardless of their number of periods, if there are three or more; otherwise their periods |
-//! | delay | that of gain, lead and delay fitted to the lines: it unwraps the phase, and the margin is interpolated without it |
+//! | excitation | the given channel; otherwise the first channel with a common name that has lines |
+//! | lines | the lines given in the options; otherwise the lines found in that channel |
+//! | average | `sum U_i D_i* / sum E_i D_i*`, where D is the coefficient of the channel; without a channel the mean of `U_i/E_i` |
+//! | runs | the records, regardless of their number of periods, if there are three or more; otherwise the periods of the records |
+//! | delay | the delay of a gain-lead-delay model fitted to the lines: it is used to unwrap the phase, and is removed from the phase before margins are interpolated |
 //!
-//! Records are used as runs if possible: the remnant of neighbouring periods is one signal, so that periods of one run
-//! are not independent, and variations of a person from day to day are not in the scatter of one run.
+//! Records are used as runs if possible. The remnant of neighbouring periods is one signal, so that periods of one run
+//! are not independent, and the scatter within one run does not contain the variation of a person from day to day.
 
 use hoid_model::{ContinuousTransferFunction, Detrend, Record, Verdict, uncertainty::Estimate};
 
 use super::{
     describe::{DescribingFunction, describe},
-    diagnostics::{DiagnosticInputs, doubts},
+    diagnostics::{DiagnosticInputs, findings},
     excitation::{Excitation, LineSearch, refuse},
     gain_lead_delay::GainLeadDelayOptions,
     open_loop::DescribingMargins,
@@ -25,51 +25,51 @@ use super::{
 };
 use crate::IdentError;
 
-/// Names of channels that commonly contain the excitation, in the order of the search.
+/// Names of channels that commonly contain the excitation, in search order.
 pub const COMMON_EXCITATIONS: [&str; 8] = ["f_t", "d", "r", "f_d", "target", "disturbance", "reference", "forcing"];
 
-/// Number of runs from which on the errors are computed from their scatter.
-const RUNS_ENOUGH: usize = 3;
-/// Longest delay: longer ones than that of a person are artefacts of noise in the phase.
+/// Minimum number of records for computing errors from the scatter between records.
+const MIN_RUNS: usize = 3;
+/// Largest plausible delay; longer delays are artefacts of noise in the phase.
 const LONGEST_DELAY_S: f64 = 0.6;
 
 /// Options of a description. By default everything is determined from the records.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DescriptionOptions {
-    /// Channel of the recorded disturbance or target.
+    /// Name of the channel with the recorded disturbance or target.
     pub excitation: Option<String>,
-    /// Its lines, rad/s.
+    /// Lines of the excitation, rad/s.
     pub lines_rad_s: Option<Vec<f64>>,
-    /// Its period, s. Necessary if the lines are given.
+    /// Period of the excitation, s. Required if the lines are given.
     pub period_s: Option<f64>,
-    /// The controlled element, for the open loop.
+    /// Controlled element, for computing the open loop.
     pub controlled_element: Option<ContinuousTransferFunction>,
     /// Start of the span, s.
     pub from_s: Option<f64>,
-    /// End of the span, s, which is excluded.
+    /// End of the span, s (exclusive).
     pub to_s: Option<f64>,
-    /// `e[k]` belongs to `u[k + offset_samples]`, an integer or not.
+    /// Offset between the channels: `e[k]` belongs to `u[k + offset_samples]`. The offset need not be an integer.
     pub offset_samples: f64,
-    /// Trend removed from e and u of each run beforehand.
+    /// Trend removed from e and u of each run before the analysis.
     pub detrend: Detrend,
 }
 
 /// A describing function with its margins and its verdict.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Description {
-    /// Lines, runs, remnant.
+    /// Describing function, with its lines, runs and remnant.
     pub function: DescribingFunction,
-    /// The lines and their period.
+    /// Lines of the excitation, and their period.
     pub excitation: Excitation,
-    /// The reference channel of the average.
+    /// Name of the reference channel of the average.
     pub channel: Option<String>,
-    /// Definition of a run.
+    /// Definition of a run: record or period.
     pub realisation: Realisation,
-    /// Delay that is removed to unwrap and interpolate phases, s.
+    /// Delay that is removed before phases are unwrapped and interpolated, s.
     pub delay_s: f64,
-    /// Crossover and margins, with a controlled element.
+    /// Crossover and margins, if a controlled element is given.
     pub margins: Option<DescribingMargins>,
-    /// Findings for and against it.
+    /// Verdict on the describing function.
     pub verdict: Verdict,
 }
 
@@ -85,7 +85,7 @@ impl Description {
     }
 }
 
-/// Computes the describing function of one or several runs.
+/// Computes the description of one or several records: describing function, margins and verdict.
 ///
 /// # Errors
 /// [`IdentError::BadOption`] if no excitation is found, and the errors of [`describe()`] and [`Excitation::found_in`].
@@ -95,7 +95,7 @@ pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result
         (None, None) => Ok(r.clone()),
         _ => r.span(from_s.unwrap_or(f64::NEG_INFINITY), to_s.unwrap_or(f64::INFINITY)),
     };
-    // The offset may need samples beyond the span, so that `records` are described.
+    // Only `parts` are restricted to the span: `records` are described, because an offset may need samples beyond it.
     let parts = records.iter().map(cut).collect::<Result<Vec<Record>, _>>()?;
     let Some(first) = parts.first() else {
         return Err(IdentError::NoRecords);
@@ -105,7 +105,7 @@ pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result
         .iter()
         .map(|part| Window::of_span(part, None, None, excitation.period_s()).map(|w| w.periods))
         .collect();
-    let realisation = match (parts.len() >= RUNS_ENOUGH, periods?.iter().sum::<usize>()) {
+    let realisation = match (parts.len() >= MIN_RUNS, periods?.iter().sum::<usize>()) {
         (false, 2..) => Realisation::Period,
         _ => Realisation::Record,
     };
@@ -139,7 +139,7 @@ pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result
         in_loop: open_loop.as_ref().zip(margins.as_ref()),
         offset_samples: options.offset_samples,
     };
-    let verdict = Verdict::of(doubts(&judged, &parts)?);
+    let verdict = Verdict::of(findings(&judged, &parts)?);
     Ok(Description {
         function,
         excitation,
@@ -151,8 +151,8 @@ pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result
     })
 }
 
-/// Returns the delay of gain, lead and delay fitted to the lines; without the lead if it would be negative, and
-/// therefore a part of the delay.
+/// Returns the delay of a gain-lead-delay model fitted to the lines; if the lead is negative, the delay of a model
+/// without a lead. Returns zero if this delay is not plausible.
 fn delay_of(function: &DescribingFunction) -> f64 {
     let fit = |lead| {
         let options = GainLeadDelayOptions {
@@ -169,7 +169,7 @@ fn delay_of(function: &DescribingFunction) -> f64 {
         .unwrap_or(0.0)
 }
 
-/// Returns the lines, and their channel if there is one.
+/// Returns the excitation, and the name of its channel if there is one.
 fn excitation_of(record: &Record, options: &DescriptionOptions) -> Result<(Excitation, Option<String>), IdentError> {
     let search = LineSearch {
         period_s: options.period_s,
@@ -181,8 +181,8 @@ fn excitation_of(record: &Record, options: &DescriptionOptions) -> Result<(Excit
         (Some(_), None) => {
             return refuse(
                 "the lines of the excitation",
-                "no period with them",
-                "the period in s, of which they are harmonics",
+                "lines without a period",
+                "the period in s of which the lines are harmonics",
             );
         }
     };
@@ -204,7 +204,7 @@ fn excitation_of(record: &Record, options: &DescriptionOptions) -> Result<(Excit
             (Ok(found), None) => return Ok((found, Some(name.to_owned()))),
             (Ok(found), Some(given)) if found == *given => return Ok((found, Some(name.to_owned()))),
             (Ok(_), Some(_)) => {}
-            // A zero target in addition to a disturbance is no excitation, and no error.
+            // A constant channel, such as a zero target next to a disturbance, is skipped without an error.
             (Err(IdentError::NoExcitation { .. }), _) => {}
             (Err(error), _) => {
                 reason.get_or_insert(error);

@@ -1,22 +1,22 @@
 //! Findings about a describing function.
 //!
-//! For n runs with a u that is not related to the excitation, the squared coherence `gamma^2` at a line exceeds x with
-//! the probability `(1 - x)^{n-1}` (N. R. Goodman, 1957, in J. S. Bendat and A. G. Piersol, *Random Data*, 2010,
-//! section 9.2): one of twenty is above `1 - 0.05^{1/(n-1)}`. So `-(n-1) ln(1 - gamma^2)` is exponential with mean 1,
-//! and twice its sum over K lines has the chi-square distribution with 2K degrees of freedom (R. A. Fisher's
-//! combination of tests): a test of all lines together, for which two periods suffice.
+//! For n runs in which u is not related to the excitation, the squared coherence `gamma^2` at a line exceeds x with the
+//! probability `(1 - x)^{n-1}` (N. R. Goodman, 1957, in J. S. Bendat and A. G. Piersol, *Random Data*, 2010, section
+//! 9.2); one in twenty is above `1 - 0.05^{1/(n-1)}`. Therefore `-(n-1) ln(1 - gamma^2)` has an exponential
+//! distribution with mean 1, and twice the sum over K lines has a chi-square distribution with 2K degrees of freedom
+//! (R. A. Fisher's combination of tests). This tests all lines together; two periods are sufficient.
 //!
 //! | finding | severity |
 //! |---|---|
-//! | `unrelated`: all lines together do not differ from chance | undetermined |
-//! | `low-coherence`: single lines do not | doubt next to the crossover or at half of the lines, else a note |
-//! | `few-runs`: one run has no errors, those of two are inaccurate | doubt |
-//! | `periods-as-runs`: the errors are those between periods of one or two runs | note |
-//! | `no-reference`: no channel of the excitation | note |
-//! | `no-crossover`, `large-error`: crossover outside the lines; errors as large as the value | doubt |
-//! | `several-crossovers`: the magnitude falls through 0 dB again | note |
-//! | `leakage`: the excitation has power at frequencies other than its lines | doubt above 1 %, else a note |
-//! | `offset-not-whole`: an offset that may have been meant as an integer number of samples | note |
+//! | `unrelated`: the coherences of all lines together do not differ from chance | undetermined |
+//! | `low-coherence`: the coherence of single lines does not differ from chance | warning next to the crossover or at half of the lines or more, otherwise a note |
+//! | `few-runs`: no errors from one run, inaccurate errors from two runs | warning |
+//! | `periods-as-runs`: the errors are computed from the periods of one or two runs | note |
+//! | `no-reference`: the channel of the excitation is not known | note |
+//! | `no-crossover`, `large-error`: there is no crossover between the lines; a standard error is large relative to the value | warning |
+//! | `several-crossovers`: the magnitude falls through 0 dB more than once | note |
+//! | `leakage`: the excitation has power at frequencies other than its lines | warning above 1 %, otherwise a note |
+//! | `offset-not-whole`: the offset is close to an integer number of samples, which may have been meant | note |
 
 use hoid_model::{Finding, Record};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -33,29 +33,30 @@ use crate::IdentError;
 
 /// Significance level of the tests against chance.
 const LEVEL: f64 = 0.05;
-/// Share of the power of the excitation at frequencies other than its lines above which it is not rounding of the file.
+/// Share of the power of the excitation outside its lines above which rounding in the file cannot be the cause.
 const LEAKAGE: f64 = 1e-4;
 const MUCH_LEAKAGE: f64 = 1e-2;
-/// Range of the distance from an integer number of samples in which an offset may have been meant as an integer.
-const NEARLY_WHOLE: (f64, f64) = (1e-6, 0.05);
+/// Range of the distance between an offset and an integer number of samples in which an integer may have been meant.
+const NEAR_INTEGER: (f64, f64) = (1e-6, 0.05);
 
-/// Inputs of the diagnostics.
+/// Input data of the diagnostics.
 pub(super) struct DiagnosticInputs<'a> {
     pub function: &'a DescribingFunction,
     pub excitation: &'a Excitation,
     pub channel: Option<&'a str>,
     pub realisation: Realisation,
-    /// The open loop and its margins, with a controlled element.
+    /// Open loop and its margins, if there is a controlled element.
     pub in_loop: Option<(&'a OpenLoop, &'a DescribingMargins)>,
     pub offset_samples: f64,
 }
 
-/// Squared coherence that one of twenty sets of n unrelated runs exceeds; `None` for one run.
+/// Returns the squared coherence that one in twenty sets of n unrelated runs exceeds; `None` for one run.
 pub fn chance_coherence(n: usize) -> Option<f64> {
     (n > 1).then(|| 1.0 - LEVEL.powf(1.0 / (n as f64 - 1.0)))
 }
 
-/// Probability that n unrelated runs have coherences at least as large as these.
+/// Returns the probability that n unrelated runs have coherences at least as large as these in total; `None` for one
+/// run.
 fn probability_by_chance(coherences: &[f64], n: usize) -> Option<f64> {
     let sum: f64 = coherences
         .iter()
@@ -65,12 +66,12 @@ fn probability_by_chance(coherences: &[f64], n: usize) -> Option<f64> {
         return None;
     }
     let chi_square = ChiSquared::new(2.0 * coherences.len() as f64).ok()?;
-    // All coherences 1: no remnant at all.
+    // The sum is infinite if a coherence is 1, i.e. without any remnant.
     Some(if sum.is_finite() { chi_square.sf(2.0 * sum) } else { 0.0 })
 }
 
 /// Returns all findings about the describing function of these records.
-pub(super) fn doubts(found: &DiagnosticInputs<'_>, records: &[Record]) -> Result<Vec<Finding>, IdentError> {
+pub(super) fn findings(found: &DiagnosticInputs<'_>, records: &[Record]) -> Result<Vec<Finding>, IdentError> {
     let mut findings = Vec::new();
     findings.extend(of_runs(found, records.len()));
     findings.extend(of_coherence(found));
@@ -80,18 +81,18 @@ pub(super) fn doubts(found: &DiagnosticInputs<'_>, records: &[Record]) -> Result
     if found.channel.is_none() {
         findings.push(Finding::note(
             "no-reference",
-            "the channel of the excitation is not known: the ratios of u and e are averaged, which the remnant biases \
-             where it is large compared with e",
+            "the channel of the excitation is not known: the ratios of u to e are averaged, and the remnant biases \
+             this average where it is large compared with e",
         ));
     }
     findings.extend(leakage(found, records)?);
     let offset = found.offset_samples;
     let off = (offset - offset.round()).abs();
-    if NEARLY_WHOLE.0 < off && off < NEARLY_WHOLE.1 {
+    if NEAR_INTEGER.0 < off && off < NEAR_INTEGER.1 {
         findings.push(Finding::note(
             "offset-not-whole",
             format!(
-                "the offset is {offset:.4} samples: if {} is meant, give it in samples",
+                "the offset is {offset:.4} samples: if {} samples are meant, give the offset in samples",
                 offset.round()
             ),
         ));
@@ -109,19 +110,20 @@ fn of_runs(found: &DiagnosticInputs<'_>, records: usize) -> Option<Finding> {
     match n {
         1 => Some(Finding::doubt(
             "few-runs",
-            "one period of one run gives neither errors nor coherence: record more runs, or longer ones",
+            "one period of one run gives neither errors nor coherence: record more runs or longer runs",
         )),
         2 => Some(Finding::doubt(
             "few-runs",
             format!(
-                "the errors come from only two {what} and may be wrong by up to a factor of six at single lines: record more runs"
+                "the errors come from only two {what} and may be wrong by up to a factor of six at individual lines: \
+                 record more runs"
             ),
         )),
         _ if periods => Some(Finding::note(
             "periods-as-runs",
             format!(
-                "the errors are computed from {n} {what}, which differ less than runs do; three runs give errors \
-                 between runs"
+                "the errors are computed from {n} {what}, which differ less than runs do; from three runs on, the \
+                 errors include the differences between runs"
             ),
         )),
         _ => None,
@@ -130,7 +132,7 @@ fn of_runs(found: &DiagnosticInputs<'_>, records: usize) -> Option<Finding> {
 
 fn of_coherence(found: &DiagnosticInputs<'_>) -> Option<Finding> {
     let n = found.function.runs.len();
-    // Without the excitation this is the coherence of u with e, which the loop makes large.
+    // Without the excitation, the coherence is that of u with e, which is large in any closed loop.
     found.channel?;
     let least = chance_coherence(n)?;
     let lines = &found.function.lines;
@@ -148,14 +150,15 @@ fn of_coherence(found: &DiagnosticInputs<'_>) -> Option<Finding> {
     let low: Vec<usize> = (0..lines.len())
         .filter(|k| lines[*k].coherence.is_some_and(|c| c < least))
         .collect();
-    // Two periods exclude chance at a single line only near 1, which `few-runs` has reported.
+    // Two runs show more than chance at a single line only if its coherence is near 1; `few-runs` already reports this
+    // limit.
     if low.is_empty() || n < 3 {
         return None;
     }
     let at: Vec<String> = low.iter().map(|k| format!("{:.2}", lines[*k].omega_rad_s)).collect();
     let words = format!(
-        "at {} rad/s u may be unrelated to the excitation: the coherence is below {least:.2}, which one in twenty sets \
-         of {n} unrelated runs exceeds",
+        "at {} rad/s u may be unrelated to the excitation: the coherence is below {least:.2}, a value that one in \
+         twenty sets of {n} unrelated runs exceeds",
         at.join(", ")
     );
     let crossover = found.in_loop.and_then(|(_, m)| m.crossover_rad_s);
@@ -180,7 +183,8 @@ fn of_loop(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
     let Some(crossover) = margins.crossover_rad_s else {
         let where_ = if sizes.iter().all(|l| *l < 1.0) {
             format!(
-                "the gain of the open loop is below 1 at all lines: the crossover lies below {low:.3} rad/s, if there is one"
+                "the gain of the open loop is below 1 at all lines: the crossover lies below {low:.3} rad/s, if it \
+                 exists"
             )
         } else if sizes.iter().all(|l| *l >= 1.0) {
             format!("the gain of the open loop is above 1 at all lines: the crossover lies above {high:.3} rad/s")
@@ -189,7 +193,7 @@ fn of_loop(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
         };
         return vec![Finding::doubt(
             "no-crossover",
-            format!("{where_}; is the controlled element correct, in the units of the record?"),
+            format!("{where_}; check that the controlled element is correct and in the units of the record"),
         )];
     };
     let mut findings = Vec::new();
@@ -219,8 +223,8 @@ fn of_loop(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
     findings
 }
 
-/// Returns the power of the excitation at frequencies other than its lines: caused by a span that is not a whole number
-/// of periods, a damaged file, or noise in the measured channel.
+/// Returns a finding if the excitation has power at frequencies other than its lines. Causes are a span that is not a
+/// whole number of periods, a damaged file, or noise in the measured channel.
 fn leakage(found: &DiagnosticInputs<'_>, records: &[Record]) -> Result<Option<Finding>, IdentError> {
     let Some(channel) = found.channel else {
         return Ok(None);
@@ -240,8 +244,8 @@ fn leakage(found: &DiagnosticInputs<'_>, records: &[Record]) -> Result<Option<Fi
     }
     Ok(worst.filter(|(off, _)| *off > LEAKAGE).map(|(off, label)| {
         let words = format!(
-            "{channel} of {label} has {:.2} % of its power at non-excited frequencies: the span is not whole periods, lines are missing, or \
-             {channel} is a noisy measurement",
+            "{channel} of {label} has {:.2} % of its power at non-excited frequencies: the span is not a whole number \
+             of periods, lines are missing, or {channel} is a noisy measurement",
             100.0 * off
         );
         match off > MUCH_LEAKAGE {

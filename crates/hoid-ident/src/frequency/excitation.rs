@@ -1,11 +1,10 @@
 //! The lines of a periodic excitation.
 //!
-//! A sum of sinusoids at harmonics `omega_k = n_k 2 pi/T` of one period T has all its power at
-//! these lines, and over a whole number of periods each of them is one bin of the discrete Fourier
-//! transform. Source: D. T. McRuer and H. R. Jex, *A Review of Quasi-Linear Pilot Models*, IEEE
-//! Trans. Human Factors in Electronics 8 (1967) 231-249; H. J. Damveld et al., *Design of Forcing
-//! Functions for the Identification of Human Control Behavior*, J. Guidance, Control, and Dynamics
-//! 33 (2010) 1064-1081.
+//! A sum of sinusoids at harmonics `omega_k = n_k 2 pi/T` of one period T has all its power at these lines. Over a
+//! whole number of periods each line is a single bin of the discrete Fourier transform. Sources: D. T. McRuer and H. R.
+//! Jex, *A Review of Quasi-Linear Pilot Models*, IEEE Trans. Human Factors in Electronics 8 (1967) 231-249; H. J.
+//! Damveld et al., *Design of Forcing Functions for the Identification of Human Control Behavior*, J. Guidance,
+//! Control, and Dynamics 33 (2010) 1064-1081.
 
 use std::f64::consts::TAU;
 
@@ -18,24 +17,24 @@ use super::{
 };
 use crate::IdentError;
 
-/// Deviation of a line from a harmonic that counts as rounding, in harmonics.
+/// Distance of a line from a harmonic that counts as rounding, in units of the fundamental frequency.
 const ROUNDING: f64 = 1e-4;
-/// Least share of the lines of a channel in its power.
+/// Minimum share of the power of a channel at its lines.
 const SHARE_OF_LINES: f64 = 0.99;
 
-/// An excitation: harmonics of a period.
+/// An excitation with lines at harmonics of one period.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Excitation {
     harmonics: Vec<usize>,
     period_s: f64,
 }
 
-/// Criteria for the lines of a channel.
+/// Criteria for finding the lines of a channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineSearch {
-    /// Period T in s; if `None`, the longest of which all found lines are harmonics.
+    /// Period T in s; if `None`, the shortest period of which all found lines are harmonics.
     pub period_s: Option<f64>,
-    /// Smallest amplitude of a line relative to the largest. Default 0.01.
+    /// Minimum amplitude of a line relative to the largest line. Default 0.01.
     pub least_amplitude: f64,
 }
 
@@ -52,8 +51,8 @@ impl Excitation {
     /// Creates an excitation from the harmonics n_k of the period T in s.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] without harmonics, for a harmonic 0 or one that occurs twice, or for a period that is
-    /// not positive.
+    /// [`IdentError::BadOption`] if there are no harmonics, if a harmonic is 0 or occurs twice, or if the period is not
+    /// positive.
     pub fn of_harmonics(harmonics: &[usize], period_s: f64) -> Result<Self, IdentError> {
         if !(period_s.is_finite() && period_s > 0.0) {
             return refuse(
@@ -86,12 +85,12 @@ impl Excitation {
     /// Creates an excitation from the lines omega_k in rad/s, each within 1e-4 of a harmonic of the period T in s.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for an invalid line, and as [`Excitation::of_harmonics`].
+    /// [`IdentError::BadOption`] for an invalid line, and the errors of [`Excitation::of_harmonics`].
     pub fn new(omega_rad_s: &[f64], period_s: f64) -> Result<Self, IdentError> {
         let mut harmonics = Vec::with_capacity(omega_rad_s.len());
         for &omega in omega_rad_s {
             let n = omega * period_s / TAU;
-            // Also refuses a value that is not a number.
+            // This also rejects `NaN`.
             if !((n - n.round()).abs() <= ROUNDING && (0.5..1e9).contains(&n)) {
                 let nearest = n.round().max(1.0) * TAU / period_s;
                 return refuse(
@@ -119,19 +118,19 @@ impl Excitation {
         Self::new(&omega, period_s)
     }
 
-    /// Finds the lines of a channel in a record of whole periods: the bins with at least the amplitude of `search`. The
-    /// leakage of a span that is wrong by about a sample is too small to be detected; with a given period it is
-    /// refused.
+    /// Finds the lines of a channel in a record of whole periods: all bins with at least the relative amplitude in
+    /// `search`. If the span is wrong by about one sample, its leakage is too small to be detected; if the period is
+    /// given, such a span is rejected.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a channel that does not exist, or whose power is not in such lines: noise, or a
-    /// span that is not a whole number of periods; [`IdentError::NoExcitation`] for a constant channel;
-    /// [`IdentError::NotWholePeriods`].
+    /// [`IdentError::BadOption`] if the channel does not exist or its power is not concentrated at lines, as for noise
+    /// or for a span that is not a whole number of periods; [`IdentError::NoExcitation`] for a constant channel;
+    /// [`IdentError::NotWholePeriods`] if the span is not a whole number of the given periods.
     pub fn found_in(record: &Record, channel: &str, search: &LineSearch) -> Result<Self, IdentError> {
-        let values = channel_of(record, channel, "the channel to find lines in")?;
+        let values = channel_of(record, channel, "the channel in which to find lines")?;
         if !(search.least_amplitude > 0.0 && search.least_amplitude <= 1.0) {
             return refuse(
-                "the least amplitude of a line",
+                "the smallest amplitude of a line",
                 search.least_amplitude,
                 "above 0 and at most 1",
             );
@@ -145,7 +144,7 @@ impl Excitation {
         let x = coefficients(values);
         let powers: Vec<f64> = (1..x.len()).map(|k| power(&x, k, n)).collect();
         let (total, largest) = (powers.iter().sum::<f64>(), powers.iter().copied().fold(0.0, f64::max));
-        // Rounding of the transform leaves about 1e-32 of the power in each bin.
+        // Rounding errors of the transform leave about 1e-32 of the power in each bin.
         if total <= 1e-24 * mean_square(values) || largest == 0.0 {
             return Err(IdentError::NoExcitation {
                 channel: channel.to_owned(),
@@ -165,7 +164,7 @@ impl Excitation {
                     bins.len(),
                     100.0 * held
                 ),
-                "single lines with nearly all of it; choose a span of whole periods, or give the lines",
+                "single lines with nearly all of the power; choose a span of whole periods, or give the lines",
             );
         }
         let common = match periods {
@@ -184,17 +183,17 @@ impl Excitation {
         Self::of_harmonics(&harmonics, period_s)
     }
 
-    /// Returns the harmonics n_k, ascending.
+    /// Returns the harmonics n_k in ascending order.
     pub fn harmonics(&self) -> &[usize] {
         &self.harmonics
     }
 
-    /// Returns the period T, s.
+    /// Returns the period T in s.
     pub fn period_s(&self) -> f64 {
         self.period_s
     }
 
-    /// Returns the lines omega_k in rad/s, ascending.
+    /// Returns the lines omega_k in rad/s, in ascending order.
     pub fn omega_rad_s(&self) -> Vec<f64> {
         self.harmonics.iter().map(|n| TAU * *n as f64 / self.period_s).collect()
     }
@@ -204,7 +203,7 @@ pub(crate) fn greatest_common_divisor(a: usize, b: usize) -> usize {
     if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
 
-/// Returns the values of a channel by its name.
+/// Returns the values of the channel with this name.
 pub(super) fn channel_of<'r>(record: &'r Record, channel: &str, what: &str) -> Result<&'r [f64], IdentError> {
     match record.channel(channel) {
         Some(values) => Ok(values),

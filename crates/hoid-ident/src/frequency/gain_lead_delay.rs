@@ -1,13 +1,13 @@
 //! Gain, lead and delay of `M = K (T_L s + 1) e^{-s tau}` from a describing function.
 //!
-//! The criterion is `sum_k w_k |M(j omega_k)/H_k - 1|^2`: errors relative to the describing function, as otherwise its
-//! largest values would dominate. For a given tau the model is linear in K and K T_L, so that the criterion is a
-//! function of tau only (G. H. Golub and V. Pereyra, SIAM J. Numerical Analysis 10 (1973) 413-432); it is scanned over
-//! the range of delays, and its lowest point is refined. Without lead this is the crossover model of McRuer and Jex
-//! (1967) for a single integrator. The delay includes all phase lag for which the model has no other term, also that of
-//! the neuromuscular system.
+//! The criterion is `sum_k w_k |M(j omega_k)/H_k - 1|^2`. Errors are relative to the describing function, since
+//! otherwise its largest values would dominate. For a given tau the model is linear in K and K T_L, so that the
+//! criterion reduces to a function of tau (G. H. Golub and V. Pereyra, SIAM J. Numerical Analysis 10 (1973) 413-432);
+//! it is scanned over the range of delays, and its lowest point is refined. Without a lead, and with a single
+//! integrator as controlled element, this is the crossover model of McRuer and Jex (1967). The delay includes all phase
+//! lag for which the model has no other term, such as the lag of the neuromuscular system.
 //!
-//! Standard errors are those of the jackknife over runs, with fixed weights (`ratio.rs`).
+//! Standard errors come from the jackknife over runs, with fixed weights (`ratio.rs`).
 
 use std::f64::consts::TAU;
 
@@ -22,7 +22,7 @@ pub enum LineWeights {
     /// `w_k` is the squared coherence; 1 for one run.
     #[default]
     Coherence,
-    /// `w_k = |H_k|^2/sigma_k^2`, of least variance when the model is true. Needs several runs.
+    /// `w_k = |H_k|^2/sigma_k^2`, which gives the smallest variance if the model is true. This needs several runs.
     Variance,
     /// Equal weights.
     Uniform,
@@ -35,7 +35,7 @@ pub struct GainLeadDelayOptions {
     pub lead: bool,
     /// Weights of the lines. Default [`LineWeights::Coherence`].
     pub weights: LineWeights,
-    /// Shortest and longest delay tau, s. Default 0 to 1.
+    /// Smallest and largest delay tau, s. Default 0 to 1.
     pub delay_range_s: (f64, f64),
 }
 
@@ -49,16 +49,16 @@ impl Default for GainLeadDelayOptions {
     }
 }
 
-/// Gain, lead and delay.
+/// Fitted gain, lead and delay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GainLeadDelay {
     /// Gain K, unit of u per unit of e.
     pub gain: Estimate,
-    /// Lead time constant T_L, s; 0 without lead.
+    /// Lead time constant T_L, s; 0 if no lead is fitted.
     pub lead_s: Estimate,
     /// Delay tau, s.
     pub delay_s: Estimate,
-    /// Root of the weighted mean square of `|M/H - 1|`.
+    /// Weighted root mean square of `|M/H - 1|`.
     pub misfit: f64,
 }
 
@@ -70,14 +70,14 @@ impl GainLeadDelay {
     }
 }
 
-/// Steps of the scan per turn of the phase of the highest line.
+/// Number of scan steps per turn of the phase of the highest line.
 const STEPS_PER_TURN: f64 = 40.0;
-/// Number of refinements, each of which reduces the bracket by 0.618: from a fortieth of a turn to rounding of the
-/// criterion.
+/// Number of golden section steps, each of which reduces the bracket by the factor 0.618: from a fortieth of a turn
+/// down to the rounding errors of the criterion.
 const REFINEMENTS: usize = 60;
 const MOST_STEPS: f64 = 1e5;
 
-/// K, K T_L and the criterion at a delay.
+/// K, K T_L and the criterion for one delay.
 #[derive(Clone, Copy)]
 struct Solution {
     gain: f64,
@@ -90,8 +90,8 @@ impl DescribingFunction {
     /// Fits gain, lead and delay by weighted least squares.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for an invalid range of delays, for variance weights with one run, or for fewer lines
-    /// than the parameters need.
+    /// [`IdentError::BadOption`] for an invalid range of delays, for variance weights with one run, or if there are too
+    /// few lines for the number of parameters.
     pub fn fit_gain_lead_delay(&self, options: &GainLeadDelayOptions) -> Result<GainLeadDelay, IdentError> {
         let (shortest, longest) = options.delay_range_s;
         let omega: Vec<f64> = self.lines.iter().map(|l| l.omega_rad_s).collect();
@@ -107,7 +107,7 @@ impl DescribingFunction {
                 ),
             );
         }
-        // Each line gives two equations.
+        // Each line gives two real equations.
         let needed = if options.lead { 2 } else { 1 };
         if omega.len() < needed {
             return refuse(
@@ -176,8 +176,9 @@ struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// Returns the best K and K T_L at a delay: normal equations of two unknowns with the columns `c` and `j omega c`,
-    /// where `c = e^{-j omega tau}/H`. As their product is imaginary, they are orthogonal.
+    /// Returns the best K and K T_L for a delay, from the normal equations of two unknowns with the columns `c` and
+    /// `j omega c`, where `c = e^{-j omega tau}/H`. Since the product of the two columns is imaginary, they are
+    /// orthogonal.
     fn at(&self, delay_s: f64) -> Solution {
         let lines = || self.omega.iter().zip(self.response).zip(self.weights);
         let column = |w: f64, h: Complex64| Complex64::from_polar(1.0, -w * delay_s) / h;
@@ -187,7 +188,7 @@ impl Problem<'_> {
             gram += weight * c.norm_sqr();
             gram_lead += weight * w * w * c.norm_sqr();
             right += weight * c.re;
-            // Re(j omega c).
+            // The right-hand side of the lead is Re(j omega c).
             right_lead -= weight * w * c.im;
         }
         let gain = right / gram;

@@ -1,24 +1,23 @@
 //! Describing functions: the response of a human operator at the lines of a periodic excitation, without a model.
 //!
-//! With `E_i, U_i` the Fourier coefficients of e and u at a line in run i, `H_i = U_i/E_i` is the describing function
-//! of that run. The remnant n, `U = H E + N`, is fed back through the loop, so that the mean of the ratios is biased,
-//! and the more the smaller E is. With D_i the coefficient of the forcing function or the disturbance, to which the
-//! remnant is not related,
+//! Let `E_i, U_i` be the Fourier coefficients of e and u at a line in run i. `H_i = U_i/E_i` is the describing function
+//! of that run. The remnant n, `U = H E + N`, is fed back through the loop, so that the mean of the ratios is biased;
+//! the bias increases as E decreases. Let D_i be the coefficient of the forcing function or the disturbance, which is
+//! not related to the remnant. The estimate
 //!
 //! `H = sum_i U_i D_i* / sum_i E_i D_i*`
 //!
-//! has a bias only in the second order of the error of its denominator. [`Averaging`] has both, and `D_i = 1` for runs
-//! that all had the same excitation.
+//! has a bias only in the second order of the error of its denominator. [`Averaging`] offers both methods, and
+//! `D_i = 1` for runs that all had the same excitation.
 //!
-//! - **Standard error**: with `N_i = U_i - H E_i`,
-//!   `sigma^2 = n/(n-1) sum |N_i D_i*|^2 / |sum E_i D_i*|^2` is the expectation of `|dH|^2`. The
-//!   coefficients of a stationary remnant are circular, real and imaginary part with half of it
-//!   each, so that `20 log10 |H|` has the standard error `(20/ln 10) sigma/(sqrt(2) |H|)` and the
-//!   phase `sigma/(sqrt(2) |H|)` rad. This holds if the remnant in e is small compared with e;
-//!   [`Line::confidence_circle`] also holds if it is not.
-//! - **Coherence** between excitation and u over runs:
-//!   `|sum U_i D_i*|^2 / (sum |U_i|^2 sum |D_i|^2)`. Of n unrelated runs it is 1/n in the mean.
-//! - **Remnant**: the part of u at non-excited frequencies, which is the remnant after the loop, `N/(1 + L)`.
+//! - **Standard error**: with `N_i = U_i - H E_i`, `sigma^2 = n/(n-1) sum |N_i D_i*|^2 / |sum E_i D_i*|^2` estimates
+//!   the expectation of `|dH|^2`. The coefficients of a stationary remnant are circular: real and imaginary part each
+//!   have half of the variance. Therefore `20 log10 |H|` has the standard error `(20/ln 10) sigma/(sqrt(2) |H|)`, and
+//!   the phase has the standard error `sigma/(sqrt(2) |H|)` rad. This is valid if the remnant in e is small compared
+//!   with e; [`Line::confidence_circle`] is valid for any remnant.
+//! - **Coherence** between excitation and u over runs: `|sum U_i D_i*|^2 / (sum |U_i|^2 sum |D_i|^2)`. Its expectation
+//!   for n unrelated runs is 1/n.
+//! - **Remnant**: the part of u at non-excited frequencies, i.e. the remnant after the closed loop, `N/(1 + L)`.
 //!
 //! Sources: D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics 8 (1967) 231-249;
 //! M. M. van Paassen and M. Mulder, *Identification of Human Operator Control Behaviour in
@@ -28,14 +27,14 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`Excitation`] | the lines: given, of a forcing function, or found in a channel |
+//! | [`Excitation`] | lines that are given, belong to a forcing function, or are found in a channel |
 //! | `window`, `spectrum` | whole periods, offsets between channels, Fourier coefficients |
 //! | [`DescribingOptions`] | averaging, span, offset, controlled element |
 //! | `describe` | [`describe()`]: lines of all runs, averages, standard errors |
 //! | `remnant` | power at non-excited frequencies: spectrum, share, noise ratio |
-//! | `open_loop` | crossover frequency and phase margin by interpolation, with their spread |
-//! | `description` | [`describe_runs()`]: everything with all choices made from the records, and the verdict |
-//! | `diagnostics` | reasons to doubt a describing function |
+//! | `open_loop` | crossover frequency, phase margin and gain margin by interpolation, with their spread |
+//! | `description` | [`describe_runs()`]: complete analysis with all choices made from the records, and the verdict |
+//! | `diagnostics` | warnings and notes about a describing function |
 //! | `unwrapping` | [`unwrapped_deg()`]: phase without jumps |
 //! | `gain_lead_delay` | gain, lead and delay by weighted least squares |
 

@@ -1,14 +1,15 @@
-//! Crossover frequency and phase margin of `L = H H_CE` between the lines.
+//! Crossover frequency and margins of `L = H H_CE` by interpolation between the lines.
 //!
 //! Magnitude in dB and phase are interpolated linearly over log omega between neighbouring lines. The crossover is the
-//! frequency at which the magnitude passes 0 dB; the phase margin is 180 deg plus the phase there. If there are
-//! several, the lowest one with a falling magnitude is returned: the describing function of one run scatters above the
-//! crossover, where coherence is low, and may pass 0 dB there again. The phase is unwrapped from one line to the next
-//! by the smaller change. A delay makes the phase curved over log omega, so that between lines half an octave apart the
-//! linear interpolation is about a degree too low; removing the delay before the interpolation and adding it afterwards
-//! avoids this error. The gain margin is the negative magnitude where the phase falls through -180 deg, in the same
-//! way; of several the one nearest to 0 dB. Standard errors are those of the jackknife over runs (`ratio.rs`); the
-//! spread is that of single runs.
+//! frequency at which the magnitude passes 0 dB; the phase margin is 180 deg plus the phase at this frequency. If there
+//! are several crossovers, the lowest one with a falling magnitude is returned: the describing function of one run
+//! scatters above the crossover, where coherence is low, and may pass 0 dB there again. The phase is unwrapped from one
+//! line to the next by the smaller change. A delay makes the phase curved over log omega: between lines half an octave
+//! apart, linear interpolation gives a phase that is about a degree too low. Removing the delay before the
+//! interpolation and adding it afterwards avoids this error. The gain margin is the negative magnitude at the frequency
+//! at which the phase falls through -180 deg, found in the same way; if there are several such frequencies, the gain
+//! margin nearest to 0 dB is returned. Standard errors come from the jackknife over runs (`ratio.rs`); the spread is
+//! the standard deviation of single runs.
 
 use hoid_model::{Complex64, ContinuousTransferFunction, uncertainty::Estimate};
 
@@ -19,16 +20,16 @@ use super::{
 };
 use crate::IdentError;
 
-/// An open loop at the lines.
+/// Frequency response of an open loop at the lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpenLoop {
-    /// The lines, rad/s.
+    /// Frequencies of the lines, rad/s.
     pub omega_rad_s: Vec<f64>,
-    /// L of the average describing function.
+    /// L computed from the average describing function.
     pub response: Vec<Complex64>,
-    /// L of each run: `per_run[i][k]` of run i at line k.
+    /// L of each run: `per_run[i][k]` is the value of run i at line k.
     pub per_run: Vec<Vec<Complex64>>,
-    /// L of all runs except one.
+    /// L averaged over all runs except run i, for each i.
     without: Vec<Vec<Complex64>>,
 }
 
@@ -41,7 +42,8 @@ pub struct Crossover {
     pub phase_margin_deg: f64,
 }
 
-/// Crossover and phase margin with their standard errors; `None` if there is no crossover between the lines.
+/// Crossover and margins with their standard errors; a quantity is `None` if there is no such crossing between the
+/// lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DescribingMargins {
     /// Crossover frequency omega_c, rad/s.
@@ -52,11 +54,11 @@ pub struct DescribingMargins {
     pub phase_crossover_rad_s: Option<Estimate>,
     /// Gain margin at this frequency, dB.
     pub gain_margin_db: Option<Estimate>,
-    /// The crossover of each run.
+    /// Crossover of each run; `None` for a run without a crossover.
     pub per_run: Vec<Option<Crossover>>,
     /// Standard deviation of the crossover over the runs that have one, rad/s.
     pub crossover_spread_rad_s: Option<f64>,
-    /// Standard deviation of the phase margin over these runs, deg.
+    /// Standard deviation of the phase margin over the runs that have a crossover, deg.
     pub phase_margin_spread_deg: Option<f64>,
 }
 
@@ -66,14 +68,14 @@ impl DescribingFunction {
         self.open_loop_with(|omega| element.response(omega))
     }
 
-    /// Returns the open loop with any frequency response over rad/s, such as that of the controlled element after its
-    /// hold.
+    /// Returns the open loop with any frequency response as a function of rad/s, such as the response of the controlled
+    /// element with its hold.
     pub fn open_loop_with(&self, element: impl Fn(f64) -> Complex64) -> OpenLoop {
         let known: Vec<Complex64> = self.lines.iter().map(|l| element(l.omega_rad_s)).collect();
         self.loop_of(|k, _| known[k], |k, _| known[k])
     }
 
-    /// Returns the open loop with the controlled element that is estimated from the records.
+    /// Returns the open loop with the controlled element estimated from the records.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] if [`super::DescribingOptions::element`] did not name its channels.
@@ -118,13 +120,13 @@ impl DescribingFunction {
 }
 
 impl OpenLoop {
-    /// Returns crossover frequency and phase margin.
+    /// Returns crossover frequency, phase margin and gain margin.
     pub fn margins(&self) -> DescribingMargins {
         self.margins_with_delay(0.0)
     }
 
-    /// Returns the same with the phase of a delay in s, such as that of [`DescribingFunction::fit_gain_lead_delay`],
-    /// removed during the interpolation.
+    /// Returns the margins, with the phase of a delay in s removed during the interpolation.
+    /// [`DescribingFunction::fit_gain_lead_delay`] gives such a delay.
     pub fn margins_with_delay(&self, delay_s: f64) -> DescribingMargins {
         let of = |response: &Vec<Complex64>| Crossover::of(&self.omega_rad_s, response, delay_s);
         let without: Vec<Option<Crossover>> = self.without.iter().map(of).collect();
@@ -156,9 +158,8 @@ impl OpenLoop {
 }
 
 impl Crossover {
-    /// Returns the lowest crossover with a falling magnitude of an open loop, between ascending frequencies in rad/s at
-    /// which its response is known; `None` if there is none. The phase of the delay in s is removed during the
-    /// interpolation.
+    /// Returns the lowest crossover of an open loop at which its magnitude falls; `None` if there is none. The response
+    /// is given at ascending frequencies in rad/s. The phase of the delay in s is removed during the interpolation.
     pub fn of(omega_rad_s: &[f64], response: &[Complex64], delay_s: f64) -> Option<Self> {
         let mut pairs = omega_rad_s.windows(2).zip(response.windows(2));
         pairs.find_map(|(w, l)| {
@@ -188,12 +189,12 @@ struct PhaseCrossover {
 }
 
 impl PhaseCrossover {
-    /// Returns the fall through -180 deg at which the magnitude is nearest to 1.
+    /// Returns the crossing at which the phase falls through -180 deg and the magnitude is nearest to 1.
     fn of(omega_rad_s: &[f64], response: &[Complex64], delay_s: f64) -> Option<Self> {
         let of_pair = |(w, l): (&[f64], &[Complex64])| {
             let by_delay = |omega: f64| Complex64::from_polar(1.0, -delay_s * omega);
             let rest = (l[1] / l[0] / by_delay(w[1] - w[0])).arg();
-            // Phase above -180 deg at a part of the way over log omega.
+            // Returns the phase plus 180 deg at a fraction of the interval in log omega.
             let ratio = (w[1] / w[0]).ln();
             let above = |part: f64| {
                 let turned = part * rest - delay_s * w[0] * ((part * ratio).exp() - 1.0);

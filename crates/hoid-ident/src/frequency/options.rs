@@ -1,41 +1,41 @@
-//! Options of a describing function: averaging, spans, offsets, and the channels of the controlled element.
+//! Options of a describing function: averaging, span, offset, and the channels of the controlled element.
 
 use hoid_model::Detrend;
 
 /// Method of averaging over runs.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Averaging {
-    /// The mean of the ratios `U_i/E_i`. Coherence is that between e and u.
+    /// Mean of the ratios `U_i/E_i`. The coherence is computed between e and u.
     #[default]
     Ratios,
-    /// `sum U_i D_i* / sum E_i D_i*` with D_i of this channel, the forcing function or the
-    /// disturbance. Phases may differ between runs. Coherence is that between this channel and u.
+    /// `sum U_i D_i* / sum E_i D_i*`, where D_i is the coefficient of this channel: a forcing function or a
+    /// disturbance. Phases may differ between runs. The coherence is computed between this channel and u.
     Reference {
-        /// Name of the channel.
+        /// Name of the channel of the forcing function or disturbance.
         channel: String,
     },
-    /// The same with D_i = 1: every run (and period) starts at the same phase of the same excitation.
+    /// `sum U_i / sum E_i`: every run (or period) starts at the same phase of the same excitation.
     SameExcitation,
 }
 
 /// Definition of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Realisation {
-    /// Each record is one realisation, however many periods it has.
+    /// Each record is one run, regardless of its number of periods.
     #[default]
     Record,
-    /// Each period of each record is one, so that one record has a spread. The remnants of neighbouring periods are
-    /// assumed independent.
+    /// Each period of each record is one run, so that a single record has a spread. The remnants of neighbouring
+    /// periods are assumed to be independent.
     Period,
 }
 
-/// Channels from which the controlled element is estimated as `Y/(U + D)` at the lines.
+/// Channels for estimating the controlled element as `Y/(U + D)` at the lines.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MeasuredElement {
-    /// Name of the channel of its output y.
+    /// Name of the channel with the output y of the controlled element.
     pub output: String,
-    /// Name of the channel of a disturbance that is added to u, row by row and with the offset of u, if there is one:
-    /// without the disturbance, `Y/U` would be minus the inverse of H.
+    /// Name of the channel of a disturbance that is added to u sample by sample, with the offset of u. `None` if there
+    /// is no disturbance. If a disturbance is left out, `Y/U` is the negative inverse of H.
     pub disturbance: Option<String>,
 }
 
@@ -48,16 +48,17 @@ pub struct DescribingOptions {
     pub realisation: Realisation,
     /// Start of the span, s; `None` for the start of the record.
     pub from_s: Option<f64>,
-    /// End of the span, s, which is excluded.
+    /// End of the span, s (exclusive); `None` for the end of the record.
     pub to_s: Option<f64>,
-    /// `e[k]` belongs to `u[k + offset_samples]`, an integer or not. Default 0.
+    /// Offset between the channels: `e[k]` belongs to `u[k + offset_samples]`. The offset need not be an integer.
+    /// Default 0.
     pub offset_samples: f64,
-    /// Trend removed from e and u of each run beforehand. A mean has no effect on the lines, but on the rms; a straight
+    /// Trend removed from e and u of each run before the analysis. A mean affects the rms but not the lines; a straight
     /// line has power at all lines. Default none.
     pub detrend: Detrend,
-    /// Number of bins of the shortest run that are averaged into one value of the remnant spectrum. Default 8.
+    /// Number of bins of the shortest run that are averaged for one value of the remnant spectrum. Default 8.
     pub smoothing_bins: usize,
-    /// Channels from which the controlled element is estimated, if any.
+    /// Channels for estimating the controlled element, if it is estimated.
     pub element: Option<MeasuredElement>,
 }
 

@@ -1,19 +1,18 @@
-//! A ratio of sums over runs, `H = sum a_i / sum b_i`, and its error.
+//! A ratio of sums over runs, `H = sum a_i / sum b_i`, and its standard error.
 //!
-//! `dH = sum (a_i - H b_i) / sum b_i` to the first order, with independent terms: `sigma^2 =
-//! n/(n-1) sum |a_i - H b_i|^2 /
-//! |sum b_i|^2`. Without linearisation: the mean of `a_i - H b_i` is zero at the true H alone, and n times its square over their
-//! sample variance there has the F distribution with 2 and 2(n - 1) degrees of freedom for circular
-//! normal errors. The values of H that a level of F does not exclude are a disc, as long as the
-//! denominator differs from zero at this level (E. C. Fieller, J. Royal Statistical Society B 16
-//! (1954) 175-185, for complex ratios). A quantity computed from several ratios has its standard error from the
-//! jackknife over runs, `sigma^2 = (n-1)/n sum (y_(i) - mean)^2`, y_(i) without run i (B. Efron, *The Jackknife, the
-//! Bootstrap and Other Resampling Plans*, 1982, chapter 3).
+//! To first order `dH = sum (a_i - H b_i) / sum b_i` with independent terms, so that the variance is
+//! `sigma^2 = n/(n-1) sum |a_i - H b_i|^2 / |sum b_i|^2`. A region without linearisation follows from the mean of
+//! `a_i - H b_i`, which has the expectation zero only at the true H: n times its square over the sample variance has
+//! the F distribution with 2 and 2(n - 1) degrees of freedom for circular normal errors. The values of H that F does
+//! not exclude at a given level form a disc if the denominator differs from zero at this level (E. C. Fieller, J. Royal
+//! Statistical Society B 16 (1954) 175-185, for complex ratios). The standard error of a quantity computed from several
+//! ratios comes from the jackknife over runs, `sigma^2 = (n-1)/n sum (y_(i) - mean)^2`, where y_(i) is the value
+//! without run i (B. Efron, *The Jackknife, the Bootstrap and Other Resampling Plans*, 1982, chapter 3).
 
 use hoid_model::{Complex64, uncertainty::Estimate};
 use hoid_numerics::statistics::{self, sample_variance, squared_deviations};
 
-/// Terms of numerator and denominator, one pair for each run.
+/// Terms of the numerator and the denominator, one pair for each run.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Ratio(pub Vec<(Complex64, Complex64)>);
 
@@ -30,7 +29,7 @@ impl Ratio {
         a / b
     }
 
-    /// Returns `a_i/b_i`.
+    /// Returns the ratio `a_i/b_i` of each run.
     pub fn per_run(&self) -> Vec<Complex64> {
         self.0.iter().map(|(a, b)| a / b).collect()
     }
@@ -45,11 +44,11 @@ impl Ratio {
     }
 
     /// Returns centre and radius of the disc that contains the true ratio with this probability; `None` for one run, or
-    /// if it is unbounded.
+    /// if the region is unbounded.
     pub fn confidence_disc(&self, probability: f64) -> Option<(Complex64, f64)> {
         let n = self.0.len() as f64;
         let (a, b) = self.sums(None);
-        // The level of F(2, 2(n - 1)) in closed form.
+        // Quantile of F(2, 2(n - 1)) in closed form.
         let level = (n - 1.0) * ((1.0 - probability).powf(-1.0 / (n - 1.0)) - 1.0);
         let scale = n * level / (n - 1.0);
         let (mut aa, mut bb, mut ab) = (0.0, 0.0, Complex64::new(0.0, 0.0));
@@ -59,7 +58,7 @@ impl Ratio {
             bb += b_i.norm_sqr();
             ab += a_i * b_i.conj();
         }
-        // |A - H B|^2 <= scale sum |a_i - H b_i - mean|^2 as p |H|^2 - 2 Re(H* q) + r <= 0.
+        // The condition |A - H B|^2 <= scale sum |a_i - H b_i - mean|^2 is p |H|^2 - 2 Re(H* q) + r <= 0.
         let p = b.norm_sqr() - scale * bb;
         let q = a * b.conj() - scale * ab;
         let r = a.norm_sqr() - scale * aa;
@@ -68,8 +67,8 @@ impl Ratio {
     }
 }
 
-/// Returns a value with the standard error of the jackknife; without it if one of the values without a run does not
-/// exist, or there is only one run.
+/// Returns a value with its standard error from the jackknife. There is no standard error if there is only one run, or
+/// if one of the values without a run does not exist.
 pub(super) fn jackknife(value: f64, without: &[Option<f64>]) -> Estimate {
     let known: Vec<f64> = without.iter().copied().flatten().collect();
     let n = without.len();
@@ -79,7 +78,7 @@ pub(super) fn jackknife(value: f64, without: &[Option<f64>]) -> Estimate {
     Estimate::with_variance(value, squared_deviations(&known) * (n as f64 - 1.0) / n as f64)
 }
 
-/// Returns the mean with its standard error from the spread; without it for one value.
+/// Returns the mean with its standard error computed from the spread; there is no standard error for a single value.
 pub(super) fn mean(values: &[f64]) -> Estimate {
     let value = statistics::mean(values);
     match deviation(values) {
@@ -88,7 +87,7 @@ pub(super) fn mean(values: &[f64]) -> Estimate {
     }
 }
 
-/// Returns the standard deviation with n - 1; `None` for fewer than two values.
+/// Returns the standard deviation with the divisor n - 1; `None` for fewer than two values.
 pub(super) fn deviation(values: &[f64]) -> Option<f64> {
     (values.len() > 1).then(|| sample_variance(values).sqrt())
 }

@@ -1,14 +1,14 @@
 //! The remnant in u: its power at non-excited frequencies.
 //!
 //! Over whole periods the response to the excitation has no power between its lines, so that all power there is
-//! remnant. Bin k of a window of N samples gives the one-sided density
-//! `|U_k|^2/2 / (2 pi/(N Ts))` per rad/s, with a relative standard error of 1 (chi-square with two
-//! degrees of freedom); the mean over n runs and neighbouring bins, m values, has one of
-//! `1/sqrt(m)` (J. S. Bendat and A. G. Piersol, *Random Data*, 2010, section 8.5.4).
+//! remnant. Bin k of a window of N samples gives the one-sided density `|U_k|^2/2 / (2 pi/(N Ts))` per rad/s, with a
+//! relative standard error of 1 (chi-square with two degrees of freedom). The mean of m values, from n runs and
+//! neighbouring bins, has a relative standard error of `1/sqrt(m)` (J. S. Bendat and A. G. Piersol, *Random Data*,
+//! 2010, section 8.5.4).
 //!
-//! The lines contain remnant too. With the density of the neighbourhood at the lines,
-//! `noise ratio = power of the remnant / var(u)` estimates P_n of eq. 43, while the share at non-excited frequencies
-//! leaves the lines out.
+//! The lines also contain remnant. The remnant at the lines is estimated from the density at neighbouring frequencies:
+//! `noise ratio = power of the remnant / var(u)` estimates P_n of eq. 43, whereas the share at non-excited frequencies
+//! does not include the remnant at the lines.
 
 use std::f64::consts::TAU;
 
@@ -19,12 +19,12 @@ use super::{spectrum::power, window::Window};
 /// Mean density of the remnant in u over a band of frequencies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RemnantBand {
-    /// Mean frequency of its bins, rad/s.
+    /// Mean frequency of the averaged bins, rad/s.
     pub omega_rad_s: f64,
-    /// One-sided power density of u at non-excited frequencies, square of the unit of u per rad/s:
-    /// its integral is a variance.
+    /// One-sided power density of u at non-excited frequencies, square of the unit of u per rad/s. The integral of the
+    /// density is a variance.
     pub density: f64,
-    /// Number of averaged values: bins of all runs.
+    /// Number of averaged values: non-excited bins of all runs.
     pub values: usize,
 }
 
@@ -35,7 +35,7 @@ impl RemnantBand {
     }
 }
 
-/// u of one run.
+/// Fourier coefficients of u in one run.
 pub(super) struct Control<'a> {
     pub coefficients: &'a [Complex64],
     pub window: Window,
@@ -54,7 +54,7 @@ impl Control<'_> {
         power(self.coefficients, k, self.window.samples)
     }
 
-    /// Returns the variance, and the power at non-excited frequencies.
+    /// Returns the variance of u, and the part of it at non-excited frequencies.
     fn powers(&self, harmonics: &[usize]) -> (f64, f64) {
         let bins = 1..self.coefficients.len();
         let all: f64 = bins.clone().map(|k| self.power(k)).sum();
@@ -66,17 +66,18 @@ impl Control<'_> {
     }
 }
 
-/// Returns bands of `neighbours` bins of the shortest window, each the mean over the non-excited bins of all runs.
+/// Returns the mean density in bands with the width of `neighbours` bins of the shortest window, over the non-excited
+/// bins of all runs.
 pub(super) fn spectrum(runs: &[Control<'_>], harmonics: &[usize], ts_s: f64, neighbours: usize) -> Vec<RemnantBand> {
     let widest = runs.iter().map(|r| r.width_rad_s(ts_s)).fold(0.0, f64::max);
     let band_rad_s = widest * neighbours.max(1) as f64;
-    // Sums of frequency and density, and their number.
+    // Sum of frequencies, sum of densities, and number of bins.
     let mut bands: Vec<(f64, f64, usize)> = Vec::new();
     for run in runs {
         let width = run.width_rad_s(ts_s);
         for k in (1..run.coefficients.len()).filter(|k| !run.is_line(*k, harmonics)) {
             let omega = k as f64 * width;
-            // Half a bin up: a frequency at an edge belongs to the band below, whatever its rounding.
+            // The shift by half a bin assigns a frequency at an edge to the band below, regardless of rounding.
             let band = ((omega - 0.5 * width) / band_rad_s).max(0.0) as usize;
             if bands.len() <= band {
                 bands.resize(band + 1, (0.0, 0.0, 0));
@@ -93,7 +94,7 @@ pub(super) fn spectrum(runs: &[Control<'_>], harmonics: &[usize], ts_s: f64, nei
     bands.iter().filter(|b| b.2 > 0).map(mean).collect()
 }
 
-/// Returns the share of the power of u at non-excited frequencies, and the noise ratio of one run.
+/// Returns the share of the power of u at non-excited frequencies and the noise ratio of one run.
 pub(super) fn share_and_ratio(
     run: &Control<'_>,
     harmonics: &[usize],
@@ -110,7 +111,8 @@ pub(super) fn share_and_ratio(
     (off / all, (off + at_lines) / all)
 }
 
-/// Density between the centres of two bands by linear interpolation; outside, that of the first or the last band.
+/// Interpolates the density linearly between the centres of two bands; outside the bands, returns the density of the
+/// first or the last band.
 fn density_at(spectrum: &[RemnantBand], omega: f64) -> f64 {
     let above = spectrum.partition_point(|b| b.omega_rad_s <= omega);
     match (above.checked_sub(1).map(|i| &spectrum[i]), spectrum.get(above)) {

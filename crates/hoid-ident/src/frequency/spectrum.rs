@@ -1,10 +1,9 @@
 //! Fourier coefficients of a record over whole periods.
 //!
-//! For N samples, `X_k = (2/N) sum_i x_i e^{-j 2 pi k i/N}`, k = 0 .. N/2: a sinusoid
-//! `A sin(omega_k t + phi)` with `omega_k = 2 pi k/(N Ts)` has `|X_k| = A`, and no part of it in
-//! any other bin. With the bins 0 and N/2 counted once, `var(x) = sum_{k = 1}^{N/2} |X_k|^2/2`
-//! (Parseval; J. S. Bendat and A. G. Piersol, *Random Data*, 2010, section 11.2; R. Pintelon and J.
-//! Schoukens, *System Identification: A Frequency Domain Approach*, 2012, section 2.2).
+//! For N samples, `X_k = (2/N) sum_i x_i e^{-j 2 pi k i/N}`, k = 0 .. N/2. A sinusoid `A sin(omega_k t + phi)` with
+//! `omega_k = 2 pi k/(N Ts)` has `|X_k| = A` and no contribution to any other bin. With the bins 0 and N/2 counted
+//! once, `var(x) = sum_{k = 1}^{N/2} |X_k|^2/2` (Parseval; J. S. Bendat and A. G. Piersol, *Random Data*, 2010, section
+//! 11.2; R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach*, 2012, section 2.2).
 
 use hoid_model::Complex64;
 use realfft::RealFftPlanner;
@@ -18,7 +17,7 @@ pub(crate) fn coefficients(values: &[f64]) -> Vec<Complex64> {
     let transform = RealFftPlanner::<f64>::new().plan_fft_forward(n);
     let mut input = values.to_vec();
     let mut output = vec![Complex64::new(0.0, 0.0); n / 2 + 1];
-    // Both lengths are those of the plan, so that there is no error to report.
+    // Both buffers have the lengths that the transform expects, so that there is no error.
     let _ = transform.process(&mut input, &mut output);
     let scale = 2.0 / n as f64;
     for x in &mut output {
@@ -27,7 +26,7 @@ pub(crate) fn coefficients(values: &[f64]) -> Vec<Complex64> {
     output
 }
 
-/// Contribution of bin k to the variance of N samples.
+/// Returns the contribution of bin k to the variance of N samples.
 pub(super) fn power(coefficients: &[Complex64], k: usize, samples: usize) -> f64 {
     let once = k == 0 || 2 * k == samples;
     coefficients[k].norm_sqr() / if once { 4.0 } else { 2.0 }

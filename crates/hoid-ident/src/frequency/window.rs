@@ -1,8 +1,8 @@
-//! Spans of whole periods, and the Fourier coefficients of two channels that are recorded with an offset.
+//! Spans of whole periods, and the Fourier coefficients of two channels with an offset between their recordings.
 //!
-//! If `e[k]` corresponds to `u[k + s]`, with s of any size, `U(omega) e^{j omega s Ts}` is the coefficient of u at the
-//! time of e: exact for periodic components. The whole samples of s are taken from the record as far as possible, which
-//! is exact for the remainder as well.
+//! If `e[k]` corresponds to `u[k + s]`, where s need not be an integer, `U(omega) e^{j omega s Ts}` is the coefficient
+//! of u at the time of e; this is exact for periodic components. The integer part of s is realised by a shift of the
+//! samples if the record is long enough, which is exact for the other components as well.
 
 use std::f64::consts::TAU;
 
@@ -11,21 +11,22 @@ use hoid_model::{Complex64, Record};
 use super::spectrum::coefficients;
 use crate::IdentError;
 
-/// A span of a record.
+/// A span of a record that contains whole periods.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Window {
     pub first: usize,
     pub samples: usize,
-    /// Number of periods of the excitation: the bin of its first harmonic.
+    /// Number of periods of the excitation, which is also the bin of its first harmonic.
     pub periods: usize,
 }
 
-/// Returns the number of periods in `samples` samples of a record, if it is an integer within half a sample.
+/// Returns the number of periods in `samples` samples of a record; the span may differ from whole periods by half a
+/// sample.
 pub(super) fn whole_periods(record: &Record, samples: usize, period_s: f64) -> Result<usize, IdentError> {
     let ts = record.sample_time().s();
     let of_period = period_s / ts;
     let nearest = (samples as f64 / of_period).round();
-    // If a period is not an integer number of samples, the best accuracy is half a sample.
+    // If a period is not an integer number of samples, a span can only match whole periods within half a sample.
     if nearest >= 1.0 && (samples as f64 - nearest * of_period).abs() <= 0.5 + 1e-6 {
         return Ok(nearest as usize);
     }
@@ -33,12 +34,12 @@ pub(super) fn whole_periods(record: &Record, samples: usize, period_s: f64) -> R
     let remedy = if fitting >= 1.0 {
         let end_s = record.time_s(0) + fitting * period_s;
         format!(
-            "the nearest whole span in it is {} s, {fitting} periods (from {} s to {end_s} s)",
+            "the longest span of whole periods in it is {} s, {fitting} periods (from {} s to {end_s} s)",
             fitting * period_s,
             record.time_s(0),
         )
     } else {
-        format!("it needs at least {period_s} s")
+        format!("a record needs at least {period_s} s")
     };
     Err(IdentError::NotWholePeriods {
         label: record.label().to_owned(),
@@ -50,7 +51,7 @@ pub(super) fn whole_periods(record: &Record, samples: usize, period_s: f64) -> R
 }
 
 impl Window {
-    /// Returns the window of the samples of a record with `from_s <= t < to_s`, which must be whole periods.
+    /// Returns the window of the samples with `from_s <= t < to_s`; these must be whole periods.
     pub fn of_span(record: &Record, from_s: Option<f64>, to_s: Option<f64>, period_s: f64) -> Result<Self, IdentError> {
         let ts = record.sample_time().s();
         let start_s = record.time_s(0);
@@ -63,7 +64,7 @@ impl Window {
         })
     }
 
-    /// Splits the window into its periods.
+    /// Splits the window into single periods.
     pub fn single_periods(self) -> Vec<Self> {
         let edge = |i: usize| (i * self.samples + self.periods / 2) / self.periods;
         let one = |i: usize| Self {
@@ -74,8 +75,8 @@ impl Window {
         (0..self.periods).map(one).collect()
     }
 
-    /// Returns the samples in the window of a channel that is `offset` samples late, and the remaining part of the
-    /// offset.
+    /// Returns the samples in the window of a channel that is `offset` samples late, and the part of the offset that
+    /// remains after the shift.
     pub fn samples_of(self, values: &[f64], offset: f64) -> (&[f64], f64) {
         let whole = offset.floor();
         let begin = self.first as f64 + whole;
@@ -86,14 +87,14 @@ impl Window {
         (&values[self.first..self.first + self.samples], offset)
     }
 
-    /// Returns the coefficients of a channel that is `offset` samples late.
+    /// Returns the Fourier coefficients of a channel that is `offset` samples late.
     pub fn coefficients(self, values: &[f64], offset: f64) -> Vec<Complex64> {
         let (samples, rest) = self.samples_of(values, offset);
         advanced(samples, rest)
     }
 }
 
-/// Returns the coefficients of samples that are `offset` samples late.
+/// Returns the Fourier coefficients of samples that are `offset` samples late.
 pub(super) fn advanced(samples: &[f64], offset: f64) -> Vec<Complex64> {
     let mut x = coefficients(samples);
     if offset != 0.0 {

@@ -1,4 +1,4 @@
-//! The grey-box estimator: the fit of each order of the remnant.
+//! The grey-box estimator: a fit for each order of the remnant.
 
 use hoid_model::{PolynomialModel, Record, SampleTime, Structure, remnant::HIGHEST_ORDER};
 
@@ -20,17 +20,16 @@ use crate::{
     progress,
 };
 
-/// Relative decrease of the loss, and number of steps, at which the search of an order ends during the comparison of
-/// orders.
+/// Limits of a search while orders are compared: relative decrease of the loss, and number of steps.
 const QUICK_TOLERANCE: f64 = 1e-7;
 const QUICK_ITERATIONS: usize = 30;
 
 impl GreyBox {
-    /// Fits one model to all records, with initial states of each record.
+    /// Fits one model to all records; each record has its own initial states.
     ///
     /// # Errors
-    /// [`IdentError`]; how a search ended is part of the fit. With several orders an error means that none could be
-    /// fitted.
+    /// [`IdentError`] if no model can be fitted. The fit itself reports how its search ended. With several orders an
+    /// error means that none of them could be fitted.
     pub fn fit(&self, records: &[Record]) -> Result<GreyBoxFit, IdentError> {
         let sample_time = informative_data::common_sample_time(records)?;
         self.check_orders()?;
@@ -67,7 +66,7 @@ impl GreyBox {
             let candidates = vec![candidate(criterion, Ok(&fit))];
             return Ok(GreyBoxFit { candidates, ..fit });
         }
-        // To compare orders the loss need not be known to the last digit; a wrong order converges slowly.
+        // The comparison of orders does not need an exact loss, and the search for a wrong order converges slowly.
         let quick = SearchOptions {
             tolerance: self.search.tolerance.max(QUICK_TOLERANCE),
             max_iterations: self.search.max_iterations.min(QUICK_ITERATIONS),
@@ -155,11 +154,11 @@ impl GreyBox {
         workspace: &mut Workspace,
     ) -> Result<GreyBoxFit, IdentError> {
         let mut etas: Vec<(String, Vec<f64>)> = Vec::new();
-        // The minimum of another order is near, whatever the layout of the records; m = 0 has no T_n to continue with.
+        // The minimum of the previous order is a good start, except for the order 0, which has no T_n.
         if let Some(before) = before.filter(|b| b.len() == criterion.layout.names.len()) {
             etas.push((format!("order {}", criterion.layout.order - 1), before.to_vec()));
         }
-        // One T_n for all starts of an order: it hardly depends on the operator.
+        // All starts of an order use the same T_n, because it hardly depends on the operator.
         let mut time_constants = starts::GRID_TIME_CONSTANT_S.to_vec();
         for start in starts {
             let eta = starts::complete(criterion, start, &time_constants, workspace);
@@ -230,7 +229,7 @@ impl GreyBox {
                 initial_state: self.initial_state,
                 termination: minimum.termination,
                 start: start.clone(),
-                held,
+                is_fixed_or_bounded: held,
                 output_variance: output_variance(&criterion.data, criterion.first),
                 robust: false,
                 instrumented: false,

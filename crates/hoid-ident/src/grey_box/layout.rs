@@ -1,9 +1,9 @@
-//! Places of the physical parameters of each record in eta, and their polynomials.
+//! Positions of the physical parameters of each record in eta, and the resulting polynomials.
 //!
-//! Slots of one record: `[K_e, K_e_dot (or T_L), omega_nm, zeta_nm, tau_e, T_n]`, the last only for m > 0. A parameter
-//! common to the records has one element in eta, an individual one has an element for each record. K_e_dot is the
-//! coordinate of the lead unless the user constrains T_L itself: `K_e_dot = K_e T_L` is well determined even if K_e is
-//! small.
+//! Slots of one record: `[K_e, K_e_dot (or T_L), omega_nm, zeta_nm, tau_e, T_n]`; the last slot exists only for m > 0.
+//! A parameter common to all records has one element in eta; an individual parameter has one element for each record.
+//! The lead is described by K_e_dot unless the user constrains T_L or makes it individual: `K_e_dot = K_e T_L` is well
+//! determined even if K_e is small.
 
 use std::{collections::BTreeMap, ops::Range};
 
@@ -16,44 +16,44 @@ use hoid_model::{
 use super::parametrisation::{HeldSamples, Mapped, Parametrisation};
 use crate::{Constraint, IdentError};
 
-/// Number of slots with a remnant filter.
+/// Number of slots of a model with a remnant filter.
 pub(crate) const SLOTS: usize = 6;
-/// Slot of the second coordinate of the gains.
+/// Slot of the lead: K_e_dot or T_L.
 pub(crate) const LEAD: usize = 1;
 /// Slot of the delay.
 pub(crate) const DELAY: usize = 4;
 /// Slot of the remnant's time constant.
 pub(crate) const TIME_CONSTANT: usize = 5;
 
-/// Names of the parameters that can be constrained or individual.
+/// Names of the parameters that can be constrained or estimated individually for each record.
 pub const GREY_BOX_NAMES: [&str; 7] = ["K_e", "K_e_dot", "T_L", "omega_nm", "zeta_nm", "tau_e", "T_n"];
 
-/// Bounds of zeta_nm: beyond them the two poles are independent.
+/// Bounds of zeta_nm. Beyond these bounds the two poles are effectively independent.
 const ZETA_LIMITS: (f64, f64) = (1e-4, 20.0);
-/// Bounds of T_n in samples: white noise below, a drift above.
+/// Bounds of T_n in samples: below them the remnant is white noise, above them it is a drift.
 const TIME_CONSTANT_LIMITS: (f64, f64) = (0.1, 1e4);
 /// Largest omega_nm as a share of pi/Ts.
 const HIGHEST_FREQUENCY: f64 = 0.999;
 
-/// The second coordinate of the gains.
+/// Coordinate that describes the lead.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) enum Lead {
-    /// K_e_dot in s.
+    /// The coordinate is K_e_dot in s.
     RateGain,
-    /// T_L in s.
+    /// The coordinate is T_L in s.
     Time,
 }
 
-/// The parameters with their constraints, after the checks.
+/// Parameters with their validated constraints.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Layout {
     /// Order m of the remnant filter.
     pub order: usize,
     pub lead: Lead,
     pub sample_time: SampleTime,
-    /// Place in eta of each slot, for each record.
+    /// Index in eta of each slot, for each record.
     pub positions: Vec<[usize; SLOTS]>,
-    /// Name of each element of eta; with the number of the record if it is individual.
+    /// Name of each element of eta; the name of an individual parameter contains the number of its record.
     pub names: Vec<String>,
     /// Bounds of each element of eta.
     pub limits: Vec<(f64, f64)>,
@@ -61,7 +61,8 @@ pub(crate) struct Layout {
     pub slots: Vec<usize>,
 }
 
-/// Orders and theta of one record at one eta; the Jacobian has a row for each coefficient and a column for each slot.
+/// Orders and theta of one record for a given eta. The Jacobian has a row for each coefficient and a column for each
+/// slot.
 #[derive(Debug, Clone)]
 pub(crate) struct Polynomials {
     pub orders: Orders,
@@ -103,7 +104,7 @@ impl Layout {
             return Err(bad(
                 "T_L",
                 "a constraint on K_e_dot = K_e T_L as well",
-                "one of the two".to_owned(),
+                "one of the two constraints".to_owned(),
             ));
         }
         let lead = if asked("T_L") { Lead::Time } else { Lead::RateGain };
@@ -150,7 +151,7 @@ impl Layout {
         names
     }
 
-    /// Returns the constraint of a parameter within its admissible range.
+    /// Returns the bounds of a parameter: its constraint, limited to the admissible range.
     fn slot_limits(
         &self,
         slot: usize,
@@ -193,23 +194,23 @@ impl Layout {
         Ok(within)
     }
 
-    /// Number of parameters of one record.
+    /// Returns the number of parameters of one record.
     pub fn slots_in_use(&self) -> usize {
         if self.order == 0 { TIME_CONSTANT } else { SLOTS }
     }
 
-    /// Returns the longest possible delay, in samples of nk.
+    /// Returns nk for the longest possible delay.
     pub fn longest_nk(&self) -> Result<usize, ModelError> {
         let longest = self.delays().into_iter().map(|i| self.limits[i].1).fold(0.0, f64::max);
         Ok(whole_samples(longest, self.sample_time)? + 1)
     }
 
-    /// Returns an eta whose parameters are the same for all records.
+    /// Returns the eta that has these parameters for every record.
     pub fn spread(&self, slots: &[f64; SLOTS]) -> Vec<f64> {
         self.slots.iter().map(|&slot| slots[slot]).collect()
     }
 
-    /// Returns the parameters of one record; T_n is 0 if there is none.
+    /// Returns the parameters of one record; T_n is 0 if the model has none.
     pub fn of_record(&self, eta: &[f64], record: usize) -> [f64; SLOTS] {
         let mut values = [0.0; SLOTS];
         for (value, &position) in values.iter_mut().zip(&self.positions[record]).take(self.slots_in_use()) {
@@ -228,7 +229,8 @@ impl Layout {
         [k_e, k_e_dot, omega, zeta, tau]
     }
 
-    /// Returns the polynomials of one record; `sample` is the sample that contains tau_e, if the caller has chosen one.
+    /// Returns the polynomials of one record. `sample` is the sampling interval that contains tau_e, if the caller has
+    /// chosen one.
     pub fn polynomials(&self, eta: &[f64], record: usize, sample: Option<usize>) -> Result<Polynomials, ModelError> {
         let slots = self.of_record(eta, record);
         let operator = self.operator(&slots);

@@ -1,9 +1,9 @@
-//! The prediction-error criterion as a function of the physical parameters.
+//! The prediction error criterion as a function of the physical parameters.
 //!
-//! For each record the polynomials follow from eta, `theta = theta(eta)` with `J = d theta/d eta`;
-//! then `psi_eta = psi J`, so that `psi_eta' eps = J' psi' eps` and
-//! `psi_eta' psi_eta = J' psi' psi J`, both summed over the records. nk changes with tau_e, but the first residual that
-//! counts does not: the loss is a function of eta only.
+//! For each record the polynomials follow from eta, `theta = theta(eta)` with `J = d theta/d eta`. Then
+//! `psi_eta = psi J`, so that `psi_eta' eps = J' psi' eps` and `psi_eta' psi_eta = J' psi' psi J`, each summed over the
+//! records. nk changes with tau_e, but the first residual that counts does not change, so that the loss is a function
+//! of eta only.
 
 use std::{fmt, ops::Range, sync::Arc};
 
@@ -20,29 +20,30 @@ use crate::{
 
 use super::parametrisation::{HeldSamples, Mapped, Parametrisation};
 
-/// The criterion over one or several records.
+/// Criterion for one or several records.
 #[derive(Debug, Clone)]
 pub(crate) struct PhysicalCriterion<'a, P> {
     pub layout: P,
     pub data: Vec<Data<'a>>,
-    /// The values of each further input, record by record.
+    /// Values of each further input in each record.
     pub further: Vec<Vec<&'a [f64]>>,
     pub initial: InitialState,
     pub first: usize,
-    /// Sample in which each delay of [`Parametrisation::delays`] is held; `None` determines it from the delay itself.
+    /// Sampling interval to which each delay of [`Parametrisation::delays`] is restricted; `None` if the delay itself
+    /// determines its interval.
     pub samples: Option<Vec<usize>>,
     pub limits: Vec<(f64, f64)>,
-    /// Prior knowledge, in units of the residuals; empty if there is none.
+    /// Prior knowledge, in units of squared residuals; empty if there is none.
     pub penalty: Vec<Penalty>,
-    /// Additional measurements of the operator of all records.
+    /// Additional measurements of the operator, which apply to all records.
     pub additional: Option<AdditionalTerm<'a>>,
 }
 
-/// Another criterion of the first elements of eta, added to the sum of squares with a weight.
+/// Another criterion for the first elements of eta, which is added to the sum of squares with a weight.
 #[derive(Clone)]
 pub(crate) struct AdditionalTerm<'a> {
     pub criterion: Arc<dyn Objective + Send + Sync + 'a>,
-    /// Number of elements of eta on which it depends.
+    /// Number of elements of eta on which the criterion depends.
     pub elements: usize,
     pub weight: f64,
 }
@@ -54,7 +55,7 @@ impl fmt::Debug for AdditionalTerm<'_> {
 }
 
 impl AdditionalTerm<'_> {
-    /// Adds its contribution at eta to a linearisation.
+    /// Adds the contribution of the term at eta to a linearisation.
     pub fn add_to(&self, eta: &[f64], total: &mut Linearisation, workspace: &mut Workspace) {
         let (p, q) = (eta.len(), self.elements);
         let own = self.criterion.linearise(&eta[..q], workspace);
@@ -68,23 +69,23 @@ impl AdditionalTerm<'_> {
     }
 }
 
-/// `v (g(eta_i) - mean)^2/s^2`, added to the sum of squares: a normal prior of g with the standard
-/// deviation s, v the variance of an innovation.
+/// Penalty `v (g(eta_i) - mean)^2/s^2`, which is added to the sum of squares. It is a normal prior for g with the
+/// standard deviation s; v is the innovation variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Penalty {
-    /// Place in eta.
+    /// Index i in eta.
     pub place: usize,
-    /// True for `g = ln eta_i` of a positive element, false for eta_i itself.
+    /// True for `g = ln eta_i` of a positive element, false for `g = eta_i`.
     pub logarithmic: bool,
     pub mean: f64,
     /// Precision `1/s^2`.
     pub precision: f64,
-    /// Variance v.
+    /// Innovation variance v.
     pub variance: f64,
 }
 
 impl Penalty {
-    /// Returns the same penalty for innovations of this variance.
+    /// Returns the same penalty for another innovation variance.
     pub fn weighted(self, variance: f64) -> Self {
         Self { variance, ..self }
     }
@@ -100,24 +101,24 @@ impl Penalty {
         }
     }
 
-    /// `v/s^2`.
+    /// Returns the weight `v/s^2`.
     fn weight(&self) -> f64 {
         self.variance * self.precision
     }
 
-    /// Contribution to the sum of squares.
+    /// Returns the contribution of the penalty to the sum of squares.
     pub fn at(&self, eta: &[f64]) -> f64 {
         let (value, _) = self.value_and_slope(eta);
         self.weight() * (self.mean - value).powi(2)
     }
 
-    /// Returns `v g'(eta_i)^2/s^2`, its element of the matrix P that is added to `psi' psi`.
+    /// Returns `v g'(eta_i)^2/s^2`, the element of the matrix P that is added to `psi' psi`.
     pub fn curvature(&self, eta: &[f64]) -> f64 {
         let (_, slope) = self.value_and_slope(eta);
         self.weight() * slope * slope
     }
 
-    /// Adds its value and derivatives to a linearisation of p parameters.
+    /// Adds the value and the derivatives of the penalty to the linearisation.
     pub fn add_to(&self, eta: &[f64], total: &mut Linearisation) {
         let i = self.place;
         let (value, slope) = self.value_and_slope(eta);
@@ -143,7 +144,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         }
     }
 
-    /// Returns the contribution of the additional measurements to the criterion at eta; zeros if there are none.
+    /// Returns the contribution of the additional measurements to the criterion at eta; zero if there are none.
     pub fn additional_at(&self, eta: &[f64], workspace: &mut Workspace) -> Linearisation {
         let mut own = Linearisation::empty(eta.len());
         if let Some(additional) = &self.additional {
@@ -156,7 +157,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()
     }
 
-    /// Number of initial states over all records.
+    /// Returns the number of initial states of all records.
     pub fn states(&self) -> usize {
         let further = self.layout.further();
         let of_record = |record: usize| {
@@ -166,12 +167,12 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         (0..self.data.len()).map(of_record).sum()
     }
 
-    /// Returns the criterion of one record in theta.
+    /// Returns the criterion of one record as a function of theta.
     pub fn of_record(&self, mapped: &Mapped, record: usize) -> Criterion<'a> {
         self.with_data((mapped.orders, &mapped.further), record, self.data[record])
     }
 
-    /// Returns the same with another e and u of the same length.
+    /// Returns the criterion of one record for another e and u.
     pub fn with_data<'b>(
         &self,
         (orders, further): (hoid_model::Orders, &[InputOrders]),
@@ -203,8 +204,8 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         self.layout.map(eta, record, held).ok()
     }
 
-    /// Returns the runs of successive records whose parameters have the same places in eta: they have the same
-    /// polynomials.
+    /// Returns the ranges of successive records whose parameters have the same indices in eta; the records of a range
+    /// have the same polynomials.
     fn of_same_places(&self) -> impl Iterator<Item = Range<usize>> {
         let records = 0..self.data.len();
         let mut next = records.start;
@@ -218,8 +219,8 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         })
     }
 
-    /// Sets the gains that are best for the other parameters, and returns the sum of squares there: the residual is
-    /// affine in K_e and K_e_dot. Only for one set of parameters common to all records, with K_e_dot as coordinate.
+    /// Sets the optimal gains for given other parameters and returns the sum of squares: the residual is affine in K_e
+    /// and K_e_dot. All records must have the same parameters, with K_e_dot as a coordinate.
     pub fn best_gains(&self, eta: &mut [f64], workspace: &mut Workspace) -> Option<f64> {
         eta[..2].fill(0.0);
         if !self.is_feasible(eta) {
@@ -239,8 +240,8 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         (value.is_finite() && eta.iter().all(|v| v.is_finite())).then_some(value)
     }
 
-    /// Searches from eta. The loss has kinks where a delay is an integer number of samples, and a search may end in
-    /// one; then it is continued inside each of the samples that meet there.
+    /// Searches for a minimum, starting from eta. The loss has kinks where a delay is an integer number of samples. If
+    /// the search does not converge, it continues within single sampling intervals.
     pub fn search(
         &self,
         eta: Vec<f64>,
@@ -255,7 +256,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         Some(self.search_by_samples(minimum, options, workspace))
     }
 
-    /// Moves from sample to sample as long as the loss decreases.
+    /// Searches within one sampling interval after the other as long as the loss decreases.
     fn search_by_samples(&self, minimum: Minimum, options: &SearchOptions, workspace: &mut Workspace) -> Minimum {
         let (delays, ts) = (self.layout.delays(), self.layout.sample_time().s());
         let begin = self.layout.first_sample_begins();
@@ -279,7 +280,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
             minimise(&within, eta, options, None, workspace)
         };
         let mut best = inside(&samples, &minimum, workspace).unwrap_or(minimum);
-        // Each move decreases the loss; the limit only guards against rounding.
+        // Each change of interval decreases the loss; the limit on their number only guards against rounding.
         for _ in 0..100 {
             let mut moved = false;
             for (k, &i) in delays.iter().enumerate() {
@@ -312,19 +313,19 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         best
     }
 
-    /// Returns the elements of eta with a variance: not fixed, and not at a bound of the user. A kink of the loss is
-    /// not a bound.
+    /// Returns the elements of eta that have a variance, i.e. that are not fixed and not at a bound set by the user. A
+    /// kink of the loss is not a bound.
     pub fn free(&self, eta: &[f64], descent: &[f64]) -> Vec<usize> {
         crate::optimize::free_parameters(self, eta, descent)
     }
 
-    /// Returns the polynomials of a record at eta.
+    /// Returns the polynomials of a record for a given eta.
     pub fn model_of(&self, eta: &[f64], record: usize) -> Result<Mapped, IdentError> {
         Ok(self.layout.map(eta, record, HeldSamples::default())?)
     }
 }
 
-/// Distance to the border of a sample, in samples, below which the next sample is tried.
+/// Distance from the border of a sampling interval, in samples, below which the next interval is tried.
 const NEAR_BORDER: f64 = 1e-6;
 
 impl<P: Parametrisation> Objective for PhysicalCriterion<'_, P> {
@@ -341,7 +342,7 @@ impl<P: Parametrisation> Objective for PhysicalCriterion<'_, P> {
         let mut total = Linearisation::empty(p);
         for records in self.of_same_places() {
             let Some(polynomials) = self.polynomials(eta, records.start) else {
-                // Only for an eta that is not feasible.
+                // This occurs only if eta is not feasible.
                 total.sum_of_squares = f64::NAN;
                 return total;
             };

@@ -1,5 +1,5 @@
 //! Options of the operator with a remnant of order m: the fields of [`GreyBox`], and the names under which texts set
-//! them. Each option is declared only here.
+//! them. Each option is declared only in this file.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
@@ -9,7 +9,7 @@ use crate::{
     shared_options as shared,
 };
 
-/// Orders m of the remnant that are tried by default.
+/// Default range of the remnant orders m that are tried.
 const DEFAULT_ORDERS: RangeInclusive<usize> = 1..=4;
 
 /// Estimator in physical parameters, with its options.
@@ -17,23 +17,23 @@ const DEFAULT_ORDERS: RangeInclusive<usize> = 1..=4;
 pub struct GreyBox {
     /// Candidate orders m of the remnant filter, 0 (white) to 4.
     pub order: RangeInclusive<usize>,
-    /// Shortest and longest delay tau_e in s. Default 0.05 to 0.6.
+    /// Smallest and largest delay tau_e in s. Default 0.05 to 0.6.
     pub delay_range_s: (f64, f64),
-    /// Fixed and bounded parameters by name ([`GREY_BOX_NAMES`](super::GREY_BOX_NAMES)). T_L or
-    /// K_e_dot, not both.
+    /// Fixed and bounded parameters by name ([`GREY_BOX_NAMES`](super::GREY_BOX_NAMES)). Either T_L or K_e_dot can be
+    /// constrained, not both.
     pub constraints: BTreeMap<String, Constraint>,
-    /// Names of the parameters that are individual to each record; all others are common to the records.
+    /// Names of the parameters that differ between records; all others are common to the records.
     pub individual: Vec<String>,
-    /// Initial states of each record. Default: estimated.
+    /// Treatment of the initial states of each record. Default: estimated.
     pub initial_state: InitialState,
     /// Limits of the search.
     pub search: SearchOptions,
-    /// Number of points of the grid from which the search runs to completion. Default 2.
+    /// Number of grid points from which a search is completed. Default 2.
     pub starts: usize,
 }
 
 impl Default for GreyBox {
-    /// Orders 1 to 4 of the remnant.
+    /// Returns the options for the orders 1 to 4 of the remnant.
     fn default() -> Self {
         Self::new(DEFAULT_ORDERS)
     }

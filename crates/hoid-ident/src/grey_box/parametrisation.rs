@@ -1,4 +1,4 @@
-//! Interface of the criterion to physical parameters: the polynomials as functions of them.
+//! Interface between the criterion and the physical parameters: polynomials as functions of the parameters.
 
 use std::ops::Range;
 
@@ -6,26 +6,27 @@ use hoid_model::{ModelError, Orders, SampleTime};
 
 use crate::criterion::further_input::InputOrders;
 
-/// Orders and theta of one record at one eta, and the derivatives of theta: a column for each slot of the record.
+/// Orders and theta of one record for a given eta, and the derivatives of theta with a column for each slot of the
+/// record.
 #[derive(Debug, Clone)]
 pub(crate) struct Mapped {
     pub orders: Orders,
-    /// Orders of further inputs, whose coefficients follow in theta.
+    /// Orders of the further inputs, whose coefficients are at the end of theta.
     pub further: Vec<InputOrders>,
     pub theta: Vec<f64>,
     pub columns: Vec<Vec<f64>>,
 }
 
-/// The samples in which delays are held, if the caller has chosen them.
+/// Sampling intervals to which delays are restricted, if the caller has chosen them.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct HeldSamples<'s> {
-    /// Places of the delays in eta.
+    /// Indices of the delays in eta.
     pub delays: &'s [usize],
     pub samples: &'s [usize],
 }
 
 impl HeldSamples<'_> {
-    /// Returns the sample of the delay at this index.
+    /// Returns the sampling interval chosen for the delay at index `place` of eta.
     pub fn of(&self, place: usize) -> Option<usize> {
         let index = self.delays.iter().position(|&delay| delay == place)?;
         self.samples.get(index).copied()
@@ -33,8 +34,8 @@ impl HeldSamples<'_> {
 }
 
 impl Mapped {
-    /// Returns the covariance of theta by rows, `J C J'`, from that of eta; the slots of the record have these indices
-    /// in eta.
+    /// Returns the covariance of theta by rows, `J C J'`, from the covariance C of eta; `places` are the indices in eta
+    /// of the slots of the record.
     pub fn covariance_of_theta(&self, of_eta: &[f64], p: usize, places: &[usize]) -> Vec<f64> {
         let columns = &self.columns;
         let of = |row: usize, other: usize| -> f64 {
@@ -58,32 +59,32 @@ impl Mapped {
 pub(crate) trait Parametrisation: Clone {
     /// Returns the index in eta of each slot of a record.
     fn positions(&self, record: usize) -> &[usize];
-    /// Returns lower and upper bound of each element of eta.
+    /// Returns the lower and the upper bound of each element of eta.
     fn limits(&self) -> &[(f64, f64)];
     /// Returns the indices of the delays in eta.
     fn delays(&self) -> Vec<usize>;
     /// Returns the index in eta of the delay of a record.
     fn delay_of(&self, record: usize) -> usize;
-    /// Returns the time between two samples.
+    /// Returns the sample time.
     fn sample_time(&self) -> SampleTime;
-    /// Delay in samples at which the interval of zero whole samples starts: -0.5 where e is interpolated (the response
+    /// Returns the delay in samples at which the sampling interval 0 starts: -0.5 where e is interpolated (the response
     /// is half a sample later), 0 by default.
     fn first_sample_begins(&self) -> f64 {
         0.0
     }
-    /// Returns the orders of the polynomials at this delay of the first coefficient of B.
+    /// Returns the orders of the polynomials if the first coefficient of B has the delay nk.
     fn orders(&self, nk: usize) -> Orders;
-    /// Returns the indices in eta of the polynomials C that must be stable and have no limits of their own.
+    /// Returns the index ranges in eta of polynomials C that must be stable and are not restricted by limits.
     fn stable_blocks(&self) -> Vec<Range<usize>>;
-    /// Returns the orders of the further inputs, at the shortest delay; none by default.
+    /// Returns the orders of the further inputs at their shortest delays; there are none by default.
     fn further(&self) -> Vec<InputOrders> {
         Vec::new()
     }
-    /// Returns the polynomials of one record, with its delays in these samples: the same for all records with the same
-    /// places in eta.
+    /// Returns the polynomials of one record, with its delays in the given sampling intervals. Records with the same
+    /// indices in eta have the same polynomials.
     ///
     /// # Errors
-    /// [`ModelError`] for an eta without a model.
+    /// [`ModelError`] if there is no model for this eta.
     fn map(&self, eta: &[f64], record: usize, held: HeldSamples<'_>) -> Result<Mapped, ModelError>;
 }
 

@@ -16,11 +16,11 @@ use super::layout::{DELAY, LEAD, Layout, Lead, TIME_CONSTANT};
 pub struct OrderCandidate {
     /// Order m.
     pub order: usize,
-    /// Its criteria, all on the same samples, or the reason why it could not be fitted.
+    /// Criteria of this order, on the same samples for all orders, or the reason why the order could not be fitted.
     pub outcome: Result<OrderFigures, String>,
 }
 
-/// Criteria of an order.
+/// Criteria of a candidate order.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OrderFigures {
     /// Loss V.
@@ -40,7 +40,7 @@ pub struct GreyBoxFit {
     pub(crate) eta: Vec<f64>,
     /// Covariance of eta by rows; zero for parameters that are fixed or at a bound.
     pub(crate) covariance: Option<Vec<f64>>,
-    /// Elements of eta with a variance.
+    /// Indices of the elements of eta that have a variance.
     pub(crate) free: Vec<usize>,
     /// Number of parameters that were not fixed.
     pub(crate) parameters: usize,
@@ -59,9 +59,9 @@ impl GreyBoxFit {
         &self.candidates
     }
 
-    /// Returns name, value and standard error of each fitted parameter, in the coordinates of the fit: K_e, K_e_dot (s)
-    /// or T_L (s) if that is constrained, omega_nm (rad/s), zeta_nm, tau_e (s), T_n (s). Individual parameters contain
-    /// the number of their record.
+    /// Returns the name, value and standard error of each fitted parameter in the coordinates of the fit: K_e, K_e_dot
+    /// (s) or, if the lead is described by it, T_L (s), omega_nm (rad/s), zeta_nm, tau_e (s), T_n (s). The name of an
+    /// individual parameter contains the number of its record.
     pub fn parameters(&self) -> Vec<(String, Estimate)> {
         self.layout
             .names
@@ -71,8 +71,8 @@ impl GreyBoxFit {
             .collect()
     }
 
-    /// Returns the covariance of [`GreyBoxFit::parameters`] by rows, zero for parameters that are fixed or at a bound;
-    /// `None` for an exact fit.
+    /// Returns the covariance of [`GreyBoxFit::parameters`] by rows, with zeros for parameters that are fixed or at a
+    /// bound; `None` for an exact fit.
     pub fn covariance(&self) -> Option<&[f64]> {
         self.covariance.as_deref()
     }
@@ -85,8 +85,8 @@ impl GreyBoxFit {
         }
     }
 
-    /// Returns an estimate of `value` with the derivatives `by_gain` with respect to K_e and `by_lead` with respect to
-    /// the second coordinate.
+    /// Returns an estimate with this value, where `by_gain` is its derivative with respect to K_e and `by_lead` its
+    /// derivative with respect to the second coordinate.
     fn of_gains(&self, record: usize, value: f64, by_gain: f64, by_lead: f64) -> Estimate {
         let places = &self.layout.positions[record];
         let used = |place: usize, by: f64| by != 0.0 && self.free.contains(&place);
@@ -101,8 +101,8 @@ impl GreyBoxFit {
         }
     }
 
-    /// Returns the operator of a record, with standard errors. `record` is the index in the records of the fit, here
-    /// and below; beyond the last record it means the last.
+    /// Returns the operator of a record with standard errors. `record` is the index of the record in the fit; a larger
+    /// index refers to the last record. This applies to all methods of the fit.
     ///
     /// # Errors
     /// [`NotConvertible::ZeroGain`] if K_e is zero, so that there is no T_L.
@@ -140,8 +140,8 @@ impl GreyBoxFit {
         Ok(self.operator(record)?.parameters())
     }
 
-    /// Returns T_n and K_n of a record, with the remnant held over each sample; `None` for m = 0, where the remnant is
-    /// white with the standard deviation of the innovation.
+    /// Returns T_n and K_n of a record, with a remnant that is held over each sample; `None` for m = 0, where the
+    /// remnant is white with the standard deviation of the innovation.
     ///
     /// `K_n = sigma/g(T_n)`; sigma has the variance `sigma^2/(2 n)` and is uncorrelated with T_n (Gaussian
     /// innovations).
@@ -168,9 +168,9 @@ impl GreyBoxFit {
         })
     }
 
-    /// Returns the same model as polynomials, for prediction, simulation and the frequency response with its bands:
-    /// Box-Jenkins with three coefficients in B. Its covariance is `J P J'` and singular, as theta has more elements
-    /// than eta; parameters, criteria, operator and remnant are those of this fit.
+    /// Returns the same model as a Box-Jenkins model with three coefficients in B, for prediction, simulation and the
+    /// frequency response with its confidence bands. Its covariance `J P J'` is singular, since theta has more elements
+    /// than eta. Use the methods of this fit for parameters, criteria, operator and remnant.
     pub fn polynomial_fit(&self, record: usize) -> &Fit {
         &self.fits[self.known(record)]
     }
@@ -179,7 +179,7 @@ impl GreyBoxFit {
         record.min(self.fits.len() - 1)
     }
 
-    /// Returns the fit with the values common to all records.
+    /// Returns the fit that contains the results common to all records.
     fn whole(&self) -> &Fit {
         &self.fits[0]
     }
@@ -210,22 +210,22 @@ impl GreyBoxFit {
         self.parameters
     }
 
-    /// How the search ended.
+    /// Returns how the search ended.
     pub fn termination(&self) -> Termination {
         self.whole().termination()
     }
 
-    /// Returns the name of the best start.
+    /// Returns the name of the start that led to this minimum.
     pub fn start(&self) -> &str {
         self.whole().start()
     }
 
-    /// Akaike's criterion `n ln V + 2 p`.
+    /// Returns Akaike's criterion `n ln V + 2 p`.
     pub fn aic(&self) -> f64 {
         self.whole().aic()
     }
 
-    /// Schwarz's (Bayesian) criterion `n ln V + p ln n`.
+    /// Returns Schwarz's (Bayesian) criterion `n ln V + p ln n`.
     pub fn bic(&self) -> f64 {
         self.whole().bic()
     }

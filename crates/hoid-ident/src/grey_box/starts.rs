@@ -1,13 +1,14 @@
 //! Starts of the search in physical parameters.
 //!
-//! 1. `grid`: delays every 0.04 s over their range with a typical neuromuscular system, then at the
-//!    best of them frequencies and dampings in the range of human operators. The residual is affine
-//!    in K_e and K_e_dot, so that both are eliminated at each point; the noise model is that of one
-//!    T_n. The best points by loss are starts.
-//! 2. `box-jenkins`: the operator to which a Box-Jenkins fit at the delay of the best point is converted, if possible.
-//! 3. `order m - 1`: the minimum of the previous order, if several orders are tried.
+//! 1. `grid`: first, delays every 0.04 s over their range with a typical neuromuscular system; then, at the best of
+//!    these delays, frequencies and damping ratios in the range of human operators. The residual is affine in K_e and
+//!    K_e_dot, so that these are eliminated at each point; the noise model has a single fixed T_n. The points with the
+//!    smallest loss are starts.
+//! 2. `box-jenkins`: the operator that corresponds to a Box-Jenkins fit at the delay of the best point, if there is
+//!    one.
+//! 3. `order m - 1`: the minimum for the previous order, if several orders are tried.
 //!
-//! For each order the T_n of a start is the best of a few.
+//! For each order, T_n of a start is the best of a few values.
 
 use hoid_model::{Record, Structure};
 
@@ -20,31 +21,31 @@ use super::{
 
 /// Spacing of the delays, s: a fraction of the period of the highest frequencies to which people respond.
 const GRID_DELAY_S: f64 = 0.04;
-/// Neuromuscular frequency with which the delays are ranked, rad/s.
+/// Neuromuscular frequency for the ranking of the delays, rad/s.
 const DEFAULT_OMEGA: f64 = 11.0;
-/// Damping ratio with which the delays are ranked.
+/// Damping ratio for the ranking of the delays.
 const DEFAULT_ZETA: f64 = 0.4;
-/// Number of delays at which the other frequencies and dampings are tried.
+/// Number of delays at which other frequencies and damping ratios are tried.
 const BEST_DELAYS: usize = 2;
 /// Neuromuscular frequencies of the grid, rad/s.
 const GRID_OMEGA: [f64; 3] = [6.0, 11.0, 20.0];
 /// Damping ratios of the grid.
 const GRID_ZETA: [f64; 3] = [0.25, 0.7, 1.3];
-/// Time constants of the remnant, s; the first ranks the grid.
-/// Below half a sample a filter of third order has another minimum.
+/// Time constants of the remnant, s. The first is used for ranking the grid. A third-order filter has another minimum
+/// below half a sample.
 pub(crate) const GRID_TIME_CONSTANT_S: [f64; 6] = [0.1, 0.004, 0.012, 0.03, 0.06, 0.3];
-/// Least number of delays over a range of positive length.
+/// Minimum number of delays if the range of delays is not a single value.
 const FEWEST_DELAYS: usize = 3;
 
-/// A start with its name: `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, T_n]`, the same for all records.
+/// A named start `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, T_n]`, which is the same for all records.
 #[derive(Debug, Clone)]
 pub(crate) struct Start {
     pub label: String,
     pub slots: [f64; SLOTS],
 }
 
-/// Returns the same data with one set of parameters for all records and K_e_dot as coordinate.
-pub(crate) fn scout<'a>(criterion: &PhysicalCriterion<'a, Layout>, order: usize) -> PhysicalCriterion<'a, Layout> {
+/// Returns a criterion for the same data in which all records have the same parameters, with K_e_dot as a coordinate.
+pub(crate) fn common_parameter_criterion<'a>(criterion: &PhysicalCriterion<'a, Layout>, order: usize) -> PhysicalCriterion<'a, Layout> {
     let of_slot = |slot: usize| {
         let bounds = criterion
             .layout
@@ -75,10 +76,10 @@ pub(crate) fn scout<'a>(criterion: &PhysicalCriterion<'a, Layout>, order: usize)
     PhysicalCriterion::new(layout, criterion.data.clone(), criterion.initial, criterion.first)
 }
 
-/// Returns the best points of the grid, with the gains that are best for them: the given number with a lead, and the
-/// best without a lead if it is better.
+/// Returns the best grid points with their optimal gains: `starts` points with a lead and, if it is better than all
+/// these, the best point without a lead.
 pub(crate) fn grid(criterion: &PhysicalCriterion<'_, Layout>, starts: usize, workspace: &mut Workspace) -> Vec<Start> {
-    let scout = scout(criterion, criterion.layout.order.min(1));
+    let scout = common_parameter_criterion(criterion, criterion.layout.order.min(1));
     let bounded = |slot: usize, value: f64| value.clamp(scout.limits[slot].0, scout.limits[slot].1);
     let (low, high) = scout.limits[DELAY];
     let intervals = match high - low {
@@ -117,8 +118,8 @@ pub(crate) fn grid(criterion: &PhysicalCriterion<'_, Layout>, starts: usize, wor
     leading(&points, starts)
 }
 
-/// Returns the first few with a lead, and the first of all: a lag instead of the lead, with a shorter delay, imitates
-/// the phase of an operator and causes a local minimum.
+/// Returns the first n points with a lead, and the first point if it has no lead. A lag with a shorter delay imitates
+/// the phase of an operator with a lead and causes a local minimum.
 fn leading(points: &[(Start, f64)], n: usize) -> Vec<Start> {
     let has_lead = |s: &Start| s.slots[0] * s.slots[LEAD] >= 0.0;
     let mut chosen: Vec<Start> = points
@@ -132,7 +133,7 @@ fn leading(points: &[(Start, f64)], n: usize) -> Vec<Start> {
     chosen
 }
 
-/// Returns the operator of a Box-Jenkins fit at this delay.
+/// Returns the operator of a Box-Jenkins fit at the delay of `nearest`.
 pub(crate) fn box_jenkins(
     records: &[Record],
     nearest: &Start,
@@ -159,7 +160,7 @@ pub(crate) fn box_jenkins(
     })
 }
 
-/// Returns the start as an eta of this criterion, with the best of a few T_n for its order.
+/// Returns the start as an eta of this criterion, with the best of a few values of T_n for its order.
 pub(crate) fn complete(
     criterion: &PhysicalCriterion<'_, Layout>,
     start: &Start,
@@ -169,7 +170,7 @@ pub(crate) fn complete(
     let layout = &criterion.layout;
     let mut slots = start.slots;
     if layout.order > 0 {
-        let scout = scout(criterion, layout.order);
+        let scout = common_parameter_criterion(criterion, layout.order);
         let (low, high) = scout.limits[TIME_CONSTANT];
         let tried = time_constants_s.iter().map(|&t| {
             let mut eta = start.slots.to_vec();
@@ -184,7 +185,7 @@ pub(crate) fn complete(
         }
     }
     if layout.lead == Lead::Time {
-        // A start without K_e has no lead time; one second is used.
+        // If K_e is zero the lead time constant is not defined; one second is used.
         slots[LEAD] = if slots[0] == 0.0 { 1.0 } else { slots[LEAD] / slots[0] };
     }
     layout.spread(&slots)

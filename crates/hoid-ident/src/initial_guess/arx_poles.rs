@@ -1,5 +1,5 @@
-//! Poles by linear least squares: from an ARX model, from one of high order, and by the iteration of Steiglitz and
-//! McBride.
+//! Poles by linear least squares: from an ARX model, from a high-order ARX model, and from the Steiglitz-McBride
+//! iteration.
 
 use hoid_core::{
     filter::{divide_in_place, fir},
@@ -9,10 +9,10 @@ use hoid_model::{Orders, polynomial::reflected_inside};
 
 use crate::criterion::{Criterion, Data, InitialState, Workspace, first_residual};
 
-/// Number of steps of Steiglitz and McBride.
+/// Number of Steiglitz-McBride steps.
 const STEIGLITZ_MCBRIDE_STEPS: usize = 4;
 
-/// Returns A of an ARX fit with as many poles as F has, with unstable ones reflected into the circle.
+/// Returns A of an ARX fit that has as many poles as F; unstable poles are reflected into the unit circle.
 pub(crate) fn arx_poles(criterion: &Criterion<'_>, data: &[Data<'_>], workspace: &mut Workspace) -> Option<Vec<f64>> {
     let orders = Orders {
         na: criterion.orders.nf,
@@ -35,12 +35,12 @@ pub(crate) fn arx_poles(criterion: &Criterion<'_>, data: &[Data<'_>], workspace:
     reflected_inside(&theta[..orders.na])
 }
 
-/// Returns F of the noise-free response of an ARX model of high order.
+/// Returns F fitted to the noise-free response of a high-order ARX model.
 pub(crate) fn reduced_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Option<Vec<f64>> {
     let o = criterion.orders;
     let orders = Orders {
-        na: (o.nf + HIGHER).min(MAX_ORDER),
-        nb: (o.nb + HIGHER).min(MAX_ORDER),
+        na: (o.nf + EXTRA_ARX_ORDER).min(MAX_ORDER),
+        nb: (o.nb + EXTRA_ARX_ORDER).min(MAX_ORDER),
         nk: o.nk,
         ..Orders::default()
     };
@@ -79,7 +79,7 @@ pub(crate) fn reduced_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) 
 }
 
 /// Number of additional coefficients of the high-order ARX model in A and in B.
-const HIGHER: usize = 8;
+const EXTRA_ARX_ORDER: usize = 8;
 
 pub(crate) fn steiglitz_mcbride(
     criterion: &Criterion<'_>,

@@ -1,16 +1,16 @@
-//! Starts from the whole region of stability, for records with many minima: short ones, and models with more
-//! coefficients than the operator's.
+//! Starts from the whole region of stability, for cases with many minima: short records, and models with more
+//! coefficients than the operator.
 //!
 //! Given F, C and D the residual is affine in B; given F, C and B it is affine in D. Therefore two grids that do not
-//! depend on the data, one of F and one of C, with least squares for the rest, reach every kind of minimum: adjacent
-//! slow real poles, a resonance, C and D that nearly cancel at any frequency.
+//! depend on the data, one for F and one for C, with least squares for the remaining coefficients, reach every kind of
+//! minimum: adjacent slow real poles, a resonance, and a C and D that nearly cancel at any frequency.
 //!
-//! **Systems**, B and F: that of the known minimum; those of refined instrumental variables with autoregressive noise
-//! of two orders ([`crate::iv::refined_system`]); and the best points of a grid of poles
-//! ([`super::pole_grid::anywhere`]), ranked with an autoregression for their noise.
+//! **Systems**, B and F: the system of the known minimum; the systems from refined instrumental variables with
+//! autoregressive noise of two orders ([`crate::iv::refined_system`]); and the best points of a pole grid
+//! ([`super::pole_grid::anywhere`]), which are ranked with an autoregressive noise model.
 //!
-//! **Noise models** of each system: C from a grid of its roots, D by least squares, and B once more
-//! with them. Those with the smallest loss are starts.
+//! **Noise models** of each system: C is taken from a grid of roots, D follows by least squares, and B is estimated
+//! again with C and D. The noise models with the smallest loss give the starts.
 
 use hoid_model::Orders;
 
@@ -25,14 +25,14 @@ use crate::{
 
 /// Number of points of the pole grid that are used.
 const PLACES: usize = 8;
-/// Number of noise models for a fitted system, and for one of the grid.
+/// Number of noise models for a fitted system, and for a system of the grid.
 const NOISE_MODELS: (usize, usize) = (4, 1);
-/// Orders of the autoregression of the instrumental variables.
+/// Orders of the autoregressive noise models for the instrumental variables.
 const IV_NOISE: [usize; 2] = [2, 6];
-/// Coefficients of the autoregression that ranks the grid, beyond those of the noise model.
-const MORE_NOISE: usize = 1;
+/// Number of additional coefficients of the autoregression that ranks the grid, compared with the noise model.
+const EXTRA_NOISE_COEFFICIENTS: usize = 1;
 
-/// A proposal for B and F.
+/// A candidate for B and F.
 struct System {
     label: &'static str,
     b: Vec<f64>,
@@ -40,7 +40,7 @@ struct System {
     noise_models: usize,
 }
 
-/// Returns the starts, each complete, the best first; `known` is a minimum.
+/// Returns complete starts in order of their loss; `known` is a minimum that was found before.
 pub(crate) fn broad_starts(criterion: &Criterion<'_>, known: &[f64], workspace: &mut Workspace) -> Vec<Start> {
     let o = criterion.orders;
     let fitted = |label, b: &[f64], f: &[f64]| System {
@@ -63,13 +63,13 @@ pub(crate) fn broad_starts(criterion: &Criterion<'_>, known: &[f64], workspace: 
     starts
 }
 
-/// Returns the points of the pole grid with the smallest loss, each with its own autoregression.
+/// Returns the points of the pole grid with the smallest loss; each point has its own autoregression.
 fn best_places(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<System> {
     let o = criterion.orders;
     let coloured = o.nc + o.nd > 0;
     let orders = Orders {
         nc: 0,
-        nd: if coloured { o.nc + o.nd + MORE_NOISE } else { 0 },
+        nd: if coloured { o.nc + o.nd + EXTRA_NOISE_COEFFICIENTS } else { 0 },
         ..o
     };
     let ranking = Criterion {
@@ -106,7 +106,7 @@ fn best_places(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Syst
     places.iter().take(PLACES).map(system).collect()
 }
 
-/// Returns a system with its best noise models.
+/// Returns the best starts for a system, each with another noise model.
 fn with_noise_models(criterion: &Criterion<'_>, system: &System, workspace: &mut Workspace) -> Vec<Start> {
     let o = criterion.orders;
     let mut starts = Vec::new();

@@ -3,9 +3,9 @@
 
 use hoid_model::{Complex64, Orders, polynomial};
 
-/// Returns theta with the roots of C moved towards the origin, `c_i rho^i`, and with pairs of them turned off the real
-/// axis: starts for a search that ended on the unit circle.
-pub(crate) fn with_c_drawn_inside(o: &Orders, theta: &[f64]) -> Vec<Vec<f64>> {
+/// Returns starts for a search that ended with a root of C on the unit circle: theta with the roots of C moved towards
+/// the origin, `c_i rho^i`, and theta with all roots of C replaced by their mean.
+pub(crate) fn starts_with_c_inside(o: &Orders, theta: &[f64]) -> Vec<Vec<f64>> {
     let block = o.na + o.nb..o.na + o.nb + o.nc;
     let c = &theta[block.clone()];
     let mut all = Vec::new();
@@ -17,11 +17,11 @@ pub(crate) fn with_c_drawn_inside(o: &Orders, theta: &[f64]) -> Vec<Vec<f64>> {
         start[block.clone()].copy_from_slice(c);
         all.push(start);
     };
-    for rho in DRAWN {
+    for rho in ROOT_SCALES {
         let drawn: Vec<f64> = c.iter().zip(1..).map(|(ci, i)| ci * f64::powi(rho, i)).collect();
         push(&drawn);
     }
-    // (1 + x q^-1)^n with the same sum of roots.
+    // C = (1 + x q^-1)^n has the same sum of roots.
     let x = (c[0] / c.len() as f64).clamp(-0.95, 0.95);
     let multiple = polynomial::from_roots(&vec![Complex64::new(-x, 0.0); c.len()]);
     if multiple.len() == c.len() + 1 {
@@ -30,5 +30,5 @@ pub(crate) fn with_c_drawn_inside(o: &Orders, theta: &[f64]) -> Vec<Vec<f64>> {
     all
 }
 
-/// Factors by which roots on the circle are moved inwards.
-const DRAWN: [f64; 5] = [0.98, 0.95, 0.9, 0.8, 0.6];
+/// Factors by which the roots of C are moved inwards.
+const ROOT_SCALES: [f64; 5] = [0.98, 0.95, 0.9, 0.8, 0.6];

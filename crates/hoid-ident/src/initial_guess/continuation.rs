@@ -1,12 +1,13 @@
-//! A start from the low-pass filtered record, which has few samples and a loss with few minima.
+//! A start from averaged records, which have fewer samples and a loss with fewer minima.
 //!
-//! Input and output are filtered by the same moving average over K samples and decimated by K; at low frequencies the
-//! system between them is the same with its poles raised to the power K. There the search runs to completion from each
-//! of a few poles of the grid at about 1/K of the cost, and the K-th roots of the poles of the resulting minimum are
-//! the start of the search on the record itself. The delay becomes a fraction of a sample, so that B has one additional
+//! Input and output are filtered by the same moving average over K samples and decimated by K. At low frequencies the
+//! system between them stays the same, with its poles raised to the power K. On these records the search is completed
+//! from a few points of the pole grid, at about 1/K of the cost. The K-th roots of the resulting poles are the start of
+//! the search on the original records. The delay becomes a fraction of a sample, so that B has one additional
 //! coefficient.
 //!
-//! It is only a start: for a system that is fast compared with K samples it is a bad one, and others are tried as well.
+//! The result is only a start. It is poor for a system that is fast compared with K samples, so that other starts are
+//! tried as well.
 
 use hoid_model::{Complex64, Orders, SampleTime, polynomial, polynomial_model::monic};
 
@@ -18,36 +19,36 @@ use crate::{
     optimize::{Objective, SearchMethod, SearchOptions},
 };
 
-/// Least number of samples that each record keeps.
-const SAMPLES_LEFT: usize = 800;
+/// Minimum number of samples of each averaged record.
+const MIN_AVERAGED_SAMPLES: usize = 800;
 /// Largest K.
 const LARGEST_FACTOR: usize = 8;
-/// Largest number of coefficients of D in a start.
+/// Largest number of coefficients of D for the averaged records.
 const LARGEST_ND: usize = 2;
-/// Number of poles of the grid from which a search runs.
+/// Number of points of the pole grid from which a search is made.
 const SEARCHED: usize = 2;
-/// Limits of the search on the averaged record.
+/// Limits of the searches on the averaged records.
 const SEARCH: SearchOptions = SearchOptions {
     method: SearchMethod::LevenbergMarquardt,
     max_iterations: 30,
     tolerance: 1e-6,
 };
 
-/// `|ln z|` of a pole of the averaged record below which it is well inside the remaining band (its Nyquist frequency is
-/// pi).
+/// A pole z of the averaged records is well inside the remaining band if `|ln z|` is below this limit (the Nyquist
+/// frequency is pi).
 const SLOW: f64 = 1.3;
 
-/// The poles from the averaged record.
+/// Poles estimated from the averaged records.
 #[derive(Debug, Default)]
 pub(crate) struct SlowPoles {
-    /// Polynomials F, best first; empty if the records are short or the model does not have its poles only in F.
+    /// Polynomials F, best first. Empty if the records are too short, or if the model has poles outside F.
     pub f: Vec<Vec<f64>>,
-    /// True if all poles of the best one are slow compared with the average, so that it determines nearly as much as
-    /// the record does.
+    /// True if all poles of the best F are slow compared with the averaging, so that the averaged records determine it
+    /// nearly as well as the original records do.
     pub complete: bool,
 }
 
-/// Returns proposals for F.
+/// Returns candidates for F from the averaged records.
 pub(crate) fn slow_poles(criterion: &Criterion<'_>, sample_time: SampleTime, workspace: &mut Workspace) -> SlowPoles {
     let Some(averaged) = AveragedRecords::of(criterion, sample_time) else {
         return SlowPoles::default();
@@ -73,10 +74,10 @@ pub(crate) struct AveragedRecords {
 }
 
 impl AveragedRecords {
-    /// Returns `None` if the records are too short, or the model does not have its poles only in F.
+    /// Averages the records of a criterion; `None` if they are too short, or if the model has poles outside F.
     pub fn of(criterion: &Criterion<'_>, sample_time: SampleTime) -> Option<Self> {
         let shortest = criterion.data.iter().map(|d| d.u.len()).min().unwrap_or(0);
-        let factor = (shortest / SAMPLES_LEFT).min(LARGEST_FACTOR);
+        let factor = (shortest / MIN_AVERAGED_SAMPLES).min(LARGEST_FACTOR);
         let o = criterion.orders;
         if factor < 2 || o.nf == 0 || o.na > 0 {
             return None;
@@ -100,7 +101,7 @@ impl AveragedRecords {
         })
     }
 
-    /// The criterion over them.
+    /// Returns the criterion of the averaged records.
     pub fn criterion(&self) -> Criterion<'_> {
         Criterion {
             orders: self.orders,
@@ -113,15 +114,15 @@ impl AveragedRecords {
     }
 }
 
-/// The search on the averaged records: the points of the pole grid are ranked with one noise model, estimated at the
-/// first point, and searches start from the best points.
+/// Search on the averaged records: the points of the pole grid are ranked with one noise model, which is estimated at
+/// the first point, and searches start from the best points.
 pub(crate) struct Continuation<'c> {
-    low: &'c Criterion<'c>,
+    averaged_criterion: &'c Criterion<'c>,
     factor: usize,
     grid: Vec<Vec<f64>>,
-    /// The noise model of the ranking, when it is known.
+    /// Noise model for the ranking; `None` until it has been estimated.
     noise: Option<Vec<f64>>,
-    /// The current point of the grid, and its number.
+    /// Current point of the grid, and its index.
     trial: Option<Start>,
     tried: usize,
     ranked: Vec<Start>,
@@ -129,26 +130,26 @@ pub(crate) struct Continuation<'c> {
 }
 
 impl<'c> Continuation<'c> {
-    /// Creates the search on these records; `low` is their criterion.
-    pub fn new(averaged: &AveragedRecords, low: &'c Criterion<'c>) -> Self {
-        let grid = pole_grid(low.orders.nf, averaged.sample_time);
+    /// Creates the search on the averaged records; `averaged_criterion` is their criterion.
+    pub fn new(averaged: &AveragedRecords, averaged_criterion: &'c Criterion<'c>) -> Self {
+        let grid = pole_grid(averaged_criterion.orders.nf, averaged.sample_time);
         let mut continuation = Self {
-            low,
+            averaged_criterion,
             factor: averaged.factor,
             grid: grid.into_iter().map(|(_, f)| f).collect(),
-            noise: (low.orders.nd == 0).then(Vec::new),
+            noise: (averaged_criterion.orders.nd == 0).then(Vec::new),
             trial: None,
             tried: 0,
             ranked: Vec::new(),
             searches: None,
         };
-        continuation.go_on();
+        continuation.next_trial();
         continuation
     }
 
-    /// Continues with the next point of the grid, and after the last point with the searches.
-    fn go_on(&mut self) {
-        let o = &self.low.orders;
+    /// Proceeds to the next point of the grid or, after the last point, to the searches.
+    fn next_trial(&mut self) {
+        let o = &self.averaged_criterion.orders;
         let start = |noise: &[f64], f: &[f64], left| {
             Start::to_be_found("pole grid", [&vec![0.0; o.nb], noise, f].concat(), left)
         };
@@ -162,13 +163,13 @@ impl<'c> Continuation<'c> {
             ranked.sort_by(|a, b| a.value.total_cmp(&b.value));
             ranked.truncate(SEARCHED);
             let starts = ranked.into_iter().map(|start| start.with_own_noise(o)).collect();
-            self.searches = Some(MultiStart::new(self.low, *o, &SEARCH, SEARCHED, starts));
+            self.searches = Some(MultiStart::new(self.averaged_criterion, *o, &SEARCH, SEARCHED, starts));
         }
     }
 
-    /// Returns the result.
+    /// Returns the poles that were found.
     pub fn slow(self) -> SlowPoles {
-        let o = &self.low.orders;
+        let o = &self.averaged_criterion.orders;
         let mut minima = self.searches.map(|searches| searches.minima).unwrap_or_default();
         minima.sort_by(|(_, a), (_, b)| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares));
         let f: Vec<Vec<f64>> = minima
@@ -188,7 +189,7 @@ impl<'c> Continuation<'c> {
 
 impl LinearisationClient for Continuation<'_> {
     fn criterion(&self) -> &Criterion<'_> {
-        self.low
+        self.averaged_criterion
     }
 
     fn evaluation_point(&self) -> Option<&[f64]> {
@@ -208,7 +209,7 @@ impl LinearisationClient for Continuation<'_> {
     }
 
     fn update(&mut self, there: Linearisation, workspace: &mut Workspace) {
-        let o = &self.low.orders;
+        let o = &self.averaged_criterion.orders;
         let Some(mut trial) = self.trial.take() else {
             if let Some(searches) = &mut self.searches {
                 searches.update(there, workspace);
@@ -222,18 +223,18 @@ impl LinearisationClient for Continuation<'_> {
         }
         let known = trial.value.is_finite();
         if self.noise.is_none() && known {
-            // From the first point again, now with the noise model.
+            // The ranking starts again at the first point, now with the noise model.
             self.noise = Some(trial.theta[Block::D.place(o)].to_vec());
             self.tried = 0;
         } else {
             self.ranked.extend(known.then_some(trial));
             self.tried += 1;
         }
-        self.go_on();
+        self.next_trial();
     }
 }
 
-/// Returns the means of consecutive groups of samples; a remainder at the end is left out.
+/// Returns the means of consecutive groups of samples; incomplete groups are left out.
 fn averaged(x: &[f64], factor: usize) -> Vec<f64> {
     let scale = 1.0 / factor as f64;
     x.chunks_exact(factor)
@@ -241,8 +242,8 @@ fn averaged(x: &[f64], factor: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Returns the polynomial whose roots are the principal K-th roots; `None` if a root is on the closed negative axis, so
-/// that the result would not be real.
+/// Returns the polynomial whose roots are the principal K-th roots of the roots of f; `None` if a root of f is zero or
+/// on the negative real axis, where the result would not be real.
 fn root_of_poles(f: &[f64], factor: usize) -> Option<Vec<f64>> {
     let k = factor as f64;
     let roots: Option<Vec<Complex64>> = polynomial::roots(&monic(f))?

@@ -1,26 +1,26 @@
 //! Automatic starts of the Box-Jenkins search.
 //!
-//! The poles are decisive: given F, the model is linear in B, and given B and F the noise model is a linear
-//! autoregression. Each start is therefore a proposal for F that is completed by linear least squares:
+//! The poles are decisive: given F, the model is linear in B, and given B and F, the noise model is a linear
+//! autoregression. Each start is therefore a candidate for F that is completed by linear least squares:
 //!
-//! 1. `low-pass continuation`: the minimum on the averaged record
-//!    ([`crate::initial_guess::continuation`]), searched from the pole grid.
-//! 2. `pole grid`, if the record is too short for that: for two poles and more, neuromuscular frequencies from 3 to 24
-//!    rad/s with damping 0.25 and 0.7, the range of human operators, through the exact zero-order hold.
-//! 3. `steiglitz-mcbride`: ARX, repeated a few times on input and output filtered by 1/F of the previous step (K.
-//!    Steiglitz and L. E. McBride, *IEEE Trans. Automatic Control* 10 (1965) 461-464). The `arx` poles themselves,
-//!    which are badly biased if the noise poles are not those of the system (m0 = 1: a2 near 0), are used only if this
-//!    fails.
-//! 4. `high-order arx`: an ARX model with additional poles for the noise, and the poles of its noise-free response by
-//!    Steiglitz and McBride (B. Wahlberg, *Automatica* 25 (1989) 829-841, in its simplest form).
-//! 5. `instruments`: ARX, instrumental variables twice, the residual, C and D from it
-//!    ([`crate::iv`]).
+//! 1. `low-pass continuation`: the minimum on the averaged records ([`crate::initial_guess::continuation`]), searched
+//!    from the pole grid.
+//! 2. `pole grid`, if the records are too short for the continuation: for two or more poles, neuromuscular frequencies
+//!    from 3 to 24 rad/s with damping ratios 0.25 and 0.7, the range of human operators, converted with the exact
+//!    zero-order hold.
+//! 3. `steiglitz-mcbride`: ARX fits to input and output filtered by 1/F of the previous step, repeated a few times (K.
+//!    Steiglitz and L. E. McBride, *IEEE Trans. Automatic Control* 10 (1965) 461-464). The `arx` poles themselves are
+//!    strongly biased if the noise poles differ from the system poles (m0 = 1: a2 near 0); they are used only if the
+//!    iteration fails.
+//! 4. `high-order arx`: an ARX model with additional poles for the noise; F is fitted to its noise-free response by the
+//!    Steiglitz-McBride iteration (B. Wahlberg, *Automatica* 25 (1989) 829-841, in its simplest form).
+//! 5. `instruments`: ARX, two estimates with instrumental variables, and C and D from the residual ([`crate::iv`]).
 //!
-//! The last three are used only if the poles of the first are not all slow compared with its average: otherwise it
-//! determines nearly as much as the record does. The proposals are ranked by their loss with the initial states
-//! eliminated; the search runs from the best of them, and the best minimum is used. Short records and larger models
-//! have more minima than these starts find; for them, other starts are tried afterwards
-//! ([`crate::initial_guess::broad`]).
+//! The last three are used only if the low-pass continuation has a pole that is not slow compared with the averaging;
+//! otherwise the averaged records determine the poles nearly as well as the original records do. The candidates are
+//! ranked by their loss with the initial states eliminated. Searches start from the best candidates, and the best
+//! minimum is used. Short records and larger models have more minima than these starts find; for them, other starts are
+//! tried afterwards ([`crate::initial_guess::broad`]).
 
 use hoid_model::{Orders, SampleTime, polynomial::reflected_inside};
 
@@ -38,21 +38,21 @@ use crate::{
     optimize::Objective,
 };
 
-/// Number of proposals that are completed with their own noise model.
+/// Number of candidates that are completed with their own noise model.
 const COMPLETED: usize = 4;
 
-/// Returns the starts, with the remaining unknowns.
+/// Returns the starts, each with the unknowns that still need to be found.
 pub(crate) fn initial_guesses(
     criterion: &Criterion<'_>,
     sample_time: SampleTime,
     workspace: &mut Workspace,
 ) -> Vec<Start> {
     let slow = continuation::slow_poles(criterion, sample_time, workspace);
-    initial_guesses_beside(slow, criterion, sample_time, workspace)
+    initial_guesses_with_poles(slow, criterion, sample_time, workspace)
 }
 
-/// As [`initial_guesses`], with the poles from the averaged record.
-pub(crate) fn initial_guesses_beside(
+/// Returns the starts, like [`initial_guesses`], for known poles from the averaged records.
+pub(crate) fn initial_guesses_with_poles(
     slow: SlowPoles,
     criterion: &Criterion<'_>,
     sample_time: SampleTime,
@@ -65,7 +65,7 @@ pub(crate) fn initial_guesses_beside(
     starts
 }
 
-/// Starts from proposals for F.
+/// Returns starts from candidates for F.
 fn from_poles(
     slow: SlowPoles,
     criterion: &Criterion<'_>,
@@ -108,7 +108,8 @@ fn from_poles(
     starts
 }
 
-/// Returns proposals for F with their own A, B and noise model: to be found, or already found if the model has A or C.
+/// Returns starts from candidates for F with their own A, B and noise model. These unknowns are computed here if the
+/// model has A or C; otherwise they remain to be found.
 fn completed(criterion: &Criterion<'_>, proposals: Vec<(String, Vec<f64>)>, workspace: &mut Workspace) -> Vec<Start> {
     let o = &criterion.orders;
     let in_steps = o.na + o.nc == 0 && criterion.initial != InitialState::Backcast;
@@ -124,7 +125,8 @@ fn completed(criterion: &Criterion<'_>, proposals: Vec<(String, Vec<f64>)>, work
         .collect()
 }
 
-/// Returns the pole grid, best first: all are ranked with the noise model of the first one, which costs one pass each.
+/// Returns the points of the pole grid, best first. All are ranked with the noise model of the first point, which takes
+/// one pass over the data for each point.
 fn ranked_grid(
     criterion: &Criterion<'_>,
     sample_time: SampleTime,
@@ -149,9 +151,10 @@ fn ranked_grid(
     ranked.into_iter().take(count).map(|(label, f, _)| (label, f)).collect()
 }
 
-/// Returns theta and sum of squares for a given F: A and B by least squares, the noise model by autoregression of the
-/// residual, and A and B once more with that noise model. If the model has A, this is repeated: A and the noise model
-/// depend on each other (generalised least squares; D. W. Clarke, *IFAC Symposium on Identification*, Prague 1967).
+/// Returns theta and the sum of squares for a given F: A and B by least squares, the noise model by an autoregression
+/// of the residual, and A and B again with this noise model. If the model has A, the last two steps are repeated, since
+/// A and the noise model depend on each other (generalised least squares; D. W. Clarke, *IFAC Symposium on
+/// Identification*, Prague 1967).
 fn complete(criterion: &Criterion<'_>, f: &[f64], workspace: &mut Workspace) -> Option<(Vec<f64>, f64)> {
     let o = criterion.orders;
     let linear = o.na + o.nb;
@@ -187,9 +190,9 @@ fn complete(criterion: &Criterion<'_>, f: &[f64], workspace: &mut Workspace) -> 
     Some((theta, value))
 }
 
-/// Starts of a model of the output alone, `u = (C/A) eps`: A and C by Hannan and Rissanen, which
-/// cancel each other in part where the roots of C are near the unit circle and the long
-/// autoregression is too short; and A by its own autoregression, with the same C and with C = 1.
+/// Returns starts for a model of the output alone, `u = (C/A) eps`. The first has A and C from the Hannan-Rissanen
+/// method; the two partly cancel if roots of C are near the unit circle and the long autoregression is too short. The
+/// other starts have A from an autoregression, with the same C and with C = 1.
 fn time_series(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Start> {
     let o = criterion.orders;
     let outputs: Vec<Vec<f64>> = criterion.data.iter().map(|d| d.u.to_vec()).collect();

@@ -1,10 +1,11 @@
-//! A start for the prediction error method by a chain of instrumental variables (L. Ljung, *System
-//! Identification*, 1999, section 10.6): ARX by least squares, instruments simulated with it, the
-//! IV estimate, instruments and estimate once more, the residual of that system, a long
-//! autoregression of it, and C and D by regression on past residuals and past innovations.
+//! A start for the prediction error method from a chain of instrumental variable estimates (L. Ljung, *System
+//! Identification*, 1999, section 10.6): ARX by least squares, instruments simulated with this model, the IV estimate,
+//! new instruments and a second IV estimate, a long autoregression of its residual, and C and D by regression on past
+//! residuals and past innovations.
 //!
-//! Consistent in an open loop for any noise; in a closed loop it is biased as far as the input follows the noise, which
-//! is little if the loop has a delay longer than the memory of the noise. About ten passes over the data.
+//! In an open loop the chain is consistent for any noise. In a closed loop it is biased to the extent that the input
+//! follows the noise, which is little if the loop has a delay longer than the correlation time of the noise. The chain
+//! takes about ten passes over the data.
 
 use hoid_model::Orders;
 
@@ -16,8 +17,8 @@ use crate::{
     optimize::Objective,
 };
 
-/// Returns theta for the orders of the criterion; `None` if the model has both A and F (the chain does not distinguish
-/// their poles), without an input, and if the data are not sufficient.
+/// Returns theta for the orders of the criterion. `None` if the model has both A and F (the chain does not distinguish
+/// their poles) or no input, or if the data are not sufficient.
 pub(crate) fn instrument_chain(criterion: &Criterion<'_>) -> Option<Vec<f64>> {
     let o = criterion.orders;
     if o.nb == 0 || (o.na > 0 && o.nf > 0) {

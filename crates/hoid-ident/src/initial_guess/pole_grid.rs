@@ -1,6 +1,6 @@
-//! Poles that do not depend on the data: in the range of human operators, F of an operator's neuromuscular system at a
-//! few frequencies and dampings, through the exact zero-order hold; and over the whole unit disc, whatever the sample
-//! time.
+//! Pole candidates that do not depend on the data. The first grid covers the range of human operators: F of a
+//! neuromuscular system at a few frequencies and damping ratios, converted with the exact zero-order hold. The second
+//! grid covers the whole unit disc, regardless of the sample time.
 
 use hoid_model::{Complex64, SampleTime, polynomial};
 
@@ -8,15 +8,15 @@ use hoid_model::{Complex64, SampleTime, polynomial};
 const GRID_OMEGA: [f64; 4] = [3.0, 6.0, 12.0, 24.0];
 /// Damping ratios of the pole grid.
 const GRID_ZETA: [f64; 2] = [0.25, 0.7];
-/// Further poles of the grid for nf > 2: fast ones, which matter least.
+/// Further poles of the grid for nf > 2, which are fast and have the least effect.
 const EXTRA_POLE: f64 = 0.3;
 
-/// Returns F of each point of the grid, with its name.
+/// Returns F and a name for each point of the grid.
 pub(crate) fn pole_grid(nf: usize, sample_time: SampleTime) -> Vec<(String, Vec<f64>)> {
     GRID_OMEGA
         .into_iter()
         .flat_map(|omega| GRID_ZETA.map(|zeta| (omega, zeta)))
-        // One pole has no damping.
+        // A single pole has no damping ratio.
         .filter(|(_, zeta)| nf > 1 || *zeta == GRID_ZETA[0])
         .map(|(omega, zeta)| {
             let poles = grid_poles(nf, omega, zeta, sample_time.s());
@@ -26,21 +26,21 @@ pub(crate) fn pole_grid(nf: usize, sample_time: SampleTime) -> Vec<(String, Vec<
         .collect()
 }
 
-/// Real poles of the grid over the disc: closer together for slow ones.
+/// Real poles of the grid over the unit disc, denser for slow poles.
 const REAL_POLES: [f64; 7] = [0.985, 0.95, 0.88, 0.7, 0.3, -0.5, -0.95];
-/// Angles of its pairs in rad, each with every radius.
+/// Angles in rad of the pole pairs of this grid; each angle is combined with every radius.
 const ANGLES: [f64; 8] = [0.05, 0.1, 0.2, 0.4, 0.8, 1.3, 2.0, 2.6];
 const RADII: [f64; 2] = [0.98, 0.85];
-/// The third pole for nf > 2: slow, like the lag of an operator, or fast.
+/// Third pole for nf > 2: slow, like the lag of an operator, or fast.
 const THIRD_POLES: [f64; 2] = [0.95, EXTRA_POLE];
 
-/// Real roots of the grid of C.
+/// Real roots of the grid for C.
 const REAL_ZEROS: [f64; 6] = [0.98, 0.8, 0.3, -0.3, -0.8, -0.98];
-/// Angles of its pairs in rad, and their radius.
+/// Angles in rad of the root pairs of this grid, and their radius.
 const ZERO_ANGLES: [f64; 7] = [0.1, 0.3, 0.7, 1.2, 1.7, 2.2, 2.7];
 const ZERO_RADIUS: f64 = 0.9;
 
-/// Returns F with poles over the whole unit disc: slow and fast, real and in pairs.
+/// Returns candidates for F with poles over the whole unit disc: slow and fast, real and in pairs.
 pub(crate) fn anywhere(nf: usize) -> Vec<Vec<f64>> {
     let two = real_and_pairs(nf, &REAL_POLES, &ANGLES, &RADII);
     let third = if nf > 2 { &THIRD_POLES[..] } else { &THIRD_POLES[..1] };
@@ -57,7 +57,8 @@ pub(crate) fn anywhere(nf: usize) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Returns C with roots over the whole unit disc, also close to the circle; roots beyond two are zero.
+/// Returns candidates for C with roots over the whole unit disc, also close to the unit circle; roots beyond the second
+/// are zero.
 pub(crate) fn noise_zeros(nc: usize) -> Vec<Vec<f64>> {
     real_and_pairs(nc, &REAL_ZEROS, &ZERO_ANGLES, &[ZERO_RADIUS])
         .into_iter()
@@ -68,8 +69,8 @@ pub(crate) fn noise_zeros(nc: usize) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Returns every two of the real roots, repetitions included, and every pair; single roots for a count of one, and the
-/// empty set for zero.
+/// Returns every combination of two real roots, including double roots, and every complex pair. For a count of one,
+/// returns the single roots; for a count of zero, one empty set.
 fn real_and_pairs(count: usize, real: &[f64], angles: &[f64], radii: &[f64]) -> Vec<Vec<Complex64>> {
     let at = |x: f64| Complex64::new(x, 0.0);
     match count {

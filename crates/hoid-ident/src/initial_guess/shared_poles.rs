@@ -1,17 +1,18 @@
 //! Starts for models with A and a noise model, or with A and F: assignment of the poles.
 //!
-//! A belongs to the system and to the noise, F to the system and D to the noise only, and the loss has a minimum for
-//! many wrong assignments: ARARX with a1 = -0.65, a2 = 0.11, d1 = -0.93 ends 40 % too high from least squares, with the
-//! pole of D in A. The poles are therefore taken from fits that do not depend on the assignment, and every assignment
-//! is a start:
+//! A belongs to the system and to the noise, F only to the system, and D only to the noise. The loss has minima for
+//! many wrong assignments of the poles: ARARX with a1 = -0.65, a2 = 0.11, d1 = -0.93, started from least squares, ends
+//! with a loss that is 40 % too high and with the pole of D in A. The poles are therefore taken from fits that do not
+//! depend on the assignment, and every assignment is a start:
 //!
-//! - the poles of the system, A F, from instruments, which no coloured noise biases in an open loop
-//!   ([`crate::iv`]): any na of them are A, the rest F, and the noise model follows from the remainder;
-//! - all poles, A D F, from an ARX model with nd more coefficients in A and in B, which is ARARX
-//!   without its common factor: any nd of them are D, any nf of the rest F, and A and B follow by
-//!   least squares.
+//! - the poles of the system, A F, come from instrumental variables, which in an open loop are not biased by coloured
+//!   noise ([`crate::iv`]): any na of these poles are assigned to A, the others to F, and the noise model follows from
+//!   the residual;
+//! - all poles, A D F, come from an ARX model with nd additional coefficients in A and in B, which equals ARARX if the
+//!   common factor is not cancelled: any nd of the poles are assigned to D, any nf of the others to F, and A and B
+//!   follow by least squares.
 //!
-//! A few steps of the search from each show which of them decrease the loss.
+//! A few steps of the search from each start show which starts decrease the loss.
 
 use hoid_model::{Complex64, Orders, polynomial, polynomial_model::monic};
 
@@ -23,11 +24,11 @@ use crate::{
     optimize::{SearchOptions, minimise},
 };
 
-/// Number of starts that are tried by a few steps, the best by their loss.
-const TRIED: usize = 8;
-/// Steps of the search from each.
+/// Number of starts with the smallest loss that are tried.
+const TRIED_STARTS: usize = 8;
+/// Number of search steps from each of these starts.
 const STEPS: usize = 8;
-/// Largest number of poles, or pairs of them, that are assigned.
+/// Largest number of real poles and pole pairs that are assigned in all ways.
 const MAX_GROUPS: usize = 6;
 
 /// True if the model has A together with other polynomials that could contain its poles.
@@ -35,7 +36,7 @@ pub(crate) fn concerns(o: &Orders) -> bool {
     o.na > 0 && o.nb > 0 && o.nc + o.nd + o.nf > 0
 }
 
-/// Returns the best starts of both kinds and of `others`, after a few steps of the search, with their sums of squares.
+/// Returns the best starts of both kinds and of `others` after a few steps of the search, with their sums of squares.
 pub(crate) fn initial_guesses(criterion: &Criterion<'_>, others: Vec<Start>, workspace: &mut Workspace) -> Vec<Start> {
     let mut starts = others;
     starts.extend(from_instruments(criterion, workspace));
@@ -47,7 +48,7 @@ pub(crate) fn initial_guesses(criterion: &Criterion<'_>, others: Vec<Start>, wor
     };
     starts
         .into_iter()
-        .take(TRIED)
+        .take(TRIED_STARTS)
         .filter_map(|start| {
             let end = minimise(criterion, start.theta, &options, None, workspace)?;
             Some(Start::complete(&start.label, end.theta, end.at.sum_of_squares))
@@ -72,7 +73,7 @@ fn from_instruments(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec
     let Some(poles) = polynomial::roots(&monic(f)) else {
         return Vec::new();
     };
-    dealt(&poles, o.na)
+    pole_assignments(&poles, o.na)
         .into_iter()
         .filter_map(|(a, f)| {
             let linear = [&coefficients(&a), b].concat();
@@ -102,8 +103,8 @@ fn from_long_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<St
         ..criterion.clone()
     };
     let mut starts = Vec::new();
-    for (d, rest) in dealt(&poles, o.nd) {
-        for (f, _) in dealt(&rest, o.nf) {
+    for (d, rest) in pole_assignments(&poles, o.nd) {
+        for (f, _) in pole_assignments(&rest, o.nf) {
             let f = coefficients(&f);
             let whitening = [&vec![0.0; o.na + o.nb], &coefficients(&d)[..], &f].concat();
             let solved = coloured.best_linear_part(&whitening, workspace);
@@ -113,8 +114,8 @@ fn from_long_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<St
     starts
 }
 
-/// Returns a start with given A, B and F: the noise model from the residual, and A and B once more with that noise
-/// model.
+/// Returns a start for given A, B and F: the noise model is estimated from the residual, and A and B are estimated
+/// again with this noise model.
 fn start(
     label: &str,
     criterion: &Criterion<'_>,
@@ -142,8 +143,9 @@ fn coefficients(roots: &[Complex64]) -> Vec<f64> {
     polynomial::from_roots(roots)[1..].to_vec()
 }
 
-/// Returns all ways to choose `count` of these poles, conjugates together: the chosen ones and the rest.
-fn dealt(poles: &[Complex64], count: usize) -> Vec<(Vec<Complex64>, Vec<Complex64>)> {
+/// Returns all ways to choose `count` of these poles, as pairs of the chosen and the remaining poles; conjugate poles
+/// stay together.
+fn pole_assignments(poles: &[Complex64], count: usize) -> Vec<(Vec<Complex64>, Vec<Complex64>)> {
     let mut groups: Vec<&[Complex64]> = Vec::new();
     let mut left = poles;
     while !left.is_empty() {
@@ -170,11 +172,11 @@ mod tests {
     fn poles_are_dealt_out_in_every_way_with_conjugates_together() {
         let pair = [Complex64::new(0.5, 0.3), Complex64::new(0.5, -0.3)];
         let poles = [pair[0], pair[1], Complex64::new(0.9, 0.0), Complex64::new(-0.2, 0.0)];
-        let chosen: Vec<Vec<Complex64>> = dealt(&poles, 2).into_iter().map(|(chosen, _)| chosen).collect();
+        let chosen: Vec<Vec<Complex64>> = pole_assignments(&poles, 2).into_iter().map(|(chosen, _)| chosen).collect();
         assert_eq!(chosen, [pair.to_vec(), poles[2..].to_vec()]);
-        assert_eq!(dealt(&poles, 1).len(), 2);
-        assert_eq!(dealt(&poles, 0), [(vec![], poles.to_vec())]);
-        assert!(dealt(&pair, 1).is_empty());
+        assert_eq!(pole_assignments(&poles, 1).len(), 2);
+        assert_eq!(pole_assignments(&poles, 0), [(vec![], poles.to_vec())]);
+        assert!(pole_assignments(&pair, 1).is_empty());
         assert_eq!(coefficients(&pair).len(), 2);
         assert!(coefficients(&[]).is_empty());
     }

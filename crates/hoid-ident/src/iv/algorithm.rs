@@ -1,21 +1,21 @@
-//! Interface between a method of instrumental variables and the estimator.
+//! Interface between an instrumental variable method and the estimator.
 
 use hoid_model::Structure;
 
 use super::equation::IvProblem;
 use crate::{IdentError, Termination, criterion::Criterion};
 
-/// A method: each has its own file and is listed in [`IvMethod`](super::IvMethod).
+/// An instrumental variable method. Each method has its own file and is listed in [`IvMethod`](super::IvMethod).
 pub(super) struct Algorithm {
-    /// Short name, as in options and tables.
+    /// Short name, as used in options and tables.
     pub name: &'static str,
-    /// Description, in a line without a full stop.
+    /// Description in one line, without a full stop.
     pub help: &'static str,
     /// Source in the literature.
     pub source: &'static str,
-    /// The only structure that it fits.
+    /// The only structure that the method fits.
     pub structures: &'static [Structure; 1],
-    /// Computes theta, its covariance, and the termination of the iteration.
+    /// Function that computes theta, its covariance, and the termination of the iteration.
     pub solve: fn(&IvProblem<'_>, &Criterion<'_>, IterationLimits) -> Result<IvSolution, IdentError>,
 }
 
@@ -24,7 +24,7 @@ pub(super) struct Algorithm {
 pub(super) struct IterationLimits {
     /// Largest number of iterations.
     pub max_iterations: usize,
-    /// Largest step of the last iteration, relative to the standard errors.
+    /// The iteration ends if a step is smaller than this value, relative to the standard errors.
     pub tolerance: f64,
 }
 

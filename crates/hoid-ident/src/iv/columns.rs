@@ -2,17 +2,17 @@
 
 use crate::linalg::least_squares::{add_scaled, dot};
 
-/// Columns over the rows of all records, one after the other.
+/// Columns over the rows of all records, one record after the other.
 pub(crate) type Columns = Vec<Vec<f64>>;
 
-/// Least independent part of a column, in amplitude; below it the column counts as a combination of previous ones.
-/// Columns orthogonalised twice are accurate to 1e-15.
+/// A column counts as a linear combination of previous columns if its independent part has less than this share of its
+/// amplitude. Columns that are orthogonalised twice are accurate to 1e-15.
 const OWN_PART: f64 = 1e-10;
-/// Longest artificial past in samples.
+/// Largest length of an artificial past, in samples.
 const PAST: usize = 256;
 
-/// Returns the signal after an artificial past, and the length of that past: reflected at the first sample and faded
-/// in, so that simulations from it start without a jump.
+/// Returns the signal with an artificial past, and the length of this past. The past is the signal reflected at its
+/// first sample and faded in, so that simulations start without a jump.
 pub(super) fn with_past(x: &[f64]) -> (Vec<f64>, usize) {
     let length = PAST.min(x.len().saturating_sub(1));
     let fade = |k: usize| 0.5 + 0.5 * (std::f64::consts::PI * k as f64 / (length + 1) as f64).cos();
@@ -21,7 +21,8 @@ pub(super) fn with_past(x: &[f64]) -> (Vec<f64>, usize) {
     (extended, length)
 }
 
-/// Orthonormal basis of the columns by Gram-Schmidt, twice, and the indices of the linearly independent columns.
+/// Returns an orthonormal basis of the columns (two passes of Gram-Schmidt), and the indices of the linearly
+/// independent columns.
 pub(super) fn orthonormal(columns: &[Vec<f64>]) -> (Columns, Vec<usize>) {
     let mut q: Columns = Vec::new();
     let mut kept = Vec::new();
@@ -35,7 +36,7 @@ pub(super) fn orthonormal(columns: &[Vec<f64>]) -> (Columns, Vec<usize>) {
             }
         }
         let rest = dot(&own, &own).sqrt();
-        // Written so that NaN is dropped too.
+        // The comparison also rejects `NaN`.
         if rest > OWN_PART * size {
             own.iter_mut().for_each(|v| *v /= rest);
             q.push(own);
@@ -45,7 +46,7 @@ pub(super) fn orthonormal(columns: &[Vec<f64>]) -> (Columns, Vec<usize>) {
     (q, kept)
 }
 
-/// Splits a residual into its records.
+/// Splits a stacked residual into the parts of the single records.
 pub(super) fn cut(residual: &[f64], rows: &[usize]) -> Columns {
     let mut at = 0;
     rows.iter()

@@ -1,10 +1,10 @@
-//! The covariance of an estimate by instrumental variables, for a residual of any colour.
+//! Covariance of an instrumental variable estimate, for a residual with any spectrum.
 //!
-//! For a residual with the covariance matrix R, independent of Z, `(Z' Phi)^-1 Z' R Z (Phi' Z)^-1` (T. Söderström and
-//! P. Stoica, *Instrumental Variable Methods for System Identification*, 1983, ch. 5). R is that of a long
-//! autoregression `D r = eps` of the residual: `Z' R Z = lambda (H'Z)' (H'Z)`, with H' the filter 1/D run backwards in
-//! time. If the filter has whitened the residual, this covariance reduces to Ljung's eq. 15.29, `lambda (Z'Z)^-1`, for
-//! Z = Phi.
+//! For a residual with the covariance matrix R, independent of Z, the covariance is `(Z' Phi)^-1 Z' R Z (Phi' Z)^-1`
+//! (T. Söderström and P. Stoica, *Instrumental Variable Methods for System Identification*, 1983, ch. 5). R is computed
+//! from a long autoregression `D r = eps` of the residual: `Z' R Z = lambda (H'Z)' (H'Z)`, where H' is the filter 1/D
+//! run backwards in time. If the prefilter of the equation has whitened the residual, this covariance reduces to
+//! Ljung's eq. 15.29, `lambda (Z'Z)^-1`, for Z = Phi.
 
 use hoid_core::filter::{divide_in_place, multiply};
 use hoid_model::polynomial::reflected_inside;
@@ -13,10 +13,10 @@ use nalgebra::DMatrix;
 use super::columns::{Columns, cut};
 use crate::{linalg::least_squares::dot, noise_model::noise_model};
 
-/// Longest autoregression for the colour of a residual.
+/// Largest order of the autoregression for the spectrum of a residual.
 const LONGEST: usize = 30;
 
-/// Long autoregression `D r = eps` of a residual: D, and the variance of eps.
+/// Fits a long autoregression `D r = eps` to a residual and returns D and the variance of eps.
 fn coloured_noise(residual: &[Vec<f64>], parameters: usize) -> (Vec<f64>, f64) {
     let n: usize = residual.iter().map(Vec::len).sum();
     let shortest = residual.iter().map(Vec::len).min().unwrap_or(0);
@@ -32,13 +32,13 @@ fn coloured_noise(residual: &[Vec<f64>], parameters: usize) -> (Vec<f64>, f64) {
         total += dot(whole, whole);
         rows += whole.len();
     }
-    // Degrees of freedom used by the parameters, as for the innovation variance.
+    // Correction for the degrees of freedom used by the parameters, as for the innovation variance.
     let freedom = n as f64 / n.saturating_sub(parameters).max(1) as f64;
     (d, total / rows.max(1) as f64 * freedom)
 }
 
-/// Returns `(Z' Phi)^-1 lambda K' K (Phi' Z)^-1` by rows, where K is Z with the spectrum of the residual applied to the
-/// columns that are independent of it. `None` if `Z' Phi` is singular.
+/// Returns `(Z' Phi)^-1 lambda K' K (Phi' Z)^-1` by rows. K is Z, with the filter for the spectrum of the residual
+/// applied to the columns that are `independent` of the residual. `None` if `Z' Phi` is singular.
 pub(super) fn covariance(
     z: &[Vec<f64>],
     phi: &[Vec<f64>],
@@ -47,7 +47,7 @@ pub(super) fn covariance(
 ) -> Option<Vec<f64>> {
     let p = z.len();
     let (d, lambda) = coloured_noise(residual, p);
-    // Unit columns: the units of the parameters have no effect on the inverse.
+    // The columns are scaled to unit length, so that the units of the parameters have no effect on the inverse.
     let length = |column: &Vec<f64>| dot(column, column).sqrt();
     let (of_z, of_phi): (Vec<f64>, Vec<f64>) = (z.iter().map(length).collect(), phi.iter().map(length).collect());
     let k: Columns = z

@@ -1,13 +1,11 @@
-//! The filtered equation, its instruments and its solution.
+//! The prefiltered equation, its instruments and its solution.
 //!
-//! With poles `f_1 .. f_n` (of A or F) the equation reads
-//! `u(t) = -f_1 u(t-1) - .. + b_0 e(t-nk) + .. + r(t)`; a filter L is applied to each of its columns, at rest at the
-//! first row. The instruments are the same columns with the noise-free input x and with `(B/F) q^-nk x`, under the same
-//! filter.
+//! With poles `f_1 .. f_n` (of A or F) the equation is `u(t) = -f_1 u(t-1) - .. + b_0 e(t-nk) + .. + r(t)`. A filter L,
+//! which is at rest at the first row, is applied to each column of the equation. The instruments are the same columns
+//! computed with the noise-free input x instead of e and with `(B/F) q^-nk x` instead of u, under the same filter.
 //!
-//! **Solution.** `Z = Q T` with orthonormal Q (Gram-Schmidt, twice), then `Q' Phi theta = Q' y` by
-//! QR with column pivoting: the condition of Z does not enter twice, and the rank is decided as for
-//! least squares.
+//! **Solution.** With `Z = Q T` and orthonormal Q (two passes of Gram-Schmidt), `Q' Phi theta = Q' y` is solved by QR
+//! with column pivoting. The condition number of Z then has no effect, and the rank is determined as for least squares.
 
 use std::{borrow::Cow, ops::Range};
 
@@ -26,7 +24,7 @@ use crate::{
     linalg::least_squares::{LeastSquares, add_scaled, dot},
 };
 
-/// `D/(C F)`.
+/// The prefilter `D/(C F)`.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Prefilter<'p> {
     pub d: &'p [f64],
@@ -35,7 +33,8 @@ pub(crate) struct Prefilter<'p> {
 }
 
 impl Prefilter<'_> {
-    /// Filters the signal from the first sample at which D has all its samples; 1/(C F) is at rest there.
+    /// Filters the signal from the first sample for which D has all its past samples; 1/(C F) is at rest at this
+    /// sample.
     fn apply(&self, x: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; x.len()];
         multiply(self.d, x, &mut y);
@@ -46,17 +45,17 @@ impl Prefilter<'_> {
     }
 }
 
-/// A noise-free input.
+/// A noise-free input and the samples for which it is valid.
 #[derive(Debug, Clone)]
 pub(crate) struct Source<'a> {
-    /// The whole input of each record.
+    /// Noise-free input of each whole record.
     pub inputs: Vec<Cow<'a, [f64]>>,
-    /// Samples for which it gives instruments, counted through all records.
+    /// Samples for which this source gives instruments, counted through all records.
     pub samples: Range<usize>,
 }
 
 impl<'a> Source<'a> {
-    /// Returns the measured inputs, for all samples.
+    /// Returns the measured inputs as a source for all samples.
     pub fn measured(data: &[Data<'a>]) -> Vec<Self> {
         vec![Self {
             inputs: data.iter().map(|d| Cow::Borrowed(d.e)).collect(),
@@ -65,13 +64,13 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Data, noise-free inputs and orders. The system is a vector `[f_1 .. f_n, b_0 .. ]`, with A instead of F for ARX.
+/// Data, noise-free inputs and orders. A system is a vector `[f_1 .. f_n, b_0 .. ]`, with A instead of F for ARX.
 pub(crate) struct IvProblem<'a> {
     pub poles: usize,
     pub nb: usize,
     pub nk: usize,
     pub data: Vec<Data<'a>>,
-    /// Noise-free inputs; each is used for its own rows.
+    /// Noise-free inputs; each of them is used only for its own rows.
     pub sources: Vec<Source<'a>>,
     /// First row of each record.
     pub first: usize,
@@ -86,7 +85,7 @@ pub(crate) struct Equation {
 }
 
 impl<'a> IvProblem<'a> {
-    /// Creates the problem for these orders; na and nf are not both positive.
+    /// Creates the problem for these orders, of which na or nf must be zero.
     pub fn new(orders: &Orders, data: Vec<Data<'a>>, sources: Vec<Source<'a>>) -> Self {
         let letter = if orders.na > 0 { 'a' } else { 'f' };
         let poles = orders.na + orders.nf;
@@ -118,7 +117,7 @@ impl<'a> IvProblem<'a> {
         }
     }
 
-    /// Returns the number of rows of each record for a filter whose D has this order.
+    /// Returns the number of rows of each record for a filter with this order of D.
     pub fn rows(&self, order_of_d: usize) -> Vec<usize> {
         self.data
             .iter()
@@ -126,7 +125,7 @@ impl<'a> IvProblem<'a> {
             .collect()
     }
 
-    /// Returns the filtered columns `[-u(t-i), e(t-nk-j)]` of these outputs and inputs.
+    /// Returns the filtered columns `[-u(t-i), e(t-nk-j)]` of pairs of outputs and inputs.
     fn columns(&self, filter: Prefilter<'_>, signals: &[(&[f64], &[f64])]) -> Columns {
         let shifted = |lag: usize, input: bool| {
             let mut column = Vec::new();
@@ -145,7 +144,7 @@ impl<'a> IvProblem<'a> {
             .collect()
     }
 
-    /// Returns `(B/F) q^-nk x` of a system with stable F and a noise-free input x.
+    /// Returns the response `(B/F) q^-nk x` of a system with stable F to a noise-free input x.
     fn simulate(&self, system: &[f64], x: &[f64]) -> Vec<f64> {
         let (f, b) = system.split_at(self.poles);
         let (extended, past) = with_past(x);
@@ -156,7 +155,7 @@ impl<'a> IvProblem<'a> {
         output
     }
 
-    /// Returns the filtered equation with instruments from the noise-free inputs and the output that this system (with
+    /// Returns the filtered equation. Its instruments are the noise-free inputs and the outputs that this system (with
     /// stable F) simulates from them.
     pub fn equation(&self, filter: Prefilter<'_>, system: &[f64]) -> Equation {
         let measured: Vec<(&[f64], &[f64])> = self.data.iter().map(|d| (d.u, d.e)).collect();
@@ -166,8 +165,8 @@ impl<'a> IvProblem<'a> {
             z: self.instruments(filter, system),
         };
         let free = self.initial_state_responses(filter);
-        // 1/(C F) starts at rest at the first row, the true filter does not: the difference is a free response, which
-        // is projected out of all columns. The estimate then does not depend on the unknown past.
+        // 1/(C F) starts at rest at the first row, whereas the true filter does not. The difference is a free response,
+        // which is projected out of all columns, so that the estimate does not depend on the unknown past.
         let all = equation.phi.iter_mut().chain(&mut equation.z).chain([&mut equation.y]);
         all.for_each(|column| eliminate(&free, column));
         equation
@@ -218,7 +217,7 @@ impl<'a> IvProblem<'a> {
             .collect()
     }
 
-    /// Returns the initial-state responses of 1/(C F) in each record, with its rows.
+    /// Returns the initial-state responses of 1/(C F) for each record, with the number of its rows.
     fn initial_state_responses(&self, filter: Prefilter<'_>) -> Vec<(InitialStateResponses, usize)> {
         let poles = product(&monic(filter.c), &monic(filter.f));
         let past = InitialHistory {
@@ -237,8 +236,8 @@ impl<'a> IvProblem<'a> {
     }
 
     /// Returns the prediction error `eps = (D/C) (u - (B/F) q^-nk e)` of a system with stable F, with 1/(C F) at rest
-    /// at the first row, and its negative gradient psi for F and B, where `filter` is `D/(C F)` with the same F: from
-    /// `F C eps = D (F u - B q^-nk e)`, `psi_fi = -(D/(C F)) u(t-i) + (1/F) eps(t-i)` and
+    /// at the first row, and its negative gradient psi for F and B. `filter` is `D/(C F)` with the same F. From
+    /// `F C eps = D (F u - B q^-nk e)` follow `psi_fi = -(D/(C F)) u(t-i) + (1/F) eps(t-i)` and
     /// `psi_bj = (D/(C F)) e(t-nk-j)`.
     pub fn prediction_error(&self, filter: Prefilter<'_>, system: &[f64]) -> (Vec<f64>, Columns) {
         let measured: Vec<(&[f64], &[f64])> = self.data.iter().map(|d| (d.u, d.e)).collect();
@@ -284,14 +283,14 @@ impl<'a> IvProblem<'a> {
     /// Returns an orthonormal basis of the instruments.
     ///
     /// # Errors
-    /// [`IdentError::SingularInstruments`].
+    /// [`IdentError::SingularInstruments`] if the instruments are linearly dependent.
     pub fn basis(&self, z: &Columns) -> Result<Columns, IdentError> {
         let (q, kept) = orthonormal(z);
         if let Some(lost) = (0..z.len()).find(|i| !kept.contains(i)) {
             let dependence = if dot(&z[lost], &z[lost]) == 0.0 {
-                format!("that of {} is zero", self.names[lost])
+                format!("the instrument of {} is zero", self.names[lost])
             } else {
-                format!("that of {} is a combination of the others", self.names[lost])
+                format!("the instrument of {} is a combination of the other instruments", self.names[lost])
             };
             return Err(IdentError::SingularInstruments { dependence });
         }
@@ -301,10 +300,10 @@ impl<'a> IvProblem<'a> {
     /// Solves `Z' Phi theta = Z' y`.
     ///
     /// # Errors
-    /// [`IdentError::SingularInstruments`].
+    /// [`IdentError::SingularInstruments`] if there is no unique solution.
     pub fn solve(&self, equation: &Equation) -> Result<Vec<f64>, IdentError> {
-        // Z = Q T with T regular, so that Z' Phi theta = Z' y and Q' Phi theta = Q' y have the same solution, but the
-        // condition number of Z does not enter.
+        // Z = Q T with regular T, so that Z' Phi theta = Z' y and Q' Phi theta = Q' y have the same solution. The
+        // second form avoids the condition number of Z.
         let q = self.basis(&equation.z)?;
         let mut product: Vec<f64> = equation
             .phi
@@ -316,7 +315,7 @@ impl<'a> IvProblem<'a> {
         if !solved.has_full_rank() {
             return Err(IdentError::SingularInstruments {
                 dependence: format!(
-                    "they do not distinguish the regressors: {}",
+                    "the instruments do not distinguish the regressors: {}",
                     solved.describe_dependence(&self.names)
                 ),
             });
@@ -329,7 +328,7 @@ impl<'a> IvProblem<'a> {
         }
     }
 
-    /// Returns the system with its poles inside the unit circle, and whether they had to be moved.
+    /// Returns the system with its poles inside the unit circle, and true if poles had to be moved.
     ///
     /// # Errors
     /// [`IdentError::NoFiniteLoss`] if the roots cannot be found.
@@ -342,7 +341,7 @@ impl<'a> IvProblem<'a> {
 }
 
 impl Equation {
-    /// Returns `y - Phi theta`.
+    /// Returns the residual `y - Phi theta`.
     pub fn residual(&self, theta: &[f64]) -> Vec<f64> {
         let mut r = self.y.clone();
         for (column, t) in self.phi.iter().zip(theta) {

@@ -1,4 +1,4 @@
-//! The estimator by instrumental variables: options, and the fit.
+//! The instrumental variable estimator: options, and the fit.
 
 use hoid_model::{Orders, Record, SampleTime};
 
@@ -17,21 +17,21 @@ use crate::{
     linalg::least_squares::dot,
 };
 
-/// Residuals below this share of the output, in amplitude, are rounding.
+/// Residuals with an amplitude below this share of the output are only rounding errors.
 const EXACT: f64 = 1e-11;
 
-/// An estimator by instrumental variables.
+/// Instrumental variable estimator with its options.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InstrumentalVariable {
-    /// The method, which determines the structure.
+    /// Method, which also determines the structure.
     pub method: IvMethod,
-    /// The orders.
+    /// Orders of the model.
     pub orders: Orders,
-    /// The instruments.
+    /// Choice of instruments.
     pub instruments: Instruments,
-    /// Largest number of iterations of the refined methods. Default 100.
+    /// Largest number of iterations of a refined method. Default 100.
     pub max_iterations: usize,
-    /// The refined methods have converged when an iteration moves theta by less than this share of its standard errors.
+    /// A refined method has converged if an iteration changes theta by less than this share of the standard errors.
     /// Default 1e-4.
     pub tolerance: f64,
 }
@@ -48,10 +48,10 @@ impl InstrumentalVariable {
         }
     }
 
-    /// Fits one model to all records: a common theta, and initial states of each record for the residuals.
+    /// Fits one model to all records, with a common theta. For the residuals each record has its own initial states.
     ///
     /// # Errors
-    /// [`IdentError`]; how an iteration ended is part of the fit.
+    /// [`IdentError`] if no model can be fitted. The fit itself reports how its iteration ended.
     pub fn fit(&self, records: &[Record]) -> Result<Fit, IdentError> {
         let structure = self.method.structure();
         self.orders.check(structure)?;
@@ -109,7 +109,7 @@ impl InstrumentalVariable {
             termination.reason = Reason::ExactFit;
         }
         let minimum = Solution {
-            held: vec![false; solution.theta.len()],
+            is_fixed_or_bounded: vec![false; solution.theta.len()],
             theta: solution.theta,
             sum_of_squares,
             termination,
@@ -122,7 +122,7 @@ impl InstrumentalVariable {
         })
     }
 
-    /// Refuses problems with fewer rows of the filtered equation than parameters and initial states of the filter.
+    /// Rejects problems in which the filtered equation has fewer rows than parameters and initial states of the filter.
     fn check_rows(&self, problem: &IvProblem<'_>, records: &[Record]) -> Result<(), IdentError> {
         let o = &self.orders;
         let states = o.nf + o.nc;
@@ -150,13 +150,13 @@ impl InstrumentalVariable {
             })
         };
         if self.max_iterations == 0 {
-            return refuse("the limit of iterations", "0".to_owned(), "1 or more");
+            return refuse("the maximum number of iterations", "0".to_owned(), "1 or more");
         }
         if !(self.tolerance.is_finite() && self.tolerance > 0.0) {
             return refuse(
                 "the tolerance",
                 self.tolerance.to_string(),
-                "a positive share of the standard errors, such as 1e-4",
+                "a positive fraction of the standard errors, such as 1e-4",
             );
         }
         Ok(())

@@ -1,23 +1,23 @@
 //! The part of the input that follows an external signal.
 //!
-//! In a closed loop `e = S f_t + (a response to the noise)`. The response to f_t is estimated as an
-//! expansion in Laguerre filters
+//! In a closed loop `e = S f_t + (a response to the noise)`. The response to f_t is estimated as an expansion in
+//! Laguerre filters,
 //!
 //! `L_0 = sqrt(1 - p^2) / (1 - p q^-1)`,  `L_k = L_{k-1} (q^-1 - p) / (1 - p q^-1)`
 //!
-//! whose weights are computed by least squares (B. Wahlberg, *IEEE Trans. Automatic Control* 36 (1991) 551-562). A few
-//! dozen of them cover the memory of a loop of some seconds, for which a finite impulse response would need hundreds of
-//! lags; the expansion is always stable; and for a sum of sinusoids it is the projection on their lines.
+//! with weights computed by least squares (B. Wahlberg, *IEEE Trans. Automatic Control* 36 (1991) 551-562). A few dozen
+//! filters cover the memory of a loop of several seconds, for which a finite impulse response would need hundreds of
+//! lags. The expansion is always stable, and for a sum of sinusoids it is the projection on their lines.
 //!
-//! The sum depends only on f_t, so that the noise can affect it only through the weights: by the noise of the record at
-//! the lines of f_t, which is a considerable part of it if noise and f_t are both slow. Therefore the record is cut
-//! into blocks, and the instruments of a block are computed with weights from the other blocks (split-sample
-//! instruments, J. D. Angrist and A. B. Krueger, *J. Business Econ. Stat.* 13 (1995) 225-235), whose noise is
-//! independent of that in the block. Poor weights then cost variance, not bias.
+//! The sum depends only on f_t, so that noise can affect it only through the weights: the noise of the record at the
+//! lines of f_t enters them, which is considerable if noise and f_t are both slow. Therefore the record is divided into
+//! blocks, and the instruments of a block are computed with weights from the other blocks, whose noise is independent
+//! of the noise in this block (split-sample instruments, J. D. Angrist and A. B. Krueger, *J. Business Econ. Stat.* 13
+//! (1995) 225-235). Poor weights then increase the variance but cause no bias.
 //!
-//! The construction of instruments from an external signal is that of M. Gilson, H. Garnier, P. C.
-//! Young and P. Van den Hof, *IET Control Theory Appl.* 5 (2011) 1147-1154; they use the known
-//! controller, which is unknown for a human operator.
+//! Instruments from an external signal were proposed by M. Gilson, H. Garnier, P. C. Young and P. Van den Hof, *IET
+//! Control Theory Appl.* 5 (2011) 1147-1154; their construction uses the known controller, which for a human operator
+//! is unknown.
 
 use std::{borrow::Cow, ops::Range};
 
@@ -35,22 +35,23 @@ use super::{
     equation::Source,
 };
 
-/// Time constants of the filters in samples; the one with the smallest residual is used.
+/// Candidate time constants of the filters in samples; the time constant with the smallest residual is used.
 const TIME_CONSTANTS: [f64; 3] = [4.0, 16.0, 64.0];
 /// Number of filters, if the records are long enough.
 const FILTERS: usize = 24;
-/// Least number of samples per filter.
+/// Minimum number of samples per filter.
 const SAMPLES_EACH: usize = 10;
-/// Number of blocks whose input is computed with weights from the others.
+/// Number of blocks; the input in each block is computed with weights from the other blocks.
 const BLOCKS: usize = 4;
-/// Ridge of the weights, against filters whose output is in one block alone. The scale of an instrument does not
-/// matter.
+/// Ridge factor of the weights, needed if the output of a filter is concentrated in one block. The scale of an
+/// instrument does not matter.
 const RIDGE: f64 = 0.02;
 
 /// Returns the external signal of each record.
 ///
 /// # Errors
-/// [`IdentError::NoChannel`], [`IdentError::NoExcitation`].
+/// [`IdentError::NoChannel`] if a record does not have the channel, [`IdentError::NoExcitation`] if it is constant,
+/// [`IdentError::BadOption`] if it is the input or the output.
 pub(super) fn signals<'a>(records: &'a [Record], name: &str) -> Result<Vec<&'a [f64]>, IdentError> {
     let found: Vec<&[f64]> = records
         .iter()
@@ -79,15 +80,15 @@ pub(super) fn signals<'a>(records: &'a [Record], name: &str) -> Result<Vec<&'a [
             return Err(IdentError::BadOption {
                 option: "the channel of the instruments".to_owned(),
                 found: format!("{}, which is in the loop", same.name),
-                expected: "a signal from outside, such as the forcing function".to_owned(),
+                expected: "a signal from outside the loop, such as the forcing function".to_owned(),
             });
         }
     }
     Ok(found)
 }
 
-/// Returns the part of each input that follows the external signals, once for each block of samples with weights from
-/// the others.
+/// Returns the part of each input that follows the external signals, once for each block of samples, with weights
+/// computed from the other blocks.
 pub(super) fn noise_free<'a>(external: &[&[f64]], data: &[Data<'a>]) -> Vec<Source<'a>> {
     let inputs: Vec<&[f64]> = data.iter().map(|d| d.e).collect();
     let lengths: Vec<usize> = inputs.iter().map(|e| e.len()).collect();
@@ -98,8 +99,8 @@ pub(super) fn noise_free<'a>(external: &[&[f64]], data: &[Data<'a>]) -> Vec<Sour
     (0..BLOCKS)
         .map(|k| {
             let block = k * samples / BLOCKS..(k + 1) * samples / BLOCKS;
-            // Weights from the other blocks: the noise of this block is independent of them, so that the instrument is
-            // uncorrelated with it.
+            // The weights come from the other blocks. The noise of this block is independent of them, so that it is not
+            // correlated with the instrument.
             let weights = weights_of_others(&basis, &whole, &target, block.clone()).unwrap_or_else(|| whole.clone());
             let sum = combination(&basis, &weights, samples);
             Source {
@@ -110,15 +111,15 @@ pub(super) fn noise_free<'a>(external: &[&[f64]], data: &[Data<'a>]) -> Vec<Sour
         .collect()
 }
 
-/// Returns least squares weights on the samples outside of a block, shrunk slightly towards zero.
+/// Returns least-squares weights from the samples outside a block, shrunk slightly towards zero.
 fn weights_of_others(basis: &[Vec<f64>], whole: &[f64], target: &[f64], block: Range<usize>) -> Option<Vec<f64>> {
     let p = basis.len();
     let mut gram = vec![0.0; p * p];
     let mut right = whole.to_vec();
     for i in 0..p {
         let inside = &basis[i][block.clone()];
-        // Normal equations of all samples minus those of the block; the basis is orthonormal over all samples, so that
-        // the Gram matrix of all is the identity.
+        // The normal equations are those of all samples minus those of the block. The basis is orthonormal over all
+        // samples, so that its Gram matrix is the identity.
         right[i] -= dot(inside, &target[block.clone()]);
         for j in 0..p {
             let unit = if i == j { 1.0 + RIDGE } else { 0.0 };
@@ -128,7 +129,7 @@ fn weights_of_others(basis: &[Vec<f64>], whole: &[f64], target: &[f64], block: R
     solve_symmetric(&gram, &right)
 }
 
-/// Returns the part of each target that follows its driving signal, through one filter for all records.
+/// Returns the part of each target that follows its driving signal, estimated with one filter for all records.
 pub(super) fn following(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>> {
     let lengths: Vec<usize> = targets.iter().map(|t| t.len()).collect();
     let target = targets.concat();
@@ -145,8 +146,8 @@ fn combination(basis: &[Vec<f64>], weights: &[f64], samples: usize) -> Vec<f64> 
     sum
 }
 
-/// Returns an orthonormal basis of the outputs of the filters, over all records, with the time constant that explains
-/// most of the targets.
+/// Returns an orthonormal basis of the filter outputs over all records, for the time constant that explains most of the
+/// targets.
 fn best_basis(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>> {
     let target = targets.concat();
     let filters = FILTERS.min(target.len() / SAMPLES_EACH).max(1);

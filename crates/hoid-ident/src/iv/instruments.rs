@@ -4,23 +4,23 @@ use std::fmt;
 
 use hoid_model::Record;
 
-/// Channel of the forcing function in a record.
+/// Name of the channel with the forcing function.
 pub const FORCING_CHANNEL: &str = "f_t";
 
 /// The choice of instruments.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Instruments {
-    /// The input itself and the output that the model simulates from it. For an open loop: in a closed loop the input
-    /// contains the noise, and the estimate is biased.
+    /// The measured input, and the output that the model simulates from it. This is valid for an open loop: in a closed
+    /// loop the input contains noise, and the estimate is biased.
     #[default]
     Simulated,
-    /// The part of the input that follows this channel, which is independent of the noise: the forcing function f_t or
-    /// a known disturbance. For a closed loop.
+    /// The part of the input that follows this channel, for a closed loop. The channel is a forcing function f_t or a
+    /// known disturbance, which is independent of the noise.
     External(String),
 }
 
 impl Instruments {
-    /// Parses the text of users: `simulated`, or the name of a channel.
+    /// Parses the value of an option: `simulated`, or the name of a channel.
     pub fn of_text(text: &str) -> Self {
         match text {
             "simulated" => Self::Simulated,
@@ -28,8 +28,8 @@ impl Instruments {
         }
     }
 
-    /// Returns the forcing function f_t if all records have it: in a closed loop it is independent of the noise.
-    /// Otherwise simulated instruments.
+    /// Returns the forcing function f_t if all records have it, since it is independent of the noise in a closed loop;
+    /// otherwise simulated instruments.
     pub fn default_for(records: &[Record]) -> Self {
         if records.iter().all(|r| r.channel(FORCING_CHANNEL).is_some()) {
             Self::External(FORCING_CHANNEL.to_owned())

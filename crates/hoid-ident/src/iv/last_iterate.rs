@@ -1,10 +1,10 @@
-//! The last iterate of instrumental variables.
+//! Final state of an instrumental variable iteration.
 
 use crate::{Termination, linalg::least_squares::dot};
 
 use super::equation::{Equation, Prefilter};
 
-/// Numerator and denominator of the noise model.
+/// Noise model C/D: numerator and denominator.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct NoiseModel {
     pub c: Vec<f64>,
@@ -12,7 +12,7 @@ pub(super) struct NoiseModel {
 }
 
 impl NoiseModel {
-    /// Returns the filter `D/(C F)` with these poles.
+    /// Returns the filter `D/(C F)` for these poles.
     pub fn prefilter<'p>(&'p self, f: &'p [f64]) -> Prefilter<'p> {
         Prefilter {
             d: &self.d,
@@ -22,11 +22,11 @@ impl NoiseModel {
     }
 }
 
-/// The last iterate.
+/// System, noise model and equation of the last iteration.
 pub(super) struct LastIterate {
     pub system: Vec<f64>,
     pub noise: NoiseModel,
-    /// The last filtered equation.
+    /// Filtered equation of the last iteration.
     pub equation: Equation,
     pub termination: Termination,
 }

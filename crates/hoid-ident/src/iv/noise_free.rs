@@ -1,4 +1,4 @@
-//! Noise-free signals of a closed loop for other estimators.
+//! Noise-free signals of a closed loop, for use by other estimators.
 
 use std::ops::Range;
 
@@ -8,20 +8,20 @@ use hoid_model::{Orders, Record};
 use super::{columns::with_past, external_signal};
 use crate::{IdentError, criterion::Data};
 
-/// The part of e that follows an excitation, for a range of samples.
+/// The part of e that follows an excitation, and the samples for which it is valid.
 pub(crate) struct NoiseFreeInput {
-    /// The whole part in each record.
+    /// The part of e in each whole record.
     pub inputs: Vec<Vec<f64>>,
-    /// Samples whose noise does not affect it, counted through all records.
+    /// Samples whose noise does not affect this input, counted through all records.
     pub samples: Range<usize>,
 }
 
-/// Returns the parts of e that follow this channel, computed with weights of other samples
-/// ([`super::external_signal`]).
+/// Returns the parts of e that follow this channel, one for each block of samples, with weights computed from the other
+/// samples ([`super::external_signal`]).
 ///
 /// # Errors
-/// [`IdentError::NoChannel`], [`IdentError::NoExcitation`], and [`IdentError::BadOption`] for a
-/// signal of the loop.
+/// [`IdentError::NoChannel`] if a record does not have the channel, [`IdentError::NoExcitation`] if the channel is
+/// constant, and [`IdentError::BadOption`] if it is a signal of the loop.
 pub(crate) fn noise_free_inputs(records: &[Record], channel: &str) -> Result<Vec<NoiseFreeInput>, IdentError> {
     let data = Data::of(records);
     let made = external_signal::noise_free(&external_signal::signals(records, channel)?, &data);
@@ -32,7 +32,7 @@ pub(crate) fn noise_free_inputs(records: &[Record], channel: &str) -> Result<Vec
     Ok(made.into_iter().map(of).collect())
 }
 
-/// Returns `(B/F) q^-nk e` after an artificial past, with theta of a Box-Jenkins model.
+/// Returns `(B/F) q^-nk e`, simulated with an artificial past, for theta of a Box-Jenkins model.
 pub(crate) fn simulated_output(orders: &Orders, theta: &[f64], e: &[f64]) -> Vec<f64> {
     let b = &theta[..orders.nb];
     let f = &theta[theta.len() - orders.nf..];

@@ -1,31 +1,31 @@
-//! Nonlinear form of the equation, in which F has its own poles, for cases in which the iteration of the refined
-//! methods does not converge.
+//! Nonlinear form of the equation, in which F has its own poles. It is used if the iteration of the refined methods
+//! does not converge.
 //!
-//! The iteration solves `Z' L (F u - B q^-nk e) = 0` for F and B with 1/F of the previous iteration in L. If F has a
-//! pole so slow that the record hardly distinguishes it from one on the unit circle, such as the lag of an operator, or
-//! if the model is too small, that equation is solved by a pole outside the circle; reflected inside, it leads to the
+//! The iteration solves `Z' L (F u - B q^-nk e) = 0` for F and B, with 1/F of the previous iteration in L. If F has a
+//! pole so slow that the record hardly distinguishes it from a pole on the unit circle, such as the lag of an operator,
+//! or if the model is too small, a pole outside the circle may solve this equation; reflected inside, it leads to the
 //! same result again. The alternative is a zero of
 //!
 //! `g(theta) = Z' eps(theta)`,  `eps = (D/C) (u - (B/F) q^-nk e)`,
 //!
-//! which is the same at a fixed point, but has a stable F. Therefore, with Z, C and D of a system fixed,
-//! `|Q' eps(theta)|^2`, Q an orthonormal basis of Z, is minimised over B and stable F (damped Gauss-Newton, along the
-//! border of stability if necessary: [`crate::optimize`]). Then Z, C and D are computed again, until theta no longer
-//! changes ([`Extrapolation`] helps if the convergence is slow or oscillates). If g has no zero in the region of
-//! stability, the smallest value is on its border, and the termination reports it.
+//! which is the same at a fixed point but has a stable F. With Z, C and D of a system fixed, and Q an orthonormal basis
+//! of Z, `|Q' eps(theta)|^2` is therefore minimised over B and stable F (damped Gauss-Newton, along the border of
+//! stability if necessary: [`crate::optimize`]). Then Z, C and D are computed again, until theta no longer changes;
+//! [`Extrapolation`] helps if the convergence is slow or oscillates. If g has no zero in the region of stability, its
+//! smallest norm is on the border of this region, and the termination reports this.
 //!
-//! **Without convergence.** For a model that is smaller than the operator, eps is correlated with some of the
-//! instruments that other systems give, and theta may follow its own instruments without ever reaching them.
-//! Instruments need not come from the estimate itself: any auxiliary model gives a consistent estimate. So the estimate
-//! is then the zero of `Z' eps(theta)` for the Z, C and D whose zero is closest to the system from which they were
-//! computed, and it counts as converged if these two differ by less than half a standard error.
+//! **Without convergence.** If the model is smaller than the operator, eps is correlated with some of the instruments
+//! that other systems give, and each theta may lead to instruments that give another theta. Instruments need not come
+//! from the estimate itself: any auxiliary model gives a consistent estimate. In this case the estimate is the zero of
+//! `Z' eps(theta)` for the Z, C and D whose zero is closest to the system from which they were computed. It counts as
+//! converged if the zero differs from this system by less than half a standard error.
 //!
-//! psi is the exact derivative with 1/(C F) at rest at the first row; the unknown state there is orthogonal to Z, from
-//! which its responses are projected out.
+//! psi is the exact derivative with 1/(C F) at rest at the first row. The unknown state there has no effect, since its
+//! responses are projected out of Z.
 //!
-//! This is the nonlinear form of the optimal instrumental variable estimate (T. Söderström and P.
-//! Stoica, *Instrumental Variable Methods for System Identification*, 1983, ch. 6; P. C. Young,
-//! *Automatica* 52 (2015) 35-46, on the stationary point of the refined iteration).
+//! This is the nonlinear form of the optimal instrumental variable estimate (T. Söderström and P. Stoica, *Instrumental
+//! Variable Methods for System Identification*, 1983, ch. 6; see P. C. Young, *Automatica* 52 (2015) 35-46, on the
+//! stationary point of the refined iteration).
 
 use std::ops::Range;
 
@@ -44,29 +44,30 @@ use crate::{
     optimize::{Linearisation, Objective, minimise},
 };
 
-/// Limits of the search with given instruments.
+/// Largest number of search steps with given instruments.
 const SEARCH_STEPS: usize = 30;
-/// Number of iterations that the extrapolation uses, and the ridge of their combination.
-const REMEMBERED: usize = 5;
+/// Number of iterations used by the extrapolation, and the ridge factor of their combination.
+const EXTRAPOLATED_ITERATES: usize = 5;
 const RIDGE: f64 = 1e-10;
-/// The search with given instruments ends at this part of the tolerance.
-const INNER: f64 = 1e-2;
-/// Radius from which on a pole counts as being on the unit circle.
+/// The search with given instruments ends at this fraction of the tolerance.
+const INNER_TOLERANCE_FACTOR: f64 = 1e-2;
+/// A pole with at least this radius counts as being on the unit circle.
 const ON_CIRCLE: f64 = 1.0 - 1e-7;
-/// A step of this many standard errors, over all parameters, carries no information about the operator.
-const IMMATERIAL: f64 = 0.5;
-/// Number of successive steps without this reduction after which the iteration counts as divergent.
-const PATIENCE: usize = 12;
+/// Largest negligible step in standard errors, over all parameters together.
+const NEGLIGIBLE_STEP: f64 = 0.5;
+/// The iteration counts as divergent after this number of successive steps without a reduction of the step length by
+/// the factor `GAIN`.
+const MAX_STEPS_WITHOUT_GAIN: usize = 12;
 const GAIN: f64 = 0.9;
-/// Ratio to the shortest step above which a step results from an excessive extrapolation.
-const ASTRAY: f64 = 10.0;
+/// A step longer than this multiple of the shortest step is attributed to an excessive extrapolation.
+const DIVERGED: f64 = 10.0;
 
-/// `|Q' eps(theta)|^2` for given instruments and noise model.
+/// The objective `|Q' eps(theta)|^2` for given instruments and a given noise model.
 struct GivenInstruments<'p, 'a> {
     problem: &'p IvProblem<'a>,
     noise: &'p NoiseModel,
     q: Columns,
-    /// Sum of squares of the output: values below 1e-26 of it count as zero.
+    /// Reference power, chosen such that 1e-26 of it is the largest value that counts as zero.
     power: f64,
 }
 
@@ -102,11 +103,12 @@ impl Objective for GivenInstruments<'_, '_> {
     }
 }
 
-/// Iterates from a system with stable F; `noise_of` returns the noise model for a system.
+/// Iterates, starting from a system with stable F; `noise_of` returns the noise model of a system.
 ///
 /// # Errors
-/// [`IdentError::SingularInstruments`], [`IdentError::NoFiniteLoss`].
-pub(super) fn solve_for_own_poles(
+/// [`IdentError::SingularInstruments`] if the instruments are linearly dependent, [`IdentError::NoFiniteLoss`] if the
+/// search fails.
+pub(super) fn solve_nonlinear_form(
     limits: IterationLimits,
     problem: &IvProblem<'_>,
     start: &[f64],
@@ -129,7 +131,7 @@ pub(super) fn solve_for_own_poles(
             problem,
             noise: &noise,
             q: problem.basis(&equation.z)?,
-            power: 1e26 * (INNER * limits.tolerance).powi(2) * variance,
+            power: 1e26 * (INNER_TOLERANCE_FACTOR * limits.tolerance).powi(2) * variance,
         };
         let end = minimise(&objective, system.clone(), &options, None, &mut Workspace::default())
             .ok_or(IdentError::NoFiniteLoss)?;
@@ -156,15 +158,15 @@ pub(super) fn solve_for_own_poles(
             };
             nearest = Some((moved, there));
         }
-        let ended = moved <= limits.tolerance || iterations >= limits.max_iterations || without_gain >= PATIENCE;
+        let ended = moved <= limits.tolerance || iterations >= limits.max_iterations || without_gain >= MAX_STEPS_WITHOUT_GAIN;
         if let (true, Some((_, mut last))) = (ended, nearest.take_if(|_| ended)) {
             last.noise = noise_of(&last.system);
             last.termination.iterations = iterations;
             return Ok(last);
         }
         system = match &nearest {
-            // The extrapolation has diverged.
-            Some((least, near)) if moved > ASTRAY * least => {
+            // The extrapolation has diverged: return to the best system.
+            Some((least, near)) if moved > DIVERGED * least => {
                 extrapolation = Extrapolation::default();
                 near.system.clone()
             }
@@ -174,9 +176,9 @@ pub(super) fn solve_for_own_poles(
     }
 }
 
-/// Returns the reason for the end of an iteration whose next step has this length in standard errors.
+/// Returns the reason for ending an iteration whose next step has the length `moved` in standard errors.
 fn reason(moved: f64, tolerance: f64, f: &[f64]) -> Reason {
-    if moved > IMMATERIAL {
+    if moved > NEGLIGIBLE_STEP {
         Reason::IterationLimit
     } else if !roots_inside(f, ON_CIRCLE) {
         Reason::Border
@@ -187,12 +189,12 @@ fn reason(moved: f64, tolerance: f64, f: &[f64]) -> Reason {
     }
 }
 
-/// Next point of a fixed-point iteration from the last few, by the combination of their steps with the smallest norm
-/// (D. G. Anderson, *J. ACM* 12 (1965) 547-560): the iteration may converge slowly or oscillate if the model is too
-/// small for instruments without noise.
+/// Extrapolation of a fixed-point iteration from the last few points, by the combination of their steps with the
+/// smallest norm (D. G. Anderson, *J. ACM* 12 (1965) 547-560). Without it the iteration may converge slowly or
+/// oscillate if the model is too small and the instruments are noise-free.
 #[derive(Default)]
 struct Extrapolation {
-    /// Point and step of the last iteration, and the differences of both between iterations.
+    /// Point and step of the last iteration, followed by the differences of points and steps between iterations.
     last: Option<(Vec<f64>, Vec<f64>)>,
     differences: Vec<(Vec<f64>, Vec<f64>)>,
 }
@@ -203,7 +205,7 @@ impl Extrapolation {
         if let Some((point_before, step_before)) = self.last.take() {
             self.differences
                 .push((minus(point, &point_before), minus(&step, &step_before)));
-            if self.differences.len() > REMEMBERED.min(p) {
+            if self.differences.len() > EXTRAPOLATED_ITERATES.min(p) {
                 self.differences.remove(0);
             }
         }

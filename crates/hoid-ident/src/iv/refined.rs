@@ -1,14 +1,13 @@
 //! The common iteration of the refined methods.
 //!
-//! Given a system, its noise-free output is simulated, the filter `D/(C F)` is built, and the
-//! filtered equation gives the next system, until an iteration moves it by less than the tolerance:
-//! with `delta` the step and sigma the standard deviation of the filtered residual,
-//! `|Z delta| <= tolerance sigma`, which is a distance in standard errors.
+//! Given a system, its noise-free output is simulated, the filter `D/(C F)` is computed, and the filtered equation
+//! gives the next system. The iteration ends when a step delta is smaller than the tolerance in standard errors:
+//! `|Z delta| <= tolerance sigma`, where sigma is the standard deviation of the filtered residual.
 //!
-//! **Start.** Input and output are replaced by the parts of them that follow the noise-free input (Laguerre expansion),
-//! and a few iterations of K. Steiglitz and L. E. McBride (*IEEE Trans. Automatic Control* 10 (1965) 461-464) on these
-//! signals give a system close to the true one, in open and in closed loop. If this fails, least squares on the data
-//! themselves is used.
+//! **Start.** Input and output are replaced by their parts that follow the noise-free input (Laguerre expansion). A few
+//! iterations of K. Steiglitz and L. E. McBride (*IEEE Trans. Automatic Control* 10 (1965) 461-464) on these signals
+//! give a system close to the true system, in open and in closed loop. If this fails, least squares on the original
+//! data is used.
 
 use crate::{
     IdentError, Reason, Termination,
@@ -21,31 +20,33 @@ use super::{
     equation::{IvProblem, Prefilter},
     external_signal::following,
     last_iterate::{LastIterate, NoiseModel},
-    own_poles::solve_for_own_poles,
+    own_poles::solve_nonlinear_form,
 };
 
-/// Number of iterations of the start.
+/// Number of iterations for the start.
 const START_ROUNDS: usize = 5;
-/// Number of iterations after which only half of each step is taken, against oscillations.
+/// Number of iterations after which only half of each step is taken, to damp oscillations.
 const FULL_STEPS: usize = 20;
-/// Ratio of the residual of a zero to the smallest one above which it is not the zero of the operator.
+/// A zero of the equation does not belong to the operator if its residual variance exceeds the smallest residual
+/// variance by this factor.
 const FAR: f64 = 1.15;
-/// Steps below this share of the output are rounding.
+/// Steps smaller than this share of the output are only rounding errors.
 const ROUNDING: f64 = 1e-12;
 
-/// Iterates, and continues in the nonlinear form if this does not converge ([`super::own_poles`]); `noise_of` returns
-/// the noise model for a system.
+/// Iterates and, if this does not converge, continues in the nonlinear form ([`super::own_poles`]); `noise_of` returns
+/// the noise model of a system.
 pub(super) fn settle(
     limits: IterationLimits,
     problem: &IvProblem<'_>,
     mut noise_of: impl FnMut(&[f64]) -> NoiseModel,
 ) -> Result<LastIterate, IdentError> {
-    let mut whitest = Whitest::default();
+    let mut whitest = SmallestResidual::default();
     let plain = iterate(limits, problem, &mut noise_of, &mut whitest)?;
     if plain.termination.converged() || limits.max_iterations <= FULL_STEPS {
         return Ok(plain);
     }
-    // From the last iterate; if that leads far away, from its best system and from its start.
+    // The nonlinear form starts from the last iterate and, if this leads far away, from the best system of the
+    // iteration and from its start.
     let mut spent = plain.termination.iterations;
     let starts = [
         plain.system.clone(),
@@ -54,10 +55,11 @@ pub(super) fn settle(
     ];
     let (mut best, mut rank) = (plain, (f64::INFINITY, f64::INFINITY));
     for from in starts.iter().filter(|from| !from.is_empty()) {
-        let found = solve_for_own_poles(limits, problem, from, &mut noise_of)?;
+        let found = solve_nonlinear_form(limits, problem, from, &mut noise_of)?;
         spent += found.termination.iterations;
         let variance = found.variance();
-        // The estimating equation has several zeros; that of the operator has about the smallest residual found.
+        // The estimating equation has several zeros; the zero that belongs to the operator has about the smallest
+        // residual.
         let far = variance > FAR * whitest.variance;
         let class = match found.termination.reason {
             Reason::Settled | Reason::InstrumentsHeld if !far => 0.0,
@@ -72,20 +74,20 @@ pub(super) fn settle(
         }
     }
     if rank.0 == 2.0 {
-        // Another zero of the equation, which does not fit the data.
+        // This is another zero of the equation, which does not fit the data.
         best.termination.reason = Reason::IterationLimit;
     }
     best.termination.iterations = spent;
     Ok(best)
 }
 
-/// The system with the smallest filtered residual of an iteration.
-struct Whitest {
+/// The system with the smallest filtered residual during an iteration.
+struct SmallestResidual {
     variance: f64,
     system: Option<Vec<f64>>,
 }
 
-impl Default for Whitest {
+impl Default for SmallestResidual {
     fn default() -> Self {
         Self {
             variance: f64::INFINITY,
@@ -94,12 +96,12 @@ impl Default for Whitest {
     }
 }
 
-/// The iteration only; `noise_of` returns the noise model for a system.
+/// Iterates without the nonlinear form; `noise_of` returns the noise model of a system.
 fn iterate(
     limits: IterationLimits,
     problem: &IvProblem<'_>,
     mut noise_of: impl FnMut(&[f64]) -> NoiseModel,
-    whitest: &mut Whitest,
+    whitest: &mut SmallestResidual,
 ) -> Result<LastIterate, IdentError> {
     let (mut system, _) = problem.stabilised(&start(problem)?)?;
     let mut iterations = 0;
@@ -108,7 +110,7 @@ fn iterate(
         let equation = problem.equation(noise.prefilter(&system[..problem.poles]), &system);
         let next = problem.solve(&equation)?;
         iterations += 1;
-        // |Z delta|/sigma: a distance in standard errors, since the covariance is about sigma^2 (Z'Z)^-1.
+        // |Z delta|/sigma is the length in standard errors, since the covariance is about sigma^2 (Z'Z)^-1.
         let mut step = vec![0.0; equation.y.len()];
         for (column, (a, b)) in equation.z.iter().zip(next.iter().zip(&system)) {
             add_scaled(&mut step, a - b, column);
@@ -121,12 +123,12 @@ fn iterate(
         let own = equation.residual(&system);
         let of_system = dot(&own, &own) / own.len() as f64;
         if of_system < whitest.variance {
-            *whitest = Whitest {
+            *whitest = SmallestResidual {
                 variance: of_system,
                 system: Some(system.clone()),
             };
         }
-        // The next iteration simulates with F and filters with 1/F: both need stable poles.
+        // The next iteration simulates with F and filters with 1/F, which requires stable poles.
         let (next, reflected) = problem.stabilised(&next)?;
         let reason = match (settled || iterations >= limits.max_iterations, reflected, settled) {
             (true, true, _) => Some(Reason::UnstableEstimate),
@@ -142,7 +144,8 @@ fn iterate(
                 termination: Termination { reason, iterations },
             });
         }
-        // A fixed point iteration can alternate between two systems; half steps damp that and keep the fixed point.
+        // A fixed-point iteration can alternate between two systems; half steps damp this and do not change the fixed
+        // point.
         let share = if iterations > FULL_STEPS { 0.5 } else { 1.0 };
         for (s, n) in system.iter_mut().zip(&next) {
             *s += share * (n - *s);
@@ -166,8 +169,8 @@ fn of_noise_free_parts(problem: &IvProblem<'_>) -> Result<Vec<f64>, IdentError> 
     let delayed: Vec<Vec<f64>> = source.inputs.iter().map(|x| late(x)).collect();
     let driving: Vec<&[f64]> = delayed.iter().map(Vec::as_slice).collect();
     let outputs: Vec<&[f64]> = problem.data.iter().map(|d| d.u).collect();
-    // In a closed loop e contains noise. The projections on the noise-free input do not, so that least squares on them
-    // is consistent up to the error of the projection.
+    // In a closed loop e contains noise. The projections on the noise-free input do not contain it, so that least
+    // squares on them is consistent, apart from the error of the projection.
     let clean = following(&driving, &outputs);
     let data = clean.iter().zip(&source.inputs).map(|(u, e)| Data::new(e, u)).collect();
     let parts = problem.of(data, Vec::new());
@@ -178,18 +181,18 @@ fn of_noise_free_parts(problem: &IvProblem<'_>) -> Result<Vec<f64>, IdentError> 
             f: &system[..parts.poles],
             ..Prefilter::default()
         };
-        // Steiglitz and McBride: filtered with 1/F of the iteration before, the equation error becomes the output
+        // Steiglitz and McBride: filtering with 1/F of the previous iteration turns the equation error into the output
         // error.
         system = parts.least_squares(filter)?;
     }
     Ok(system)
 }
 
-/// The iteration only, for a start.
+/// Iterates without the nonlinear form, for use as a start.
 pub(super) fn plain_iteration(
     limits: IterationLimits,
     problem: &IvProblem<'_>,
     noise_of: impl FnMut(&[f64]) -> NoiseModel,
 ) -> Result<LastIterate, IdentError> {
-    iterate(limits, problem, noise_of, &mut Whitest::default())
+    iterate(limits, problem, noise_of, &mut SmallestResidual::default())
 }

@@ -1,9 +1,9 @@
-//! A system by refined instrumental variables, as a start of the prediction error method.
+//! A system from refined instrumental variables, as a start for the prediction error method.
 //!
-//! The iteration of RIV-BJ ([`super::refined`]) with instruments from the measured input and an autoregression as noise
-//! model: it contains no search. It need not converge; a start only has to be near. It is consistent in an open loop
-//! for any noise, and in a closed loop biased as far as the input follows the noise, like every start from the input
-//! alone.
+//! This is the iteration of RIV-BJ ([`super::refined`]) with instruments from the measured input and an autoregressive
+//! noise model, so that it contains no search. It need not converge, because a start only has to be near the minimum.
+//! In an open loop it is consistent for any noise. In a closed loop it is biased to the extent that the input follows
+//! the noise, like every start based on the input alone.
 
 use super::{
     algorithm::IterationLimits,
@@ -14,14 +14,14 @@ use super::{
 };
 use crate::{criterion::Criterion, noise_model::noise_model};
 
-/// A start need not be nearer than this share of its standard errors.
+/// Limits of the iteration; the tolerance is large, because a start need not be accurate.
 const LIMITS: IterationLimits = IterationLimits {
     max_iterations: 30,
     tolerance: 1e-2,
 };
 
-/// Returns `[f_1 .., b_0 ..]` with an autoregression of order `nd` for the noise; `None` if the model has A, without an
-/// input, and if the data are not sufficient.
+/// Returns `[f_1 .., b_0 ..]`, estimated with an autoregressive noise model of order `nd`. `None` if the model has A or
+/// no input, or if the data are not sufficient.
 pub(crate) fn refined_system(criterion: &Criterion<'_>, nd: usize) -> Option<Vec<f64>> {
     let o = criterion.orders;
     if o.na > 0 || o.nb == 0 || o.nf == 0 {

@@ -1,4 +1,4 @@
-//! The output that a system does not explain: the disturbance, from which the noise model is estimated.
+//! The part of the output that a system does not explain. This disturbance is used to estimate the noise model.
 
 use hoid_model::Orders;
 

@@ -1,8 +1,8 @@
-//! Normal equations of few columns, summed row by row.
+//! Normal equations for a small number of columns, summed row by row.
 
 use std::ops::Range;
 
-/// Sum `sum x x'` over rows x; its lower triangle is stored.
+/// The sum `sum x x'` over rows x; only its lower triangle is stored.
 pub(crate) struct Gram {
     size: usize,
     sums: Vec<f64>,
@@ -17,7 +17,7 @@ impl Gram {
         }
     }
 
-    /// Adds a row by its elements.
+    /// Adds a row, given by a function that returns its elements.
     pub fn add(&mut self, row: impl Fn(usize) -> f64) {
         for (i, sums) in self.sums.chunks_exact_mut(self.size).enumerate() {
             let x = row(i);
@@ -32,7 +32,7 @@ impl Gram {
         self.sums[i.max(j) * self.size + i.min(j)]
     }
 
-    /// Returns the matrix of some columns by rows, and their products with another column.
+    /// Returns the matrix of some columns by rows, and the products of these columns with another column.
     pub fn system(&self, columns: Range<usize>, with: usize) -> (Vec<f64>, Vec<f64>) {
         let pairs = columns.clone().flat_map(|i| columns.clone().map(move |j| (i, j)));
         let matrix = pairs.map(|(i, j)| self.at(i, j)).collect();

@@ -1,21 +1,21 @@
-//! The inverse of an information matrix, and the parameters that it does not determine.
+//! The inverse of an information matrix, and the detection of parameters that it does not determine.
 //!
-//! `psi' psi` is scaled to a unit diagonal, so that units do not matter, and inverted by its
-//! eigenvalues: an eigenvalue that is zero up to rounding indicates a combination of parameters that the data do not
-//! determine, and its eigenvector identifies them.
+//! `psi' psi` is scaled to a unit diagonal, so that units have no effect, and inverted by means of its eigenvalues. An
+//! eigenvalue that is zero except for rounding belongs to a combination of parameters that the data do not determine,
+//! and its eigenvector identifies these parameters.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
 use crate::IdentError;
 
-/// Eigenvalue of the information matrix (scaled to a unit diagonal) below which a combination of parameters counts as
-/// undetermined by the data. Rounding leaves about 1e-15 times the number of parameters.
+/// A combination of parameters counts as undetermined by the data if its eigenvalue of the information matrix (scaled
+/// to a unit diagonal) is below this limit. Rounding leaves about 1e-15 times the number of parameters.
 const SINGULAR: f64 = 1e-13;
 
-/// Returns the inverse of the information matrix (by rows) of the named parameters.
+/// Returns the inverse of the information matrix by rows; `names` are the names of the parameters.
 ///
 /// # Errors
-/// [`IdentError::SingularInformation`] with the parameters that are not determined.
+/// [`IdentError::SingularInformation`] with the names of the parameters that are not determined.
 pub(crate) fn inverse_information(gram: &[f64], names: &[String]) -> Result<Vec<f64>, IdentError> {
     let p = names.len();
     let zero: Vec<&str> = (0..p)
@@ -53,7 +53,7 @@ pub(crate) fn inverse_information(gram: &[f64], names: &[String]) -> Result<Vec<
     Ok(inverse)
 }
 
-/// Returns the inverse for the free parameters only; rows and columns of the others are zero, as those parameters have
+/// Returns the inverse for the free parameters; the rows and columns of all other parameters are zero, since these have
 /// no variance.
 ///
 /// # Errors

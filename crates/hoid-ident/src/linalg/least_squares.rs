@@ -1,33 +1,34 @@
 //! Linear least squares by Householder QR with column pivoting.
 //!
-//! `min |y - X theta|^2` for a tall X stored by columns. Columns are scaled to unit length first,
-//! so that the decision about the rank does not depend on units; at each step the column with the largest remainder is
-//! chosen. The rank is the number of diagonal elements of R above `tolerance |R_11|`. Source: P. Businger and G. H.
-//! Golub, *Numer. Math.* 7 (1965) 269-276.
+//! Solves `min |y - X theta|^2` for a tall X stored by columns. Columns are first scaled to unit length, so that the
+//! rank does not depend on units. At each step the column with the largest remainder is chosen. The rank is the number
+//! of diagonal elements of R above `tolerance |R_11|`. Source: P. Businger and G. H. Golub, *Numer. Math.* 7 (1965)
+//! 269-276.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Relative size of a diagonal element of R below which a column counts as dependent on previous ones. Rounding alone
-/// leaves about 1e-15; regressors that determine their coefficients to a few digits are above 1e-10.
+/// A column counts as linearly dependent on previous columns if its diagonal element of R has less than this relative
+/// size. Rounding alone leaves about 1e-15; regressors that determine their coefficients to a few digits are above
+/// 1e-10.
 pub(crate) const RANK_TOLERANCE: f64 = 1e-12;
 
-/// `X P = Q R` and `Q' y`, which contain all necessary information of the data.
+/// The factors of `X P = Q R` and `Q' y`, which contain all necessary information about the data.
 #[derive(Debug)]
 pub(crate) struct LeastSquares {
-    /// Upper triangle by columns, in pivoted order, of the scaled columns.
+    /// Upper triangle by columns of the scaled columns, in pivoted order.
     r: Vec<f64>,
     qty: Vec<f64>,
     pivots: Vec<usize>,
     scales: Vec<f64>,
     /// Number of independent columns.
     pub rank: usize,
-    /// Sum of squares of the residuals of the best fit with full rank.
+    /// Residual sum of squares of the least-squares fit, for full rank.
     pub residual_sum_of_squares: f64,
 }
 
 impl LeastSquares {
-    /// Factors the columns (each `rows` long, one after the other) together with the right-hand side. Both are
-    /// overwritten.
+    /// Factors the columns (each `rows` long, one after the other) together with the right-hand side. Columns and
+    /// right-hand side are overwritten.
     pub fn factor(columns: &mut [f64], y: &mut [f64]) -> Self {
         let rows = y.len();
         let p = columns.len().checked_div(rows).unwrap_or(0);
@@ -44,8 +45,8 @@ impl LeastSquares {
         let mut rank = 0;
         let steps = p.min(rows);
         for k in 0..steps {
-            // Residual norm of each column computed again: downdating the norms loses digits exactly where the rank is
-            // decided.
+            // The residual norms of the columns are computed again at each step, because downdating loses digits
+            // exactly where the rank is decided.
             let rest = |j: usize, columns: &[f64]| {
                 let tail = &columns[j * rows + k..(j + 1) * rows];
                 dot(tail, tail)
@@ -106,12 +107,12 @@ impl LeastSquares {
         self.pivots.len()
     }
 
-    /// True if every column is independent of the others.
+    /// True if all columns are linearly independent.
     pub fn has_full_rank(&self) -> bool {
         self.rank == self.columns()
     }
 
-    /// Returns the least-squares solution; call only with full rank.
+    /// Returns the least-squares solution; to be called only if the rank is full.
     pub fn solution(&self) -> Vec<f64> {
         let p = self.columns();
         let scaled = self.back_substitute(&self.qty[..p]);
@@ -122,10 +123,10 @@ impl LeastSquares {
         theta
     }
 
-    /// Returns `(X' X)^-1` by rows; call only with full rank.
+    /// Returns `(X' X)^-1` by rows; to be called only if the rank is full.
     pub fn inverse_gram(&self) -> Vec<f64> {
         let p = self.columns();
-        // Columns of R^-1, then R^-1 R^-T.
+        // First the columns of R^-1, then R^-1 R^-T.
         let inverse: Vec<Vec<f64>> = (0..p)
             .map(|i| {
                 let mut unit = vec![0.0; p];
@@ -155,7 +156,7 @@ impl LeastSquares {
         x
     }
 
-    /// Describes which columns depend on which, by name.
+    /// Describes by name which columns are linearly dependent on which others.
     pub fn describe_dependence(&self, names: &[String]) -> String {
         let p = self.columns();
         let sentences: Vec<String> = (self.rank..p)
@@ -164,7 +165,7 @@ impl LeastSquares {
                 if self.scales[self.pivots[k]] == 0.0 {
                     return format!("the column of {name} is zero");
                 }
-                // Solve R11 x = r12: how the dependent column is made of the others.
+                // Solves R11 x = r12 for the combination of columns that gives the dependent column.
                 let mut x: Vec<f64> = (0..self.rank).map(|i| self.r[k * p + i]).collect();
                 for i in (0..self.rank).rev() {
                     for j in i + 1..self.rank {
@@ -184,8 +185,8 @@ impl LeastSquares {
     }
 }
 
-/// Solves the positive definite system `gram x = rhs` (gram by rows) by Cholesky, scaled to a unit diagonal. `None` if
-/// it is not positive definite.
+/// Solves the positive definite system `gram x = rhs` (gram by rows) by a Cholesky factorisation, after scaling to a
+/// unit diagonal. `None` if the matrix is not positive definite.
 pub(crate) fn solve_symmetric(gram: &[f64], rhs: &[f64]) -> Option<Vec<f64>> {
     let p = rhs.len();
     let scale: Vec<f64> = (0..p).map(|i| gram[i * p + i].sqrt()).collect();
@@ -197,14 +198,15 @@ pub(crate) fn solve_symmetric(gram: &[f64], rhs: &[f64]) -> Option<Vec<f64>> {
     Some(y.iter().zip(&scale).map(|(v, s)| v / s).collect())
 }
 
-/// `y += k x`.
+/// Computes `y += k x`.
 pub(crate) fn add_scaled(y: &mut [f64], k: f64, x: &[f64]) {
     for (yi, xi) in y.iter_mut().zip(x) {
         *yi += k * xi;
     }
 }
 
-/// Sum of products, in eight fixed partial sums: fast, and bitwise identical on every machine.
+/// Returns the dot product, computed with eight partial sums in a fixed order: fast, and bitwise identical on every
+/// machine.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));

@@ -1,11 +1,11 @@
-//! Linear algebra of the estimators.
+//! Linear algebra for the estimators.
 //!
 //! | module | contents |
 //! |---|---|
 //! | `products` | sums of products of long signals |
 //! | `least_squares` | linear regression by QR with column pivoting |
-//! | `gram` | normal equations of few columns, row by row |
-//! | `information` | the inverse of the information matrix of the free parameters |
+//! | `gram` | normal equations for a small number of columns, row by row |
+//! | `information` | inverse of the information matrix of the free parameters |
 
 pub(crate) mod gram;
 pub(crate) mod information;

@@ -1,12 +1,13 @@
-//! Sums of products of many columns, in one pass over each.
+//! Sums of products of many columns, with one pass over each column.
 //!
-//! A normal matrix needs the product of each pair of its columns. One column with four others at a time reads five
-//! numbers for four products, while single products read eight; and a column that is the previous one delayed by one
-//! sample needs no pass: `sum x(t-1) y(t-1)` over a span is `sum x(t) y(t)` except for the samples at both ends.
+//! A normal matrix contains the product of each pair of columns. Multiplying one column by four others at a time reads
+//! five numbers for four products, whereas single products read eight. A column that is the previous column delayed by
+//! one sample needs no pass: `sum x(t-1) y(t-1)` over a span equals `sum x(t) y(t)` except for the samples at both
+//! ends.
 //!
-//! Each product has partial sums of a fixed number and order, in registers that are chosen at run time
-//! ([`hoid_lanes::with_four_lanes`]): the result is bitwise independent of the registers, of other sums computed
-//! together with it, and of the stretches in which the record is read.
+//! Each product is accumulated in a fixed number of partial sums in a fixed order, in registers that are chosen at run
+//! time ([`hoid_lanes::with_four_lanes`]). The result is bitwise independent of the type of registers, of other sums
+//! computed at the same time, and of the stretches in which the record is read.
 
 use std::ops::Range;
 
@@ -14,23 +15,23 @@ use hoid_lanes::{FourLaneTask, FourLanes, with_four_lanes};
 
 use crate::linalg::least_squares::add_scaled;
 
-/// Number of samples that are read at a time, so that those of all columns remain in the first-level cache. A multiple
-/// of eight, the largest number of partial sums of a product. For residuals the last digits depend on it, since their
-/// sums are completed after each stretch.
+/// Number of samples that are read at a time, such that the samples of all columns remain in the first-level cache. It
+/// is a multiple of eight, the largest number of partial sums of a product. The last digits of sums over residuals
+/// depend on it, since these sums are completed after each stretch.
 const STRETCH: usize = 512;
 
-/// Products of one column with four, two or one other.
+/// Products of one column with four, two or one other columns.
 #[derive(Debug, Clone, Copy)]
 struct Tile<F> {
     x: usize,
     ys: [usize; 4],
     count: usize,
-    /// FourLanes partial sums of each product. A single product has eight, in the first two.
+    /// Four partial sums for each product. A single product has eight, in the first two elements.
     sums: [F; 4],
 }
 
 impl<F: FourLanes> Tile<F> {
-    /// Creates tiles for the products of x with each of ys, with zero sums.
+    /// Creates tiles for the products of x with each of ys; their sums are zero.
     fn cover(x: usize, mut ys: &[usize], zero: F, tiles: &mut Vec<Self>) {
         while !ys.is_empty() {
             let count = match ys.len() {
@@ -51,8 +52,8 @@ impl<F: FourLanes> Tile<F> {
         }
     }
 
-    /// Adds the products over the whole blocks of a stretch. The sums have names because those of an array are kept in
-    /// memory.
+    /// Adds the products over the whole blocks of a stretch. The sums are separate variables, because the elements of
+    /// an array would be kept in memory.
     #[inline(always)]
     fn add<'a>(&mut self, column: impl Fn(usize) -> &'a [f64]) {
         let x = column(self.x);
@@ -87,8 +88,8 @@ impl<F: FourLanes> Tile<F> {
         self.sums = [s0, s1, s2, s3];
     }
 
-    /// Returns the product of x with the k-th of ys over whole columns: the sums, plus the samples after the last whole
-    /// block.
+    /// Returns the product of x with the k-th of ys over the whole columns: the partial sums, plus the samples after
+    /// the last whole block.
     #[inline(always)]
     fn total<'a>(&self, k: usize, column: impl Fn(usize) -> &'a [f64]) -> f64 {
         let (x, y) = (column(self.x), column(self.ys[k]));
@@ -119,12 +120,12 @@ fn eights(x: &[f64]) -> &[[[f64; 4]; 2]] {
     fours(x).as_chunks().0
 }
 
-/// Returns start and end of the stretches of n samples.
+/// Returns the ranges of the stretches of n samples.
 fn stretches(n: usize) -> impl Iterator<Item = Range<usize>> {
     (0..n).step_by(STRETCH).map(move |from| from..n.min(from + STRETCH))
 }
 
-/// Sum over all of x.
+/// Returns the sum of all elements of x.
 #[inline(always)]
 fn sum<F: FourLanes>(x: &[f64], zero: F) -> f64 {
     let (mut s0, mut s1) = (zero, zero);
@@ -137,7 +138,7 @@ fn sum<F: FourLanes>(x: &[f64], zero: F) -> f64 {
     sums.as_flattened().iter().chain(tail).sum()
 }
 
-/// Sum of the squared distances from the mean.
+/// Returns the sum of the squared distances from the mean.
 #[inline(always)]
 fn squares<F: FourLanes>(x: &[f64], mean: f64, zero: F) -> f64 {
     let (mut s0, mut s1) = (zero, zero);
@@ -152,7 +153,7 @@ fn squares<F: FourLanes>(x: &[f64], mean: f64, zero: F) -> f64 {
     sums.as_flattened().iter().sum::<f64>() + tail.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>()
 }
 
-/// Variance about the common mean of some spans.
+/// Returns the variance of several spans about their common mean.
 pub(crate) fn variance(spans: &[&[f64]]) -> f64 {
     with_four_lanes(Variance(spans))
 }
@@ -182,13 +183,13 @@ impl FourLaneTask for Variance<'_, '_> {
 pub(crate) struct Lagged<'a> {
     pub values: &'a [f64],
     /// True if this is the previous column delayed by one sample.
-    pub follows: bool,
+    pub is_shift_of_previous: bool,
 }
 
-/// The symmetric matrix of the products of all columns, by rows.
+/// Returns the symmetric matrix of the products of all columns, by rows.
 ///
-/// A column that does not follow another is multiplied with all columns at once. The remaining pairs are columns that
-/// both follow, whose product results from that of the previous pair.
+/// A column that does not follow another is multiplied by all columns. In each remaining pair both columns follow
+/// others, so that the product results from the product of the previous columns.
 pub(crate) fn gram(columns: &[Lagged<'_>]) -> Vec<f64> {
     with_four_lanes(Gram(columns))
 }
@@ -203,14 +204,14 @@ impl FourLaneTask for Gram<'_, '_> {
         let Self(columns) = self;
         let p = columns.len();
         let (mut tiles, mut others) = (Vec::with_capacity(p), Vec::with_capacity(p));
-        for (i, _) in columns.iter().enumerate().filter(|(_, column)| !column.follows) {
+        for (i, _) in columns.iter().enumerate().filter(|(_, column)| !column.is_shift_of_previous) {
             others.clear();
-            // Previous leading columns have been multiplied with it already.
-            others.extend((0..p).filter(|j| *j >= i || columns[*j].follows));
+            // The products with previous columns that do not follow others are already known.
+            others.extend((0..p).filter(|j| *j >= i || columns[*j].is_shift_of_previous));
             Tile::cover(i, &others, zero, &mut tiles);
         }
         match columns {
-            &[u, u1, u2, e, e1] if [u, u1, u2, e, e1].map(|c| c.follows) == TWO_OF_EACH => {
+            &[u, u1, u2, e, e1] if [u, u1, u2, e, e1].map(|c| c.is_shift_of_previous) == TWO_OF_EACH => {
                 add_two_of_each(&mut tiles, [u, u1, u2, e, e1].map(|c| c.values));
             }
             _ => {
@@ -229,7 +230,7 @@ impl FourLaneTask for Gram<'_, '_> {
             }
         }
         for i in 0..p {
-            for j in (0..=i).filter(|j| columns[i].follows && columns[*j].follows) {
+            for j in (0..=i).filter(|j| columns[i].is_shift_of_previous && columns[*j].is_shift_of_previous) {
                 let product = gram[(i - 1) * p + j - 1] + ends(columns, i, j);
                 (gram[i * p + j], gram[j * p + i]) = (product, product);
             }
@@ -238,21 +239,21 @@ impl FourLaneTask for Gram<'_, '_> {
     }
 }
 
-/// Difference of the product of columns i and j from that of the columns before them.
+/// Returns the product of columns i and j minus the product of the columns before them.
 fn ends(columns: &[Lagged<'_>], i: usize, j: usize) -> f64 {
     let (x, y) = (columns[i - 1].values, columns[j - 1].values);
     let last = x.len() - 1;
     columns[i].values[0] * columns[j].values[0] - x[last] * y[last]
 }
 
-/// Columns that follow in the most frequent regression: an output with two lags, an input with two.
+/// Columns that follow others in the most frequent regression: an output with two lags, and an input with one.
 const TWO_OF_EACH: [bool; 5] = [false, true, true, false, true];
 
-/// The tiles of such a regression in one pass, which reads five numbers for nine products; tile by tile it would read
-/// twelve.
+/// Adds the products of such a regression in one pass, which reads five numbers for nine products; separate tiles would
+/// read twelve.
 #[inline(always)]
 fn add_two_of_each<F: FourLanes>(tiles: &mut [Tile<F>], columns: [&[f64]; 5]) {
-    // u with the first four columns, u with the last, e with the last four.
+    // The tiles are u with the first four columns, u with the last column, and e with the last four columns.
     let [by_u, by_u_alone, by_e] = tiles else { return };
     let [mut uu, mut uu1, mut uu2, mut ue] = by_u.sums;
     let [mut ue1, mut ue1_later, ..] = by_u_alone.sums;
@@ -274,7 +275,7 @@ fn add_two_of_each<F: FourLanes>(tiles: &mut [Tile<F>], columns: [&[f64]; 5]) {
         eu2 = eu2 + e * u2;
         let e1 = kind.load(e1);
         ee1 = ee1 + e * e1;
-        // The product alone has eight partial sums, in turn: with two blocks written out the sums
+        // The single product has eight partial sums, which are used alternately: with two blocks per step the sums
         // would not fit in sixteen registers.
         (ue1, ue1_later) = (ue1_later, ue1 + u * e1);
     }
@@ -286,7 +287,7 @@ fn add_two_of_each<F: FourLanes>(tiles: &mut [Tile<F>], columns: [&[f64]; 5]) {
     }
 }
 
-/// Residuals of a combination of columns: their power, and their products with the columns.
+/// Sum of squares of the residuals of a regression, and the products of the residuals with the columns.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ResidualProducts {
     pub squares: f64,
@@ -302,7 +303,8 @@ impl ResidualProducts {
         }
     }
 
-    /// Adds those of `y - sum_k factors_k x_k`, of which one stretch at a time is in memory. The first column is y.
+    /// Adds the sums for the residuals `y - sum_k factors_k x_k`, of which only one stretch at a time is in memory. The
+    /// first column is y.
     pub fn add(&mut self, columns: &[Lagged<'_>], factors: &[f64]) {
         with_four_lanes(Residuals {
             columns,
@@ -325,7 +327,7 @@ impl FourLaneTask for Residuals<'_, '_> {
     fn run<F: FourLanes>(self, zero: F) {
         let Self { columns, factors, of } = self;
         let inputs: Vec<usize> = (1..columns.len()).collect();
-        // The residual is stored in place of y.
+        // In these tiles the residual replaces y.
         let mut tiles = Vec::with_capacity(columns.len());
         Tile::cover(0, &[0], zero, &mut tiles);
         Tile::cover(0, &inputs, zero, &mut tiles);
@@ -358,7 +360,8 @@ impl FourLaneTask for Residuals<'_, '_> {
     }
 }
 
-/// Power and products of the residuals of four inputs over a whole stretch, which are kept in registers.
+/// Returns the sum of squares and the products of the residuals of four inputs over a whole stretch; all sums are kept
+/// in registers.
 #[inline(always)]
 fn of_four_inputs<F: FourLanes>(columns: [&[f64]; 5], factors: [f64; 4], zero: F) -> (f64, [f64; 4]) {
     let [y, a, b, c, d] = columns;
@@ -380,7 +383,7 @@ fn of_four_inputs<F: FourLanes>(columns: [&[f64]; 5], factors: [f64; 4], zero: F
     (in_order(rr + rr_later), products)
 }
 
-/// `y -= sum_k factors_k x_k`.
+/// Computes `y -= sum_k factors_k x_k`.
 #[inline(always)]
 fn subtract<'a>(y: &mut [f64], factors: &[f64], x: impl Fn(usize) -> &'a [f64]) {
     let (by_four, alone) = factors.as_chunks::<4>();

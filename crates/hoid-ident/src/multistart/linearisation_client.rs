@@ -1,18 +1,19 @@
-//! A search by reverse communication: it returns the theta at which it needs the linearisation of the criterion, and is
-//! updated with it. The caller decides how to linearise: for one record, or for several records in parallel lanes.
+//! A search by reverse communication: it returns the theta at which it needs the linearisation of the criterion, and
+//! continues when it is given this linearisation. The caller decides how to linearise: for one record, or for several
+//! records in parallel lanes.
 
 use crate::{
     criterion::{Block, Criterion, Workspace},
     optimize::Linearisation,
 };
 
-/// A computation that needs the linearisation of a criterion at one theta after the other.
+/// A computation that needs the linearisation of a criterion at a sequence of theta.
 pub(crate) trait LinearisationClient {
-    /// The criterion.
+    /// Returns the criterion.
     fn criterion(&self) -> &Criterion<'_>;
     /// Returns theta at which the linearisation is needed next; `None` when the computation has ended.
     fn evaluation_point(&self) -> Option<&[f64]>;
-    /// Returns the polynomial with respect to which derivatives are needed; `None` for all.
+    /// Returns the polynomial for which derivatives are needed; `None` for all polynomials.
     fn block(&self) -> Option<Block>;
     /// Continues with the linearisation at [`LinearisationClient::evaluation_point`].
     fn update(&mut self, there: Linearisation, workspace: &mut Workspace);

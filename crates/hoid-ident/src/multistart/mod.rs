@@ -1,11 +1,11 @@
-//! Searches from several starts by reverse communication: the caller evaluates the criterion, so that the searches of
+//! Searches from several starts by reverse communication: the caller evaluates the criterion, so that the searches for
 //! several records can run in parallel lanes.
 //!
 //! | module | contents |
 //! |---|---|
 //! | `start` | a start of a search, with its unknown polynomials |
-//! | `searches` | the searches from the best starts, and the lowest minimum |
-//! | `linearisation_client` | the interface: one theta after the other, and the linearisation there |
+//! | `searches` | searches from the best starts, and the lowest minimum |
+//! | `linearisation_client` | interface of a search: it requests one linearisation after another |
 
 mod linearisation_client;
 mod searches;

@@ -1,12 +1,12 @@
-//! Searches from several starts of one criterion, one linearisation after the other.
+//! Searches from several starts of one criterion, with one linearisation after another.
 //!
-//! The unknown polynomials of each start are computed first; searches then run from the best start and from the next
-//! ones. A start in the basin of a known minimum is omitted, and a search that comes close to such a minimum without a
-//! predicted lower end is stopped.
+//! The unknown polynomials of each start are computed first; searches then run from the best starts in turn. A start in
+//! the basin of a known minimum is skipped, and a search that comes close to such a minimum is stopped unless it is
+//! predicted to end lower.
 //!
 //! The searches do not evaluate the criterion themselves: they return the theta at which they need its linearisation
-//! and are updated with it (reverse communication), so that those of several records can run in parallel lanes
-//! ([`crate::pem::batched`]).
+//! and continue when they are given it (reverse communication), so that the searches for several records can run in
+//! parallel lanes ([`crate::pem::batched`]).
 
 use hoid_model::Orders;
 
@@ -21,18 +21,18 @@ use crate::{
     },
 };
 
-/// The searches.
+/// The searches for the minima of one criterion.
 pub(crate) struct MultiStart<'s> {
     objective: &'s dyn Objective,
     orders: Orders,
     options: &'s SearchOptions,
-    /// Largest number of starts from which a search runs.
+    /// Largest number of searches.
     most: usize,
-    /// The starts; when all of them are complete, those that have not been used, the best last.
+    /// Starts; after all starts are complete, the starts that have not been used, the best last.
     starts: Vec<Start>,
-    /// The current search, with the label of its start.
+    /// Current search, with the label of its start.
     searching: Option<(String, GaussNewton<'s>)>,
-    /// The minima, each with its start.
+    /// Minima found, each with the label of its start.
     pub minima: Vec<(String, Minimum)>,
 }
 
@@ -68,7 +68,7 @@ impl<'s> MultiStart<'s> {
         }
     }
 
-    /// Returns the polynomial with respect to which derivatives are needed; `None` for all.
+    /// Returns the polynomial for which derivatives are needed; `None` for all polynomials.
     pub fn block(&self) -> Option<Block> {
         self.incomplete().and_then(|at| self.starts[at].next_block())
     }
@@ -101,7 +101,7 @@ impl<'s> MultiStart<'s> {
         self.starts.iter().position(|start| start.next_block().is_some())
     }
 
-    /// Starts the searches, with the best start.
+    /// Ranks the starts, and starts the first search from the best of them.
     fn rank(&mut self) {
         self.starts.retain(|start| start.value.is_finite());
         self.starts.sort_by(|a, b| a.value.total_cmp(&b.value));
@@ -124,7 +124,7 @@ impl<'s> MultiStart<'s> {
         self.minima.iter().map(|(_, minimum)| minimum).min_by(lowest)
     }
 
-    /// Returns the lowest minimum and its start.
+    /// Returns the lowest minimum and the label of its start.
     pub fn lowest(self) -> Option<(String, Minimum)> {
         let lowest =
             |a: &(String, Minimum), b: &(String, Minimum)| a.1.at.sum_of_squares.total_cmp(&b.1.at.sum_of_squares);

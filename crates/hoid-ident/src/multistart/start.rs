@@ -1,4 +1,4 @@
-//! A start of the search, with its unknown polynomials.
+//! A start of a search, with polynomials that may still be unknown.
 
 use hoid_model::Orders;
 
@@ -8,14 +8,14 @@ use crate::{
     optimize::Linearisation,
 };
 
-/// A start of the search, with its name.
+/// A start of a search, with its label.
 #[derive(Debug, Clone)]
 pub(crate) struct Start {
     pub label: String,
     pub theta: Vec<f64>,
-    /// The sum of squares there, when the start is complete; not finite if a regression was singular.
+    /// Sum of squares of the complete start; not finite if a regression was singular.
     pub value: f64,
-    /// Polynomials that are still unknown, the next one last.
+    /// Polynomials that are still unknown; the next polynomial is the last element.
     left: Vec<Block>,
 }
 
@@ -30,8 +30,8 @@ impl Start {
         }
     }
 
-    /// Creates a start whose B and noise model are still unknown for its F, without A and C: B with white noise, D of
-    /// the residual, and B once more with that noise model.
+    /// Creates a start from F, for a model without A and C. The unknowns are B with white noise, D from the residual,
+    /// and B again with this noise model.
     pub fn of_poles(label: &str, o: &Orders, f: &[f64]) -> Self {
         let left = if o.nd > 0 {
             vec![Block::B, Block::D, Block::B]
@@ -41,7 +41,7 @@ impl Start {
         Self::to_be_found(label, [&vec![0.0; o.nb + o.nd], f].concat(), left)
     }
 
-    /// Creates a start with some unknown polynomials, the next one last.
+    /// Creates a start with some unknown polynomials; the next polynomial is the last element.
     pub fn to_be_found(label: &str, theta: Vec<f64>, left: Vec<Block>) -> Self {
         Self {
             label: label.to_owned(),
@@ -51,7 +51,7 @@ impl Start {
         }
     }
 
-    /// Adds its own noise model, and B once more with that, to the unknown polynomials.
+    /// Marks the noise model, and then B with this noise model, as unknown.
     pub fn with_own_noise(mut self, o: &Orders) -> Self {
         if o.nd > 0 {
             self.left = vec![Block::B, Block::D];
@@ -59,13 +59,13 @@ impl Start {
         self
     }
 
-    /// Returns the next unknown polynomial.
+    /// Returns the next unknown polynomial; `None` if the start is complete.
     pub fn next_block(&self) -> Option<Block> {
         self.left.last().copied()
     }
 
-    /// Updates the start with the criterion at theta. The residual is affine in B, and in D: one step of least squares
-    /// computes either for fixed other polynomials.
+    /// Updates the start with the linearisation at its theta. The residual is affine in B and in D, so that one
+    /// least-squares step computes either polynomial if the others are fixed.
     pub fn update(&mut self, o: &Orders, there: &Linearisation) {
         let Some(block) = self.left.pop() else { return };
         let (p, place) = (self.theta.len(), block.place(o));

@@ -4,7 +4,7 @@ use super::objective::Minimum;
 use crate::linalg::least_squares::dot;
 
 /// True if a start with this loss is in the basin of a known minimum: its loss agrees with the quadratic model about
-/// the minimum, so that a search from there would end in the same minimum.
+/// the minimum, so that a search from the start would end in this minimum.
 pub(crate) fn lies_in_basin(minimum: &Minimum, start: &[f64], sum_of_squares: f64) -> bool {
     let p = start.len();
     let delta: Vec<f64> = start.iter().zip(&minimum.theta).map(|(a, b)| a - b).collect();
@@ -15,5 +15,5 @@ pub(crate) fn lies_in_basin(minimum: &Minimum, start: &[f64], sum_of_squares: f6
     rise <= BASIN * minimum.at.sum_of_squares && (found - rise).abs() <= 0.1 * rise
 }
 
-/// Relative increase of the loss up to which a start is compared with the quadratic model of a minimum.
+/// Relative increase of the loss up to which a start is compared with the quadratic model.
 const BASIN: f64 = 0.05;

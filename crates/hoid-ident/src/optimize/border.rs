@@ -9,8 +9,8 @@ use super::{
 };
 use crate::criterion::Workspace;
 
-/// Searches from `theta`. `None` if the start is unstable or its loss is not finite, or if the search comes close to
-/// `rival`, the sum of squares of a known minimum, and is not predicted to end lower.
+/// Searches for a minimum from `theta`. `None` if the start is unstable or its loss is not finite, or if the search
+/// comes close to `rival`, the sum of squares of a known minimum, and is not predicted to end lower.
 pub(crate) fn minimise(
     objective: &dyn Objective,
     theta: Vec<f64>,
@@ -24,8 +24,8 @@ pub(crate) fn minimise(
 }
 
 impl GaussNewton<'_> {
-    /// Returns the minimum, when the search has ended for this reason; the automatic search may continue along the
-    /// border of stability.
+    /// Returns the minimum after the search has ended for this reason. The automatic search may first continue along
+    /// the border of stability.
     pub fn finish(mut self, reason: Reason, workspace: &mut Workspace) -> Option<Minimum> {
         let reason = if self.options.method == SearchMethod::Automatic && reason == Reason::NoDescent {
             self.follow_the_border(workspace)?
@@ -42,8 +42,8 @@ impl GaussNewton<'_> {
         })
     }
 
-    /// Continues in coordinates in which the border of stability is a bound. `None` if the loss is not finite or the
-    /// rival will not be reached.
+    /// Continues in coordinates in which the border of stability is a bound. `None` if the loss is not finite, or if
+    /// the search is not predicted to end below the rival.
     fn follow_the_border(&mut self, workspace: &mut Workspace) -> Option<Reason> {
         let Some((coordinates, kappa)) = StableCoordinates::of(self.objective, &self.theta) else {
             return Some(Reason::NoDescent);

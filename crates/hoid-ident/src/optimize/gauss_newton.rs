@@ -1,5 +1,5 @@
-//! A damped Gauss-Newton search by reverse communication: it returns the theta at which it needs the derivatives and is
-//! updated with them.
+//! A damped Gauss-Newton search by reverse communication: it returns the theta at which it needs the derivatives and
+//! continues when it is given them.
 
 use super::{
     objective::{Linearisation, Objective},
@@ -9,14 +9,14 @@ use super::{
 use crate::criterion::Workspace;
 use crate::linalg::least_squares::{dot, solve_symmetric};
 
-/// Predicted relative decrease of the loss below which the second derivative is estimated from the gradients.
+/// Below this predicted relative decrease of the loss, the second derivative is estimated from the gradients.
 const NEAR: f64 = 1e-2;
 
-/// Relative decrease of the loss that may be hidden by its rounding: filters with poles near the unit circle lose five
-/// of the sixteen digits.
+/// Relative decrease of the loss that rounding may hide: filters with poles near the unit circle lose five of the
+/// sixteen digits.
 const ROUNDING: f64 = 1e-10;
 
-/// A search that is driven by its caller, so that several can run in parallel lanes.
+/// A search that is driven by its caller, so that several searches can run in parallel lanes.
 pub(crate) struct GaussNewton<'s> {
     pub(super) objective: &'s dyn Objective,
     pub(super) options: &'s SearchOptions,
@@ -27,39 +27,40 @@ pub(crate) struct GaussNewton<'s> {
     pub(super) iterations: usize,
     mu: f64,
     growth: f64,
-    /// Decrease that the quadratic model predicts for the undamped step of this iteration.
+    /// Decrease of the sum of squares that the quadratic model predicts for the undamped step.
     predicted_decrease: f64,
-    /// Difference of half the second derivative from the Gauss-Newton matrix, from the gradients of the last steps;
-    /// empty if not used.
+    /// Half the second derivative minus the Gauss-Newton matrix, estimated from the gradients of the last steps; empty
+    /// if not used.
     secant: Vec<f64>,
     trial: Trial,
     /// Point at which the derivatives are needed next.
     evaluation_point: Vec<f64>,
 }
 
-/// The purpose of the next linearisation.
+/// Purpose of the next linearisation.
 enum Trial {
     /// Test of whether the start is usable.
     Start,
-    /// A step of Levenberg and Marquardt, with the decrease that the quadratic model predicts.
+    /// A Levenberg-Marquardt step, with the decrease that the quadratic model predicts.
     Damped { predicted: f64 },
-    /// A share of a step that is halved until the loss decreases.
+    /// A fraction of a step, which is halved until the loss decreases.
     Share { delta: Vec<f64>, factor: f64 },
-    /// The last step, after convergence.
+    /// The last step after convergence.
     Last,
 }
 
 /// State of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Progress {
-    /// It needs another linearisation.
+    /// The search needs another linearisation.
     Continues,
-    /// It has ended; without a reason if the loss is not finite or the rival will not be reached.
+    /// The search has ended. There is no reason if the loss is not finite, or if the search is not predicted to end
+    /// below the rival.
     Ended(Option<Reason>),
 }
 
 impl<'s> GaussNewton<'s> {
-    /// Creates a search from `theta`, moved inside the limits; `None` if the predictor does not exist there.
+    /// Creates a search from `theta`, which is moved inside the limits; `None` if there is no predictor for this theta.
     pub fn new(
         objective: &'s dyn Objective,
         mut theta: Vec<f64>,
@@ -88,7 +89,7 @@ impl<'s> GaussNewton<'s> {
         })
     }
 
-    /// Returns the point at which the derivatives are needed.
+    /// Returns the theta at which the derivatives are needed.
     pub fn evaluation_point(&self) -> &[f64] {
         &self.evaluation_point
     }
@@ -140,7 +141,8 @@ impl<'s> GaussNewton<'s> {
                 }
             }
             Trial::Last => {
-                // The predicted decrease is below the possible rounding of the loss, which must not decide.
+                // The predicted decrease may be less than the rounding error of the loss, so a small increase is
+                // accepted.
                 if finite && there.sum_of_squares <= self.at.sum_of_squares * (1.0 + ROUNDING) {
                     self.move_to(there);
                 }
@@ -159,7 +161,7 @@ impl<'s> GaussNewton<'s> {
         self.at = there;
     }
 
-    /// Symmetric rank-one correction of the secant, so that `(H + S) s = g - g'` for the last step s.
+    /// Corrects the secant by a symmetric matrix of rank one, so that `(H + S) s = g - g'` for the last step s.
     fn learn(&mut self, there: &Linearisation) {
         let p = self.theta.len();
         self.secant.resize(p * p, 0.0);
@@ -179,7 +181,7 @@ impl<'s> GaussNewton<'s> {
         let scale = |i: usize| there.gram[i * p + i];
         let size_of_step: f64 = (0..p).map(|i| scale(i) * step[i] * step[i]).sum();
         let size_of_missing: f64 = (0..p).map(|i| missing[i] * missing[i] / scale(i)).sum();
-        // Nearly orthogonal to the step: rounding would dominate.
+        // The correction is nearly orthogonal to the step, so that rounding would dominate it.
         if along.is_nan() || along * along <= 1e-16 * size_of_step * size_of_missing {
             return;
         }
@@ -190,7 +192,7 @@ impl<'s> GaussNewton<'s> {
         }
     }
 
-    /// Returns the first trial of the next step, or the end.
+    /// Returns the first trial of the next step, or ends the search.
     fn iterate(&mut self) -> Progress {
         if !self.at.sum_of_squares.is_finite() {
             return Progress::Ended(None);
@@ -245,7 +247,7 @@ impl<'s> GaussNewton<'s> {
             if let Some(step) = step.or_else(|| self.damped_step(self.mu, &[]))
                 && self.ask(&step.delta, 1.0)
             {
-                // Most trials are accepted: computing derivatives at once costs less than a second pass.
+                // Most trials are accepted: computing the derivatives immediately costs less than a second pass.
                 self.trial = Trial::Damped {
                     predicted: step.predicted,
                 };
@@ -261,7 +263,7 @@ impl<'s> GaussNewton<'s> {
         self.growth *= 2.0;
     }
 
-    /// Halves the share of a step until it can be tried.
+    /// Halves the fraction of a step until the step can be tried.
     fn try_share(&mut self, delta: Vec<f64>, mut factor: f64) -> Progress {
         while factor > 1e-12 {
             if self.ask(&delta, factor) {
@@ -274,18 +276,18 @@ impl<'s> GaussNewton<'s> {
     }
 
     fn give_up(&self) -> Progress {
-        // The predicted decrease may be lost in the rounding of the loss.
+        // The predicted decrease may be hidden by the rounding of the loss.
         let lost = self.predicted_decrease <= ROUNDING * self.at.sum_of_squares;
         Progress::Ended(Some(if lost { Reason::SmallDecrease } else { Reason::NoDescent }))
     }
 
-    /// Makes theta after a step the next evaluation point; returns false if there is no predictor.
+    /// Makes the end of a step the next evaluation point; returns false if there is no predictor for it.
     fn ask(&mut self, delta: &[f64], factor: f64) -> bool {
         self.evaluation_point.clear();
         self.evaluation_point
             .extend(self.theta.iter().zip(delta).map(|(t, s)| t + factor * s));
         if let Some(limits) = self.objective.limits() {
-            // Against rounding: a step that was cut at a bound ends exactly on it.
+            // This corrects rounding: a step that was cut at a bound ends exactly on the bound.
             for (t, (low, high)) in self.evaluation_point.iter_mut().zip(limits) {
                 *t = t.max(*low).min(*high);
             }
@@ -293,8 +295,8 @@ impl<'s> GaussNewton<'s> {
         self.objective.is_feasible(&self.evaluation_point)
     }
 
-    /// Returns `(H + S + mu diag H)^-1 g` of the free parameters, cut at the bounds, and the decrease of the sum of
-    /// squares that the quadratic model predicts for it. `None` if the matrix is not positive definite.
+    /// Returns the step `(H + S + mu diag H)^-1 g` of the free parameters, cut at the bounds, and the decrease of the
+    /// sum of squares that the quadratic model predicts. `None` if the matrix is not positive definite.
     fn damped_step(&self, mu: f64, secant: &[f64]) -> Option<Step> {
         let p = self.theta.len();
         let mut free = self.free();
@@ -330,7 +332,7 @@ impl<'s> GaussNewton<'s> {
         }
     }
 
-    /// Returns `alpha (diag H)^-1 g` with the best alpha for the quadratic model.
+    /// Returns the step `alpha (diag H)^-1 g`, with the alpha that is optimal for the quadratic model.
     fn scaled_gradient(&self) -> Option<Vec<f64>> {
         let p = self.theta.len();
         let mut delta = vec![0.0; p];
@@ -352,7 +354,7 @@ impl<'s> GaussNewton<'s> {
         Some(delta)
     }
 
-    /// `V(theta + step) ~ V - 2 g' step + step' H step`.
+    /// Returns the step with its predicted decrease, from `V(theta + step) ~ V - 2 g' step + step' H step`.
     fn step(&self, delta: Vec<f64>, secant: &[f64]) -> Option<Step> {
         let mut predicted = 2.0 * dot(&self.at.descent, &delta) - curvature(&self.at.gram, &delta);
         if !secant.is_empty() {
@@ -366,13 +368,13 @@ impl<'s> GaussNewton<'s> {
     }
 }
 
-/// `delta' M delta`.
+/// Returns `delta' M delta`.
 fn curvature(matrix: &[f64], delta: &[f64]) -> f64 {
     let p = delta.len();
     (0..p).map(|i| delta[i] * dot(&matrix[i * p..(i + 1) * p], delta)).sum()
 }
 
-/// Returns the parameters that may move: neither fixed nor at a bound beyond which the loss decreases.
+/// Returns the parameters that may change: those that are neither fixed nor at a bound beyond which the loss decreases.
 pub(crate) fn free_parameters(objective: &dyn Objective, theta: &[f64], descent: &[f64]) -> Vec<usize> {
     let Some(limits) = objective.limits() else {
         return (0..theta.len()).collect();
@@ -385,7 +387,7 @@ pub(crate) fn free_parameters(objective: &dyn Objective, theta: &[f64], descent:
         .collect()
 }
 
-/// Returns the share of a step that is within the limits.
+/// Returns the largest fraction of a step that stays within the limits.
 fn cut(theta: &[f64], delta: &[f64], limits: &[(f64, f64)]) -> f64 {
     let room = |((t, d), (low, high)): ((&f64, &f64), &(f64, f64))| match *d {
         d if d > 0.0 => (high - t) / d,

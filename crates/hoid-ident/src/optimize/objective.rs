@@ -7,7 +7,8 @@ use hoid_model::Complex64;
 use super::termination::Termination;
 use crate::{criterion::Workspace, linalg::least_squares::solve_symmetric};
 
-/// Sum of squares, `psi' eps` and the projected `psi' psi` (by rows).
+/// Sum of squares, `psi' eps` and `psi' psi` (by rows) of a criterion at one theta, with the initial states projected
+/// out.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Linearisation {
     pub sum_of_squares: f64,
@@ -16,7 +17,7 @@ pub(crate) struct Linearisation {
 }
 
 impl Linearisation {
-    /// Creates zero sums over p parameters.
+    /// Creates zero sums for p parameters.
     pub fn empty(p: usize) -> Self {
         Self {
             sum_of_squares: 0.0,
@@ -25,7 +26,7 @@ impl Linearisation {
         }
     }
 
-    /// Adds `weight |r|^2` of a complex residual r = H - M, `slopes` the derivatives of M.
+    /// Adds `weight |r|^2` for a complex residual r = H - M; `slopes` are the derivatives of M.
     pub fn add_complex(&mut self, weight: f64, residual: Complex64, slopes: &[Complex64]) {
         let p = slopes.len();
         self.sum_of_squares += weight * residual.norm_sqr();
@@ -37,14 +38,15 @@ impl Linearisation {
         }
     }
 
-    /// Adds this part of its diagonal to `psi' psi` and solves the normal equations; `None` if they are singular.
+    /// Increases the diagonal of `psi' psi` by the fraction `ridge` and solves the normal equations; `None` if they are
+    /// singular.
     pub fn solution(&mut self, ridge: f64) -> Option<Vec<f64>> {
         let p = self.descent.len();
         (0..p).for_each(|i| self.gram[i * p + i] *= 1.0 + ridge);
         solve_symmetric(&self.gram, &self.descent)
     }
 
-    /// Returns `variance (psi' psi)^-1` by rows; `None` if it is singular.
+    /// Returns `variance (psi' psi)^-1` by rows; `None` if the matrix is singular.
     pub fn covariance(&self, variance: f64) -> Option<Vec<f64>> {
         let p = self.descent.len();
         let mut all = Vec::with_capacity(p * p);
@@ -57,22 +59,23 @@ impl Linearisation {
     }
 }
 
-/// A sum of squares over theta with its derivatives: the interface of the search to a model. The search uses it as
-/// `dyn`: the cost of a call is negligible compared with a pass over a record, and the search is compiled once for all
-/// models.
+/// A sum of squares as a function of theta, with its derivatives: the interface between a search and a model. The
+/// search uses it as `dyn`, so that it is compiled once for all models; the cost of a call is negligible compared with
+/// a pass over a record.
 pub(crate) trait Objective {
-    /// True if the predictor exists: finite theta, stable polynomials.
+    /// True if the predictor exists, i.e. if theta is finite and the polynomials are stable.
     fn is_feasible(&self, theta: &[f64]) -> bool;
-    /// Returns sum of squares, `psi' eps` and `psi' psi` at a feasible theta; the workspace is memory for signals,
-    /// reused by the next linearisation.
+    /// Returns the sum of squares, `psi' eps` and `psi' psi` at a feasible theta. The workspace is memory for signals
+    /// that the next linearisation uses again.
     fn linearise(&self, theta: &[f64], workspace: &mut Workspace) -> Linearisation;
-    /// Returns the sum of squares of the output, relative to which residuals count as zero.
+    /// Returns the sum of squares of the output, which determines the residuals that count as zero.
     fn output_power(&self) -> f64;
-    /// Returns lower and upper bound of each parameter; equal bounds fix it. By default there are none.
+    /// Returns the lower and the upper bound of each parameter; equal bounds fix a parameter. By default there are no
+    /// bounds.
     fn limits(&self) -> Option<&[(f64, f64)]> {
         None
     }
-    /// Returns the indices in theta of the polynomials that must be stable and have no limits of their own.
+    /// Returns the index ranges in theta of polynomials that must be stable and are not restricted by limits.
     fn stable_blocks(&self) -> Vec<Range<usize>> {
         Vec::new()
     }

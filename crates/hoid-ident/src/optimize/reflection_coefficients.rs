@@ -1,24 +1,25 @@
 //! Coordinates in which the region of stable polynomials is a box.
 //!
-//! A monic polynomial of order n has its roots inside the unit circle exactly when its reflection
-//! coefficients obey `|k_m| < 1`, m = 1 .. n, with the recursion of Levinson and Durbin
+//! A monic polynomial of order n has all roots inside the unit circle if and only if its reflection coefficients
+//! satisfy `|k_m| < 1`, m = 1 .. n, with the Levinson-Durbin recursion
 //!
 //! `p^(m)_i = p^(m-1)_i + k_m p^(m-1)_{m-i}` for i < m,  `p^(m)_m = k_m`
 //!
-//! (O. Barndorff-Nielsen and G. Schou, *J. Multivariate Analysis* 3 (1973) 408-419; J. F. Monahan,
-//! *Biometrika* 71 (1984) 403-404). In theta the border of stability is curved, and a search that reaches it stops
-//! although the loss decreases along it; in k it is a bound, along which the search can move. With `J = dp/dk` the
-//! derivatives are `J' psi' eps` and `J' psi' psi J`.
+//! (O. Barndorff-Nielsen and G. Schou, *J. Multivariate Analysis* 3 (1973) 408-419; J. F. Monahan, *Biometrika* 71
+//! (1984) 403-404). In theta the border of stability is curved, and a search that reaches it stops although the loss
+//! decreases along it. In k the border is a bound, along which the search can move. With `J = dp/dk` the derivatives
+//! are `J' psi' eps` and `J' psi' psi J`.
 
 use std::ops::Range;
 
 use crate::criterion::Workspace;
 use crate::optimize::objective::{Linearisation, Objective};
 
-/// Largest reflection coefficient: a root this close to the circle is on it for any record.
+/// Largest absolute value of a reflection coefficient: for any record, a root this close to the unit circle counts as
+/// being on it.
 pub(crate) const BORDER: f64 = 1.0 - 1e-8;
 
-/// An objective in reflection coefficients instead of some of its polynomials.
+/// An objective in which some polynomials are replaced by their reflection coefficients.
 pub(crate) struct StableCoordinates<'o> {
     objective: &'o dyn Objective,
     blocks: Vec<Range<usize>>,
@@ -26,7 +27,8 @@ pub(crate) struct StableCoordinates<'o> {
 }
 
 impl<'o> StableCoordinates<'o> {
-    /// Returns the coordinates, and theta in them. `None` if there is no polynomial to keep stable.
+    /// Returns the objective in these coordinates, and the coordinates of theta. `None` if no polynomial must be
+    /// stable.
     pub fn of(objective: &'o dyn Objective, theta: &[f64]) -> Option<(Self, Vec<f64>)> {
         let blocks = objective.stable_blocks();
         if blocks.is_empty() {
@@ -50,7 +52,7 @@ impl<'o> StableCoordinates<'o> {
         Some((coordinates, kappa))
     }
 
-    /// Converts back to theta.
+    /// Converts the coordinates back to theta.
     pub fn theta(&self, kappa: &[f64]) -> Vec<f64> {
         let mut theta = kappa.to_vec();
         for block in &self.blocks {
@@ -91,7 +93,7 @@ impl Objective for StableCoordinates<'_> {
         let descent = (0..p)
             .map(|j| column(j).map(|(i, j)| jacobian[i * p + j] * at.descent[i]).sum())
             .collect();
-        // G J, then J' (G J).
+        // First G J, then J' (G J).
         let times: Vec<f64> = (0..p * p)
             .map(|place| {
                 let (i, j) = (place / p, place % p);
@@ -120,7 +122,7 @@ impl Objective for StableCoordinates<'_> {
     }
 }
 
-/// Returns `[p_1, ..., p_n]` from its reflection coefficients.
+/// Returns the coefficients `[p_1, ..., p_n]` of the polynomial with these reflection coefficients.
 fn polynomial(k: &[f64]) -> Vec<f64> {
     let mut p: Vec<f64> = Vec::with_capacity(k.len());
     for &km in k {
@@ -138,7 +140,7 @@ fn polynomial_jacobian(k: &[f64]) -> Vec<f64> {
     let n = k.len();
     let mut jacobian = vec![0.0; n * n];
     for j in 0..n {
-        // The recursion is linear in each single k_j, whose own derivative enters at step j.
+        // The recursion is linear in each k_j, whose derivative enters at step j.
         let (mut p, mut slope): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
         for (m, &km) in k.iter().enumerate() {
             let (before, slope_before) = (p.clone(), slope.clone());
@@ -157,7 +159,7 @@ fn polynomial_jacobian(k: &[f64]) -> Vec<f64> {
     jacobian
 }
 
-/// Returns the reflection coefficients by the backward recursion; `None` for a polynomial that is not stable.
+/// Returns the reflection coefficients, computed by the backward recursion; `None` if the polynomial is not stable.
 fn reflection_coefficients(p: &[f64]) -> Option<Vec<f64>> {
     let mut p = p.to_vec();
     let mut k = vec![0.0; p.len()];

@@ -1,12 +1,12 @@
 //! Method and limits of a search.
 
-/// Method of a step.
+/// Method for the steps of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SearchMethod {
-    /// Levenberg-Marquardt, along the border of stability if necessary.
+    /// Levenberg-Marquardt, continued along the border of stability if necessary.
     #[default]
     Automatic,
-    /// Gauss-Newton with halved steps.
+    /// Gauss-Newton with step halving.
     GaussNewton,
     /// Levenberg-Marquardt.
     LevenbergMarquardt,
@@ -18,14 +18,14 @@ hoid_model::named_choice!(SearchMethod, "search method", 4, {
     Automatic => "auto", GaussNewton => "gn", LevenbergMarquardt => "lm", SteepestDescent => "grad",
 });
 
-/// Method and limits of the search.
+/// Method and limits of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchOptions {
-    /// Method of a step. Default automatic.
+    /// Method for the steps. Default automatic.
     pub method: SearchMethod,
     /// Largest number of steps from each start. Default 100.
     pub max_iterations: usize,
-    /// Relative decrease of the loss for convergence. Default 1e-12.
+    /// Predicted relative decrease of the loss below which the search has converged. Default 1e-12.
     pub tolerance: f64,
 }
 

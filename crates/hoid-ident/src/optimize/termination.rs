@@ -6,25 +6,25 @@ use std::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum Reason {
-    /// A linear problem, solved directly.
+    /// The problem is linear and was solved directly.
     Direct,
-    /// The next step predicts no relevant decrease.
+    /// The next step is not predicted to decrease the loss significantly.
     SmallDecrease,
     /// The loss is smallest on the border of stability: a root of C or F is on the unit circle.
     Border,
     /// The residuals are zero up to rounding.
     ExactFit,
-    /// The limit of iterations was reached.
+    /// The largest number of iterations was reached.
     IterationLimit,
-    /// No step decreases the loss although the gradient is not zero; often the loss decreases only across the border of
+    /// No step decreases the loss although the gradient is not zero. Often the loss decreases only beyond the border of
     /// stability.
     NoDescent,
-    /// An iteration of instrumental variables has converged.
+    /// An instrumental variable iteration has converged.
     Settled,
-    /// An iteration of instrumental variables did not converge, and moves the parameters by less than half a standard
-    /// error: they solve its equation for instruments that were then fixed.
+    /// An instrumental variable iteration did not converge, but its steps are less than half a standard error. The
+    /// parameters solve its equation for the last instruments, which were kept fixed.
     InstrumentsHeld,
-    /// Instrumental variables ended with a pole outside the unit circle, which was then reflected into it.
+    /// An instrumental variable iteration ended with a pole outside the unit circle, which was reflected inside.
     UnstableEstimate,
 }
 
@@ -32,7 +32,7 @@ impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Direct => "solved directly (linear least squares)",
-            Self::SmallDecrease => "converged: the next step promises no decrease of the loss",
+            Self::SmallDecrease => "converged: the next step would not decrease the loss",
             Self::Border => {
                 "converged at the border of stability: a root of C or F lies on the unit circle, so that standard errors are unreliable"
             }
@@ -41,10 +41,11 @@ impl fmt::Display for Reason {
             Self::NoDescent => "not converged: no step inside the region of stable C and F lowers the loss",
             Self::Settled => "converged: a further iteration does not change the parameters",
             Self::InstrumentsHeld => {
-                "converged with the instruments held: new instruments still change the parameters, by less than half a standard error"
+                "converged with the instruments kept constant: new instruments still change the parameters, by less \
+                 than half a standard error"
             }
             Self::UnstableEstimate => {
-                "not converged: the estimate had a pole outside the unit circle, reflected into it"
+                "not converged: the estimate had a pole outside the unit circle, which was reflected into it"
             }
         })
     }
@@ -53,9 +54,9 @@ impl fmt::Display for Reason {
 /// Reason and number of steps of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Termination {
-    /// The reason.
+    /// Reason for the end of the search.
     pub reason: Reason,
-    /// Steps taken from the best start.
+    /// Number of steps from the best start.
     pub iterations: usize,
 }
 

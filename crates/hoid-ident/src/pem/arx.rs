@@ -1,14 +1,15 @@
 //! ARX by linear least squares.
 //!
-//! `u(t) = phi(t)' theta + eps(t)` with `phi = [-u(t-1) .. -u(t-na), e(t-nk) .. e(t-nk-nb+1)]` (eq. 5.31), from the
-//! first sample at which phi lies inside the record (eq. 5.33) in each record, or with zeros for anything before it.
+//! The model is `u(t) = phi(t)' theta + eps(t)` with `phi = [-u(t-1) .. -u(t-na), e(t-nk) .. e(t-nk-nb+1)]` (eq. 5.31).
+//! In each record, the residuals start at the first sample for which phi lies inside the record (eq. 5.33), or zeros
+//! replace the samples before the record.
 //!
-//! **How it is solved.** The columns are shifts of two signals, so that `Phi' Phi` costs a few passes over the record,
-//! a tenth of an orthogonal factorisation. A solution of the normal equations has an error of `cond(Phi' Phi) eps`; one
-//! step of refinement from the residuals themselves, `theta + (Phi' Phi)^-1 Phi' (y - Phi theta)`, squares that factor
-//! (A. Bjorck, *Numerical Methods for Least Squares Problems*, 1996, sec. 2.9.3). If the regressors are too nearly
-//! dependent for this, the fit is exact, u has a level, or zeros precede the record, QR with column pivoting determines
-//! the rank and the solution.
+//! **Solution.** The columns are shifts of two signals, so that `Phi' Phi` takes a few passes over the record, a tenth
+//! of the cost of an orthogonal factorisation. The solution of the normal equations has an error of
+//! `cond(Phi' Phi) eps`; one step of refinement with the residuals themselves,
+//! `theta + (Phi' Phi)^-1 Phi' (y - Phi theta)`, squares this factor (A. Bjorck, *Numerical Methods for Least Squares
+//! Problems*, 1996, sec. 2.9.3). If the regressors are too close to linear dependence for this, if the fit is exact, if
+//! u has a level, or if zeros precede the record, QR with column pivoting determines the rank and the solution.
 
 use hoid_model::{Orders, SampleTime, Structure};
 use nalgebra::{DMatrix, DVector};
@@ -21,14 +22,14 @@ use crate::{
     linalg::products::{Lagged, ResidualProducts, gram},
 };
 
-/// Condition of the scaled normal matrix (an upper bound, `p tr(G^-1)`) up to which it is used:
-/// refined, the solution keeps all digits but three, the covariance nine.
+/// Largest condition number (an upper bound, `p tr(G^-1)`) for which the scaled normal matrix is used. At this limit
+/// the refined solution loses three digits, and the covariance keeps nine.
 const WELL_CONDITIONED: f64 = 1e7;
 
-/// Share of the residuals in the power of the output below which the fit counts as exact.
+/// A fit counts as exact if the residuals have less than this share of the power of the output.
 const EXACT: f64 = 1e-12;
 
-/// Solution of the regression with the data for its uncertainty.
+/// Solution of the regression, with the matrix for its covariance.
 #[derive(Debug)]
 struct Regression {
     pub theta: Vec<f64>,
@@ -40,11 +41,11 @@ struct Regression {
 /// Fits a criterion whose residual is linear in theta.
 ///
 /// # Errors
-/// [`IdentError::SingularRegressors`].
+/// [`IdentError::SingularRegressors`] if the columns of Phi are linearly dependent.
 pub(crate) fn fit(structure: Structure, criterion: &Criterion<'_>, sample_time: SampleTime) -> Result<Fit, IdentError> {
     let solved = regress(&criterion.orders, &criterion.data, criterion.first)?;
     let solution = Solution {
-        held: vec![false; solved.theta.len()],
+        is_fixed_or_bounded: vec![false; solved.theta.len()],
         theta: solved.theta,
         sum_of_squares: solved.sum_of_squares,
         termination: Termination {
@@ -58,7 +59,7 @@ pub(crate) fn fit(structure: Structure, criterion: &Criterion<'_>, sample_time: 
     Ok(fit.with_covariance(sigma2, &solved.inverse_gram))
 }
 
-/// Least squares over all records, residuals from sample `first` on.
+/// Solves the least-squares problem over all records, with residuals from sample `first` on.
 fn regress(orders: &Orders, data: &[Data<'_>], first: usize) -> Result<Regression, IdentError> {
     let levels: Vec<usize> = (0..data.len()).filter(|k| data[*k].level).collect();
     if levels.is_empty()
@@ -84,7 +85,7 @@ fn regress(orders: &Orders, data: &[Data<'_>], first: usize) -> Result<Regressio
     for j in 0..orders.nb {
         data.iter().for_each(|d| lagged(d.e, orders.nk + j, 1.0));
     }
-    // A level is a column of ones over its record.
+    // A level is a column of ones in its own record and zeros in all other records.
     for level in &levels {
         for (k, d) in data.iter().enumerate() {
             let one = if k == *level { 1.0 } else { 0.0 };
@@ -111,21 +112,22 @@ fn regress(orders: &Orders, data: &[Data<'_>], first: usize) -> Result<Regressio
     })
 }
 
-/// Returns the output, and the columns of Phi: u(t-1) .. u(t-na) without their sign, e(t-nk) ...
+/// Returns the columns u(t), u(t-1) .. u(t-na) without sign, e(t-nk) .. of one record: the output and the columns of
+/// Phi.
 fn columns<'a>(orders: &Orders, data: &Data<'a>, first: usize) -> Vec<Lagged<'a>> {
     let n = data.u.len();
     let outputs = (0..=orders.na).map(|lag| Lagged {
         values: &data.u[first - lag..n - lag],
-        follows: lag > 0,
+        is_shift_of_previous: lag > 0,
     });
     let inputs = (0..orders.nb).map(|j| Lagged {
         values: &data.e[first - orders.nk - j..n - orders.nk - j],
-        follows: j > 0,
+        is_shift_of_previous: j > 0,
     });
     outputs.chain(inputs).collect()
 }
 
-/// Returns `None` if QR has to decide.
+/// Solves by refined normal equations; `None` if QR is required instead.
 fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Option<Regression> {
     let p = orders.na + orders.nb;
     if p == 0 || first < orders.first_regressed_sample() {
@@ -147,7 +149,7 @@ fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Opti
     });
     let factor = scaled.cholesky()?;
     let inverse = factor.inverse();
-    // Not <=: NaN is not a valid condition either.
+    // The comparison also rejects `NaN`.
     let well_conditioned = p as f64 * inverse.trace() < WELL_CONDITIONED;
     if !well_conditioned {
         return None;
@@ -157,7 +159,7 @@ fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Opti
         x.iter().zip(&scale).map(|(x, s)| x / s).collect()
     };
     let mut theta = solve(&|i| sign(i) * all[i + 1]);
-    // Residuals, their power, and their products with the regressors.
+    // Computes the residuals, their sum of squares, and their products with the regressors.
     let factors: Vec<f64> = (0..p).map(|i| sign(i) * theta[i]).collect();
     let mut residuals = ResidualProducts::new(p);
     for d in data {
@@ -169,7 +171,7 @@ fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Opti
         theta[i] += correction[i];
         squares -= correction[i] * sign(i) * residuals.products[i];
     }
-    // An exact fit leaves the rounding of the residuals, which is more accurate by QR.
+    // In an exact fit only rounding errors remain in the residuals; QR computes them more accurately.
     if !squares.is_finite() || squares < EXACT * power {
         return None;
     }

@@ -1,8 +1,8 @@
-//! The prediction-error criterion with constraints and priors.
+//! The prediction error criterion with constraints and priors.
 //!
-//! `N V(theta) = sum eps^2 + N sum_i w_i (theta_i - theta*_i)^2` (the regularised criterion of L. Ljung, *System
-//! Identification*, 1999, eq. 7.107), with bounds on each parameter, and optionally only models that are stable from e
-//! to u.
+//! The criterion is `N V(theta) = sum eps^2 + N sum_i w_i (theta_i - theta*_i)^2` (the regularised criterion of L.
+//! Ljung, *System Identification*, 1999, eq. 7.107), with bounds on each parameter. Optionally, only models that are
+//! stable from e to u are admitted.
 
 use std::ops::Range;
 
@@ -15,14 +15,14 @@ use crate::{
     optimize::Objective,
 };
 
-/// The criterion, its limits and its prior.
+/// The criterion with its limits and its prior.
 pub(crate) struct ConstrainedCriterion<'c, 'a> {
     pub criterion: &'c Criterion<'a>,
     /// Lower and upper bound of each parameter.
     pub limits: Option<Vec<(f64, f64)>>,
-    /// The guess for each parameter that has one, with its weight in the sum of squares.
+    /// Prior guess for each parameter that has one, with its weight in the sum of squares.
     pub prior: Vec<(usize, Prior)>,
-    /// True if the roots of A must be inside the unit circle as well.
+    /// True if the roots of A must also be inside the unit circle.
     pub stable: bool,
 }
 

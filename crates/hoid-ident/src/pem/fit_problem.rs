@@ -1,12 +1,12 @@
-//! The search for the lowest minimum from all starts of one fit, and the fit there.
+//! Search for the lowest minimum from all starts of one fit, and the fit at this minimum.
 
 use hoid_model::{SampleTime, polynomial::reflected_inside};
 
 use crate::{
     Fit, IdentError, Loss, Reason,
-    assembled_fit::{Solution, assembled_fit, held},
+    assembled_fit::{Solution, assembled_fit, is_fixed_or_bounded},
     criterion::{Block, Criterion, Workspace},
-    initial_guess::c_drawn_inside::with_c_drawn_inside,
+    initial_guess::c_drawn_inside::starts_with_c_inside,
     linalg::information::inverse_of_free,
     multistart::{LinearisationClient, MultiStart, Start},
     optimize::{Linearisation, Objective, free_parameters, minimise},
@@ -22,10 +22,10 @@ pub(crate) struct FitProblem<'q, 'a> {
 }
 
 impl<'q, 'a> FitProblem<'q, 'a> {
-    /// Creates the searches from the given start, or from those of `own_starts`.
+    /// Creates the searches from the given start or, if there is none, from `own_starts`.
     ///
     /// # Errors
-    /// [`IdentError::BadStart`].
+    /// [`IdentError::BadStart`] if the given start has the wrong length or no predictor.
     pub fn new(
         settings: &'q FitSettings,
         constrained: &'q ConstrainedCriterion<'q, 'a>,
@@ -48,10 +48,11 @@ impl<'q, 'a> FitProblem<'q, 'a> {
         })
     }
 
-    /// Returns the fit at the lowest minimum, when all searches have ended.
+    /// Returns the fit at the lowest minimum, after all searches have ended.
     ///
     /// # Errors
-    /// [`IdentError::NoFiniteLoss`] if no search was successful, [`IdentError::SingularInformation`].
+    /// [`IdentError::NoFiniteLoss`] if no search was successful, [`IdentError::SingularInformation`] if the data do not
+    /// determine all parameters.
     pub fn fit(self, workspace: &mut Workspace) -> Result<Fit, IdentError> {
         let Self {
             settings, constrained, ..
@@ -61,8 +62,9 @@ impl<'q, 'a> FitProblem<'q, 'a> {
             (start, minimum) = (label, lower);
         }
         if settings.start.is_none() && matches!(minimum.termination.reason, Reason::Border | Reason::NoDescent) {
-            // The loss often has a lower minimum inside in addition to one on the border.
-            let inside = with_c_drawn_inside(&settings.orders, &minimum.theta);
+            // In addition to a minimum on the border, the loss often has a lower minimum inside the region of
+            // stability.
+            let inside = starts_with_c_inside(&settings.orders, &minimum.theta);
             let known = minimum.at.sum_of_squares;
             let others = inside
                 .into_iter()
@@ -89,7 +91,7 @@ impl<'q, 'a> FitProblem<'q, 'a> {
         let free = free_parameters(constrained, &minimum.theta, &minimum.at.descent);
         let solution = Solution {
             sum_of_squares: constrained.without_prior(&minimum.theta, &minimum.at),
-            held: held(&free, settings.orders.parameters()),
+            is_fixed_or_bounded: is_fixed_or_bounded(&free, settings.orders.parameters()),
             theta: minimum.theta,
             termination: minimum.termination,
             start,
@@ -104,7 +106,7 @@ impl<'q, 'a> FitProblem<'q, 'a> {
     }
 }
 
-/// Returns the start with a stable A if that was requested; `None` if the roots of A cannot be found.
+/// Returns the start, with a stable A if this was requested; `None` if the roots of A cannot be found.
 fn stabilised(mut start: Start, constrained: &ConstrainedCriterion<'_, '_>) -> Option<Start> {
     if constrained.stable {
         let na = constrained.criterion.orders.na;
@@ -114,7 +116,7 @@ fn stabilised(mut start: Start, constrained: &ConstrainedCriterion<'_, '_>) -> O
     Some(start)
 }
 
-/// Checks a given start: its length, and the existence of the predictor.
+/// Checks the length of a given start and the existence of its predictor.
 fn checked_start(theta: &[f64], constrained: &ConstrainedCriterion<'_, '_>) -> Result<Vec<f64>, IdentError> {
     let orders = constrained.criterion.orders;
     let bad = |reason: &str| IdentError::BadStart {
@@ -131,7 +133,7 @@ fn checked_start(theta: &[f64], constrained: &ConstrainedCriterion<'_, '_>) -> R
     if !constrained.is_feasible(theta) {
         return Err(bad(
             "C or F (or a polynomial required to be stable) has a root on or outside the unit circle; give a stable \
-             start or none",
+             start or no start",
         ));
     }
     Ok(theta.to_vec())

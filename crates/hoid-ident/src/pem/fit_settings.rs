@@ -11,29 +11,28 @@ use crate::{
     pem::constraints::ConstrainedCriterion,
 };
 
-/// The options of an estimator after the checks, with the automatic ones resolved.
+/// Validated options of an estimator, in which automatic options are replaced by their values.
 #[derive(Debug, Clone)]
 pub(crate) struct FitSettings {
     pub structure: Structure,
     pub orders: Orders,
     pub initial_state: InitialState,
     pub search: SearchOptions,
-    /// Number of own starts from which the search runs to completion.
+    /// Number of automatic starts from which the search is completed.
     pub starts: usize,
-    /// Start of the search, instead of the estimator's own starts.
+    /// Start given by the user, which replaces the automatic starts.
     pub start: Option<Vec<f64>>,
     pub constraints: BTreeMap<String, Constraint>,
     pub priors: BTreeMap<String, Prior>,
     pub loss: Loss,
-    /// True if u of each record has a level.
+    /// True if a level of u is estimated for each record.
     pub level: bool,
-    /// True if A must be stable too.
+    /// True if A must also be stable.
     pub stable: bool,
 }
 
 impl FitSettings {
-    /// Returns the criterion over these records, with residuals from sample `first` on at the earliest, and their
-    /// sample time.
+    /// Returns the criterion for these records and their sample time. Residuals start at sample `first` or later.
     ///
     /// # Errors
     /// [`IdentError`] if the records are not informative enough.
@@ -89,12 +88,12 @@ impl FitSettings {
         }
     }
 
-    /// True for the plain sum of squares: without constraints, priors or another loss.
+    /// True if the criterion is a plain sum of squares, without constraints, priors or another loss.
     pub fn is_unconstrained(&self) -> bool {
         self.constraints.is_empty() && self.priors.is_empty() && self.loss == Loss::Quadratic && !self.stable
     }
 
-    /// True if least squares gives the fit in one step.
+    /// True if the fit is a linear least-squares problem.
     pub fn is_linear(&self) -> bool {
         self.structure.is_linear() && self.initial_state != InitialState::Backcast && self.is_unconstrained()
     }

@@ -1,12 +1,13 @@
-//! Search for a lower minimum than that of the default starts, for models and records that may have one.
+//! Search for a minimum lower than the best minimum from the default starts, for models and records that may have such
+//! a minimum.
 //!
-//! The starts cover the whole region of stability ([`crate::initial_guess::broad`]). A few steps of the search from
-//! each show which of them decrease the loss; the best are continued to the end, unless they come close to the known
-//! minimum without a predicted lower end. If nothing lower is found, the known result is unchanged to the last digit.
+//! The starts cover the whole region of stability ([`crate::initial_guess::broad`]). A few search steps from each start
+//! show which starts decrease the loss. The best searches are completed, unless they come close to the known minimum
+//! without a predicted lower end. If nothing lower is found, the known result remains bitwise unchanged.
 //!
-//! **Conditions.** A record of some hundred samples has many minima, and a model with more coefficients than the
-//! operator's (nb, nf > 2, nc > 0, nd > 4) has them in longer records too. There the first few steps use a part of the
-//! record, whose cost does not depend on the length of the record.
+//! **Conditions.** Records of some hundred samples have many minima. A model with more coefficients than the operator
+//! (nb, nf > 2, nc > 0, nd > 4) has many minima in longer records too; in this case the first few steps use only a part
+//! of the record, so that their cost does not depend on its length.
 
 use super::{constraints::ConstrainedCriterion, fit_settings::FitSettings};
 use crate::{
@@ -16,23 +17,24 @@ use crate::{
     optimize::{Minimum, basin::lies_in_basin, minimise},
 };
 
-/// Number of residuals up to which every model is searched widely, and of the part for the first steps of other models.
+/// Largest number of residuals for which every model is searched this way, and length of the part that longer records
+/// use for the first steps.
 const SPAN: usize = 1000;
-/// Largest number of coefficients of D of the operator's models.
+/// Largest order of D that does not count as larger than the operator model.
 const LARGEST_ND: usize = 4;
-/// Number of starts for a few steps, the best by their loss.
-const TRIED: usize = 24;
-/// Number of steps from each of them.
+/// Number of starts with the smallest loss from which a few steps are made.
+const RANKED_STARTS: usize = 24;
+/// Number of steps from each of these starts.
 const STEPS: usize = 8;
-/// Number of starts whose search runs to completion, on the whole record.
-const FINISHED: usize = 8;
-/// The same two numbers for a record that is longer than the span.
-const OF_LONG: [usize; 2] = [12, 3];
-/// Relative decrease of the loss above which a minimum counts as another one.
-const LOWER: f64 = 1e-7;
+/// Number of searches that are completed on the whole record.
+const COMPLETED_SEARCHES: usize = 8;
+/// Values that replace [`RANKED_STARTS`] and [`COMPLETED_SEARCHES`] for a record longer than [`SPAN`].
+const COUNTS_FOR_LONG_RECORD: [usize; 2] = [12, 3];
+/// Minimum relative decrease of the loss for a minimum to count as a different one.
+const MIN_DECREASE: f64 = 1e-7;
 
-/// Returns a lower minimum with the name of its start. With a given start, or with a single start, no other is searched
-/// for.
+/// Returns a lower minimum with the label of its start, if there is one. Nothing is searched for if the start was given
+/// or the number of starts is one.
 pub(crate) fn lower_minimum(
     settings: &FitSettings,
     constrained: &ConstrainedCriterion<'_, '_>,
@@ -51,7 +53,7 @@ pub(crate) fn lower_minimum(
         max_iterations: STEPS,
         ..settings.search
     };
-    let [most_tried, most_finished] = if whole { [TRIED, FINISHED] } else { OF_LONG };
+    let [most_tried, most_finished] = if whole { [RANKED_STARTS, COMPLETED_SEARCHES] } else { COUNTS_FOR_LONG_RECORD };
     let rival = whole.then_some(known.at.sum_of_squares);
     let mut tried: Vec<(String, Minimum)> = broad_starts(&part, &known.theta, workspace)
         .into_iter()
@@ -65,7 +67,7 @@ pub(crate) fn lower_minimum(
     for (label, near) in tried {
         let rival = lowest.as_ref().map_or(known, |(_, minimum)| minimum).at.sum_of_squares;
         if let Some(mut end) = minimise(constrained, near.theta, &settings.search, Some(rival), workspace)
-            && end.at.sum_of_squares < rival * (1.0 - LOWER)
+            && end.at.sum_of_squares < rival * (1.0 - MIN_DECREASE)
         {
             end.termination.iterations += near.termination.iterations;
             lowest = Some((label, end));
@@ -74,21 +76,20 @@ pub(crate) fn lower_minimum(
     lowest
 }
 
-/// True for models with F and without A whose records are short, or which have more coefficients
-/// than the operator's.
+/// True for models with F and without A if the records are short, or if the model has more coefficients than the
+/// operator.
 fn may_have_more_minima(criterion: &Criterion<'_>) -> bool {
     let o = criterion.orders;
     let larger = o.nb > 2 || o.nc > 0 || o.nd > LARGEST_ND || o.nf > 2;
     o.na == 0 && o.nb > 0 && o.nf > 0 && (larger || criterion.residuals() <= SPAN)
 }
 
-/// Returns the criterion over the first samples, enough for [`SPAN`] residuals: the records in order, the last one
-/// truncated.
+/// Returns the criterion for the first [`SPAN`] residuals: the records in their order, with the last record truncated.
 fn first_span<'a>(criterion: &Criterion<'a>) -> Criterion<'a> {
     let mut left = SPAN;
     let mut data = Vec::new();
     for d in &criterion.data {
-        // A piece with fewer residuals than this carries little information beyond its initial states.
+        // A shorter part carries little information in addition to its initial states.
         if left < SPAN / 10 {
             break;
         }

@@ -1,15 +1,15 @@
-//! The fit by the prediction error method: it minimises [`crate::criterion`] by [`crate::optimize`].
+//! Fits by the prediction error method: [`crate::criterion`] is minimised by [`crate::optimize`].
 //!
 //! | module | contents |
 //! |---|---|
 //! | `constraints` | bounds and priors |
-//! | `fit_settings` | the settings of a fit in addition to the records |
-//! | `prediction_focus`, `simulation_focus` | the fit by the prediction error, and of models for simulation |
+//! | `fit_settings` | all settings of a fit except the records |
+//! | `prediction_focus`, `simulation_focus` | fits for prediction, and fits of models for simulation |
 //! | `arx` | structures that are linear in theta |
-//! | `fit_problem` | the searches from all starts of one fit, and the fit at the lowest minimum |
-//! | `lower_minimum` | a lower minimum, for short records and larger models |
-//! | `batched` | the fits of many records at a time |
-//! | `loss`, `robust` | a loss that outliers cannot dominate, and its reweighted searches |
+//! | `fit_problem` | searches from all starts of one fit, and the fit at the lowest minimum |
+//! | `lower_minimum` | search for a lower minimum, for short records and larger models |
+//! | `batched` | fits of many records at the same time |
+//! | `loss`, `robust` | loss that outliers cannot dominate, and its minimisation by reweighting |
 
 pub mod arx;
 pub mod batched;

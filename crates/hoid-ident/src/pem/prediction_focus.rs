@@ -1,4 +1,4 @@
-//! Fits by the prediction error: in one step if the residual is linear in theta, otherwise by searches.
+//! Fits for prediction: in one step if the residual is linear in theta, otherwise by searches.
 
 use hoid_model::Record;
 
@@ -7,10 +7,10 @@ use crate::{
     optimize::Objective, pem::arx, pem::fit_problem::FitProblem, pem::fit_settings::FitSettings,
 };
 
-/// Fits one model to all records, with residuals from sample `first` of each record on at the earliest.
+/// Fits one model to all records. In each record, residuals start at sample `first` or later.
 ///
 /// # Errors
-/// [`IdentError`].
+/// [`IdentError`] if no model can be fitted.
 pub(crate) fn fit(settings: &FitSettings, records: &[Record], first: usize) -> Result<Fit, IdentError> {
     let (criterion, sample_time) = settings.criterion(records, first)?;
     if settings.is_linear() {

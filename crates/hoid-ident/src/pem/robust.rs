@@ -1,43 +1,44 @@
 //! A loss that outliers cannot dominate.
 //!
-//! Huber's loss ([`Loss`](crate::Loss)) with the threshold k is minimised by iteratively reweighted
-//! least squares (P. J. Huber, *Robust Statistics*, 1981, section 7.8): the weights
-//! `w = min(1, k/|r|)` of one search are computed from the residuals of the previous search, in units of the scale s.
-//! Each round lowers the loss. The scale is the median absolute residual divided by 0.6745, from the residuals of the
-//! previous round; it is kept constant after [`SCALES`] rounds, so that the rounds converge.
+//! Huber's loss ([`Loss`](crate::Loss)) with the threshold k is minimised by iteratively reweighted least squares (P.
+//! J. Huber, *Robust Statistics*, 1981, section 7.8): the weights `w = min(1, k/|r|)` of a search are computed from the
+//! residuals r of the previous search, in units of the scale s. Each round lowers the loss. The scale is the median
+//! absolute residual of the previous round divided by 0.6745; it is kept constant after [`SCALES`] rounds, so that the
+//! rounds converge.
 //!
-//! A bounded loss bounds the weight of a residual, and not the effect of a sample on the regressors: one wrong sample
-//! of e is in the response of the operator for seconds, with residuals that are large because theta is right, and theta
-//! is biased (F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw and W. A. Stahel, *Robust Statistics*, 1986, section 6.3:
-//! the influence is the product of those of the residual and of the position). To bound the influence of the position
-//! too, the estimator first limits each sample of e and u by its neighbours ([`crate::faults::resistant`]); in a normal
-//! channel one sample in 16 000 is changed, and the efficiency remains that of the loss.
+//! A bounded loss bounds the weight of a residual but not the effect of a sample on the regressors. A single wrong
+//! sample of e remains in the response of the operator for seconds: its residuals are large although theta is correct,
+//! so that theta becomes biased (F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw and W. A. Stahel, *Robust Statistics*,
+//! 1986, section 6.3: the influence is the product of the influence of residual and the influence of position). To
+//! bound the influence of position as well, the estimator first limits each sample of e and u by its neighbours
+//! ([`crate::faults::resistant`]); in a normal channel one sample in 16 000 is changed, so that the efficiency of the
+//! loss is retained.
 //!
-//! Covariance (Huber, eq. 7.6.8, for residuals that are independent of the gradient):
-//! `s^2 kappa (psi' psi)^-1`, `kappa = mean(rho'^2) / mean(rho'')^2`, with the unweighted psi.
+//! The covariance is `s^2 kappa (psi' psi)^-1`, `kappa = mean(rho'^2) / mean(rho'')^2`, with the unweighted psi (Huber,
+//! eq. 7.6.8, for residuals that are independent of the gradient).
 
 use hoid_model::SampleTime;
 use hoid_numerics::statistics::upper_median;
 
 use crate::{
     Fit, IdentError, Reason, Termination,
-    assembled_fit::{Solution, assembled_fit, held},
+    assembled_fit::{Solution, assembled_fit, is_fixed_or_bounded},
     criterion::{Criterion, Workspace},
     linalg::{information::inverse_of_free, least_squares::dot},
     optimize::{Minimum, Objective, free_parameters, minimise},
     pem::{constraints::ConstrainedCriterion, fit_settings::FitSettings},
 };
 
-/// Rounds in which the scale is estimated again.
+/// Number of rounds in which the scale is estimated again.
 const SCALES: usize = 10;
 
 /// Largest number of rounds.
 const ROUNDS: usize = 50;
 
-/// The rounds end when theta moves by less than this share of its standard errors.
-const SETTLED: f64 = 1e-5;
+/// The rounds end when theta changes by less than this share of its standard errors.
+const CONVERGED: f64 = 1e-5;
 
-/// Weights of Huber's loss over the rounds.
+/// State of the reweighting: threshold, scale and number of rounds.
 #[derive(Debug)]
 struct Reweighting {
     threshold: f64,
@@ -56,10 +57,10 @@ impl Reweighting {
     }
 
     /// Returns the square roots of the weights for the next round, from the residuals of each record. `None` if the
-    /// residuals have no scale (half of them are zero).
+    /// scale is zero because half of the residuals are zero.
     pub fn next(&mut self, residuals: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
-        // A scale estimated in every round can alternate with the weights; with a fixed one, each round decreases
-        // Huber's loss.
+        // If the scale is estimated in every round, it can alternate with the weights; with a fixed scale each round
+        // decreases Huber's loss.
         if self.round < SCALES {
             self.scale = median_absolute(residuals) / 0.674_489_750_196_081_7;
         }
@@ -82,10 +83,11 @@ impl Reweighting {
     }
 }
 
-/// Runs rounds of reweighted searches from the least squares minimum, which was found from `start`.
+/// Runs rounds of reweighted searches from a least-squares minimum; `start` is the label of the start of this minimum.
 ///
 /// # Errors
-/// [`IdentError::NoFiniteLoss`], [`IdentError::SingularInformation`].
+/// [`IdentError::NoFiniteLoss`] if a search fails, [`IdentError::SingularInformation`] if the data do not determine all
+/// parameters.
 pub(crate) fn fit(
     settings: &FitSettings,
     threshold: f64,
@@ -114,13 +116,13 @@ pub(crate) fn fit(
         let next = minimise(&objective, minimum.theta.clone(), &settings.search, None, workspace)
             .ok_or(IdentError::NoFiniteLoss)?;
         iterations += next.termination.iterations;
-        // step' G step/(S/n): the squared distance of the rounds in standard errors.
+        // step' G step/(S/n) is the squared step length in standard errors.
         let step: Vec<f64> = next.theta.iter().zip(&minimum.theta).map(|(a, b)| a - b).collect();
         let p = step.len();
         let curvature: f64 = (0..p)
             .map(|i| step[i] * dot(&next.at.gram[i * p..(i + 1) * p], &step))
             .sum();
-        settled = curvature * criterion.residuals() as f64 <= SETTLED * SETTLED * next.at.sum_of_squares;
+        settled = curvature * criterion.residuals() as f64 <= CONVERGED * CONVERGED * next.at.sum_of_squares;
         minimum = next;
         residuals = all_residuals(&weighted, &minimum.theta, workspace);
         if settled {
@@ -139,7 +141,7 @@ pub(crate) fn fit(
     let variance = rounds.variance(&residuals, names.len() + criterion.states());
     let sum_of_squares = residuals.iter().map(|r| dot(r, r)).sum();
     let solution = Solution {
-        held: held(&free, names.len()),
+        is_fixed_or_bounded: is_fixed_or_bounded(&free, names.len()),
         theta: minimum.theta,
         sum_of_squares,
         termination: Termination { reason, iterations },

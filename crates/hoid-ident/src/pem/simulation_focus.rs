@@ -1,15 +1,14 @@
 //! Fits of models for simulation.
 //!
-//! First the system `B/(A F)` is fitted by the output-error criterion, i.e. only by the simulation error. Then C and D
-//! are fitted by the prediction error with that system fixed.
+//! The system `B/(A F)` is first fitted by the output-error criterion, i.e. by its simulation error. Then C and D are
+//! fitted by the prediction error, with this system fixed.
 //!
-//! **Covariance.** The simulation error is `v = H eps` with `H = C/(A D)`, not white. With psi the
-//! gradient of the simulation error (initial states projected out) the estimate of the system has,
-//! to first order, `(psi' psi)^-1 psi' (sigma^2 H H') psi (psi' psi)^-1` (L. Ljung, *System
-//! Identification*, 1999, section 9.4), with `H' psi` the filter H run backwards in time. It holds
-//! in an open loop; in a closed loop the input is correlated with the noise and the system is
-//! biased in addition. C and D have the covariance of their own search, and no correlation with the
-//! system is taken into account.
+//! **Covariance.** The simulation error `v = H eps` with `H = C/(A D)` is not white. Let psi be the gradient of the
+//! simulation error (initial states projected out). To first order, the covariance of the system estimate is
+//! `(psi' psi)^-1 psi' (sigma^2 H H') psi (psi' psi)^-1` (L. Ljung, *System Identification*, 1999, section 9.4), where
+//! `H' psi` is computed with the filter H run backwards in time. This is valid in an open loop; in a closed loop the
+//! input is correlated with the noise, and the system is also biased. C and D have the covariance of their own search;
+//! their correlation with the system is not taken into account.
 
 use std::collections::BTreeMap;
 
@@ -25,10 +24,10 @@ use crate::{
     pem::prediction_focus,
 };
 
-/// Fits a structure by the simulation error of its system; `settings` are those of the structure.
+/// Fits a structure by the simulation error of its system; `settings` are the settings of this structure.
 ///
 /// # Errors
-/// [`IdentError`] of either fit.
+/// [`IdentError`] if one of the two fits fails.
 pub(crate) fn fit(settings: &FitSettings, records: &[Record], first: usize) -> Result<Fit, IdentError> {
     let o = settings.orders;
     let of_system = FitSettings {
@@ -63,14 +62,14 @@ pub(crate) fn fit(settings: &FitSettings, records: &[Record], first: usize) -> R
     }
     let of_noise = |i: usize| i >= o.na + o.nb && i < o.na + o.nb + o.nc + o.nd;
     let fixed = fit
-        .held
+        .is_fixed_or_bounded
         .iter()
         .enumerate()
         .map(|(i, held)| of_noise(i) && *held)
         .collect();
     Ok(Fit {
         covariance,
-        held: fixed,
+        is_fixed_or_bounded: fixed,
         start,
         termination: iterations,
         states: simulated.state_count().max(fit.state_count()),
@@ -78,7 +77,7 @@ pub(crate) fn fit(settings: &FitSettings, records: &[Record], first: usize) -> R
     })
 }
 
-/// Renames coefficients of A to those of F, which contains the poles in the simulation; C and D are left out.
+/// Renames coefficients of A to coefficients of F, which contains these poles in the simulation; C and D are left out.
 fn as_poles_of_f<T: Copy>(named: &BTreeMap<String, T>) -> BTreeMap<String, T> {
     named
         .iter()
@@ -93,7 +92,7 @@ fn of_noise_model<T: Copy>(named: &BTreeMap<String, T>) -> impl Iterator<Item = 
     of_noise.map(|(name, value)| (name.clone(), *value))
 }
 
-/// Fixes the coefficients of the system at their values.
+/// Returns constraints that fix the coefficients of the system at their values.
 fn hold(system: &PolynomialModel, orders: &Orders) -> Vec<(String, Constraint)> {
     let pole = if orders.na > 0 { 'a' } else { 'f' };
     let poles = (1..).zip(system.f()).map(|(i, f)| (format!("{pole}{i}"), *f));
@@ -104,7 +103,7 @@ fn hold(system: &PolynomialModel, orders: &Orders) -> Vec<(String, Constraint)> 
         .collect()
 }
 
-/// Covariance of theta; `None` if the noise model is not stable, or if there is no noise.
+/// Returns the covariance of theta; `None` if the noise model is not stable or there is no noise.
 fn covariance(simulated: &Fit, fit: &Fit, records: &[Record], first: usize) -> Result<Option<Vec<f64>>, IdentError> {
     let (Some(_), Some(of_noise)) = (&simulated.covariance, &fit.covariance) else {
         return Ok(None);
@@ -144,7 +143,7 @@ fn covariance(simulated: &Fit, fit: &Fit, records: &[Record], first: usize) -> R
             .collect()
     };
     let sandwich = times(&times(&inverse, &coloured), &inverse);
-    // theta of the simulation is [b, f]; that of the structure [a, b, c, d, f].
+    // theta of the simulation is [b, f]; theta of the structure is [a, b, c, d, f].
     let o = fit.orders();
     let p = o.parameters();
     let pole_at = if o.na > 0 { 0 } else { p - o.nf };

@@ -1,18 +1,18 @@
-//! An option of a batch estimator, declared once: its setting, its parser, and its printed form.
+//! An option of a batch estimator, which is declared once: its description, its parser, and its printed form.
 
 use hoid_model::SampleTime;
 
 use super::setting::Setting;
 use crate::IdentError;
 
-/// Sets an option of an estimator from a text.
+/// Function that sets an option of an estimator from a text.
 type Set<E, X> = Box<dyn Fn(&mut E, &Setting, &str) -> Result<(), X>>;
-/// Writes the value as text for a given sample time; `None` if the value is not printed.
+/// Function that returns the value as text for a given sample time; `None` if the value is not printed.
 type Words<E> = Box<dyn Fn(&E, SampleTime) -> Option<String>>;
 
-/// An option of an estimator `E`, with errors of type `X` for invalid texts.
+/// An option of an estimator `E`; invalid texts give errors of type `X`.
 pub struct BatchOption<E, X = IdentError> {
-    /// Name, type, default, bounds, help.
+    /// Name, type, default, bounds and help text.
     pub setting: Setting,
     set: Set<E, X>,
     printed: Option<(&'static str, Words<E>)>,
@@ -25,7 +25,7 @@ pub trait BatchOptions: Sized + 'static {
 }
 
 impl<E: 'static, X: 'static> BatchOption<E, X> {
-    /// Creates an option with its setter.
+    /// Creates an option with a function that sets it.
     pub fn new(setting: Setting, set: impl Fn(&mut E, &Setting, &str) -> Result<(), X> + 'static) -> Self {
         Self {
             setting,
@@ -34,7 +34,7 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
         }
     }
 
-    /// Returns the option with a name under which it is printed among the settings in use.
+    /// Returns the same option, which is also printed among the settings in use, under this name.
     #[must_use]
     pub fn printed(self, name: &'static str, words: impl Fn(&E, SampleTime) -> Option<String> + 'static) -> Self {
         Self {
@@ -43,15 +43,15 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
         }
     }
 
-    /// Sets the option from its text.
+    /// Sets the option from a text.
     ///
     /// # Errors
-    /// For a text that is not a valid value, or contradicts an option that was set before.
+    /// An error of type `X` if the text is not a valid value or contradicts an option that was set before.
     pub fn set(&self, of: &mut E, text: &str) -> Result<(), X> {
         (self.set)(of, &self.setting, text)
     }
 
-    /// Returns its name and value as printed.
+    /// Returns the name and the value as printed; `None` if the option is not printed.
     pub fn words(&self, of: &E, sample_time: SampleTime) -> Option<(&'static str, String)> {
         let (name, words) = self.printed.as_ref()?;
         Some((*name, words(of, sample_time)?))
@@ -66,7 +66,7 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
         }
     }
 
-    /// Returns the same option for the estimator that contains this one.
+    /// Returns the same option for an estimator that contains this estimator.
     pub fn within<W: 'static, Y: From<X> + 'static>(
         self,
         part: fn(&W) -> &E,

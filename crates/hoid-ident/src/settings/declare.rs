@@ -1,11 +1,11 @@
-//! The declaration of options.
+//! Macro for the declaration of options.
 
-/// Declares a struct of options: of each field documentation, unit, bounds and default. It
-/// implements `Default` and [`Settings`](crate::settings::Settings). Options that several methods share are in a
-/// separate struct, named under `groups`.
+/// Declares a struct of options: for each field its documentation, unit, bounds and default. The struct implements
+/// `Default` and [`Settings`](crate::settings::Settings). Options that several methods share are declared in a separate
+/// struct, which is named under `groups`.
 ///
 /// `#[setting(..)]` contains methods of [`Setting`](crate::settings::Setting): `unit`, `bounds`, `default` (as text),
-/// `name` (where it is not that of the field).
+/// `name` (if it differs from the name of the field).
 #[macro_export]
 macro_rules! settings {
     (

@@ -15,15 +15,15 @@ pub enum Kind {
     Memory,
     /// A number, or `off`.
     NumberOrOff,
-    /// A number, or the name of the option alone, which means this number.
+    /// A number, or the option without a value, which means the number given here.
     NumberOrDefault(&'static str),
     /// A transfer function of s, such as `90/(s(s+6))`.
     Element,
     /// `LO..HI`, two finite numbers in order.
     Span,
-    /// `LO..HI`, with either end optional.
+    /// `LO..HI`, where either end may be missing.
     OpenSpan,
-    /// An integer, or `LO..HI` for a search.
+    /// An integer, or `LO..HI` for a search over integers.
     Counts,
     /// A number, or `LO..HI`.
     NumberOrSpan,
@@ -37,35 +37,35 @@ pub enum Kind {
     Channel,
     /// Names, such as `K,T_L`.
     Names,
-    /// Prior knowledge of a person: `population`, `none`, `NAME=CENTRE:SPREAD,..`, or the file of a fit.
+    /// Prior knowledge about a person: `population`, `none`, `NAME=CENTRE:SPREAD,..`, or the file of a fit.
     Prior,
-    /// Values of a type by name, such as `b0=256,f=inf`.
+    /// Values of one type by name, such as `b0=256,f=inf`.
     Named(&'static Kind),
 }
 
-/// Bounds of numbers.
+/// Admissible range of a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bounds {
     /// Any number.
     Any,
     /// Any finite number.
     Finite,
-    /// Above zero, finite or not.
+    /// Above zero, finite or infinite.
     Positive,
     /// More than zero and finite.
     PositiveFinite,
     /// At least zero and finite.
     NonNegative,
-    /// At least this, and finite.
+    /// At least this value, and finite.
     AtLeast(f64),
-    /// More than the first and less than the second.
+    /// More than the first value and less than the second.
     Between(f64, f64),
-    /// More than the first, and at most the second.
+    /// More than the first value, and at most the second.
     UpTo(f64, f64),
 }
 
 impl Bounds {
-    /// True for a number within the bounds.
+    /// True if the number is within the bounds.
     pub fn hold(self, x: f64) -> bool {
         match self {
             Self::Any => !x.is_nan(),
@@ -87,7 +87,7 @@ impl fmt::Display for Bounds {
             Self::Finite => f.write_str("a finite number"),
             Self::Positive => f.write_str("a positive number, or inf"),
             Self::PositiveFinite => f.write_str("a positive finite number"),
-            Self::NonNegative => f.write_str("a finite number of zero or more"),
+            Self::NonNegative => f.write_str("a finite nonnegative number"),
             Self::AtLeast(least) => write!(f, "{least} or more"),
             Self::Between(low, high) => write!(f, "a number between {low} and {high}"),
             Self::UpTo(low, high) => write!(f, "a number above {low} and up to {high}"),

@@ -1,8 +1,8 @@
-//! Options that describe themselves.
+//! Self-describing options.
 //!
-//! An estimator or a recursive method declares its options once, by
-//! [`settings!`](crate::settings!): name, type, unit, default, bounds and a line of help. The
-//! command line, plans of studies, Python and the pages of the book read that declaration and have no separate list.
+//! An estimator or a recursive method declares its options once, by [`settings!`](crate::settings!): name, type, unit,
+//! default, bounds and a line of help. The command line, study plans, Python and the pages of the book use this
+//! declaration and have no separate list.
 //!
 //! ```
 //! use hoid_ident::{settings, settings::{Bounds, Settings}};
@@ -26,8 +26,8 @@
 //! # Ok::<(), hoid_ident::IdentError>(())
 //! ```
 //!
-//! A value is written as on the command line: `256`, `true`, `0.2..0.4`, `b0=256,f=inf`. Values that a plan or Python
-//! has in its own types are first converted to that form, so that there is one reader of each type ([`Value`]).
+//! A value is written as on the command line: `256`, `true`, `0.2..0.4`, `b0=256,f=inf`. Typed values from a plan or
+//! from Python are first converted to this form, so that each type has a single parser ([`Value`]).
 
 mod batch_option;
 mod declare;
@@ -44,18 +44,17 @@ pub use value::{Value, named_pairs};
 
 use crate::IdentError;
 
-/// Options with names.
+/// A set of named options.
 pub trait Settings {
-    /// Available settings, in the order of the declaration, with the defaults.
+    /// Returns the available settings in the order of their declaration, with their defaults.
     fn list(&self) -> Vec<Setting>;
 
-    /// Sets an option from its text; false when the name is not among them.
+    /// Sets an option from a text; returns false if there is no option with this name.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a text that is not a value of the option, or out of its
-    /// bounds.
+    /// [`IdentError::BadOption`] if the text is not a valid value of the option or is outside its bounds.
     fn set(&mut self, name: &str, text: &str) -> Result<bool, IdentError>;
 
-    /// The value of an option as text; `None` if it has none, or the name is not among them.
+    /// Returns the value of an option as text; `None` if it has no value, or if there is no option with this name.
     fn get(&self, name: &str) -> Option<String>;
 }

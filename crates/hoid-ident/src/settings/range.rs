@@ -1,4 +1,4 @@
-//! Ranges as typed by users: integers to search, delays in samples and in seconds.
+//! Ranges as typed by users: integers for a search, and delays in samples or in seconds.
 
 use std::{fmt, ops::RangeInclusive, str::FromStr};
 
@@ -6,7 +6,7 @@ use hoid_model::SampleTime;
 
 use super::{kind::Kind, value::Value};
 
-/// `N` or `LO..HI`, both ends included.
+/// `N` or `LO..HI`, including both ends.
 impl Value for RangeInclusive<usize> {
     const KIND: Kind = Kind::Counts;
 
@@ -18,8 +18,8 @@ impl Value for RangeInclusive<usize> {
         };
         match ends {
             Some((low, high)) if low <= high => Ok(low..=high),
-            Some(_) => Err("a range that is not empty: LO..HI, the smaller number first".to_owned()),
-            None => Err("a whole number of zero or more, or LO..HI".to_owned()),
+            Some(_) => Err("a nonempty range: LO..HI, the smaller number first".to_owned()),
+            None => Err("a nonnegative whole number, or LO..HI".to_owned()),
         }
     }
 
@@ -63,23 +63,23 @@ impl Value for OneOrSpan {
     }
 }
 
-/// A given delay: of b0 in samples, or the dead time in s.
+/// A delay as given by the user: nk in samples, or tau_e in seconds.
 #[derive(Debug, Clone, PartialEq)]
 pub enum DelayRange {
-    /// First and last nk.
+    /// Smallest and largest nk.
     Samples(RangeInclusive<usize>),
-    /// Shortest and longest tau_e.
+    /// Smallest and largest tau_e, s.
     Seconds(f64, f64),
 }
 
 impl DelayRange {
-    /// Returns the delay that was given, in samples or in seconds.
+    /// Returns the delay given in samples or, if there is none, the delay given in seconds.
     pub fn given(nk: Option<&Self>, delay_s: Option<OneOrSpan>) -> Option<Self> {
         nk.cloned()
             .or(delay_s.map(|OneOrSpan(low, high)| Self::Seconds(low, high)))
     }
 
-    /// Returns nk of both ends: tau_e = (nk - 1) Ts.
+    /// Returns the range of nk, with tau_e = (nk - 1) Ts.
     pub fn samples(&self, sample_time: SampleTime) -> RangeInclusive<usize> {
         match self {
             Self::Samples(range) => range.clone(),
@@ -97,7 +97,7 @@ impl fmt::Display for DelayRange {
     }
 }
 
-/// `N` or `LO..HI` in samples, or in seconds if one or both ends are followed by an s.
+/// `N` or `LO..HI` in samples; in seconds if one or both ends are followed by `s`.
 impl Value for DelayRange {
     const KIND: Kind = Kind::Delay;
 
@@ -138,12 +138,12 @@ impl FromStr for DelayRange {
 impl FromStr for OneOrSpan {
     type Err = String;
 
-    /// Parses non-negative numbers.
+    /// Parses one or two nonnegative numbers.
     fn from_str(text: &str) -> Result<Self, String> {
         let read = Self::read(text).map_err(|expected| format!("{text:?}: expected {expected}"))?;
         match read.0 >= 0.0 {
             true => Ok(read),
-            false => Err(format!("{text:?}: expected zero or more")),
+            false => Err(format!("{text:?}: expected a nonnegative number")),
         }
     }
 }

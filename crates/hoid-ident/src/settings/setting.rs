@@ -8,25 +8,25 @@ use super::{
 };
 use crate::IdentError;
 
-/// An option: name, type, unit, default, bounds, help.
+/// Description of an option: name, type, unit, default, bounds and help text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
-    /// Name, with underscores: a keyword in Python, and with hyphens a flag of the command line.
+    /// Name with underscores, which is a keyword in Python and, with hyphens, a flag of the command line.
     pub name: &'static str,
-    /// Type of its value.
+    /// Type of the value.
     pub kind: Kind,
-    /// Unit of its value; empty if it has none.
+    /// Unit of the value; empty if it has none.
     pub unit: &'static str,
     /// Default as text, or a description of it; empty if there is none.
     pub default: String,
-    /// Bounds of its numbers.
+    /// Bounds of the numbers in the value.
     pub bounds: Bounds,
-    /// Description, without a full stop.
+    /// Help text, without a full stop.
     pub help: String,
 }
 
 impl Setting {
-    /// Creates an option of the type of its default.
+    /// Creates an option with this default and its type.
     pub fn of<V: Value>(name: &'static str, default: &V) -> Self {
         Self {
             name,
@@ -50,7 +50,7 @@ impl Setting {
         }
     }
 
-    /// Returns the option with a name other than that of its field.
+    /// Returns the option with a name that differs from the name of its field.
     pub fn name(self, name: &'static str) -> Self {
         Self { name, ..self }
     }
@@ -65,7 +65,7 @@ impl Setting {
         Self { bounds, ..self }
     }
 
-    /// Returns the option with a default as text.
+    /// Returns the option with this text as default.
     pub fn default(self, words: &str) -> Self {
         Self {
             default: words.to_owned(),
@@ -73,7 +73,7 @@ impl Setting {
         }
     }
 
-    /// Returns the option with help: the lines of a comment.
+    /// Returns the option with a help text, which is given as the lines of a comment.
     pub fn help(self, lines: &[&str]) -> Self {
         let lines: Vec<&str> = lines.iter().map(|line| line.trim()).collect();
         Self {
@@ -85,7 +85,7 @@ impl Setting {
     /// Reads a value.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a text that is invalid, or out of the bounds.
+    /// [`IdentError::BadOption`] if the text is invalid or the value is out of bounds.
     pub fn read<V: Value>(&self, text: &str) -> Result<V, IdentError> {
         let bad = |expected: String| self.refused(text, &expected);
         let value = V::read(text.trim()).map_err(bad)?;
@@ -97,10 +97,10 @@ impl Setting {
 }
 
 impl Setting {
-    /// Reads one of the words of a choice, with hyphens or underscores.
+    /// Parses one word of a choice, written with hyphens or underscores.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] with the available words.
+    /// [`IdentError::BadOption`] with the available words if the text is none of them.
     pub fn word<T: NamedChoice>(&self, text: &str) -> Result<T, IdentError> {
         T::of_name(&text.replace('_', "-")).map_err(|_| {
             let words: Vec<&str> = T::CHOICES.iter().map(|choice| choice.choice_name()).collect();
@@ -108,7 +108,7 @@ impl Setting {
         })
     }
 
-    /// Returns the error for an invalid text, with the expected value.
+    /// Returns the error for an invalid text; `expected` describes a valid value.
     pub fn refused(&self, text: &str, expected: &str) -> IdentError {
         IdentError::BadOption {
             option: self.name.to_owned(),
@@ -117,7 +117,7 @@ impl Setting {
         }
     }
 
-    /// Returns the error for a contradiction with other options, with the reason.
+    /// Returns the error for a contradiction with other options, for the given reason.
     pub fn error(&self, reason: impl Into<String>) -> IdentError {
         IdentError::Option {
             name: self.name,
@@ -129,14 +129,14 @@ impl Setting {
 /// Description of an estimator or a recursive method.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MethodSpec {
-    /// Name as typed.
+    /// Name as typed by users.
     pub name: &'static str,
-    /// Description, in a line without a full stop.
+    /// Description in one line, without a full stop.
     pub help: &'static str,
     /// Source in the literature.
     pub source: &'static str,
-    /// The structures for which it is valid.
+    /// Structures for which the method is valid.
     pub structures: &'static [Structure],
-    /// Its options.
+    /// Options of the method.
     pub settings: Vec<Setting>,
 }

@@ -7,21 +7,21 @@ use hoid_core::{predictor::Regressor, recursion::Stable};
 use super::kind::Kind;
 use crate::{Constraint, Prior};
 
-/// A type of values: its name, its parser, its text form.
+/// A type of value, with its kind, its parser and its text form.
 pub trait Value: Sized {
-    /// The type as known to users.
+    /// Type as shown to users.
     const KIND: Kind;
 
     /// Parses a text.
     ///
     /// # Errors
-    /// The expected value, as text.
+    /// A description of the expected value.
     fn read(text: &str) -> Result<Self, String>;
 
-    /// Returns the value as text; `None` for an invalid one.
+    /// Returns the value as text; `None` for an invalid value.
     fn text(&self) -> Option<String>;
 
-    /// Returns the numbers in it, for the check of the bounds.
+    /// Returns the numbers in the value, which are checked against the bounds.
     fn numbers(&self) -> Vec<f64> {
         Vec::new()
     }
@@ -64,7 +64,7 @@ impl Value for f64 {
     }
 
     fn text(&self) -> Option<String> {
-        // 1e6 instead of 1000000.
+        // Prefers 1e6 to 1000000.
         let (plain, short) = (self.to_string(), format!("{self:e}"));
         Some(if short.len() < plain.len() { short } else { plain })
     }
@@ -125,7 +125,7 @@ impl Value for (f64, f64) {
     }
 }
 
-/// Bounds `LO..HI` of a parameter, with either end optional.
+/// Bounds `LO..HI` of a parameter, where either end may be missing.
 impl Value for Constraint {
     const KIND: Kind = Kind::OpenSpan;
 
@@ -159,7 +159,7 @@ impl Value for Prior {
             .and_then(|(value, weight)| Some((number(value)?, number(weight)?)))
             .filter(|(_, weight)| *weight >= 0.0)
             .map(|(value, weight)| Self { value, weight })
-            .ok_or_else(|| "VALUE:WEIGHT with a weight that is not negative".to_owned())
+            .ok_or_else(|| "VALUE:WEIGHT with a nonnegative weight".to_owned())
     }
 
     fn text(&self) -> Option<String> {
@@ -184,10 +184,10 @@ impl Value for Vec<String> {
     }
 }
 
-/// Parses `NAME=VALUE,NAME=VALUE`, each name once.
+/// Parses `NAME=VALUE,NAME=VALUE`; each name may occur once.
 ///
 /// # Errors
-/// The expected value, as text.
+/// A description of the expected value.
 pub fn named_pairs(text: &str) -> Result<Vec<(String, String)>, String> {
     let mut pairs: Vec<(String, String)> = Vec::new();
     for item in text.split(',').map(str::trim).filter(|item| !item.is_empty()) {
@@ -231,7 +231,7 @@ impl<V: Value> Value for BTreeMap<String, V> {
     }
 }
 
-/// Parses one of a list of words; the words of a second list are accepted too.
+/// Parses one word of a list; the words of a second list are also accepted.
 fn choice<T: Copy>(text: &str, words: &[(&str, T)], others: &[(&str, T)]) -> Result<T, String> {
     let plain = text.to_ascii_lowercase().replace('_', "-");
     let known = || words.iter().map(|(word, _)| *word).collect::<Vec<_>>().join(", ");
@@ -243,7 +243,7 @@ fn choice<T: Copy>(text: &str, words: &[(&str, T)], others: &[(&str, T)]) -> Res
         .ok_or_else(|| format!("one of {}", known()))
 }
 
-/// Implements the value of an enum as a choice of words.
+/// Implements [`Value`] for an enum as a choice of words.
 macro_rules! choices {
     ($target:ty { $($word:literal = $value:path),+ $(,)? } $(also { $($alias:literal = $other:path),+ })?) => {
         impl Value for $target {

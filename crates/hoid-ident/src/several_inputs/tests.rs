@@ -164,7 +164,7 @@ fn what_has_no_meaning_is_refused() {
             structure: Structure::Ar,
             ..box_jenkins()
         })
-        .contains("one with inputs")
+        .contains("a structure with inputs")
     );
     let mut late = box_jenkins();
     late.inputs[1].1.nk = 400;

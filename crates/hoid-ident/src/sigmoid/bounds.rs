@@ -1,4 +1,4 @@
-//! Search ranges of the parameters of a change.
+//! Search ranges for the parameters of a change.
 
 use std::collections::BTreeMap;
 
@@ -7,23 +7,24 @@ use hoid_model::{Form, SampleTime, operator_family::Coordinate};
 use super::layout::{Element, Layout};
 use crate::{Constraint, IdentError, family::coordinates};
 
-/// Bounds of zeta_nm: beyond them the two poles are independent.
+/// Bounds of zeta_nm. Beyond these bounds the two poles are effectively independent.
 const ZETA_LIMITS: (f64, f64) = (1e-4, 100.0);
-/// Admissible T_I, s: a shorter lag is equivalent to none, a longer one to an integration.
+/// Admissible range of T_I, s: a shorter lag is equivalent to no lag, a longer one to an integration.
 const LAG_LIMITS_S: (f64, f64) = (1e-3, 1e6);
 /// Largest omega_nm as a share of pi/Ts.
 const HIGHEST_FREQUENCY: f64 = 0.999;
-/// Share of the span at either end in which t_M is not searched by default: a shorter part of a record does not
+/// Share of the span at each end in which t_M is not searched by default, since such a short part of a record does not
 /// determine two gains.
 const ENDS: f64 = 0.05;
-/// Largest rate times the sample time: four fifths of the change take two samples (2 ln 9 = 4.4). A faster change is
-/// indistinguishable, and its likelihood would be a staircase in t_M, with a step for each sample (here its slope
-/// varies by 2 % with the position of t_M between two samples, for twice the rate by 50 %).
+/// Largest default rate times the sample time: 10 to 90 % of the change take two samples (2 ln 9 = 4.4). A faster
+/// change cannot be distinguished from this one, and its likelihood would be a staircase in t_M with a step for each
+/// sample (at this rate the slope varies by 2 % with the position of t_M between two samples, at twice the rate by 50
+/// %).
 pub(crate) const FASTEST: f64 = 2.0;
 /// Largest admissible rate times the sample time.
 const FASTEST_GIVEN: f64 = 10.0;
-/// Smallest rate times the span: nine tenths of the change fill it (2 ln 19 = 5.9), and it is hardly distinguished from
-/// a line.
+/// Smallest rate times the span: 5 to 95 % of the change fill the span (2 ln 19 = 5.9), so that the change can hardly
+/// be distinguished from a line.
 const SLOWEST: f64 = 5.0;
 
 /// Quantities that determine the bounds.
@@ -35,10 +36,11 @@ pub(crate) struct Frame {
     pub delay_range_s: (f64, f64),
 }
 
-/// Returns the bounds of theta; of G for its logarithm, of T_I for its inverse.
+/// Returns the bounds of theta, whose elements include ln G and 1/T_I.
 ///
 /// # Errors
-/// [`IdentError::UnknownParameter`], [`IdentError::BadOption`].
+/// [`IdentError::UnknownParameter`] for a constraint on an unknown name, [`IdentError::BadOption`] for an invalid
+/// constraint.
 pub(crate) fn limits(
     layout: &Layout,
     frame: &Frame,
@@ -73,12 +75,12 @@ pub(crate) fn limits(
 
 type Range = (f64, f64);
 
-/// Returns the admissible range of a parameter, and its default search range, in the units that are typed.
+/// Returns the admissible range of a parameter and its default search range, in the units of the user input.
 fn ranges(layout: &Layout, frame: &Frame, element: Element) -> Result<(Range, Range), IdentError> {
     let (from, to) = frame.span_s;
     let span = to - from;
     let sample_time = SampleTime::new(frame.ts_s)?;
-    // The search range of the family.
+    // This is the search range of the operator family.
     let of_family = |coordinate: Coordinate| {
         let all = coordinates::limits(layout.form, layout.neuromuscular, frame.delay_range_s, sample_time);
         let place = layout.coordinates().iter().position(|c| *c == coordinate);

@@ -1,4 +1,4 @@
-//! The operator before and after the change, and at any time, with its errors.
+//! The operator before the change, after the change and at any time, with standard errors.
 
 use hoid_model::{
     FamilyOperator, Form, ModelError,
@@ -11,25 +11,25 @@ use super::{
     layout::{Layout, MOST_VARYING},
 };
 
-/// A parameter with its unit and its estimate.
+/// A parameter with its name, unit and estimate.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct NamedEstimate {
-    /// K, T_L, T_I ..., with the names of [`FamilyOperator::named`].
+    /// Name, such as K, T_L or T_I, as in [`FamilyOperator::named`].
     #[serde(deserialize_with = "hoid_model::interned::name")]
     pub name: hoid_model::interned::Name,
     /// Unit; empty if there is none.
     #[serde(deserialize_with = "hoid_model::interned::name")]
     pub unit: hoid_model::interned::Name,
-    /// Estimate.
+    /// Value and standard error.
     pub estimate: Estimate,
 }
 
 /// An operator with the standard errors of its parameters.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ChangedOperator {
-    /// The operator.
+    /// The operator without standard errors.
     pub operator: FamilyOperator,
-    /// Its parameters: those of the numerator, products of them, and the constant part.
+    /// Parameters of the operator: those of the numerator, their products, and those that do not change.
     pub parameters: Vec<NamedEstimate>,
 }
 
@@ -39,7 +39,7 @@ impl ChangedOperator {
         self.parameters.iter().find(|p| p.name == name).map(|p| p.estimate)
     }
 
-    /// Returns the same with the names of the thesis; `None` for a form other than a gain and a lead with the
+    /// Returns the parameters with the names of the thesis; `None` for forms other than a gain and a lead with the
     /// neuromuscular part.
     pub fn lead(&self) -> Option<OperatorEstimate> {
         if self.operator.form() != Form::Lead {
@@ -56,14 +56,14 @@ impl ChangedOperator {
     }
 }
 
-/// Theta with its covariance.
+/// An estimate of theta and its covariance.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ThetaEstimate<'a> {
     pub layout: &'a Layout,
     pub theta: &'a [f64],
     /// Covariance of theta, by rows; `None` for an exact fit.
     pub covariance: Option<&'a [f64]>,
-    /// Variance of t_M if it is a change point: the sigmoid is then not linear over its interval.
+    /// Variance of t_M if it is a change point, where the sigmoid is not linear over the interval of t_M.
     pub change_point: Option<f64>,
 }
 
@@ -86,10 +86,10 @@ impl ThetaEstimate<'_> {
         Ok(ChangedOperator { operator, parameters })
     }
 
-    /// Returns the parameters that change, at one time.
+    /// Returns the changing parameters at one time.
     pub fn at(&self, time_s: f64) -> Vec<NamedEstimate> {
         let here = Instant::at(self.layout, self.theta, time_s);
-        // Between two valid operators there is a valid one.
+        // An operator between two valid operators is always valid.
         let Ok(operator) = self.layout.operator(self.theta, &here.values) else {
             return Vec::new();
         };
@@ -105,7 +105,7 @@ impl ThetaEstimate<'_> {
             let mut of_time = 0.0;
             if let Some(variance) = self.change_point {
                 let x = (time_s - self.theta[midpoint]) / variance.sqrt();
-                // The logistic function nearest to the normal distribution.
+                // This logistic function closely approximates the normal distribution function.
                 let happened = 1.0 / (1.0 + (-1.702 * x).exp());
                 of_time = by_share * by_share * happened * (1.0 - happened);
             } else {
@@ -117,19 +117,19 @@ impl ThetaEstimate<'_> {
         self.named(&operator, changes, of)
     }
 
-    /// Returns the part of a gradient that belongs to the constant part.
+    /// Converts the part of a gradient for the parameters that do not change to a gradient with respect to theta.
     fn constant_part(&self, gradient: &[f64]) -> Vec<f64> {
         let mut whole = vec![0.0; self.theta.len()];
         for (place, slope) in self.layout.poles().into_iter().zip(&gradient[self.layout.varying..]) {
-            // omega_nm and zeta_nm are in theta themselves.
-            let logarithmic = self.layout.muscles.is_some_and(|own| own.contains(&place));
+            // theta contains omega_nm and zeta_nm, not their logarithms.
+            let logarithmic = self.layout.neuromuscular_indices.is_some_and(|own| own.contains(&place));
             whole[place] = if logarithmic { slope / self.theta[place] } else { *slope };
         }
         whole
     }
 
-    /// Returns the parameters of an operator with the gradients `wanted`; `of` converts a gradient with respect to the
-    /// coordinates to one with respect to theta, and adds a variance.
+    /// Returns the parameters of an operator whose gradients are `wanted`. `of` converts a gradient with respect to the
+    /// coordinates to a gradient with respect to theta, and returns an additional variance.
     fn named(
         &self,
         operator: &FamilyOperator,
@@ -141,8 +141,8 @@ impl ThetaEstimate<'_> {
             .map(|(parameter, gradient)| {
                 let (mut whole, beside) = of(&gradient);
                 let mut value = parameter.value;
-                // Directly, without their logarithms.
-                let own = match (parameter.coordinate, self.layout.muscles) {
+                // These parameters are taken directly from theta, without logarithms.
+                let own = match (parameter.coordinate, self.layout.neuromuscular_indices) {
                     (Some(Coordinate::LogOmega), Some([omega, _])) => Some(omega),
                     (Some(Coordinate::LogZeta), Some([_, zeta])) => Some(zeta),
                     _ => None,

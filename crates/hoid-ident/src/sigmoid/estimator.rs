@@ -1,4 +1,4 @@
-//! The estimator of an operator that changes once.
+//! Estimator for an operator that changes once.
 
 use hoid_model::{Record, SampleTime, Structure, delayed_operator::whole_samples};
 
@@ -20,21 +20,23 @@ use crate::{
     optimize::Reason,
 };
 
-/// Highest order of the noise model that is chosen, and the order without a choice: for exact data and a given start.
+/// Largest order of the noise model that can be chosen, and the order without a choice, i.e. for exact data or a given
+/// start.
 const MOST_NOISE: usize = 12;
 const DEFAULT_NOISE: usize = 1;
-/// Number of lower minima that the walks along t_M and G may find before the fit is stopped at the last one.
-const MOST_LOWER: usize = 10;
+/// Number of lower minima that the likelihood intervals of t_M and G may find before the fit ends at the last one.
+const MAX_LOWER_MINIMA: usize = 10;
 
 impl SigmoidChange {
-    /// Fits one change to all records: parameters and t_M in common (t_M on the time axis of each record), and initial
-    /// states of each record.
+    /// Fits one change to all records. The parameters are common to the records, including t_M on the time axis of each
+    /// record; the initial states are estimated for each record.
     ///
     /// # Errors
-    /// [`IdentError`]; how the search ended, and which parameters the data do not determine, is part of the fit.
+    /// [`IdentError`] if no model can be fitted. The fit itself reports how the search ended and which parameters the
+    /// data do not determine.
     pub fn fit(&self, records: &[Record]) -> Result<SigmoidFit, IdentError> {
         let sample_time = common_sample_time(records)?;
-        // The regressions that make and rank the starts have no level.
+        // The regressions that compute and rank the starts do not estimate a level.
         let off_level = self.level.then(|| without_level(records));
         let off_level = off_level.as_deref().unwrap_or(records);
         let guess = match self.start {
@@ -50,7 +52,7 @@ impl SigmoidChange {
             };
             ordered.fit_from(records, (sample_time, off_level), guess.as_deref())
         };
-        // Exact data determine no noise model: the one of first order is as good as any.
+        // Exact data do not determine a noise model, so that the first order is sufficient.
         let is_exact = |fit: &SigmoidFit| fit.termination().reason == Reason::ExactFit;
         let chosen = order
             .filter(|nd| self.nd.is_none() && *nd > DEFAULT_NOISE)
@@ -59,7 +61,7 @@ impl SigmoidChange {
         chosen.map_or_else(|| with_noise(self.nd.unwrap_or(DEFAULT_NOISE)), Ok)
     }
 
-    /// The operator without a change, from which starts are derived.
+    /// Returns the estimator for an operator without a change, which gives the starts.
     fn of_one_operator(&self) -> FamilyEstimator {
         FamilyEstimator {
             forms: vec![self.form],
@@ -80,17 +82,17 @@ impl SigmoidChange {
         let mut criterion = self.criterion(records, sample_time)?;
         let unit = prior::penalties(&criterion.layout, &self.prior);
         for penalty in &unit {
-            // A parameter with a prior is positive.
+            // A parameter with a prior must be positive.
             let (low, high) = criterion.limits[penalty.place];
             criterion.limits[penalty.place] = (low.max(0.0), high);
         }
         let starts = self.starts(&criterion, off_level, guess)?;
         if let Some((_, theta)) = starts.first() {
-            criterion.penalty = prior::begun(&criterion, &unit, theta);
+            criterion.penalty = prior::scaled_at_start(&criterion, &unit, theta);
         }
         let (mut start, minimum) = best_minimum(starts, &criterion, &self.search)?;
         let settled = |criterion: &mut ChangeCriterion<'_>, minimum| {
-            prior::settled(criterion, &unit, minimum, self.noise_level, &self.search)
+            prior::minimum_with_scaled_prior(criterion, &unit, minimum, self.noise_level, &self.search)
         };
         let (mut minimum, mut levels) = settled(&mut criterion, minimum)?;
         let (mut lower, mut stay) = (0, false);
@@ -103,14 +105,14 @@ impl SigmoidChange {
             let Some(theta) = walk.flatten() else {
                 return Ok(found);
             };
-            // With the weights of the other minimum this one may be the lower: the likelihood, weights included, is
-            // decisive.
+            // With the weights of the other minimum, this minimum may have the lower loss. The decision is therefore by
+            // the likelihood, which includes the weights.
             let weights = criterion.weights.clone();
             let other = search(&criterion, theta, &self.search, None).ok_or(IdentError::NoFiniteLoss)?;
             let penalty = criterion.penalty.clone();
             let (mut other, other_levels) = settled(&mut criterion, other)?;
             lower += 1;
-            if other.at.sum_of_squares < minimum.at.sum_of_squares && lower <= MOST_LOWER {
+            if other.at.sum_of_squares < minimum.at.sum_of_squares && lower <= MAX_LOWER_MINIMA {
                 other.termination.iterations += minimum.termination.iterations;
                 (minimum, levels) = (other, other_levels);
                 if lower == 1 {
@@ -123,13 +125,15 @@ impl SigmoidChange {
         }
     }
 
-    /// Returns the names of the parameters of this form and noise model (of first order if its order is chosen): `K_e1`,
-    /// `K_e2`, `T_L1`, `T_L2`, `t_M`, `G`, `omega_nm`, `zeta_nm`, `tau_e`, `d1` ... for a gain and a lead.
+    /// Returns the names of the parameters for this form and noise model (of order 1 if the order is chosen
+    /// automatically): `K_e1`, `K_e2`, `T_L1`, `T_L2`, `t_M`, `G`, `omega_nm`, `zeta_nm`, `tau_e`, `d1` ... for a gain
+    /// and a lead.
     pub fn names(&self) -> Vec<String> {
         self.layout().names()
     }
 
-    /// Returns the names of all parameters that a fit may have: as [`Self::names`], with every `d` that can be chosen.
+    /// Returns the names of all parameters that a fit may have: the names of [`Self::names`], with every `d` that can
+    /// be chosen.
     pub fn most_names(&self) -> Vec<String> {
         Layout::new(self.form, self.neuromuscular, self.nd.unwrap_or(MOST_NOISE)).names()
     }
@@ -138,7 +142,7 @@ impl SigmoidChange {
         Layout::new(self.form, self.neuromuscular, self.nd.unwrap_or(DEFAULT_NOISE))
     }
 
-    /// Returns name and theta of each start.
+    /// Returns the name and the theta of each start.
     fn starts(
         &self,
         criterion: &ChangeCriterion<'_>,
@@ -162,7 +166,7 @@ impl SigmoidChange {
             return Err(IdentError::BadOption {
                 option: "the form of the operator".to_owned(),
                 found: format!("{} without neuromuscular dynamics", self.form),
-                expected: "one that is not a pure derivative: with neuromuscular dynamics, or with a lag".to_owned(),
+                expected: "a form other than a pure derivative: with neuromuscular dynamics, or with a lag".to_owned(),
             });
         }
         let (low, high) = self.delay_range_s;
@@ -170,7 +174,7 @@ impl SigmoidChange {
             return Err(IdentError::BadOption {
                 option: "the range of the delay tau_e".to_owned(),
                 found: format!("{low} to {high} s"),
-                expected: "two times that are not negative, the shorter one first".to_owned(),
+                expected: "two nonnegative times, the shorter time first".to_owned(),
             });
         }
         let span_s = records

@@ -11,16 +11,16 @@ use super::{
 };
 use crate::{IdentError, Series, Termination, informative_data::check_record, optimize::Minimum};
 
-/// One parameter of the fit.
+/// A parameter of the fit, with its estimate and remark.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChangeParameter {
-    /// Name.
+    /// Name of the parameter.
     pub name: String,
     /// Unit; empty if there is none.
     pub unit: &'static str,
-    /// Estimate.
+    /// Value and standard error.
     pub estimate: Estimate,
-    /// The reason if it has no standard error.
+    /// Reason why the parameter has no standard error, or none from the data.
     pub remark: Option<Remark>,
 }
 
@@ -29,26 +29,27 @@ pub struct ChangeParameter {
 pub struct GainsAt {
     /// Time on the axis of the record, s.
     pub time_s: f64,
-    /// K_e, T_L and K_e_dot for a gain and a lead; otherwise K and, with a lag, K_over_T_I, followed by T_L and so on.
+    /// K_e, T_L and K_e_dot for a gain and a lead; for other forms K (and K_over_T_I with a lag), followed by T_L and
+    /// further parameters of the form.
     pub gains: Vec<NamedEstimate>,
 }
 
 impl GainsAt {
-    /// Returns one of them by name.
+    /// Returns a gain by its name.
     pub fn get(&self, name: &str) -> Option<Estimate> {
         self.gains.iter().find(|g| g.name == name).map(|g| g.estimate)
     }
 }
 
-/// Fit of an operator that changes once.
+/// Fit of an operator whose gains change once.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SigmoidFit {
     layout: Layout,
     sample_time: SampleTime,
     first: usize,
-    /// True if u of each record has a level.
+    /// True if a level of u is estimated for each record.
     level: bool,
-    /// theta, with ln G and 1/T_I.
+    /// theta, which contains ln G and 1/T_I.
     theta: Vec<f64>,
     covariance: Option<Vec<f64>>,
     #[serde(with = "each_or_none")]
@@ -69,7 +70,8 @@ pub struct SigmoidFit {
     constant: ChangedOperator,
 }
 
-/// Serialises a list with missing elements as lists of one or none: not every format has a missing element.
+/// Serialises each optional element as a list of zero or one elements, because not every format supports missing
+/// elements.
 mod each_or_none {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -86,7 +88,7 @@ mod each_or_none {
 }
 
 impl SigmoidFit {
-    /// Creates the fit at the minimum with a change, compared with the one without, `constant`.
+    /// Creates the fit from the minimum with a change; `constant` is the minimum without a change, for comparison.
     pub(super) fn new(
         criterion: &ChangeCriterion<'_>,
         minimum: &Minimum,
@@ -127,18 +129,18 @@ impl SigmoidFit {
         })
     }
 
-    /// The form of the operator.
+    /// Returns the form of the operator.
     pub fn form(&self) -> Form {
         self.layout.form
     }
 
-    /// True with the neuromuscular part.
+    /// True if the operator has a neuromuscular part.
     pub fn has_neuromuscular(&self) -> bool {
         self.layout.neuromuscular
     }
 
-    /// Returns all parameters in the order of [`SigmoidChange::names`](crate::SigmoidChange::names): the changing ones
-    /// before and after the change, t_M, G, the others, then d1 ... d_nd.
+    /// Returns all parameters in the order of [`SigmoidChange::names`](crate::SigmoidChange::names): the changing
+    /// parameters before and after the change, t_M, G, the parameters that do not change, then d1 ... d_nd.
     pub fn parameters(&self) -> Vec<ChangeParameter> {
         let names = self.layout.names_and_units().into_iter().enumerate();
         names
@@ -151,7 +153,7 @@ impl SigmoidFit {
             .collect()
     }
 
-    /// Returns one parameter by name.
+    /// Returns a parameter by its name.
     pub fn parameter(&self, name: &str) -> Option<ChangeParameter> {
         self.parameters().into_iter().find(|p| p.name == name)
     }
@@ -165,8 +167,8 @@ impl SigmoidFit {
         }
     }
 
-    /// Returns the covariance of the parameters in the order and the units of [`SigmoidFit::parameters`], by rows; zero
-    /// for fixed parameters, `None` for an exact fit.
+    /// Returns the covariance of the parameters by rows, in the order and the units of [`SigmoidFit::parameters`]; it
+    /// contains zeros for fixed parameters. `None` for an exact fit.
     pub fn covariance(&self) -> Option<Vec<f64>> {
         let p = self.theta.len();
         let scale: Vec<f64> = (0..p).map(|i| self.layout.typed_slope(i, self.theta[i])).collect();
@@ -174,8 +176,8 @@ impl SigmoidFit {
         Some((0..p * p).map(|k| c[k] * scale[k / p] * scale[k % p]).collect())
     }
 
-    /// Adds likelihood intervals of t_M and G, if there was a change and noise. If the walk along t_M or G finds a
-    /// lower loss than at the minimum and `stay` is false, returns theta there.
+    /// Adds likelihood intervals of t_M and G if there is a change and noise. If the loss is lower somewhere along t_M
+    /// or G than at the minimum, and `stay` is false, returns theta at this point instead.
     pub(super) fn add_intervals(
         &mut self,
         criterion: &ChangeCriterion<'_>,
@@ -203,7 +205,7 @@ impl SigmoidFit {
         if self.change_point
             && let (Some(interval), Some(covariance)) = (self.midpoint_interval, self.covariance.as_mut())
         {
-            // A normal error with the same interval.
+            // The variance of a normal distribution with the same interval replaces the covariance of t_M.
             for i in 0..p {
                 (covariance[midpoint * p + i], covariance[i * p + midpoint]) = (0.0, 0.0);
             }
@@ -215,29 +217,29 @@ impl SigmoidFit {
         None
     }
 
-    /// Returns the 95 % likelihood interval of t_M in s; `None` without noise, without a change, or if it was not
-    /// requested.
+    /// Returns the 95 % likelihood interval of t_M in s; `None` if there is no noise or no change, or if the interval
+    /// was not requested.
     pub fn midpoint_interval(&self) -> Option<(f64, f64)> {
         self.midpoint_interval.map(|i| (i.low, i.high))
     }
 
-    /// Returns the 95 % likelihood interval of G in 1/s, open to infinity if the change may have been abrupt; otherwise
-    /// as [`SigmoidFit::midpoint_interval`].
+    /// Returns the 95 % likelihood interval of G in 1/s, open to infinity if the change may have been abrupt; `None` in
+    /// the same cases as [`SigmoidFit::midpoint_interval`].
     pub fn rate_interval(&self) -> Option<(f64, f64)> {
         self.rate_interval.map(|i| (i.low, i.high))
     }
 
-    /// True if the change is too fast for a normally distributed error of t_M: a change point.
+    /// True if t_M is a change point: the change is too fast for a normally distributed error of t_M.
     pub fn is_change_point(&self) -> bool {
         self.change_point
     }
 
-    /// Returns the operator before the change, if there was one ([`SigmoidFit::change_found`]).
+    /// Returns the operator before the change, which is valid only if [`SigmoidFit::change_found`] is true.
     pub fn initial_operator(&self) -> &ChangedOperator {
         &self.initial
     }
 
-    /// Returns the operator after the change, if there was one.
+    /// Returns the operator after the change, which is valid only if [`SigmoidFit::change_found`] is true.
     pub fn last_operator(&self) -> &ChangedOperator {
         &self.last
     }
@@ -252,18 +254,18 @@ impl SigmoidFit {
         self.comparison
     }
 
-    /// True if the change justifies its parameters by the BIC. Otherwise t_M and G have no meaning
+    /// True if the BIC justifies the additional parameters of the change. Otherwise t_M and G have no meaning
     /// ([`Remark::NoChange`]), and [`SigmoidFit::constant_operator`] describes the records.
     pub fn change_found(&self) -> bool {
         self.comparison.bic_difference > 0.0
     }
 
-    /// Returns the gains at a time on the axis of the record, with standard errors: those of the sigmoid if the records
-    /// show a change, otherwise those of the fit without one.
+    /// Returns the gains with their standard errors at a time on the axis of the record. They come from the sigmoid if
+    /// the records show a change, otherwise from the fit without a change.
     ///
-    /// The errors are computed by the delta method and include those of t_M and G. Near a change point, where the
-    /// sigmoid is not linear over the interval of t_M, its contribution is `step^2 p (1 - p)`, with p the probability
-    /// that the change has happened.
+    /// The errors are computed by the delta method and include the errors of t_M and G. At a change point the sigmoid
+    /// is not linear over the interval of t_M; there t_M contributes `step^2 p (1 - p)` to the variance, where p is the
+    /// probability that the change has happened.
     pub fn gains_at(&self, time_s: f64) -> GainsAt {
         let known = ThetaEstimate {
             layout: &self.layout,
@@ -293,19 +295,19 @@ impl SigmoidFit {
         &self.theta[self.layout.noise..]
     }
 
-    /// Returns the loss: the mean of the squared residuals, weighted if the noise level changes (weights with the
-    /// geometric mean 1).
+    /// Returns the loss, i.e. the mean of the squared residuals. If the noise level changes, the residuals are
+    /// weighted, and their weights have the geometric mean 1.
     pub fn loss(&self) -> f64 {
         self.loss
     }
 
-    /// Returns `sum eps^2/(n - p - s)` of the same residuals, with p parameters and s initial states.
+    /// Returns `sum eps^2/(n - p - s)` of the residuals in the loss, with p parameters and s initial states.
     pub fn innovation_variance(&self) -> f64 {
         self.innovation_variance
     }
 
-    /// Returns the standard deviation of the innovations before and after the change; `None` if a constant level was
-    /// requested, or the residuals are zero.
+    /// Returns the standard deviation of the innovations before and after the change; `None` if a constant noise level
+    /// was requested or the residuals are zero.
     pub fn noise_levels(&self) -> Option<[f64; 2]> {
         self.levels
     }
@@ -320,25 +322,26 @@ impl SigmoidFit {
         self.states
     }
 
-    /// How the search ended.
+    /// Returns how the search ended.
     pub fn termination(&self) -> Termination {
         self.termination
     }
 
-    /// Returns the name of the best start.
+    /// Returns the name of the start that led to the minimum.
     pub fn start(&self) -> &str {
         &self.start
     }
 
-    /// Returns the one-step-ahead residuals on a record (not weighted), with its initial state estimated.
+    /// Returns the unweighted one-step-ahead residuals of a record, with its initial state estimated.
     ///
     /// # Errors
-    /// [`IdentError::MixedSampling`], [`IdentError::TooFewSamples`].
+    /// [`IdentError::MixedSampling`] for another sample time, [`IdentError::TooFewSamples`] if the record is too short.
     pub fn residuals(&self, record: &Record) -> Result<Series, IdentError> {
         self.errors_of(self.layout, &self.theta, record)
     }
 
-    /// Returns the output of the operator alone, without noise model; the initial state minimises the simulation error.
+    /// Returns the simulated output of the operator without the noise model; the initial state minimises the simulation
+    /// error.
     ///
     /// # Errors
     /// As [`SigmoidFit::residuals`].
@@ -352,8 +355,8 @@ impl SigmoidFit {
         })
     }
 
-    /// Returns the level of u in a record, in the unit of u, with its standard error; `None` if it was not estimated
-    /// ([`crate::SigmoidChange::level`]), and for an exact fit.
+    /// Returns the level of u in a record with its standard error, in the unit of u; `None` if the level was not
+    /// estimated ([`crate::SigmoidChange::level`]) or the fit is exact.
     pub fn level(&self, record: &Record) -> Option<Estimate> {
         let (criterion, covariance) = (self.criterion(self.layout, record).ok()?, self.covariance.as_ref()?);
         let (value, variance) = criterion.level_of(&self.theta, 0, self.innovation_variance, covariance)?;
@@ -367,7 +370,7 @@ impl SigmoidFit {
         Ok(Series { first, values })
     }
 
-    /// Returns the criterion of this fit over another record, without weights.
+    /// Returns the criterion of this fit for another record, without weights.
     fn criterion<'a>(&self, layout: Layout, record: &'a Record) -> Result<ChangeCriterion<'a>, IdentError> {
         if !self.sample_time.matches(record.sample_time()) {
             return Err(IdentError::MixedSampling {

@@ -1,41 +1,41 @@
-//! Poles, delay and noise model from which searches start.
+//! Poles, delay and noise model for the starts of searches.
 //!
-//! For all forms they are those of one operator fitted to the response of an ARX model of high order for all records.
-//! For a gain and a lead, others are obtained from Box-Jenkins fits to the first and the last third of the records or,
-//! if there are none, from a small grid of poles. Other forms always use a grid too.
+//! For every form, one candidate is a single operator fitted to the response of a high-order ARX model for all records.
+//! For a gain and a lead, further candidates come from Box-Jenkins fits to the first and the last third of the records;
+//! if there is no candidate at all, a small grid of poles is used. Other forms always use a grid as well.
 
 use hoid_model::{OperatorParameters, Orders, Record, Structure, operator_family::Coordinate};
 
 use super::{layout::Layout, objective::ChangeCriterion};
 use crate::{Estimator, Fit, SearchMethod, SearchOptions};
 
-/// Step between the delays that are tried, s: the search converges from a distance of a tenth of the period of the
-/// poles.
+/// Step between the delays that are tried, s. A search converges if its delay is off by no more than a tenth of the
+/// period of the poles.
 const DELAY_STEP_S: f64 = 0.06;
-/// Limits of the searches in the windows: a start need not be exact.
+/// Limits of the searches in the windows, whose results need not be exact.
 const COARSE: SearchOptions = SearchOptions {
     method: SearchMethod::LevenbergMarquardt,
     max_iterations: 15,
     tolerance: 1e-6,
 };
-/// Poles if the windows give none: omega_nm in rad/s, zeta_nm.
+/// Poles of the grid: omega_nm in rad/s, zeta_nm.
 const GRID: [(f64, f64); 3] = [(6.0, 0.4), (11.0, 0.4), (18.0, 0.4)];
-/// 1/T_I of the grid, 1/s.
+/// Values of 1/T_I in the grid, 1/s.
 const LAG_RATES: [f64; 3] = [0.05, 0.25, 1.2];
-/// d1 if the windows give none.
+/// Coefficient d1 of candidates that do not come from a window.
 const GRID_D1: f64 = -0.8;
 
-/// Poles, delay and noise model in a theta without a change.
+/// Poles, delay and noise model, stored in a theta without numerators and change.
 #[derive(Debug, Clone)]
-pub(super) struct Frozen {
+pub(super) struct PoleCandidate {
     pub label: String,
     pub theta: Vec<f64>,
 }
 
-/// Returns the grid of a form of the family.
-pub(super) fn of_family(criterion: &ChangeCriterion<'_>) -> Vec<Frozen> {
+/// Returns the candidates of the grid for a form of the operator family.
+pub(super) fn of_family(criterion: &ChangeCriterion<'_>) -> Vec<PoleCandidate> {
     let (layout, ts) = (&criterion.layout, criterion.sample_time.s());
-    let muscles: &[(f64, f64)] = if layout.muscles.is_some() { &GRID } else { &[(0.0, 0.0)] };
+    let muscles: &[(f64, f64)] = if layout.neuromuscular_indices.is_some() { &GRID } else { &[(0.0, 0.0)] };
     let rates: &[f64] = if layout.lag.is_some() { &LAG_RATES } else { &[0.0] };
     let mut all = Vec::new();
     for nk in delays(criterion) {
@@ -45,7 +45,7 @@ pub(super) fn of_family(criterion: &ChangeCriterion<'_>) -> Vec<Frozen> {
                 if let Some(place) = layout.lag {
                     theta[place] = *rate;
                 }
-                if let Some([of_omega, of_zeta]) = layout.muscles {
+                if let Some([of_omega, of_zeta]) = layout.neuromuscular_indices {
                     (theta[of_omega], theta[of_zeta]) = (*omega, *zeta);
                 }
                 theta[layout.delay] = (nk - 1) as f64 * ts;
@@ -53,7 +53,7 @@ pub(super) fn of_family(criterion: &ChangeCriterion<'_>) -> Vec<Frozen> {
                     theta[layout.noise] = GRID_D1;
                 }
                 within_limits(criterion, &mut theta);
-                all.push(Frozen {
+                all.push(PoleCandidate {
                     label: format!("grid, tau_e = {:.3} s", theta[layout.delay]),
                     theta,
                 });
@@ -63,8 +63,8 @@ pub(super) fn of_family(criterion: &ChangeCriterion<'_>) -> Vec<Frozen> {
     all
 }
 
-/// Returns the poles and the delay of one operator for all records.
-pub(super) fn of_guess(criterion: &ChangeCriterion<'_>, coordinates: &[f64]) -> Frozen {
+/// Returns the poles and the delay of one operator for all records, given by its coordinates.
+pub(super) fn of_guess(criterion: &ChangeCriterion<'_>, coordinates: &[f64]) -> PoleCandidate {
     let layout = &criterion.layout;
     let mut theta = vec![0.0; layout.len()];
     let of_form = layout.form.coordinates(layout.neuromuscular);
@@ -72,11 +72,11 @@ pub(super) fn of_guess(criterion: &ChangeCriterion<'_>, coordinates: &[f64]) -> 
         match coordinate {
             Coordinate::LagRate => layout.lag.into_iter().for_each(|place| theta[place] = *value),
             Coordinate::LogOmega => layout
-                .muscles
+                .neuromuscular_indices
                 .into_iter()
                 .for_each(|[omega, _]| theta[omega] = value.exp()),
             Coordinate::LogZeta => layout
-                .muscles
+                .neuromuscular_indices
                 .into_iter()
                 .for_each(|[_, zeta]| theta[zeta] = value.exp()),
             Coordinate::Delay => theta[layout.delay] = *value,
@@ -87,14 +87,14 @@ pub(super) fn of_guess(criterion: &ChangeCriterion<'_>, coordinates: &[f64]) -> 
         theta[layout.noise] = GRID_D1;
     }
     within_limits(criterion, &mut theta);
-    Frozen {
+    PoleCandidate {
         label: format!("one operator, tau_e = {:.3} s", theta[layout.delay]),
         theta,
     }
 }
 
-/// Returns the poles of the windows.
-pub(super) fn of_windows(criterion: &ChangeCriterion<'_>, records: &[Record]) -> Vec<Frozen> {
+/// Returns the candidates from the first and the last third of the records.
+pub(super) fn of_windows(criterion: &ChangeCriterion<'_>, records: &[Record]) -> Vec<PoleCandidate> {
     let third = |record: &Record, part: usize| {
         let (from, to) = (record.time_s(0), record.time_s(record.len()));
         let length = (to - from) / 3.0;
@@ -106,7 +106,7 @@ pub(super) fn of_windows(criterion: &ChangeCriterion<'_>, records: &[Record]) ->
     for (part, name) in [(0, "first"), (2, "last")] {
         let windows: Option<Vec<Record>> = records.iter().map(|r| third(r, part)).collect();
         let Some(windows) = windows else { continue };
-        // Each delay continues from the model of the previous one.
+        // Each fit starts from the model for the previous delay.
         let mut fits: Vec<Fit> = Vec::new();
         for nk in delays(criterion) {
             let before = fits.last().map(|f| f.model().theta().to_vec());
@@ -117,7 +117,7 @@ pub(super) fn of_windows(criterion: &ChangeCriterion<'_>, records: &[Record]) ->
         };
         if let Ok(operator) = best.operator() {
             let (orders, theta) = (best.orders(), best.model().theta());
-            found.push(Frozen {
+            found.push(PoleCandidate {
                 label: format!("{name} third, nk = {}", orders.nk),
                 theta: frozen_theta(
                     criterion,
@@ -144,12 +144,12 @@ fn fit(criterion: &ChangeCriterion<'_>, windows: &[Record], nk: usize, start: Op
         start,
         ..Estimator::new(Structure::BoxJenkins, orders)
     };
-    // Only models that correspond to operators give poles.
+    // Only models that correspond to an operator give poles.
     estimator.fit(windows).ok().filter(|fit| fit.operator().is_ok())
 }
 
-/// Returns the grid of a gain and a lead.
-pub(super) fn of_grid(criterion: &ChangeCriterion<'_>) -> Vec<Frozen> {
+/// Returns the candidates of the grid for a gain and a lead.
+pub(super) fn of_grid(criterion: &ChangeCriterion<'_>) -> Vec<PoleCandidate> {
     let ts = criterion.sample_time.s();
     let mut d = vec![0.0; criterion.layout.nd];
     if let Some(d1) = d.first_mut() {
@@ -165,7 +165,7 @@ pub(super) fn of_grid(criterion: &ChangeCriterion<'_>) -> Vec<Frozen> {
                 zeta_nm: zeta,
                 tau_e_s: (nk - 1) as f64 * ts,
             };
-            all.push(Frozen {
+            all.push(PoleCandidate {
                 label: format!("grid, nk = {nk}, omega_nm = {omega} rad/s"),
                 theta: frozen_theta(criterion, &operator, &d),
             });
@@ -174,7 +174,7 @@ pub(super) fn of_grid(criterion: &ChangeCriterion<'_>) -> Vec<Frozen> {
     all
 }
 
-/// nk from the shortest to the longest delay.
+/// Returns values of nk from the shortest to the longest delay.
 fn delays(criterion: &ChangeCriterion<'_>) -> Vec<usize> {
     let ts = criterion.sample_time.s();
     let (low, high) = criterion.limits[criterion.layout.delay];
@@ -186,7 +186,7 @@ fn delays(criterion: &ChangeCriterion<'_>) -> Vec<usize> {
 fn frozen_theta(criterion: &ChangeCriterion<'_>, operator: &OperatorParameters, d: &[f64]) -> Vec<f64> {
     let layout: &Layout = &criterion.layout;
     let mut theta = vec![0.0; layout.len()];
-    if let Some([omega, zeta]) = layout.muscles {
+    if let Some([omega, zeta]) = layout.neuromuscular_indices {
         (theta[omega], theta[zeta]) = (operator.omega_nm_rad_s, operator.zeta_nm);
     }
     theta[layout.delay] = operator.tau_e_s;

@@ -1,9 +1,7 @@
-//! Inference from the two minima, with a change and without: covariance, parameters with a standard error, and the test
-//! for a change.
+//! Inference from the minima with and without a change: covariance, remarks on parameters, and the test for a change.
 //!
-//! The covariance is `sigma^2 (psi' psi)^-1` of the parameters that were free, with the initial
-//! states eliminated and the weights taken as known. The comparison is by the likelihood ratio
-//! `n ln(V_0/V_1)` and the BIC.
+//! The covariance is `sigma^2 (psi' psi)^-1` for the free parameters, with the initial states eliminated and the
+//! weights treated as known. The fits are compared by the likelihood ratio `n ln(V_0/V_1)` and the BIC.
 
 use std::fmt;
 
@@ -21,31 +19,32 @@ use crate::{
     optimize::{Linearisation, Minimum, free_parameters},
 };
 
-/// The reason why a parameter has no standard error, or none from the data.
+/// Reason why a parameter has no standard error, or none from the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum Remark {
-    /// It was fixed.
+    /// The parameter was fixed.
     Fixed,
-    /// It is at a bound.
+    /// The parameter is at a bound.
     AtBound,
     /// G is at its upper bound: the change takes no longer than two samples, and its rate cannot be determined.
     Abrupt,
-    /// The records show no change (BIC): t_M and G have no meaning, and the gains on either side are due to chance.
+    /// The records show no change (BIC): t_M and G have no meaning, and the differences between the gains are due to
+    /// chance.
     NoChange,
-    /// The change is too fast for a normal error: only the likelihood interval is valid.
+    /// The change is too fast for a normally distributed error: only the likelihood interval is valid.
     ChangePoint,
-    /// The data do not determine it.
+    /// The data do not determine the parameter.
     Undetermined,
-    /// More than half of its variance before the data remains: its error is that of the prior.
+    /// More than half of the prior variance of the parameter remains: its error is essentially that of the prior.
     PriorAlone,
 }
 
-/// Largest ratio of the variance after to that before the data for a determined parameter.
+/// Largest ratio of posterior to prior variance for which a parameter counts as determined by the data.
 const LARGEST_PRIOR_SHARE: f64 = 0.5;
 
 impl Remark {
-    /// True if the parameter still has a standard error.
+    /// True if a parameter with this remark still has a standard error.
     pub(super) fn leaves_an_error(self) -> bool {
         self == Self::PriorAlone
     }
@@ -59,7 +58,7 @@ impl fmt::Display for Remark {
             Self::Abrupt => {
                 "at its upper bound: the change takes no longer than two samples, so that its rate cannot be determined"
             }
-            Self::NoChange => "the records show no change: use the fit without one",
+            Self::NoChange => "the records show no change: use the fit without a change",
             Self::ChangePoint => "the change is too fast for its error to be normal: use the likelihood interval",
             Self::Undetermined => "not determined by the data",
             Self::PriorAlone => "determined by the prior alone",
@@ -72,30 +71,30 @@ impl fmt::Display for Remark {
 pub struct Comparison {
     /// `n ln(V_0/V_1)`.
     pub likelihood_ratio: f64,
-    /// Number of parameters that the change adds: those after it (K_e2, T_L2 ...), t_M and G, as far as they were not
-    /// fixed.
+    /// Number of parameters that the change adds: the parameters after the change (K_e2, T_L2 ...), t_M and G, without
+    /// those that were fixed.
     pub extra_parameters: usize,
     /// BIC without the change minus BIC with it; positive if the change justifies its parameters.
     pub bic_difference: f64,
 }
 
-/// Inference at the minimum with a change.
+/// Results of the inference at the minimum with a change.
 pub(super) struct Inference {
-    /// Variance of the innovations, weighted if the noise level changes.
+    /// Innovation variance, computed with weighted residuals if the noise level changes.
     pub innovation_variance: f64,
     /// Covariance of theta by rows; `None` for an exact fit.
     pub covariance: Option<Vec<f64>>,
-    /// The reason if an element of theta has no standard error.
+    /// Remark on each element of theta that has no standard error, or none from the data.
     pub remarks: Vec<Option<Remark>>,
     pub comparison: Comparison,
-    /// True if the change is too fast for a normal error of t_M.
+    /// True if the change is too fast for a normally distributed error of t_M.
     pub change_point: bool,
 }
 
-/// Computes the inference from the minimum with a change and the one without, `constant`.
+/// Computes the inference from the minimum with a change; `constant` is the minimum without a change.
 ///
 /// # Errors
-/// [`IdentError::SingularInformation`].
+/// [`IdentError::SingularInformation`] if the data do not determine all parameters.
 pub(super) fn inference(
     criterion: &ChangeCriterion<'_>,
     minimum: &Minimum,
@@ -112,7 +111,7 @@ pub(super) fn inference(
     let extra_parameters = of_the_change
         .filter(|&i| criterion.limits[i].0 < criterion.limits[i].1)
         .count();
-    // An exact fit without a change leaves two losses of rounding errors.
+    // If the fit without a change is also exact, both losses are only rounding errors.
     let both_exact = constant.termination.reason == Reason::ExactFit;
     let ratio = (constant.at.sum_of_squares / sum_of_squares).ln();
     let likelihood_ratio = if both_exact { 0.0 } else { n as f64 * ratio };
@@ -136,7 +135,7 @@ pub(super) fn inference(
             }
         })
         .collect();
-    // A rate at its bound is fixed even if the loss is flat there.
+    // A parameter at its bound has no variance, even if the loss is flat there.
     free.retain(|&i| !matches!(remarks[i], Some(Remark::AtBound | Remark::Abrupt)));
     let exact = minimum.termination.reason == Reason::ExactFit;
     let covariance = if exact {
@@ -173,12 +172,13 @@ pub(super) fn inference(
     })
 }
 
-/// ln G from which on the change counts as abrupt, up to rounding.
+/// Returns the smallest ln G for which the change counts as abrupt, with a margin for rounding.
 fn fastest(criterion: &ChangeCriterion<'_>) -> f64 {
     (FASTEST / criterion.sample_time.s()).ln() - 1e-9
 }
 
-/// Inverts the information of the free parameters. Time and rate of a change without any effect are removed.
+/// Inverts the information matrix of the free parameters. If it is singular, t_M and G are removed, which are
+/// undetermined if the change has no effect.
 fn invert(
     layout: &Layout,
     at: &Linearisation,
@@ -202,7 +202,7 @@ fn invert(
 /// Returns the operator at the minimum without a change.
 ///
 /// # Errors
-/// [`IdentError::SingularInformation`].
+/// [`IdentError::SingularInformation`] if the data do not determine all parameters.
 pub(super) fn constant_operator(
     criterion: &ChangeCriterion<'_>,
     minimum: &Minimum,

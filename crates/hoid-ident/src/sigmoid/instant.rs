@@ -1,24 +1,24 @@
-//! The sigmoid (eq. 5), and its numerator at one time.
+//! The sigmoid (eq. 5) and the numerator of the operator at one time.
 
 use super::layout::{Layout, MOST_VARYING};
 
 /// Argument above which `e^-x` is zero in double precision.
-const NOTHING: f64 = 746.0;
+const UNDERFLOW_ARGUMENT: f64 = 746.0;
 
 /// The sigmoid and the changing parameters at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Instant {
-    /// Share of the change that has happened.
+    /// Share of the change that has taken place.
     pub share: f64,
     /// Derivative of the share with respect to t_M, 1/s.
     pub by_midpoint: f64,
     /// Derivative of the share with respect to ln G.
     pub by_log_rate: f64,
-    /// The parameters of the numerator, the gain first.
+    /// Parameters of the numerator, starting with the gain.
     pub values: [f64; MOST_VARYING],
     /// The numerator divided by its gain, in ascending powers of s.
     pub shape: [f64; 3],
-    /// Derivatives of the shape with respect to the parameters other than the gain.
+    /// Derivatives of the shape with respect to all parameters except the gain.
     pub slopes: [[f64; 3]; 2],
 }
 
@@ -27,8 +27,8 @@ impl Instant {
     pub fn at(layout: &Layout, theta: &[f64], t_s: f64) -> Self {
         let rate = theta[layout.log_rate].exp();
         let x = rate * (t_s - theta[layout.midpoint]);
-        // The exponential is zero there, and slow to compute.
-        let far = if x.abs() > NOTHING { 0.0 } else { (-x.abs()).exp() };
+        // The exponential underflows to zero there and would be slow to compute.
+        let far = if x.abs() > UNDERFLOW_ARGUMENT { 0.0 } else { (-x.abs()).exp() };
         let rest = far / (1.0 + far);
         let share = if x < 0.0 { rest } else { 1.0 - rest };
         let slope = rest / (1.0 + far);
@@ -46,7 +46,7 @@ impl Instant {
         Self::of(layout, values, share, [-rate * slope, by_log_rate])
     }
 
-    /// Returns the first state, as if there were no change.
+    /// Returns the state before the change, for a model without a change.
     pub fn constant(layout: &Layout, theta: &[f64]) -> Self {
         let mut values = [0.0; MOST_VARYING];
         for (i, value) in values.iter_mut().enumerate().take(layout.varying) {
@@ -71,7 +71,7 @@ impl Instant {
         self.values[0]
     }
 
-    /// Coefficient of `s^i` in the numerator.
+    /// Returns the coefficient of `s^i` in the numerator.
     pub fn numerator(&self, i: usize) -> f64 {
         self.values[0] * self.shape[i]
     }

@@ -1,22 +1,23 @@
 //! Order and meaning of the parameters.
 //!
-//! A parameter that changes has two elements in theta, before and after the change; a constant one has one element:
+//! A parameter that changes has two elements in theta, before and after the change; a parameter that does not change
+//! has one element:
 //!
-//! `theta = [v1 v2 of each of the numerator, t_M, ln G, 1/T_I, omega_nm, zeta_nm, tau_e, d1 .. d_nd]`
+//! `theta = [v1 v2 of each parameter of the numerator, t_M, ln G, 1/T_I, omega_nm, zeta_nm, tau_e, d1 .. d_nd]`
 //!
-//! where the numerator has the gain (K, with a lag K/T_I), followed by T_L, or c_1 and c_2, or T_L and alpha
-//! ([`Form::shape`]); a parameter that the form does not have has no element. For the operator of a gain and a lead
-//! that is `[K_e1, K_e2, T_L1, T_L2, t_M, ln G, omega_nm, zeta_nm, tau_e, d1 .. d_nd]`. The rate enters by its
-//! logarithm: it is positive, and its likelihood is far more nearly a parabola in ln G than in G. A lag enters by
-//! `1/T_I`, for the same reason.
+//! where the parameters of the numerator are the gain (K, or K/T_I with a lag), followed by T_L, or c_1 and c_2, or T_L
+//! and alpha ([`Form::shape`]). A parameter that the form does not have has no element. For a gain and a lead,
+//! `theta = [K_e1, K_e2, T_L1, T_L2, t_M, ln G, omega_nm, zeta_nm, tau_e, d1 .. d_nd]`. The rate enters through its
+//! logarithm, because it is positive and its log-likelihood is much closer to a parabola in ln G than in G. A lag
+//! enters as `1/T_I` for the same reason.
 
 use hoid_model::{
     FamilyOperator, Form, ModelError, Orders,
     operator_family::{Coordinate, PARAMETERS},
 };
 
-/// Names of the parameters of an operator of a gain and a lead before the coefficients d1, d2 ... of
-/// the noise model, with their units; those of other forms: [`crate::SigmoidChange::names`].
+/// Names and units of the parameters for a gain and a lead, without the coefficients d1, d2 ... of the noise model. For
+/// other forms see [`crate::SigmoidChange::names`].
 pub const SIGMOID_NAMES: [(&str, &str); 9] = [
     ("K_e1", ""),
     ("K_e2", ""),
@@ -32,7 +33,7 @@ pub const SIGMOID_NAMES: [(&str, &str); 9] = [
 /// Largest number of parameters of a numerator.
 pub(crate) const MOST_VARYING: usize = 3;
 
-/// Places of the parameters in theta.
+/// Indices of the parameters in theta.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Layout {
     pub form: Form,
@@ -42,25 +43,25 @@ pub(crate) struct Layout {
     pub varying: usize,
     pub midpoint: usize,
     pub log_rate: usize,
-    /// Place of 1/T_I.
+    /// Index of 1/T_I.
     pub lag: Option<usize>,
-    /// Places of omega_nm and zeta_nm.
-    pub muscles: Option<[usize; 2]>,
+    /// Indices of omega_nm and zeta_nm.
+    pub neuromuscular_indices: Option<[usize; 2]>,
     pub delay: usize,
-    /// Place of d1.
+    /// Index of d1.
     pub noise: usize,
 }
 
 /// Meaning of an element of theta.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Element {
-    /// A coordinate of the numerator, before (0) or after (1) the change.
+    /// A coordinate of the numerator before (0) or after (1) the change.
     Varying(Coordinate, usize),
     Midpoint,
     LogRate,
-    /// A coordinate that does not change; omega_nm and zeta_nm instead of their logarithms.
+    /// A coordinate that does not change. omega_nm and zeta_nm themselves replace their logarithms.
     Constant(Coordinate),
-    /// d_i.
+    /// Coefficient d_i of the noise model.
     Noise(usize),
 }
 
@@ -75,7 +76,7 @@ impl Layout {
             place
         };
         let lag = form.has_lag().then(|| take(1));
-        let muscles = neuromuscular.then(|| take(2)).map(|place| [place, place + 1]);
+        let neuromuscular_indices = neuromuscular.then(|| take(2)).map(|place| [place, place + 1]);
         let delay = take(1);
         Self {
             form,
@@ -85,13 +86,13 @@ impl Layout {
             midpoint,
             log_rate: midpoint + 1,
             lag,
-            muscles,
+            neuromuscular_indices,
             delay,
             noise: delay + 1,
         }
     }
 
-    /// Number of elements of theta.
+    /// Returns the number of elements of theta.
     pub fn len(&self) -> usize {
         self.noise + self.nd
     }
@@ -107,13 +108,13 @@ impl Layout {
         last.chain([self.midpoint, self.log_rate]).collect()
     }
 
-    /// Returns the indices of the poles and the delay, on which the responses depend.
+    /// Returns the indices of the poles and the delay, which determine the responses.
     pub fn poles(&self) -> Vec<usize> {
-        let muscles = self.muscles.into_iter().flatten();
+        let muscles = self.neuromuscular_indices.into_iter().flatten();
         self.lag.into_iter().chain(muscles).chain([self.delay]).collect()
     }
 
-    /// Order of the dynamics.
+    /// Returns the order of the dynamics.
     pub fn order(&self) -> usize {
         usize::from(self.form.has_pole()) + if self.neuromuscular { 2 } else { 0 }
     }
@@ -123,13 +124,13 @@ impl Layout {
         self.form.degree() == self.order()
     }
 
-    /// Returns the number of samples in addition to nk after which the state alone contains the past.
+    /// Returns the number of samples after nk from which the state alone represents the past.
     pub fn reach(&self) -> usize {
         if self.has_direct_part() { 2 } else { 0 }
     }
 
-    /// Returns the number of pieces of a sample within which the response is a smooth function of the delay: the direct
-    /// part has a kink in the middle ([`hoid_model::operator_family`], `zoh`).
+    /// Returns the number of pieces of a sampling interval within each of which the response is a smooth function of
+    /// the delay. The direct part has a kink in the middle of the interval ([`hoid_model::operator_family`], `zoh`).
     pub fn pieces(&self) -> usize {
         if self.has_direct_part() { 2 } else { 1 }
     }
@@ -139,7 +140,7 @@ impl Layout {
         self.form.coordinates(self.neuromuscular)
     }
 
-    /// Each element of theta.
+    /// Returns the meaning of each element of theta.
     pub fn elements(&self) -> Vec<Element> {
         let all = self.coordinates();
         let (varying, constant) = all.split_at(self.varying);
@@ -152,12 +153,13 @@ impl Layout {
             .collect()
     }
 
-    /// Returns name and unit of each element as it is typed and reported: G, T_I, omega_nm and zeta_nm themselves.
+    /// Returns the name and unit of each parameter as typed and reported: G, T_I, omega_nm and zeta_nm, not their
+    /// transformed values.
     pub fn names_and_units(&self) -> Vec<(String, &'static str)> {
         let of = |element: Element| match element {
             Element::Varying(coordinate, end) => {
                 let name = self.parameter(coordinate);
-                // c_1 has a digit of its own.
+                // A name such as c_1 already ends with a digit.
                 let sign = if name.ends_with('1') || name.ends_with('2') {
                     "_"
                 } else {
@@ -180,7 +182,7 @@ impl Layout {
         self.names_and_units().into_iter().map(|(name, _)| name).collect()
     }
 
-    /// Returns the parameter as which a coordinate is reported.
+    /// Returns the name under which a coordinate is reported.
     fn parameter(&self, coordinate: Coordinate) -> &'static str {
         match (coordinate, self.form) {
             (Coordinate::Gain, Form::Lead) => "K_e",
@@ -216,7 +218,7 @@ impl Layout {
         }
     }
 
-    /// Returns the derivative of the reported number with respect to an element of theta.
+    /// Returns the derivative of the reported number with respect to its element of theta.
     pub fn typed_slope(&self, place: usize, value: f64) -> f64 {
         match place {
             _ if place == self.log_rate => value.exp(),
@@ -225,7 +227,7 @@ impl Layout {
         }
     }
 
-    /// Returns the orders of its discrete model, with this nk.
+    /// Returns the orders of the discrete model for this nk.
     pub fn orders(&self, nk: usize) -> Orders {
         Orders {
             nb: self.order() + if self.has_direct_part() { 3 } else { 1 },
@@ -236,14 +238,14 @@ impl Layout {
         }
     }
 
-    /// Returns the operator with this numerator, and with the poles and the delay of theta.
+    /// Returns the operator with these parameters of the numerator, and with the poles and the delay of theta.
     ///
     /// # Errors
-    /// As [`FamilyOperator::new`].
+    /// The errors of [`FamilyOperator::new`].
     pub fn operator(&self, theta: &[f64], numerator: &[f64]) -> Result<FamilyOperator, ModelError> {
         let mut x = numerator[..self.varying].to_vec();
         x.extend(self.lag.map(|place| theta[place]));
-        x.extend(self.muscles.into_iter().flatten().map(|place| theta[place].ln()));
+        x.extend(self.neuromuscular_indices.into_iter().flatten().map(|place| theta[place].ln()));
         x.push(theta[self.delay]);
         FamilyOperator::new(self.form, self.neuromuscular, &x)
     }
@@ -284,7 +286,7 @@ mod tests {
                 if let Some(place) = layout.lag {
                     assert_eq!(elements[place], Element::Constant(Coordinate::LagRate));
                 }
-                if let Some([omega, zeta]) = layout.muscles {
+                if let Some([omega, zeta]) = layout.neuromuscular_indices {
                     assert_eq!(elements[omega], Element::Constant(Coordinate::LogOmega));
                     assert_eq!(elements[zeta], Element::Constant(Coordinate::LogZeta));
                 }

@@ -1,30 +1,31 @@
-//! Noise whose level changes with the operator.
+//! Noise with a level that changes together with the operator.
 //!
-//! If the gain of the remnant changes, so does the standard deviation of the innovations:
-//! `sigma(t) = sigma_1 + (sigma_2 - sigma_1) s(t)` with the sigmoid s of the gains, without their delay. Given the
-//! residuals, sigma_1 and sigma_2 minimise `sum of ln sigma(t) + eps(t)^2/(2 sigma(t)^2)` (Fisher scoring); the
-//! residuals are then weighted by 1/sigma(t), and the fit and the levels are estimated in turn. Source: R. J. Carroll
-//! and D. Ruppert, *Transformation and Weighting in Regression*, 1988, ch. 3.
+//! If the gain of the remnant changes, the standard deviation of the innovations changes as well:
+//! `sigma(t) = sigma_1 + (sigma_2 - sigma_1) s(t)`, where s is the sigmoid of the gains without the delay. Given the
+//! residuals, sigma_1 and sigma_2 minimise `sum of ln sigma(t) + eps(t)^2/(2 sigma(t)^2)` (Fisher scoring). The
+//! residuals are then weighted by 1/sigma(t), and fit and levels are estimated in turn. Source: R. J. Carroll and D.
+//! Ruppert, *Transformation and Weighting in Regression*, 1988, ch. 3.
 
 use crate::linalg::least_squares::dot;
 
-/// Standard deviation of the innovations over the record.
+/// Model of the standard deviation of the innovations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum NoiseLevel {
-    /// Constant.
+    /// One constant level.
     Constant,
-    /// One level before and one after the change, with the same sigmoid between them.
+    /// One level before and one after the change, with a transition that follows the sigmoid of the gains.
     #[default]
     Changing,
 }
 
-/// Smallest ratio of the two levels: a smaller one means a record without noise on one side.
+/// Smallest ratio of the two levels; a smaller ratio indicates a record without noise on one side.
 const SMALLEST_RATIO: f64 = 1e-3;
 
-/// Returns `[sigma_1, sigma_2]` for the residuals and the share of the change at each; `None` if they are zero.
+/// Returns `[sigma_1, sigma_2]` from the residuals and from the share of the change at each residual; `None` if the
+/// residuals on one side are zero or the levels cannot be determined.
 pub(crate) fn levels(residuals: &[Vec<f64>], shares: &[Vec<f64>]) -> Option<[f64; 2]> {
     let pairs = || residuals.iter().flatten().zip(shares.iter().flatten());
-    // From the weighted mean squares on either side.
+    // The search starts from the weighted mean squares on both sides.
     let side = |weight: &dyn Fn(f64) -> f64| {
         let (sum, total) = pairs().fold((0.0, 0.0), |(sum, total), (eps, share)| {
             (sum + weight(*share) * eps * eps, total + weight(*share))
@@ -59,7 +60,7 @@ pub(crate) fn levels(residuals: &[Vec<f64>], shares: &[Vec<f64>]) -> Option<[f64
         ];
         let mut largest = 0.0_f64;
         for (s, d) in sigma.iter_mut().zip(step) {
-            // In one step, a level changes at most by a factor of two.
+            // In one step a level changes by no more than a factor of two.
             let moved = (*s + d).clamp(0.5 * *s, 2.0 * *s);
             largest = largest.max((moved - *s).abs() / *s);
             *s = moved;
@@ -72,8 +73,8 @@ pub(crate) fn levels(residuals: &[Vec<f64>], shares: &[Vec<f64>]) -> Option<[f64
     (ratio >= SMALLEST_RATIO).then_some(sigma)
 }
 
-/// Returns weights `1/sigma(t)`, scaled to the geometric mean 1 over all residuals: the sum of weighted squares then
-/// replaces the sum of squares in the likelihood.
+/// Returns weights `1/sigma(t)`, scaled to the geometric mean 1 over all residuals, so that the weighted sum of squares
+/// can replace the sum of squares in the likelihood.
 pub(crate) fn weights(sigma: [f64; 2], shares: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let level = |share: f64| sigma[0] + (sigma[1] - sigma[0]) * share;
     let count: usize = shares.iter().map(Vec::len).sum();

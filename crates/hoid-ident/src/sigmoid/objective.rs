@@ -1,31 +1,32 @@
-//! The prediction-error criterion of an operator that changes.
+//! The prediction error criterion for an operator that changes.
 //!
-//! With y_i the response of `s^i` over the poles of the operator, after their delay, to the held error, and n_i the
-//! coefficients of the numerator,
+//! Let y_i be the response to the held error of an operator with the numerator `s^i`, the poles and the delay, and n_i
+//! the coefficients of the actual numerator. Then
 //!
 //! `w(t) = sum_i n_i(t - tau) y_i(t)`,  `v = u - w`,  `eps = D v`,
 //!
-//! because the delay is after the gains. For a gain and a lead that is `K_e(t - tau) y_0(t) + K_e_dot(t - tau) y_1(t)`,
-//! with y_0 of `omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}`. The y_i have one F and one state in common, which
-//! the numerator does not affect, so that y_i = (B_i/F) q^-nk e holds throughout ([`super::unit_operator`]). With the
-//! gain k and the shape m of the numerator, `n = k m(x)` ([`hoid_model::Form::shape`]),
+//! because the delay follows the gains. For a gain and a lead, w is `K_e(t - tau) y_0(t) + K_e_dot(t - tau) y_1(t)`,
+//! with y_0 the response of `omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}`. All y_i have the same F and the same
+//! state, which the numerator does not affect, so that y_i = (B_i/F) q^-nk e is always valid
+//! ([`super::unit_operator`]). With the gain k and the shape m of the numerator, `n = k m(x)`
+//! ([`hoid_model::Form::shape`]),
 //!
 //! `dw/dk = sum_i m_i y_i`,  `dw/dx_j = k sum_i (dm_i/dx_j) y_i`.
 //!
-//! **Initial states.** The state of the operator at the start of a record is unknown: as many numbers as there are
-//! poles. Any state is reached from rest by as many held errors before it; those are the unknowns, so that the same
-//! filters give the responses to them and all derivatives. For a gain and a lead these errors precede the record; for
-//! other forms they immediately precede the first residual: there the response of a fast pole has not yet decayed, and
-//! none of the responses is lost among the others. They enter eps linearly and are eliminated exactly for each theta,
-//! as in [`crate::criterion::initial_state_responses`]: `eps = (I - Q Q') eps_0`, psi with the best states,
-//! `psi' (I - Q Q') psi` (G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432; L. Kaufman, *BIT* 15
-//! (1975) 49-57).
+//! **Initial states.** The state of the operator at the start of a record is unknown and has as many elements as there
+//! are poles. Any state can be reached from rest by the same number of held errors before it. These errors are the
+//! unknowns, so that the same filters give the responses to them and all derivatives. For a gain and a lead the errors
+//! precede the record. For other forms they immediately precede the first residual, where the response of a fast pole
+//! has not yet decayed and remains distinguishable from the other responses. They enter eps linearly and are eliminated
+//! exactly for each theta, as in [`crate::criterion::initial_state_responses`]: `eps = (I - Q Q') eps_0`, psi is
+//! computed with the optimal states, and its products are `psi' (I - Q Q') psi` (G. H. Golub and V. Pereyra, *SIAM J.
+//! Numer. Anal.* 10 (1973) 413-432; L. Kaufman, *BIT* 15 (1975) 49-57).
 //!
 //! **Level.** In recorded data u may have a level c that is not a response to e ([`crate::Fit::level`]). It is an
-//! additional linear unknown of each record, with a response of ones, eliminated in the same way. The means cannot be
-//! removed beforehand, as the response to that of e changes with the gains.
+//! additional linear unknown of each record, with a response of ones, and is eliminated in the same way. The means
+//! cannot be removed before the fit, since the response to the mean of e changes with the gains.
 //!
-//! **Prior.** Prior knowledge is added to the residuals as additional squares ([`super::prior`]).
+//! **Prior.** Prior knowledge is added as additional squared residuals ([`super::prior`]).
 
 use hoid_model::{Form, SampleTime, uncertainty::variance_along};
 
@@ -38,7 +39,7 @@ use crate::{
     optimize::Objective,
 };
 
-/// Input, output and start of one record.
+/// Input, output and start time of one record.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Data<'a> {
     pub e: &'a [f64],
@@ -46,47 +47,48 @@ pub(crate) struct Data<'a> {
     pub start_s: f64,
 }
 
-/// The criterion over one or several records.
+/// Criterion for one or several records.
 #[derive(Debug, Clone)]
 pub(crate) struct ChangeCriterion<'a> {
     pub layout: Layout,
     pub data: Vec<Data<'a>>,
     pub sample_time: SampleTime,
-    /// First sample whose residual counts; at least the longest nk plus nd.
+    /// First sample with a residual; at least the largest nk plus nd.
     pub first: usize,
     pub limits: Vec<(f64, f64)>,
-    /// Piece of a sample in which the delay is held ([`Layout::pieces`]); `None` determines it from the delay itself.
+    /// Piece of a sampling interval to which the delay is restricted ([`Layout::pieces`]); `None` if the delay itself
+    /// determines the piece.
     pub piece: Option<usize>,
-    /// False for the model whose first state is valid throughout.
+    /// False for a model without a change, whose initial parameters are valid throughout.
     pub changes: bool,
-    /// Weights of the residuals of each record, from the first residual on; `None` if all weights are equal.
+    /// Weights of the residuals of each record, starting at the first residual; `None` if all weights are equal.
     pub weights: Option<Vec<Vec<f64>>>,
-    /// Prior knowledge.
+    /// Prior knowledge about the parameters.
     pub penalty: Vec<Penalty>,
-    /// True if u of each record has a level.
+    /// True if a level of u is estimated for each record.
     pub level: bool,
 }
 
-/// Signals of one record at one theta.
+/// Signals of one record for one theta.
 #[derive(Debug)]
 pub(crate) struct Pass {
     unit: UnitOperator,
-    /// The error, preceded by the past.
+    /// Error of the record, preceded by the errors that represent the initial state.
     input: Vec<f64>,
-    /// Responses to it.
+    /// Responses y_i to the input.
     y: Vec<Vec<f64>>,
-    /// Numerators from the first regressed sample on.
+    /// Numerators, starting at the first regressed sample.
     gains: Vec<Instant>,
-    /// `u - w` from the first regressed sample on.
+    /// `u - w`, starting at the first regressed sample.
     v: Vec<f64>,
     /// Weighted residuals.
     pub eps: Vec<f64>,
     basis: Vec<Vec<f64>>,
-    /// The level of u, and the norm of its column after projection on the complement of those of the states.
+    /// Level of u, and the norm of its column after the columns of the states have been projected out.
     pub level: Option<(f64, f64)>,
 }
 
-/// Returns `sum_i of(instant, i) y_i`, as long as the shortest y_i.
+/// Returns `sum_i of(instant, i) y_i` with the length of the shortest y_i.
 fn combined(gains: &[Instant], y: &[&[f64]], of: impl Fn(&Instant, usize) -> f64) -> Vec<f64> {
     let length = y.iter().map(|y| y.len()).fold(gains.len(), usize::min);
     (0..length)
@@ -98,28 +100,29 @@ fn combined(gains: &[Instant], y: &[&[f64]], of: impl Fn(&Instant, usize) -> f64
 }
 
 impl ChangeCriterion<'_> {
-    /// Number of residuals over all records.
+    /// Returns the number of residuals in all records.
     pub fn residuals(&self) -> usize {
         self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()
     }
 
-    /// Number of initial states and levels over all records.
+    /// Returns the number of initial states and levels in all records.
     pub fn states(&self) -> usize {
         (self.layout.order() + usize::from(self.level)) * self.data.len()
     }
 
-    /// Contribution of the prior to the sum of squares.
+    /// Returns the contribution of the prior to the sum of squares.
     pub fn penalty_at(&self, theta: &[f64]) -> f64 {
         self.penalties().map(|penalty| penalty.at(theta)).sum()
     }
 
-    /// Returns the prior, without that of the change if there is none.
+    /// Returns the penalties of the prior; for a model without a change, without the penalties of its additional
+    /// parameters.
     fn penalties(&self) -> impl Iterator<Item = &Penalty> {
         let last = self.layout.of_the_change();
         (self.penalty.iter()).filter(move |penalty| self.changes || !last.contains(&penalty.place))
     }
 
-    /// Returns the residuals of one record from [`ChangeCriterion::first`] on, not weighted.
+    /// Returns the unweighted residuals of one record, starting at [`ChangeCriterion::first`].
     pub fn residuals_of(&self, theta: &[f64], record: usize) -> Option<Vec<f64>> {
         let mut eps = self.pass(theta, record)?.eps;
         if let Some(weights) = &self.weights {
@@ -128,7 +131,7 @@ impl ChangeCriterion<'_> {
         Some(eps)
     }
 
-    /// Returns `D x` with the weights of the record, for a signal from the first regressed sample on.
+    /// Returns `D x` with the weights of the record, for a signal that starts at the first regressed sample.
     fn whitened(&self, theta: &[f64], record: usize, x: &[f64]) -> Vec<f64> {
         let nd = self.layout.nd;
         let mut y = x[nd..].to_vec();
@@ -145,7 +148,7 @@ impl ChangeCriterion<'_> {
         }
     }
 
-    /// Returns the numerators after the delay at each sample from the first regressed one on.
+    /// Returns the delayed numerators at each sample, starting at the first regressed sample.
     fn gains(&self, theta: &[f64], record: usize) -> Vec<Instant> {
         let (from, data) = (self.first - self.layout.nd, self.data[record]);
         let at = |t: usize| data.start_s + t as f64 * self.sample_time.s() - theta[self.layout.delay];
@@ -168,7 +171,7 @@ impl ChangeCriterion<'_> {
         if unit.nk + layout.reach() > from || self.first >= n {
             return None;
         }
-        // Position of the oldest error of the past; those of a direct part reach on by two samples.
+        // Index of the oldest unknown error. With a direct part the errors have an effect for two more samples.
         let oldest = match layout.form {
             Form::Lead => 0,
             _ => from - unit.nk - layout.reach(),
@@ -177,7 +180,7 @@ impl ChangeCriterion<'_> {
         input.extend_from_slice(&data.e[..n - unit.nk]);
         let powers = unit.b.len();
         let mut y: Vec<Vec<f64>> = (0..powers).map(|i| unit.response(i, &input)).collect();
-        // Sample t is at t - nk + past_errors.
+        // Sample t has the index t - nk + past_errors.
         let begin = from + past_errors - unit.nk;
         let gains = self.gains(theta, record);
         let respond = |y: &[&[f64]]| combined(&gains, y, Instant::numerator);
@@ -185,13 +188,13 @@ impl ChangeCriterion<'_> {
         let mut v: Vec<f64> = data.u[from..].iter().zip(&w).map(|(u, w)| u - w).collect();
         let mut eps = self.whitened(theta, record, &v);
 
-        // Responses to the errors before the record, the oldest one first.
+        // Responses to the unknown errors, starting with the oldest error.
         let h: Vec<Vec<f64>> = (0..powers).map(|i| unit.impulse_response(i, input.len())).collect();
         let mut free: Vec<Vec<f64>> = (0..past_errors)
             .map(|age| {
                 let tails: Vec<&[f64]> = h.iter().map(|h| h.get(begin - oldest - age..).unwrap_or(&[])).collect();
                 let mut column = respond(&tails);
-                // Room for D after its end.
+                // The filter D makes the response longer.
                 column.resize((column.len().max(past_errors) + nd).min(n - from), 0.0);
                 column
             })
@@ -224,9 +227,10 @@ impl ChangeCriterion<'_> {
         })
     }
 
-    /// The level of u in one record at a minimum, and its variance for this variance of the innovations and covariance
-    /// of theta: `sigma^2/r^2` for given theta, with r the length of the component q r of its column orthogonal to
-    /// those of the states, and the uncertainty of theta, along `dc/dtheta = -q' psi/r`.
+    /// Returns the level of u in one record at a minimum, and its variance for this innovation variance and this
+    /// covariance of theta. Given theta, the variance is `sigma^2/r^2`, where q r is the component of the level's
+    /// column orthogonal to the columns of the states and r its length. The uncertainty of theta is added along
+    /// `dc/dtheta = -q' psi/r`.
     pub fn level_of(&self, theta: &[f64], record: usize, variance: f64, covariance: &[f64]) -> Option<(f64, f64)> {
         let pass = self.pass(theta, record)?;
         let (value, length) = pass.level.filter(|(_, length)| *length > 0.0)?;
@@ -236,12 +240,13 @@ impl ChangeCriterion<'_> {
         Some((value, variance / (length * length) + variance_along(&slope, covariance)))
     }
 
-    /// Returns the columns of psi in one record, weighted, not projected.
+    /// Returns the weighted columns of psi in one record, before projection.
     fn columns(&self, theta: &[f64], record: usize, pass: &Pass) -> Vec<Vec<f64>> {
         let (layout, gains) = (&self.layout, &pass.gains);
         let begin = self.first - layout.nd + layout.order() - pass.unit.nk;
         let y: Vec<&[f64]> = pass.y.iter().map(|y| &y[begin..]).collect();
-        // Along the gain; along the others over the gain.
+        // Derivatives with respect to the gain, and derivatives with respect to the other parameters divided by the
+        // gain.
         let along: Vec<Vec<f64>> = (0..layout.varying)
             .map(|j| match j.checked_sub(1) {
                 None => combined(gains, &y, |g, i| g.shape[i]),
@@ -294,8 +299,8 @@ impl ChangeCriterion<'_> {
     }
 }
 
-/// Projects the columns out of eps; returns their orthonormal basis and, for each column, its coefficient and the norm
-/// of its part orthogonal to the previous ones.
+/// Projects the columns out of eps. Returns their orthonormal basis and, for each column, its coefficient and the norm
+/// of its part orthogonal to the previous columns.
 fn eliminate(columns: Vec<Vec<f64>>, eps: &mut [f64]) -> (Vec<Vec<f64>>, Vec<(f64, f64)>) {
     let count = columns.len();
     let mut basis: Vec<Vec<f64>> = Vec::with_capacity(count);
@@ -305,7 +310,7 @@ fn eliminate(columns: Vec<Vec<f64>>, eps: &mut [f64]) -> (Vec<Vec<f64>>, Vec<(f6
     for (j, mut column) in columns.into_iter().enumerate() {
         let size = dot(&column, &column).sqrt();
         let mut row = vec![0.0; basis.len()];
-        // Twice, for orthogonality to rounding.
+        // Two passes give orthogonality to rounding accuracy.
         for _ in 0..2 {
             for (q, component) in basis.iter().zip(&mut row) {
                 let common = q.len().min(column.len());
@@ -347,7 +352,7 @@ fn eliminate(columns: Vec<Vec<f64>>, eps: &mut [f64]) -> (Vec<Vec<f64>>, Vec<(f6
 impl Objective for ChangeCriterion<'_> {
     fn is_feasible(&self, theta: &[f64]) -> bool {
         theta.iter().all(|v| v.is_finite())
-            && self.layout.muscles.is_none_or(|[_, zeta]| theta[zeta] > 0.0)
+            && self.layout.neuromuscular_indices.is_none_or(|[_, zeta]| theta[zeta] > 0.0)
             && UnitOperator::of(&self.layout, theta, self.piece, self.sample_time)
                 .is_some_and(|unit| unit.nk + self.layout.reach() + self.layout.nd <= self.first)
     }
@@ -361,7 +366,7 @@ impl Objective for ChangeCriterion<'_> {
         };
         for record in 0..self.data.len() {
             let Some(pass) = self.pass(theta, record) else {
-                // Only for a theta that is not feasible.
+                // This occurs only if theta is not feasible.
                 total.sum_of_squares = f64::NAN;
                 return total;
             };
@@ -384,8 +389,8 @@ impl Objective for ChangeCriterion<'_> {
         }
         self.penalties().for_each(|penalty| penalty.add_to(theta, &mut total));
         for i in 0..p {
-            // A parameter without any effect here would make the matrix singular; a diagonal element of one keeps it
-            // fixed.
+            // A parameter without any effect for this theta would make the matrix singular; a diagonal element of one
+            // keeps the parameter constant.
             if total.gram[i * p + i] <= 0.0 {
                 total.descent[i] = 0.0;
                 for j in 0..p {

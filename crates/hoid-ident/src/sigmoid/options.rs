@@ -1,5 +1,5 @@
 //! Options of an operator that changes once: the fields of [`SigmoidChange`], and the names under which texts set them.
-//! Each option is declared only here.
+//! Each option is declared only in this file.
 
 use std::collections::BTreeMap;
 
@@ -9,47 +9,48 @@ use super::noise_level::NoiseLevel;
 use crate::{
     Constraint, IdentError, InitialState, SearchOptions,
     family::OperatorPrior,
-    order_selection::{NamedOrders, written},
+    order_selection::{NamedOrders, range_text},
     settings::{BatchOption, BatchOptions},
     shared_options as shared,
 };
 
-/// Estimator of an operator that changes once, with its options.
+/// Estimator for an operator that changes once, with its options.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SigmoidChange {
-    /// Form of the operator: its numerator changes (K, T_L, c_1, c_2, alpha; with a lag the gain is K/T_I). Lag,
-    /// neuromuscular part and delay do not change. Default: a gain and a lead.
+    /// Form of the operator. The parameters of its numerator change (K, T_L, c_1, c_2, alpha; with a lag the gain is
+    /// K/T_I); lag, neuromuscular part and delay do not change. Default: a gain and a lead.
     pub form: Form,
-    /// True with the neuromuscular part. Default true.
+    /// True if the operator has a neuromuscular part. Default true.
     pub neuromuscular: bool,
     /// True if a level of u is estimated in each record, for recorded data
     /// ([`SigmoidFit::level`](crate::SigmoidFit::level)). Default false.
     pub level: bool,
-    /// Prior knowledge of the person; that of T_L is used before and after the change. Default: none.
+    /// Prior knowledge about the person; the prior of T_L applies before and after the change. Default: none.
     pub prior: OperatorPrior,
-    /// Order nd of D; `None` for the best by Schwarz's criterion, from 1 to 12, for the part of u that one operator
-    /// leaves; 1 with a given start. Default `None`.
+    /// Order nd of D. If it is `None`, Schwarz's criterion chooses an order from 1 to 12 for the part of u that an
+    /// operator without a change does not explain; with a given start the order is 1. Default `None`.
     pub nd: Option<usize>,
-    /// Shortest and longest delay tau_e, s; any fraction of a sample. Equal ends fix it.
+    /// Smallest and largest delay tau_e, s; the delay need not be a whole number of samples. Equal values fix the
+    /// delay.
     pub delay_range_s: (f64, f64),
-    /// Fixed and bounded parameters by name ([`SigmoidChange::names`]). By default t_M is within the middle nine tenths
-    /// of the time span common to the records, and G between 5/span and 2/Ts.
+    /// Fixed and bounded parameters by name ([`SigmoidChange::names`]). By default t_M is in the middle nine tenths of
+    /// the time span common to the records, and G is between 5/span and 2/Ts.
     pub constraints: BTreeMap<String, Constraint>,
-    /// Standard deviation of the innovations over the record.
+    /// Model of the standard deviation of the innovations.
     pub noise_level: NoiseLevel,
-    /// Start of the search, instead of the estimator's own starts: the parameters of [`SigmoidChange::names`] in their
+    /// Start of the search, which replaces the automatic starts: the parameters of [`SigmoidChange::names`] in their
     /// units.
     pub start: Option<Vec<f64>>,
     /// Method and limits of each search.
     pub search: SearchOptions,
-    /// True if likelihood intervals of t_M and G are computed; they take about as long as the fit. Default true.
+    /// True if likelihood intervals of t_M and G are computed, which takes about as long as the fit. Default true.
     pub likelihood_intervals: bool,
 }
 
 impl Default for SigmoidChange {
-    /// Noise of the order that the records show, delay between 0.05 and 0.6 s, a noise level that changes, and the
-    /// default starts; searches of up to 200 steps to a relative decrease of 1e-10 (a thousandth of a standard error):
-    /// with a small change the loss has many ripples in t_M.
+    /// Returns the default options: a noise order chosen from the records, a delay between 0.05 and 0.6 s, a changing
+    /// noise level, and automatic starts. Searches have up to 200 steps and a tolerance of 1e-10 (a thousandth of a
+    /// standard error), because the loss has many ripples in t_M if the change is small.
     fn default() -> Self {
         Self {
             form: Form::Lead,
@@ -72,17 +73,17 @@ impl Default for SigmoidChange {
 }
 
 impl SigmoidChange {
-    /// Sets the given order nd of the noise.
+    /// Sets the order nd of the noise model.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for other orders, and for a range.
+    /// [`IdentError::BadOption`] for an order other than nd, and for a range.
     pub fn with_noise_orders(self, named: &NamedOrders) -> Result<Self, IdentError> {
         for (name, range) in named {
             if name != "nd" || range.start() != range.end() {
                 return Err(IdentError::BadOption {
                     option: format!("order {name}"),
-                    found: written(range),
-                    expected: "a single number nd of an operator that changes, such as nd=2".to_owned(),
+                    found: range_text(range),
+                    expected: "a single number nd for an operator that changes, such as nd=2".to_owned(),
                 });
             }
         }

@@ -1,8 +1,8 @@
-//! Prior knowledge of the person in the criterion of a change.
+//! Prior knowledge about the person in the criterion of a change.
 //!
 //! A prior of a positive parameter x, `ln x ~ N(m, s)`, is added to the squared residuals as `sigma^2 (ln x - m)^2/s^2`
-//! ([`crate::family::OperatorPrior`]); that of T_L is used before and after the change. The innovation variance sigma^2
-//! is that of the fit; both are computed in turn.
+//! ([`crate::family::OperatorPrior`]); the prior of T_L applies before and after the change. sigma^2 is the innovation
+//! variance of the fit; fit and sigma^2 are computed in turn.
 
 use super::{
     layout::{Element, Layout},
@@ -17,12 +17,12 @@ use crate::{
     optimize::{Minimum, Objective},
 };
 
-/// Rounds in which sigma^2 of the prior is updated.
+/// Largest number of rounds in which sigma^2 of the prior is updated.
 const ROUNDS: usize = 3;
 /// Relative change of sigma^2 below which no further round is necessary.
-const SETTLED: f64 = 0.05;
+const CONVERGED: f64 = 0.05;
 
-/// Returns the prior for each element of theta, in units of one standard deviation.
+/// Returns the prior for each element of theta that has one, for the innovation variance 1.
 pub(super) fn penalties(layout: &Layout, prior: &OperatorPrior) -> Vec<Penalty> {
     let all = layout.coordinates();
     let elements = layout.elements();
@@ -32,7 +32,7 @@ pub(super) fn penalties(layout: &Layout, prior: &OperatorPrior) -> Vec<Penalty> 
             Element::Varying(own, _) | Element::Constant(own) => *own == coordinate,
             _ => false,
         };
-        // omega_nm and zeta_nm are parameters here, in the family by their logarithms.
+        // theta contains omega_nm and zeta_nm, whereas the family uses their logarithms.
         let own = elements.iter().enumerate().filter(move |(_, e)| is_own(e));
         own.map(move |(place, _)| Penalty {
             place,
@@ -45,23 +45,23 @@ pub(super) fn penalties(layout: &Layout, prior: &OperatorPrior) -> Vec<Penalty> 
     unit.into_iter().flat_map(places).collect()
 }
 
-/// Returns the penalties with the variance of the innovations as their unit.
+/// Returns the penalties for this innovation variance.
 pub(super) fn weighted(unit: &[Penalty], variance: f64) -> Vec<Penalty> {
     unit.iter().map(|p| p.weighted(variance)).collect()
 }
 
-/// Variance of the innovations at a minimum.
+/// Returns the innovation variance at a minimum.
 pub(super) fn innovation_variance(criterion: &ChangeCriterion<'_>, minimum: &Minimum) -> f64 {
     let not_fixed = criterion.limits.iter().filter(|(low, high)| low < high).count();
     let squares = minimum.at.sum_of_squares - criterion.penalty_at(&minimum.theta);
     squares / (criterion.residuals() - not_fixed - criterion.states()) as f64
 }
 
-/// Returns the minimum with noise levels, and with the prior in units of the variance that belongs to it.
+/// Returns the minimum with noise levels, for a prior that is scaled with the innovation variance at this minimum.
 ///
 /// # Errors
-/// [`IdentError::NoFiniteLoss`].
-pub(super) fn settled(
+/// [`IdentError::NoFiniteLoss`] if a search fails.
+pub(super) fn minimum_with_scaled_prior(
     criterion: &mut ChangeCriterion<'_>,
     unit: &[Penalty],
     found: Minimum,
@@ -76,7 +76,7 @@ pub(super) fn settled(
     for _ in 1..ROUNDS {
         let Some(now) = criterion.penalty.first() else { break };
         let variance = innovation_variance(criterion, &minimum);
-        if (variance / now.variance - 1.0).abs() < SETTLED || variance <= 0.0 {
+        if (variance / now.variance - 1.0).abs() < CONVERGED || variance <= 0.0 {
             break;
         }
         criterion.penalty = weighted(unit, variance);
@@ -88,8 +88,8 @@ pub(super) fn settled(
     Ok((minimum, levels))
 }
 
-/// Returns the prior in units of the variance at a start.
-pub(super) fn begun(criterion: &ChangeCriterion<'_>, unit: &[Penalty], theta: &[f64]) -> Vec<Penalty> {
+/// Returns the prior scaled with the innovation variance at a start.
+pub(super) fn scaled_at_start(criterion: &ChangeCriterion<'_>, unit: &[Penalty], theta: &[f64]) -> Vec<Penalty> {
     if unit.is_empty() {
         return Vec::new();
     }

@@ -1,11 +1,11 @@
 //! Profile likelihood intervals of t_M and G.
 //!
-//! An interval contains the values at which the loss, minimised over the other parameters, is only slightly larger:
-//! `n ln(V(x)/V) <= q`. The loss need not be a parabola. For G, and for t_M where the change is resolved (two standard
-//! errors are less than the width 1/G of the change), this increase is chi-square with one degree of freedom: q = 3.84
-//! for 95 %. An abrupt change is a change point instead: the increase at the true t_M is distributed as the larger of
-//! two exponential variables, `P(loss <= q) = (1 - e^{-q/2})^2`, q = 7.35 for 95 % (B. E. Hansen, *Econometrica* 68
-//! (2000) 575-603, theorem 2).
+//! An interval contains the values at which the loss, minimised over the other parameters, is only slightly larger than
+//! at the minimum: `n ln(V(x)/V) <= q`. The loss need not be a parabola. For G, and for t_M if the change is resolved
+//! (two standard errors are less than the width 1/G of the change), this statistic is chi-square with one degree of
+//! freedom: q = 3.84 for 95 %. If the change is abrupt, t_M is a change point instead: at the true t_M the statistic is
+//! distributed as the larger of two exponential variables, `P(loss <= q) = (1 - e^{-q/2})^2`, q = 7.35 for 95 % (B. E.
+//! Hansen, *Econometrica* 68 (2000) 575-603, theorem 2).
 
 use super::{layout::Layout, objective::ChangeCriterion, search::search};
 use crate::optimize::{Minimum, SearchMethod, SearchOptions};
@@ -14,15 +14,15 @@ use crate::optimize::{Minimum, SearchMethod, SearchOptions};
 const REGULAR: f64 = 3.841;
 /// 95 % quantile of the larger of two exponential variables with mean 2.
 const CHANGE_POINT: f64 = 7.352;
-/// Multiple of the quantile up to which the walk continues: the loss need not increase monotonically.
+/// The walk continues up to this multiple of the quantile, since the loss need not increase monotonically.
 const WELL_OUTSIDE: f64 = 2.0;
-/// Growth factor of the steps of the walk.
+/// Growth factor of the steps along the profile.
 const GROWTH: f64 = 1.5;
-/// First step in standard errors.
+/// First step along the profile, in standard errors.
 const FIRST_STEP: f64 = 0.5;
-/// Number of points of the walk on either side; the longest step is then hundreds of times the first.
+/// Largest number of points on each side of the minimum; the largest step can be hundreds of times the first.
 const MOST_POINTS: usize = 40;
-/// Halvings of the last step: the end is known to a sixteenth of it.
+/// Number of halvings of the last step, which determine the end of the interval to a sixteenth of this step.
 const HALVINGS: usize = 4;
 
 /// Ends of a 95 % interval; an open end is the bound of the parameter, or infinity for a rate.
@@ -32,24 +32,24 @@ pub(crate) struct Interval {
     pub high: f64,
 }
 
-/// Result of a walk along the profile.
+/// Result of a walk along the profile likelihood.
 #[derive(Debug)]
 pub(crate) enum Profile {
-    /// An interval.
+    /// The interval of the parameter.
     Interval(Interval),
-    /// A point with a lower loss than that of the minimum.
+    /// A theta with a lower loss than the minimum.
     Lower(Vec<f64>),
 }
 
-/// True if t_M, with this standard error of a regular parameter, is a change point.
+/// True if t_M is a change point, given its standard error as a regular parameter.
 pub(crate) fn is_change_point(layout: &Layout, theta: &[f64], standard_error: f64) -> bool {
-    // Derivatives at one t_M carry no information about another one at a distance of the width of the change: the ends
-    // of a 95 % interval.
+    // Derivatives at one t_M carry no information about another t_M at a distance of the width of the change, such as
+    // the ends of a 95 % interval.
     2.0 * standard_error >= (-theta[layout.log_rate]).exp()
 }
 
-/// Returns the 95 % interval of t_M or ln G around a minimum, `standard_error` its own if it has one; with `stay` a
-/// lower loss on the way counts only as inside.
+/// Returns the 95 % interval of t_M or ln G around a minimum, where `standard_error` is the standard error of the
+/// parameter if it has one. If `stay` is true, points with a lower loss count as inside the interval.
 pub(crate) fn profile_likelihood_interval(
     criterion: &ChangeCriterion<'_>,
     minimum: &Minimum,
@@ -67,7 +67,8 @@ pub(crate) fn profile_likelihood_interval(
     let options = SearchOptions {
         method: SearchMethod::LevenbergMarquardt,
         max_iterations: 30,
-        // For the statistic, which is n times this: a thousandth of the quantile.
+        // The statistic is n times the relative change of the loss, so that it is accurate to a thousandth of the
+        // quantile.
         tolerance: 1e-3 * quantile / n,
     };
     let (low, high) = criterion.limits[place];
@@ -97,8 +98,8 @@ pub(crate) fn profile_likelihood_interval(
             let value = (from[place] + sign * step).clamp(low, high);
             step *= GROWTH;
             let Some((loss, theta)) = at(value, &from) else { break };
-            // A minimum lower than the one found, by a tenth of the relevant difference: the walk continues to the
-            // lowest.
+            // This minimum is lower by more than a tenth of the relevant difference: the walk continues, and its lowest
+            // point is returned.
             if loss < lowest && !stay {
                 lowest = loss;
                 lower = Some(theta.clone());

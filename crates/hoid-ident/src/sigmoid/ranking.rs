@@ -1,9 +1,9 @@
-//! The best numerators for given poles, delay, noise model and change, by linear least squares.
+//! The best numerators for given poles, delay, noise model and change, computed by linear least squares.
 //!
-//! `u = sum_i (n_i1 (1 - s) + n_i2 s) y_i` with the share s of the change and the responses y_i, whitened by D. The
-//! coefficients n at either end determine the parameters of the numerator: if it has fewer parameters than
-//! coefficients, the nearest ones in the metric of the responses. A slow pole of the operator has a state at the start
-//! of a record, which is an additional unknown for each.
+//! The model is `u = sum_i (n_i1 (1 - s) + n_i2 s) y_i` with the share s of the change and the responses y_i, whitened
+//! by D. The coefficients n before and after the change determine the parameters of the numerator. If the numerator has
+//! fewer parameters than coefficients, the nearest parameters in the metric of the responses are used. A slow pole of
+//! the operator has a state at the start of each record, which is an additional unknown.
 
 use hoid_model::Form;
 
@@ -15,18 +15,18 @@ use super::{
 };
 use crate::linalg::least_squares::{add_scaled, dot, solve_symmetric};
 
-/// Time constants of the poles before the first residual of the ranking.
+/// Time before the first residual of the ranking, in time constants of the poles.
 const SETTLING: f64 = 4.0;
-/// Slowest pole if there is no neuromuscular part, 1/s.
+/// Assumed rate of decay if there is no neuromuscular part, 1/s.
 const FAST: f64 = 10.0;
-/// Lead times at which a squared lead is searched, s: first value, factor, number.
+/// Lead time constants tried for a squared lead, s: first value, factor, number.
 const LEADS_S: (f64, f64, usize) = (0.02, 1.12, 60);
 
 /// Responses for given poles, delay and noise model.
 pub(super) struct Ranking<'c, 'a> {
     pub criterion: &'c ChangeCriterion<'a>,
     theta: Vec<f64>,
-    /// For each record: first sample that counts, and the responses and u from nd samples before it on.
+    /// For each record: the first sample with a residual, and the responses and u from nd samples before it.
     signals: Vec<(usize, Vec<Vec<f64>>, Vec<f64>)>,
 }
 
@@ -34,7 +34,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
     pub fn new(criterion: &'c ChangeCriterion<'a>, theta: &[f64]) -> Option<Self> {
         let layout = &criterion.layout;
         let unit = UnitOperator::of(layout, theta, None, criterion.sample_time)?;
-        let decay = layout.muscles.map_or(FAST, |[omega, zeta]| theta[omega] * theta[zeta]);
+        let decay = layout.neuromuscular_indices.map_or(FAST, |[omega, zeta]| theta[omega] * theta[zeta]);
         let ts = criterion.sample_time.s();
         let mut signals = Vec::with_capacity(criterion.data.len());
         for data in &criterion.data {
@@ -55,8 +55,9 @@ impl<'c, 'a> Ranking<'c, 'a> {
         })
     }
 
-    /// Returns the sum of squares and the parameters of the numerator at both ends, in the order of theta, by least
-    /// squares for the change of `theta`; without a change, both ends are equal.
+    /// Returns the sum of squares and the parameters of the numerator before and after the change, in the order of
+    /// theta, by least squares for the change in `change`. Without a change the parameters before and after it are
+    /// equal.
     pub fn best_gains(&self, change: Option<&[f64]>) -> Option<(f64, Vec<f64>)> {
         let powers = self.powers();
         let ends = if change.is_some() { 2 } else { 1 };
@@ -81,7 +82,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
             if of_states > 0 {
                 columns.push(self.whitened(&self.slow_state(u.len())));
             }
-            // The entries of the other records are zero here.
+            // The states of other records have no effect on this record.
             let place = |i: usize| if i < ends * powers { i } else { i + record };
             let target = self.whitened(u);
             power += dot(&target, &target);
@@ -111,7 +112,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
         (rank.is_finite() && values.iter().all(|g| g.is_finite())).then_some((rank, values))
     }
 
-    /// Returns the part of u that the best numerators for a theta do not explain, in each record.
+    /// Returns the part of u that the numerators of theta do not explain, in each record.
     pub fn unexplained(&self, theta: &[f64]) -> Option<Vec<Vec<f64>>> {
         let (layout, mut all) = (&self.criterion.layout, Vec::new());
         for (record, (first, y, u)) in self.signals.iter().enumerate() {
@@ -143,7 +144,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
         self.criterion.layout.form.has_pole()
     }
 
-    /// Returns the decay of the state of the pole of a lag or an integration.
+    /// Returns the decaying free response of the pole of a lag or an integration.
     fn slow_state(&self, n: usize) -> Vec<f64> {
         let rate = self.criterion.layout.lag.map_or(0.0, |place| self.theta[place]);
         let per_sample = (-rate * self.criterion.sample_time.s()).exp();
@@ -152,7 +153,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
             .collect()
     }
 
-    /// Returns the times of the samples of a record, minus the delay.
+    /// Returns the times of the samples of a record minus the delay.
     fn times(&self, theta: &[f64], record: usize, first: usize, n: usize) -> impl Iterator<Item = f64> {
         let (data, ts) = (&self.criterion.data[record], self.criterion.sample_time.s());
         let from = first - self.criterion.layout.nd;
@@ -178,9 +179,9 @@ impl<'c, 'a> Ranking<'c, 'a> {
     }
 }
 
-/// Returns the parameters of a numerator `n_0 + n_1 s + n_2 s^2`.
+/// Returns the parameters of the numerator `n_0 + n_1 s + n_2 s^2`.
 fn parameters(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f64; MOST_VARYING] {
-    // A gain of zero has no lead time.
+    // If the gain is zero, the lead time constant is set to zero.
     let over = |x: f64, gain: f64| if gain == 0.0 { 0.0 } else { x / gain };
     match form {
         Form::Gain | Form::Lag => [n[0], 0.0, 0.0],
@@ -198,7 +199,7 @@ fn parameters(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f
     }
 }
 
-/// Returns gain and lead time whose `k (1, 2 T, T^2)` is nearest to n.
+/// Returns the gain and the lead time constant for which `k (1, 2 T, T^2)` is nearest to n.
 fn square_of_a_lead(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f64; MOST_VARYING] {
     let product = |a: &[f64], b: &[f64]| {
         let pairs = (0..3).flat_map(|i| (0..3).map(move |j| (i, j)));

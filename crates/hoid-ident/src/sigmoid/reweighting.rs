@@ -1,5 +1,5 @@
-//! The fit with one noise level before the change and another after it: fit and levels in turn, until the ratio of the
-//! levels converges. The squared residuals are weighted with the inverse of the level at their time
+//! Fit with different noise levels before and after the change. Fit and levels are estimated in turn until the ratio of
+//! the levels converges. The residuals are weighted by the inverse of the noise level at their time
 //! ([`super::noise_level`]).
 
 use super::{
@@ -14,19 +14,19 @@ use crate::{
     optimize::{Minimum, Objective},
 };
 
-/// Rounds of fit and noise levels in turn.
+/// Largest number of rounds of fit and noise levels.
 const ROUNDS: usize = 20;
-/// The rounds end when the ratio of the levels changes by less than this share; its own standard error is `1/sqrt n`,
-/// about 1 %.
-const SETTLED: f64 = 1e-6;
-/// Relative change of the loss that is negligible: for the log-likelihood of 10000 residuals, a two-hundredth.
-const NO_MATTER: f64 = 1e-6;
+/// The rounds end when the relative change of the ratio of the levels is below this limit; the standard error of the
+/// ratio is about `1/sqrt n`, i.e. 1 %.
+const CONVERGED: f64 = 1e-6;
+/// Negligible relative change of the loss: it changes the log-likelihood of 10000 residuals by 0.005.
+const NEGLIGIBLE: f64 = 1e-6;
 
-/// Returns the minimum with the noise levels estimated in turn with the fit, and the levels; `None` if the residuals
-/// are rounding.
+/// Estimates fit and noise levels in turn and returns the minimum and the levels. The levels are `None` if the
+/// residuals are only rounding errors.
 ///
 /// # Errors
-/// [`IdentError::NoFiniteLoss`].
+/// [`IdentError::NoFiniteLoss`] if a search fails.
 pub(super) fn with_levels(
     criterion: &mut ChangeCriterion<'_>,
     mut minimum: Minimum,
@@ -40,7 +40,7 @@ pub(super) fn with_levels(
         };
         let before = levels.replace(found);
         let ratio = |s: [f64; 2]| s[1] / s[0];
-        if before.is_some_and(|b: [f64; 2]| (ratio(found) / ratio(b) - 1.0).abs() < SETTLED) {
+        if before.is_some_and(|b: [f64; 2]| (ratio(found) / ratio(b) - 1.0).abs() < CONVERGED) {
             break;
         }
         let weights = weights(found, &shares(criterion, &minimum.theta));
@@ -48,13 +48,14 @@ pub(super) fn with_levels(
         let next = search(criterion, minimum.theta.clone(), options, None).ok_or(IdentError::NoFiniteLoss)?;
         iterations += next.termination.iterations;
         let change = next.at.sum_of_squares / minimum.at.sum_of_squares - 1.0;
-        if round > 0 && change > NO_MATTER {
-            // Two changes that each have a higher loss with the noise levels of the other: the more likely one is kept.
+        if round > 0 && change > NEGLIGIBLE {
+            // Each of two changes has the higher loss with the noise levels of the other; the more likely of the two is
+            // kept.
             (criterion.weights, levels) = (kept, before);
             break;
         }
         minimum = next;
-        if round + 1 == ROUNDS && change < -NO_MATTER && minimum.termination.converged() {
+        if round + 1 == ROUNDS && change < -NEGLIGIBLE && minimum.termination.converged() {
             minimum.termination.reason = Reason::IterationLimit;
         }
     }
@@ -62,7 +63,8 @@ pub(super) fn with_levels(
     Ok((minimum, levels))
 }
 
-/// Returns the share of the change at the time of each residual, without the delay: the remnant is not delayed.
+/// Returns the share of the change at the time of each residual. The delay is not subtracted, because the remnant is
+/// not delayed.
 fn shares(criterion: &ChangeCriterion<'_>, theta: &[f64]) -> Vec<Vec<f64>> {
     let ts = criterion.sample_time.s();
     let of = |d: &Data<'_>| {
@@ -80,6 +82,6 @@ fn levels_at(criterion: &ChangeCriterion<'_>, theta: &[f64]) -> Option<[f64; 2]>
     let residuals = residuals?;
     let size: f64 = residuals.iter().map(|r| dot(r, r)).sum();
     let power = criterion.output_power();
-    // Rounding has no level.
+    // Residuals that are only rounding errors have no noise level.
     (size > 1e-24 * power).then(|| levels(&residuals, &shares(criterion, theta)))?
 }

@@ -1,5 +1,5 @@
-//! Searches for the minimum of the loss, which has kinks where the delay is an integer number of samples, and for an
-//! operator with a direct part between them too ([`super::layout`], pieces).
+//! Searches for the minimum of the loss. The loss has kinks where the delay is an integer number of samples and, for an
+//! operator with a direct part, also halfway between ([`super::layout`], pieces).
 
 use super::{objective::ChangeCriterion, starts};
 use crate::{
@@ -8,23 +8,23 @@ use crate::{
     optimize::{Minimum, minimise},
 };
 
-/// Number of steps from each start before the best search is continued to completion.
-const LOOK: usize = 30;
-/// Distance to the border of a piece, in pieces, below which the next piece is tried.
+/// Number of steps from each start before only the best search is continued.
+const SHORT_SEARCH_STEPS: usize = 30;
+/// Distance from the border of a piece, in pieces, below which the next piece is tried.
 const NEAR_BORDER: f64 = 1e-6;
 
 /// Returns the lowest minimum found from these starts and the name of its start. Each start gets a few steps; only the
 /// best search is completed.
 ///
 /// # Errors
-/// [`IdentError::NoFiniteLoss`].
+/// [`IdentError::NoFiniteLoss`] if no search is successful.
 pub(super) fn best_minimum(
     starts: Vec<(String, Vec<f64>)>,
     criterion: &ChangeCriterion<'_>,
     options: &SearchOptions,
 ) -> Result<(String, Minimum), IdentError> {
     let look = SearchOptions {
-        max_iterations: options.max_iterations.min(LOOK),
+        max_iterations: options.max_iterations.min(SHORT_SEARCH_STEPS),
         ..*options
     };
     let mut best: Option<(String, Minimum)> = None;
@@ -46,10 +46,10 @@ pub(super) fn best_minimum(
     Ok((label, minimum))
 }
 
-/// Returns the minimum of the model without a change, with the weights of the other.
+/// Returns the minimum of the model without a change, with the weights of the model with a change.
 ///
 /// # Errors
-/// [`IdentError::NoFiniteLoss`].
+/// [`IdentError::NoFiniteLoss`] if the search fails.
 pub(super) fn without_change(
     criterion: &ChangeCriterion<'_>,
     theta: &[f64],
@@ -66,8 +66,8 @@ pub(super) fn without_change(
     search(&constant, start, options, None).ok_or(IdentError::NoFiniteLoss)
 }
 
-/// Searches from theta. The loss has kinks where tau_e is an integer number of samples, and a search may end in one; it
-/// is then continued inside each of the pieces that meet there.
+/// Searches for a minimum, starting from theta. The loss has kinks where tau_e is an integer number of samples. If the
+/// search does not converge, it continues within single pieces of the sampling interval.
 pub(super) fn search(
     criterion: &ChangeCriterion<'_>,
     theta: Vec<f64>,
@@ -95,7 +95,7 @@ pub(super) fn search(
     let mut iterations = minimum.termination.iterations;
     let mut best = inside(piece, &minimum.theta)?;
     iterations += best.termination.iterations;
-    // Each move decreases the loss; the limit only guards against rounding.
+    // Each change of piece decreases the loss; the limit on their number only guards against rounding.
     for _ in 0..100 {
         let position = best.theta[delay] / length;
         let neighbours = [

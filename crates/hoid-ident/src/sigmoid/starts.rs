@@ -1,28 +1,28 @@
-//! Starts of the search if none is given.
+//! Automatic starts of the search.
 //!
-//! Poles, delay and noise model are those of [`super::frozen`]. With these and t_M and G given the
-//! residual is linear in the coefficients of the numerator at both ends (all of them following the sigmoid, as products
-//! of gain and lead do at both ends), so that pairs of t_M and G are ranked by least squares ([`super::ranking`]): a
-//! grid of t_M for a slow, a moderate and an abrupt change, then halved steps of t_M around the best of each.
+//! Poles, delay and noise model come from [`super::frozen`]. If these, t_M and G are given, the residual is linear in
+//! the coefficients of the numerator before and after the change, provided that each coefficient follows the sigmoid.
+//! Pairs of t_M and G are therefore ranked by least squares ([`super::ranking`]): first a grid of t_M for a slow, a
+//! moderate and an abrupt change, then successively halved steps of t_M around the best point of each.
 
 use hoid_model::{Form, Record};
 
 use super::{
-    frozen::{Frozen, of_family, of_grid, of_guess, of_windows},
+    frozen::{PoleCandidate, of_family, of_grid, of_guess, of_windows},
     objective::ChangeCriterion,
     ranking::Ranking,
 };
 use crate::family::noise::NoiseProducts;
 
-/// Rates of the grid, 1/s.
+/// Rates G of the grid, 1/s.
 const RATES: [f64; 3] = [0.5, 5.0, 100.0];
-/// Times of the change in the grid.
+/// Number of times t_M in the grid.
 const MIDPOINTS: usize = 12;
-/// Number of delays of a grid that are tried for each rate, each with its best poles: a search changes poles more
+/// Number of delays of a grid that are tried for each rate, each with its best poles: a search corrects poles more
 /// easily than delays.
 const BEST_DELAYS: usize = 4;
 
-/// A start with its description.
+/// A start with its label.
 #[derive(Debug, Clone)]
 pub(crate) struct Start {
     pub label: String,
@@ -30,8 +30,8 @@ pub(crate) struct Start {
     rank: f64,
 }
 
-/// Returns the starts, the best first: one for each rate, and for a form of the family one for each of the best delays.
-/// `guess` has the coordinates of one operator for all records.
+/// Returns the starts, best first: one for each rate and, for forms other than a gain and a lead, for each of the best
+/// delays. `guess` contains the coordinates of one operator for all records.
 pub(crate) fn initial_guesses(
     criterion: &ChangeCriterion<'_>,
     records: &[Record],
@@ -40,7 +40,7 @@ pub(crate) fn initial_guesses(
     let (low, high) = criterion.limits[criterion.layout.log_rate];
     let mut rates: Vec<f64> = RATES.iter().map(|g| g.ln().clamp(low, high)).collect();
     rates.dedup();
-    // The best poles for the medium rate are used for all.
+    // The best poles for the medium rate are used for all rates.
     let middling = rates[rates.len() / 2];
     let guessed = guess.map(|guess| of_guess(criterion, guess));
     let frozen = match criterion.layout.form {
@@ -68,13 +68,13 @@ pub(crate) fn initial_guesses(
     starts
 }
 
-/// Returns the best poles of a grid and of a guess, each with the noise model of its residuals.
-fn best_of_family(criterion: &ChangeCriterion<'_>, guessed: Option<Frozen>, log_rate: f64) -> Vec<(f64, Frozen)> {
-    let ranked = |frozen: Frozen| Some((on_grid(criterion, &frozen, log_rate)?.0, frozen));
+/// Returns the best poles from a grid and from a guess, each with the noise model of its residuals.
+fn best_of_family(criterion: &ChangeCriterion<'_>, guessed: Option<PoleCandidate>, log_rate: f64) -> Vec<(f64, PoleCandidate)> {
+    let ranked = |frozen: PoleCandidate| Some((on_grid(criterion, &frozen, log_rate)?.0, frozen));
     let grid = of_family(criterion).into_iter().chain(guessed);
-    let mut all: Vec<(f64, Frozen)> = grid.filter_map(ranked).collect();
+    let mut all: Vec<(f64, PoleCandidate)> = grid.filter_map(ranked).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let delay = |frozen: &Frozen| frozen.theta[criterion.layout.delay];
+    let delay = |frozen: &PoleCandidate| frozen.theta[criterion.layout.delay];
     let mut tried: Vec<f64> = Vec::new();
     all.retain(|(_, frozen)| {
         let is_new = !tried.contains(&delay(frozen));
@@ -82,12 +82,13 @@ fn best_of_family(criterion: &ChangeCriterion<'_>, guessed: Option<Frozen>, log_
         is_new
     });
     all.truncate(BEST_DELAYS);
-    let noise = |(rank, frozen): (f64, Frozen)| Some((rank, with_noise(criterion, frozen, log_rate)?));
+    let noise = |(rank, frozen): (f64, PoleCandidate)| Some((rank, with_noise(criterion, frozen, log_rate)?));
     all.into_iter().filter_map(noise).collect()
 }
 
-/// Returns the noise model of the part of u that the poles do not explain; `None` if they have no numerator.
-fn with_noise(criterion: &ChangeCriterion<'_>, mut frozen: Frozen, log_rate: f64) -> Option<Frozen> {
+/// Adds the noise model of the part of u that the poles do not explain; `None` if no numerator can be computed for
+/// these poles.
+fn with_noise(criterion: &ChangeCriterion<'_>, mut frozen: PoleCandidate, log_rate: f64) -> Option<PoleCandidate> {
     let (nd, noise) = (criterion.layout.nd, criterion.layout.noise);
     let (_, theta, ranking) = on_grid(criterion, &frozen, log_rate)?;
     let series = ranking.unexplained(&theta)?;
@@ -97,7 +98,8 @@ fn with_noise(criterion: &ChangeCriterion<'_>, mut frozen: Frozen, log_rate: f64
     Some(frozen)
 }
 
-/// Returns the start of the model without a change, from the poles, the delay and the noise model of the other.
+/// Returns a start for the model without a change, with the poles, the delay and the noise model of the model with a
+/// change.
 pub(crate) fn without_change(criterion: &ChangeCriterion<'_>, theta: &[f64]) -> Vec<f64> {
     let mut theta = theta.to_vec();
     if let Some(ranking) = Ranking::new(criterion, &theta)
@@ -108,7 +110,7 @@ pub(crate) fn without_change(criterion: &ChangeCriterion<'_>, theta: &[f64]) -> 
     theta
 }
 
-/// Returns rank and theta for one change, with the best gains.
+/// Returns the sum of squares and theta for one t_M, with the best gains.
 fn rank_at(ranking: &Ranking<'_, '_>, theta: &[f64], t_m: f64) -> Option<(f64, Vec<f64>)> {
     let mut there = theta.to_vec();
     there[ranking.criterion.layout.midpoint] = t_m;
@@ -123,10 +125,10 @@ fn grid_step(criterion: &ChangeCriterion<'_>) -> f64 {
     (high - low) / MIDPOINTS as f64
 }
 
-/// Returns the best t_M of the grid for the given ln G.
+/// Returns the best t_M of the grid for the given ln G, with its sum of squares.
 fn on_grid<'c, 'a>(
     criterion: &'c ChangeCriterion<'a>,
-    frozen: &Frozen,
+    frozen: &PoleCandidate,
     log_rate: f64,
 ) -> Option<(f64, Vec<f64>, Ranking<'c, 'a>)> {
     let mut theta = frozen.theta.clone();
@@ -139,12 +141,12 @@ fn on_grid<'c, 'a>(
     Some((rank, best, ranking))
 }
 
-/// Returns the best t_M for the given ln G.
-fn best_midpoint(criterion: &ChangeCriterion<'_>, frozen: &Frozen, log_rate: f64) -> Option<Start> {
+/// Returns a start with the best t_M for the given ln G.
+fn best_midpoint(criterion: &ChangeCriterion<'_>, frozen: &PoleCandidate, log_rate: f64) -> Option<Start> {
     let (rank, theta, ranking) = on_grid(criterion, frozen, log_rate)?;
     let (low, high) = criterion.limits[criterion.layout.midpoint];
     let (mut best, mut step) = ((rank, theta), grid_step(criterion));
-    // To a tenth of the width of the change, or a sample.
+    // t_M is found to a tenth of the width of the change, or to one sample.
     let finest = (0.1 * (-log_rate).exp()).max(criterion.sample_time.s());
     while step > finest {
         step *= 0.5;

@@ -1,9 +1,8 @@
-//! Responses of an operator of the family whose numerator is a single power of s, and their
-//! derivatives along its poles and its delay.
+//! Responses of a family operator whose numerator is a single power of s, and their derivatives with respect to its
+//! poles and its delay.
 //!
-//! `F y_i = B_i q^-nk e`, `F dy_i/dp = (dB_i/dp) q^-nk e - (dF/dp) y_i` for p of 1/T_I, omega_nm,
-//! zeta_nm and tau_e. For a gain and a lead B and F are those of
-//! [`hoid_model::delayed_operator`], else those of
+//! `F y_i = B_i q^-nk e`, `F dy_i/dp = (dB_i/dp) q^-nk e - (dF/dp) y_i`, where p is 1/T_I, omega_nm, zeta_nm or tau_e.
+//! For a gain and a lead, B and F come from [`hoid_model::delayed_operator`]; for other forms they come from
 //! [`FamilyOperator::zoh_powers_within`](hoid_model::FamilyOperator::zoh_powers_within).
 
 use hoid_core::filter::{divide_in_place, fir};
@@ -15,27 +14,28 @@ use hoid_model::{
 use super::layout::Layout;
 use crate::linalg::least_squares::add_scaled;
 
-/// The operator with each power of s as its numerator at one theta.
+/// Operators with each power of s as numerator, for one theta.
 #[derive(Debug, Clone)]
 pub(crate) struct UnitOperator {
     pub nk: usize,
-    /// For each power.
+    /// Coefficients of B for each power of s.
     pub b: Vec<Vec<f64>>,
     pub f: Vec<f64>,
-    /// For each power, with respect to each of [`Layout::poles`].
+    /// Derivatives of B for each power of s, with respect to each element of [`Layout::poles`].
     b_slopes: Vec<Vec<Vec<f64>>>,
-    /// With respect to each of [`Layout::poles`].
+    /// Derivatives of F with respect to each element of [`Layout::poles`].
     f_slopes: Vec<Vec<f64>>,
 }
 
 impl UnitOperator {
-    /// Returns `None` for an invalid theta. The delay may be held in a piece of a sample ([`Layout::pieces`]).
+    /// Returns the operators for theta; `None` if theta is invalid. The delay may be restricted to a piece of a
+    /// sampling interval ([`Layout::pieces`]).
     pub fn of(layout: &Layout, theta: &[f64], piece: Option<usize>, ts: SampleTime) -> Option<Self> {
         let sample = match piece {
             Some(piece) => piece / layout.pieces(),
             None => whole_samples(theta[layout.delay], ts).ok()?,
         };
-        match (layout.form, layout.muscles) {
+        match (layout.form, layout.neuromuscular_indices) {
             (Form::Lead, Some([omega, zeta])) => {
                 Self::of_lead([theta[omega], theta[zeta], theta[layout.delay]], sample, ts)
             }
@@ -63,16 +63,16 @@ impl UnitOperator {
     }
 
     fn of_family(layout: &Layout, theta: &[f64], sample: usize, ts: SampleTime) -> Option<Self> {
-        // The numerator has no effect.
+        // The numerator has no effect on the result.
         let operator = layout.operator(theta, &[1.0; 3]).ok()?;
         let powers = operator.zoh_powers_within(sample, ts).ok()?;
-        // From the coordinates of the family to theta.
+        // Derivatives of the family coordinates with respect to theta.
         let scale: Vec<(usize, f64)> = layout
             .poles()
             .into_iter()
             .enumerate()
             .map(|(p, place)| {
-                let logarithmic = layout.muscles.is_some_and(|own| own.contains(&place));
+                let logarithmic = layout.neuromuscular_indices.is_some_and(|own| own.contains(&place));
                 (layout.varying + p, if logarithmic { 1.0 / theta[place] } else { 1.0 })
             })
             .collect();
@@ -92,7 +92,7 @@ impl UnitOperator {
         })
     }
 
-    /// Returns `y_i` for an input preceded by the past.
+    /// Returns `y_i` for an input that starts with the errors before the record.
     pub fn response(&self, i: usize, input: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; input.len()];
         fir(&self.b[i], 0, input, &mut y);
@@ -100,7 +100,7 @@ impl UnitOperator {
         y
     }
 
-    /// Returns the derivative of `y_i` with respect to the p-th of [`Layout::poles`].
+    /// Returns the derivative of `y_i` with respect to element p of [`Layout::poles`].
     pub fn slope(&self, i: usize, p: usize, input: &[f64], y: &[f64]) -> Vec<f64> {
         let mut x = vec![0.0; input.len()];
         fir(&self.b_slopes[i][p], 0, input, &mut x);
@@ -111,7 +111,7 @@ impl UnitOperator {
         x
     }
 
-    /// Returns the response of `B_i/F` to a unit input, until it has died away or its length is `longest`.
+    /// Returns the impulse response of `B_i/F`, until it has decayed or its length is `longest`.
     pub fn impulse_response(&self, i: usize, longest: usize) -> Vec<f64> {
         let mut h: Vec<f64> = Vec::with_capacity(longest.min(4096));
         let mut largest = 0.0_f64;

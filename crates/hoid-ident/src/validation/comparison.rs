@@ -1,4 +1,4 @@
-//! Comparison of a model with a record: simulated and predicted output, and the tests of the residuals.
+//! Comparison of a model with a record: simulated and predicted output, and tests of the residuals.
 
 use std::fmt;
 
@@ -11,27 +11,27 @@ use super::{
 };
 use crate::{Fit, IdentError, Series};
 
-/// Results of the residual tests. A lag outside its 99 % bound is expected once in a hundred; a share of more than
+/// Results of the residual tests. One in a hundred lags is expected outside its 99 % bound; a share above
 /// [`OUTSIDE_ALLOWED`] is significant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ResidualDiagnostics {
-    /// The residuals are not white at the 1 % level: the noise model is too small.
+    /// The residuals are not white at the 1 % level: the order of the noise model is too low.
     pub coloured_residuals: bool,
-    /// The residuals follow the input at positive lags: the model misses dynamics, or has the wrong
+    /// The residuals are correlated with the input at nonnegative lags: the model lacks dynamics or has the wrong
     /// delay.
     pub under_modelled: bool,
-    /// The input follows the residuals at negative lags: the output is fed back to the input, as in
-    /// every closed loop.
+    /// The input is correlated with earlier residuals (negative lags): the output is fed back to the input, as in every
+    /// closed loop.
     pub feedback: bool,
 }
 
-/// Share of lags outside the 99 % bound above which a correlation counts as present.
+/// Share of lags outside the 99 % bound above which a correlation is significant.
 pub const OUTSIDE_ALLOWED: f64 = 0.06;
 
-/// Simulated and predicted output of a model on a record, with the derived results.
+/// Simulated and predicted output of a model for a record, with the derived results.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Validation {
-    /// First sample that all series below contain.
+    /// First sample of all series below.
     pub first: usize,
     /// Simulated output.
     pub simulated: Vec<f64>,
@@ -39,11 +39,11 @@ pub struct Validation {
     pub predicted: Vec<f64>,
     /// VAF and NRMSE.
     pub quality: GoodnessOfFit,
-    /// Residual autocorrelation, lags 1 to [`LARGEST_LAG`].
+    /// Residual autocorrelation at the lags 1 to [`LARGEST_LAG`].
     pub autocorrelation: Correlation,
-    /// Cross-correlation of residuals and input, lags from minus to plus [`LARGEST_LAG`]; empty without an input.
+    /// Cross-correlation of residuals and input at the lags from minus to plus [`LARGEST_LAG`]; empty without an input.
     pub cross_correlation: Correlation,
-    /// Whiteness of the residuals; `None` if there are fewer lags than coefficients of the noise model.
+    /// Whiteness test of the residuals; `None` unless there are more lags than coefficients of the noise model.
     pub ljung_box: Option<LjungBox>,
 }
 
@@ -119,7 +119,7 @@ impl fmt::Display for Validation {
 }
 
 impl Fit {
-    /// Compares the model with a record, the one it was fitted to or another.
+    /// Compares the model with a record, which may be one of the fitted records or another record.
     ///
     /// # Errors
     /// As [`Fit::residuals`].
@@ -136,7 +136,7 @@ impl Fit {
             .zip(self.held())
             .filter(|(name, held)| of_noise(name) && !**held)
             .count();
-        // A grey box has one parameter in its noise model, T_n.
+        // The noise model of a grey box has a single parameter, T_n.
         let free = if self.is_grey_box() { free.min(1) } else { free };
         Ok(Validation {
             ljung_box: ljung_box(&autocorrelation, residuals.len(), free),
@@ -156,8 +156,8 @@ impl Fit {
         })
     }
 
-    /// Returns the first sample that both contain, and from there on the simulated output and the one-step-ahead
-    /// prediction.
+    /// Returns the first sample contained in both outputs, and the simulated output and the one-step-ahead prediction
+    /// from this sample on.
     fn model_outputs(&self, record: &Record) -> Result<(usize, Vec<f64>, Vec<f64>), IdentError> {
         let (simulated, predicted) = (self.simulate(record)?, self.predict(record)?);
         let first = simulated.first.max(predicted.first);
@@ -168,12 +168,12 @@ impl Fit {
         Ok((first, from_there(simulated), from_there(predicted)))
     }
 
-    /// Predicts the output k samples ahead, with the input known: `u - sum_{j<k} h_j eps(t-j)` with h the impulse
+    /// Predicts the output k samples ahead for a known input: `u - sum_{j<k} h_j eps(t-j)`, where h is the impulse
     /// response of the noise filter C/(A D) (L. Ljung, *System Identification*, 1999, eq. 3.31). k = 1 is
-    /// [`Fit::predict`]; for large k, and a stable noise filter, it approaches [`Fit::simulate`].
+    /// [`Fit::predict`]; for large k and a stable noise filter the prediction approaches [`Fit::simulate`].
     ///
     /// # Errors
-    /// As [`Fit::residuals`]; [`IdentError::BadOption`] for k = 0.
+    /// The errors of [`Fit::residuals`]; [`IdentError::BadOption`] for k = 0.
     pub fn predict_ahead(&self, record: &Record, k: usize) -> Result<Series, IdentError> {
         if k == 0 {
             return Err(IdentError::BadOption {
@@ -185,13 +185,13 @@ impl Fit {
         let eps = self.residuals(record)?;
         let m = self.model();
         let mut h = monic(m.c());
-        // Beyond the record there are no products.
+        // Longer impulse responses have no effect within the record.
         h.resize(k.min(eps.values.len().max(1)), 0.0);
         let poles = product(&monic(m.a()), &monic(m.d()));
         hoid_core::filter::divide_in_place(&poles[1..], &mut h);
         let mut errors = vec![0.0; eps.values.len()];
         hoid_core::filter::fir(&h, 0, &eps.values, &mut errors);
-        // Before that the residuals of the last k samples are not all known.
+        // For earlier samples not all of the last k residuals are known.
         let skipped = (k - 1).min(errors.len());
         let first = eps.first + skipped;
         let output = &record.output()[first..];
@@ -201,8 +201,8 @@ impl Fit {
         })
     }
 
-    /// Returns VAF and NRMSE over several records together: the sum of all squared errors relative to the total power
-    /// (for NRMSE, the total of the squared deviations from the mean of each record).
+    /// Returns VAF and NRMSE for several records together: the sum of all squared errors relative to the total power
+    /// or, for NRMSE, relative to the total of the squared deviations from the mean of each record.
     ///
     /// # Errors
     /// As [`Fit::residuals`].
@@ -216,7 +216,7 @@ impl Fit {
 }
 
 impl GoodnessOfFit {
-    /// Returns the same as [`Fit::quality`] for several records together, from their existing validations.
+    /// Returns the same result as [`Fit::quality`] for several records, computed from their existing validations.
     pub fn pooled<'a>(validated: impl Iterator<Item = (&'a Record, &'a Validation)>) -> Self {
         let with = |all: ErrorSums, (record, v): (&'a Record, &'a Validation)| {
             all.and(&record.output()[v.first..], &v.simulated, &v.predicted)

@@ -1,27 +1,28 @@
-//! Autocorrelation of residuals and their cross-correlation with the input, with 99 % bounds.
+//! Autocorrelation of residuals and cross-correlation of residuals and input, with 99 % bounds.
 
 use hoid_numerics::statistics::mean;
 
 use crate::linalg::least_squares::dot;
 
-/// 99 % point of the normal distribution, two sided.
+/// Two-sided 99 % point of the normal distribution.
 const Z_99: f64 = 2.575_829_303_548_901;
 
-/// A correlation over lags with its 99 % bound.
+/// A correlation at several lags with its 99 % bound.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correlation {
     /// Lags in samples.
     pub lags: Vec<i64>,
     /// Normalised correlation at each lag.
     pub values: Vec<f64>,
-    /// Bound for 99 % of the values if there is no correlation.
+    /// Bound that contains 99 % of the values if there is no correlation.
     pub bound_99: f64,
 }
 
-/// Number of samples that are multiplied with all lags before the next ones: they remain in the processor cache.
+/// Number of samples that are processed for all lags before the next samples, so that they remain in the processor
+/// cache.
 const BLOCK: usize = 8192;
 
-/// Returns `sum_t x(t) y(t - k)` over the overlap, for each lag k; both have the same length.
+/// Returns `sum_t x(t) y(t - k)` over the overlap for each lag k; x and y have the same length.
 fn covariances_at(x: &[f64], y: &[f64], lags: &[i64]) -> Vec<f64> {
     let n = x.len();
     let mut sums = vec![0.0; lags.len()];
@@ -45,7 +46,7 @@ pub(super) fn centred(mut x: Vec<f64>) -> Vec<f64> {
     x
 }
 
-/// Returns covariances divided by a size; zeros if that is zero.
+/// Returns the covariances divided by `size`, or zeros if `size` is zero.
 fn relative_to(size: f64, mut covariances: Vec<f64>) -> Vec<f64> {
     covariances
         .iter_mut()
@@ -53,7 +54,7 @@ fn relative_to(size: f64, mut covariances: Vec<f64>) -> Vec<f64> {
     covariances
 }
 
-/// Autocorrelation of a signal with mean zero, lags from 1 to `largest`.
+/// Returns the autocorrelation of a zero-mean signal at the lags from 1 to `largest`.
 pub(super) fn autocorrelation(x: &[f64], largest: usize) -> Correlation {
     let power = covariances_at(x, x, &[0])[0];
     let lags: Vec<i64> = (1..=largest.min(x.len().saturating_sub(1)) as i64).collect();
@@ -64,12 +65,11 @@ pub(super) fn autocorrelation(x: &[f64], largest: usize) -> Correlation {
     }
 }
 
-/// Cross-correlation of residuals and an input, both with mean zero, lags from minus to plus
-/// `largest`.
+/// Returns the cross-correlation of zero-mean residuals and a zero-mean input at the lags from minus to plus `largest`.
 pub(super) fn cross_correlation(x: &[f64], y: &[f64], largest: usize) -> Correlation {
     let largest = largest.min(x.len().saturating_sub(1)) as i64;
     let lags: Vec<i64> = (-largest..=largest).collect();
-    // The residuals are nearly white, so that a few lags on both sides of zero dominate the sum.
+    // Since the residuals are nearly white, lags near zero dominate the sum.
     let reach: Vec<i64> = (0..=(4 * largest).min(x.len() as i64 - 1)).collect();
     let (of_x, of_y) = (covariances_at(x, x, &reach), covariances_at(y, y, &reach));
     let zero = of_x.first().zip(of_y.first()).map_or(0.0, |(x, y)| x * y);

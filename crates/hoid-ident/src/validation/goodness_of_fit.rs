@@ -1,8 +1,8 @@
-//! Share of the measured output that a model explains: VAF and NRMSE, for one record or for several together.
+//! Share of the measured output that a model explains: VAF and NRMSE for one or several records.
 
 use crate::linalg::{least_squares::dot, products::variance};
 
-/// Fit percentages on one record.
+/// VAF and NRMSE of a model, %.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct GoodnessOfFit {
     /// VAF of the simulated output, %.
@@ -15,7 +15,7 @@ pub struct GoodnessOfFit {
     pub nrmse_prediction: f64,
 }
 
-/// Sums of squares over records.
+/// Sums of squares for one or several records.
 #[derive(Default)]
 pub(super) struct ErrorSums {
     power: f64,
@@ -25,7 +25,7 @@ pub(super) struct ErrorSums {
 }
 
 impl ErrorSums {
-    /// Returns the sums with an additional record.
+    /// Returns the sums after adding a record.
     pub fn and(self, measured: &[f64], simulated: &[f64], predicted: &[f64]) -> Self {
         Self {
             power: self.power + dot(measured, measured),
@@ -45,17 +45,17 @@ impl ErrorSums {
     }
 }
 
-/// Returns the variance accounted for (eq. 39), %. Zero if the measured signal is zero.
+/// Returns the variance accounted for (eq. 39), %; zero if the measured signal is zero.
 pub fn vaf(measured: &[f64], model: &[f64]) -> f64 {
     vaf_of(squared_distance(measured, model), dot(measured, measured))
 }
 
-/// Returns the NRMSE fit, %. Zero if the measured signal is constant.
+/// Returns the NRMSE fit, %; zero if the measured signal is constant.
 pub fn nrmse_fit(measured: &[f64], model: &[f64]) -> f64 {
     nrmse_of(squared_distance(measured, model), spread_of(measured))
 }
 
-/// Returns the sum of the squared deviations from the mean; zero for a constant.
+/// Returns the sum of the squared deviations from the mean.
 fn spread_of(x: &[f64]) -> f64 {
     if x.is_empty() {
         0.0

@@ -1,31 +1,31 @@
-//! Whiteness of the residuals: the test of Ljung and Box.
+//! Whiteness of the residuals: the Ljung-Box test.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::correlation::{Correlation, autocorrelation, centred};
 
-/// Largest lag of the residual tests, in samples.
+/// Largest lag of the residual tests, samples.
 pub const LARGEST_LAG: usize = 50;
 
-/// Result of the test of Ljung and Box for white residuals.
+/// Result of the Ljung-Box test for white residuals.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LjungBox {
     /// `Q = n (n + 2) sum_k r_k^2/(n - k)` over the lags 1 to [`LARGEST_LAG`].
     pub statistic: f64,
     /// Number of lags minus the number of free coefficients of the noise model (those of A, C and D).
     pub degrees_of_freedom: usize,
-    /// Probability of a larger Q for white residuals.
+    /// Probability of a larger Q if the residuals are white.
     pub p_value: f64,
 }
 
-/// Applies the Ljung-Box test to residuals whose noise model has `free` coefficients; `None` unless there are more lags
-/// than coefficients.
+/// Applies the Ljung-Box test to residuals of a model whose noise model has `free` free coefficients; `None` unless
+/// there are more lags than coefficients.
 pub fn whiteness(residuals: &[f64], free: usize) -> Option<LjungBox> {
     let residuals = centred(residuals.to_vec());
     ljung_box(&autocorrelation(&residuals, LARGEST_LAG), residuals.len(), free)
 }
 
-/// Returns the same from the autocorrelation of n residuals.
+/// Applies the Ljung-Box test to the autocorrelation of n residuals.
 pub(super) fn ljung_box(correlation: &Correlation, n: usize, free: usize) -> Option<LjungBox> {
     let lags = correlation.lags.len();
     let degrees_of_freedom = lags.checked_sub(free).filter(|d| *d > 0)?;

@@ -1,63 +1,63 @@
-//! The even grid fitted to a recorded time, and the deviation of the time from it.
+//! The evenly spaced grid fitted to a recorded time, and the deviation of the time from this grid.
 //!
-//! Row i is at `t_i = t_0 + k_i Ts + jitter`, with whole k that increase by one from row to row,
-//! and by more where rows are missing. The k are found by a phase that follows the times,
-//! `k_i - k_{i-1} = round((t_i - g) / Ts)`, with `g` pulled by a small share towards each time:
-//! jitter of nearly half a sample is then not a gap. An excess step is undone if the next row seems not to advance. Ts
-//! is the least-squares slope, computed twice.
+//! Row i is at `t_i = t_0 + k_i Ts + jitter` with integers k_i, which increase by one from row to row, and by more
+//! where rows are missing. The increments are `k_i - k_{i-1} = round((t_i - g) / Ts)`, where g is a phase that is
+//! corrected at each row by a small fraction of its deviation from the time: jitter of nearly half a sample is then not
+//! mistaken for a gap. If a row then appears not to advance, the excess increment of a nearby row is undone. Ts is the
+//! least-squares slope, computed twice.
 //!
-//! The jitter is the deviation from straight lines over parts of 256 rows without a gap, so that
-//! slow drift does not count as jitter.
+//! Jitter is the deviation from straight lines fitted to parts of up to 256 rows without a gap, so that slow drift does
+//! not count as jitter.
 
 use std::borrow::Cow;
 
 use crate::time::sampling::every;
 
-/// Rows of a part, and the fewest rows of one.
+/// Maximum and minimum number of rows of a part.
 const PART: usize = 256;
 const LEAST_PART: usize = 5;
-/// A gap of at least this many rows is a pause, after which the grid restarts.
+/// A step of at least this many sample times is a pause, after which the grid restarts.
 const PAUSE: f64 = 10.0;
-/// Rows within which an excess step is corrected.
+/// Maximum distance in rows at which an excess step is corrected.
 const NEAR: usize = 4;
-/// Number of times used to locate the start of a grid.
+/// Number of times from which the start of a grid is estimated.
 const BEGIN: usize = 8;
 
-/// Position of the rows on an even grid.
+/// Positions of the rows on an evenly spaced grid.
 pub(crate) struct Grid {
-    /// Rows whose time is later than that of all rows before.
+    /// Rows whose time is later than the times of all rows before.
     pub(crate) rows: Vec<usize>,
-    /// Grid steps from each of these rows to the one before; 1 where no row is missing.
+    /// Number of grid steps between each of these rows and the one before; 1 if no row is missing in between.
     pub(crate) steps: Vec<f64>,
     /// Sample time, s; NaN if fewer than two rows advance.
     pub(crate) sample_time_s: f64,
-    /// Rows whose time stays constant.
-    pub(super) standing: Vec<usize>,
-    /// Rows whose time is earlier than that of a previous row.
-    pub(super) back: Vec<usize>,
+    /// Rows whose time equals the latest time before them.
+    pub(super) repeated_times: Vec<usize>,
+    /// Rows whose time is earlier than the latest time before them.
+    pub(super) backward_times: Vec<usize>,
 }
 
 impl Grid {
     pub(crate) fn of(t: &[f64]) -> Self {
-        let (mut rows, mut standing, mut back) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut rows, mut repeated_times, mut backward_times) = (Vec::new(), Vec::new(), Vec::new());
         let mut last = f64::NEG_INFINITY;
         for (row, t) in t.iter().enumerate().filter(|(_, t)| t.is_finite()) {
             if *t > last {
                 rows.push(row);
                 last = *t;
             } else if *t == last {
-                standing.push(row);
+                repeated_times.push(row);
             } else {
-                back.push(row);
+                backward_times.push(row);
             }
         }
-        // All rows of nearly every recording: these are not copied.
+        // In nearly every recording the time advances in all rows; the times are then not copied.
         let times: Cow<'_, [f64]> = match rows.len() == t.len() {
             true => Cow::Borrowed(t),
             false => rows.iter().map(|row| t[*row]).collect(),
         };
-        // The median of single steps is exact without jitter; that of sums of sixteen steps averages out jitter, if few
-        // rows are missing.
+        // The median of single steps is exact if there is no jitter; the median over spans of sixteen steps averages
+        // out jitter, if few rows are missing.
         let median = |length: usize| {
             let mut spans: Vec<f64> = times
                 .windows(length + 1)
@@ -82,7 +82,7 @@ impl Grid {
                     sample_time_s = slope;
                 }
                 if is_even(&times, &steps, sample_time_s) {
-                    // If followed again, every step would be the same.
+                    // A second pass would return the same steps.
                     break;
                 }
             }
@@ -91,20 +91,20 @@ impl Grid {
             rows,
             steps,
             sample_time_s,
-            standing,
-            back,
+            repeated_times,
+            backward_times,
         }
     }
 
-    /// Gaps: index of the preceding row among the rows that advance, and number of missing rows.
+    /// Returns each gap: the index of its preceding row among the rows that advance, and the number of missing rows.
     pub(crate) fn gaps(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         (1..self.steps.len())
             .filter(|i| self.steps[*i] > 1.5)
             .map(|i| (i - 1, self.steps[i] - 1.0))
     }
 
-    /// Deviation from lines over parts without a gap: RMS, largest deviation and its row; none if
-    /// no part is long enough.
+    /// Returns the deviation from lines fitted to parts without a gap: its RMS value, the largest deviation and the row
+    /// of the largest; `None` if no part is long enough.
     pub(crate) fn jitter(&self, t: &[f64]) -> Option<(f64, f64, usize)> {
         let (mut squares, mut freedom) = (0.0, 0);
         let mut worst = (0.0, 0);
@@ -143,12 +143,11 @@ fn is_even(times: &[f64], steps: &[f64], ts: f64) -> bool {
     steps.iter().all(|step| *step == 1.0) && times.iter().enumerate().all(near)
 }
 
-/// Computes the grid steps from row to row, one for each time.
+/// Computes the grid steps from row to row, one per time.
 fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
     steps.fill(1.0);
     let mut owed: Option<usize> = None;
-    // Where a grid starts, its position is estimated from several of the first times, since a single time deviates by
-    // its jitter.
+    // The start of a grid is estimated from several times, since a single time deviates by its jitter.
     let begin = |i: usize| {
         let ahead = times[i..]
             .iter()
@@ -171,7 +170,8 @@ fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
         }
         known += 1.0;
         steps[i] = step.max(1.0);
-        // A row that seems not to advance undoes the excess step of an early time, or takes a step from the next row.
+        // If a row appears not to advance, an excess step just before is undone; otherwise the next excess step is
+        // reduced.
         if step < 1.0 {
             match (i.saturating_sub(NEAR)..i).rev().find(|j| steps[*j] > 1.5) {
                 Some(taken) => steps[taken] -= 1.0,
@@ -183,9 +183,9 @@ fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
     }
 }
 
-/// Least-squares slope of the times over the grid.
+/// Returns the least-squares slope of the times against the grid index.
 pub(super) fn slope(times: &[f64], steps: &[f64]) -> f64 {
-    // Recomputed for each sum: the indices of a record of hours would take too much memory.
+    // Recomputed for each sum: for a record of several hours, storing the indices would take too much memory.
     let indexed = || {
         let mut index = 0.0;
         times.iter().zip(steps).enumerate().map(move |(i, (time, step))| {
@@ -196,7 +196,7 @@ pub(super) fn slope(times: &[f64], steps: &[f64]) -> f64 {
         })
     };
     let n = times.len() as f64;
-    // Scaled by n before summation, so that meaningful values do not overflow.
+    // Divided by n before summation, so that the sum does not overflow.
     let x = indexed().map(|(index, _)| index / n).sum::<f64>();
     let y = times.iter().map(|t| t / n).sum::<f64>();
     let covariance: f64 = indexed().map(|(index, time)| (index - x) * (time - y)).sum();

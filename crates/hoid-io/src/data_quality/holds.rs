@@ -1,12 +1,11 @@
-//! Duplicated rows, and stalls: all channels hold their values while the time continues.
+//! Duplicated rows, and stalls: all channels hold their values while the time advances.
 //!
-//! One channel may hold because the hand rests, and two in coarse steps may do so together. A stall
-//! is judged by the channel whose natural holds are shortest: all channels hold for longer than
-//! `min_c L_c`. For a quantised channel L is ten times the length that nine of ten of its holds do
-//! not exceed; for one in full precision it is twice the longest hold while another channel moves,
-//! which is 0 unless the channel is printed with few decimals: then each hold of all channels is
-//! reported, unless one of them is quantised and the hold is of one row. A single channel must be
-//! in full precision to be judged.
+//! A single channel may hold because the hand rests, and two coarsely quantised channels may do so together. The
+//! channel whose natural holds are shortest therefore decides: in a stall all channels hold for longer than
+//! `min_c L_c`. For a quantised channel L is ten times the 90th percentile of the lengths of its holds. For a channel
+//! in full precision L is twice its longest hold while another channel moves; this is 0 unless the channel is printed
+//! with few decimals. If the minimum is 0, each hold of all channels is reported, but if one of them is quantised, not
+//! a hold of a single row. If only one channel moves, stalls are searched only if it is in full precision.
 
 use std::ops::Range;
 
@@ -16,8 +15,8 @@ use super::signals::{Signal, Signals};
 use super::values::Levels;
 use crate::wording::{counted, short};
 
-/// Rows whose time does not advance: duplicates of the row before, and the others.
-pub(super) fn standing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
+/// Finds rows whose time does not advance: rows that equal the row before, and other rows.
+pub(super) fn without_advance(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     let same = |row: &usize| {
         *row > 0
             && signals
@@ -25,8 +24,8 @@ pub(super) fn standing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<Quali
                 .iter()
                 .all(|signal| signal.values[*row] == signal.values[row - 1] || signal.values[*row].is_nan())
     };
-    let (repeated, others): (Vec<usize>, Vec<usize>) = grid.standing.iter().copied().partition(same);
-    // Of the rows after a time that was set back, only the first is earlier than the row before.
+    let (repeated, others): (Vec<usize>, Vec<usize>) = grid.repeated_times.iter().copied().partition(same);
+    // After a time that was set back, only the first row is earlier than the row before it.
     let falls = |row: &usize| {
         signals
             .time
@@ -34,7 +33,7 @@ pub(super) fn standing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<Quali
     };
     let mut others: Vec<usize> = others
         .into_iter()
-        .chain(grid.back.iter().copied().filter(falls))
+        .chain(grid.backward_times.iter().copied().filter(falls))
         .collect();
     others.sort_unstable();
     for (kind, rows) in [
@@ -66,7 +65,7 @@ pub(super) fn standing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<Quali
     }
 }
 
-/// All runs of true.
+/// Returns all ranges of consecutive true values.
 fn runs(holds: impl Iterator<Item = bool>) -> Vec<Range<usize>> {
     let mut runs: Vec<Range<usize>> = Vec::new();
     for (row, hold) in holds.enumerate() {
@@ -91,8 +90,8 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
     if moving.is_empty() || rows < 3 {
         return;
     }
-    // Whether each row holds the values of the row before; duplicated rows are reported separately.
-    let advances = |row: usize| grid.is_none_or(|grid| grid.standing.binary_search(&row).is_err());
+    // True for each row whose value equals that of the row before; duplicated rows are reported separately.
+    let advances = |row: usize| grid.is_none_or(|grid| grid.repeated_times.binary_search(&row).is_err());
     let holds: Vec<Vec<bool>> = moving
         .iter()
         .map(|(signal, _)| {
@@ -103,13 +102,13 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
         .collect();
     let all: Vec<bool> = (0..rows).map(|row| holds.iter().all(|held| held[row])).collect();
     let limit = if let [(_, levels)] = moving.as_slice() {
-        if levels.is_coarse() {
+        if levels.is_quantised() {
             return;
         }
         0
     } else {
         let natural = |((_, levels), held): (&(&Signal<'_>, &Levels), &Vec<bool>)| {
-            if levels.is_coarse() {
+            if levels.is_quantised() {
                 let mut lengths: Vec<usize> = runs(held.iter().copied()).iter().map(Range::len).collect();
                 lengths.sort_unstable();
                 lengths.get(lengths.len() * 9 / 10).map_or(0, |length| 10 * length)
@@ -118,9 +117,9 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
                 2 * alone.iter().map(Range::len).max().unwrap_or(0)
             }
         };
-        // A channel printed with few digits, which holds at a peak, may by chance do so together with a quantised
-        // channel, which holds often.
-        let by_chance = usize::from(moving.iter().any(|(_, levels)| levels.is_coarse()));
+        // A channel printed with few digits holds at a peak, and may by chance do so together with a quantised channel,
+        // which holds often.
+        let by_chance = usize::from(moving.iter().any(|(_, levels)| levels.is_quantised()));
         moving.iter().zip(&holds).map(natural).min().unwrap_or(0).max(by_chance)
     };
     let stalled: Vec<Range<usize>> = runs(all.into_iter())

@@ -10,7 +10,7 @@ use crate::IoError;
 use crate::record::ReadOptions;
 use crate::table::{Table, column_expression};
 
-/// Problems with the requested columns, within the span.
+/// Returns the problems with the requested columns within the requested span, and the rows of this span.
 ///
 /// # Errors
 /// [`IoError::NoSuchColumn`] and [`IoError::Expression`].
@@ -42,10 +42,10 @@ pub(crate) fn issues_of_signals(
         .collect();
     used.sort_unstable();
     used.dedup();
-    // A resampling frequency carries no information about the clock of the file.
+    // A resampling frequency does not describe the clock of the file.
     let nominal_hz = options.sampling_hz.filter(|_| !options.repair.resample);
     let mut found = of_columns(table, &used, time, nominal_hz, span_rows(table, time, options));
-    // A difference may have one constant term, such as a zero reference.
+    // One term of a difference may be constant, such as a zero reference.
     let names = |one: &QualityIssue, column: usize| table.columns[column].name == one.channel;
     let constant: Vec<QualityIssue> = found
         .iter()
@@ -67,7 +67,7 @@ pub(crate) fn issues_of_signals(
     found
 }
 
-/// Rows of the span, as far as the time of the file determines them.
+/// Rows of the span, as far as the time in the file determines them.
 fn span_rows(table: &Table<'_>, time: Option<usize>, options: &ReadOptions) -> Range<usize> {
     let at = |row: usize| match (time, options.sampling_hz) {
         (Some(time), _) => table.columns[time].values[row],
@@ -82,7 +82,7 @@ fn span_rows(table: &Table<'_>, time: Option<usize>, options: &ReadOptions) -> R
     start..end.unwrap_or(table.rows)
 }
 
-/// Problems with some columns of a table.
+/// Returns the problems with some columns of a table.
 fn of_columns(
     table: &Table<'_>,
     used: &[usize],
@@ -90,8 +90,8 @@ fn of_columns(
     nominal_hz: Option<f64>,
     rows: Range<usize>,
 ) -> Vec<QualityIssue> {
-    // Values that --sparse has filled in are not a fault of the recording, and neither are those that were missing
-    // there.
+    // In a column filled in by --sparse, neither the filled-in values nor the originally missing ones are faults of the
+    // recording.
     let own: Vec<(usize, Cow<'_, [f64]>)> = (used.iter())
         .map(|column| (*column, table.columns[*column].own_values(rows.clone())))
         .collect();
@@ -118,7 +118,7 @@ fn of_columns(
         table
             .columns
             .iter()
-            .any(|column| column.name == name && !column.made.is_empty())
+            .any(|column| column.name == name && !column.filled_rows.is_empty())
     };
     found.retain(|one| one.kind != QualityIssueKind::Missing || !is_sparse(&one.channel));
     found

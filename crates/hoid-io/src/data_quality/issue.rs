@@ -1,4 +1,4 @@
-//! A finding: kind, location, size and remedy.
+//! A data-quality problem: kind, location, size and remedy.
 
 use std::fmt;
 
@@ -6,29 +6,29 @@ use serde::{Deserialize, Serialize};
 
 use crate::wording::decimal;
 
-/// Maximum number of locations of a finding written as JSON; all of them are counted.
+/// Maximum number of locations of a problem written as JSON; further locations are only counted.
 const PLACES_WRITTEN: usize = 100;
 
-/// Kind of a problem.
+/// Kind of a data-quality problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum QualityIssueKind {
     /// Missing or non-finite values.
     Missing,
-    /// Time that is constant or runs backwards.
+    /// A time that is constant or runs backwards.
     Unordered,
-    /// Duplicated rows, including the time.
+    /// Rows that equal the row before, including the time.
     Repeated,
     /// Missing rows.
     Gap,
-    /// Times that deviate from an even grid.
+    /// Times that deviate from an evenly spaced grid.
     Jitter,
-    /// A clock that differs from another, or from a typical rate.
+    /// A clock whose rate differs from another clock, from the given rate or from a common rate.
     Clock,
     /// A clock whose rate changes.
     Drift,
-    /// All channels hold their values while time continues.
+    /// All channels hold their values while the time advances.
     Stalled,
     /// A channel that stays at its limit.
     Saturated,
@@ -39,11 +39,11 @@ pub enum QualityIssueKind {
 }
 
 impl QualityIssueKind {
-    /// Kinds that have a location in a record and can be excluded from it; a clock error or a constant channel has
-    /// none.
+    /// Kinds that are located in part of a record, so that the part can be excluded; a clock error or a constant
+    /// channel affects the whole record.
     pub const MASKABLE: [Self; 4] = [Self::Missing, Self::Gap, Self::Stalled, Self::Saturated];
 
-    /// Returns the remedy.
+    /// Returns the remedy for the problem.
     pub fn remedy(self) -> &'static str {
         match self {
             Self::Missing => {
@@ -87,35 +87,35 @@ hoid_model::named_choice!(QualityIssueKind, "kind of fault", 11, {
 /// Consecutive rows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RowSpan {
-    /// The first row, counted from 1 without header and comments; for a gap, the row before it.
+    /// First row, counted from 1 without header and comments; for a gap, the row before the gap.
     pub row: usize,
-    /// Number of rows; for a gap, of missing rows.
+    /// Number of rows; for a gap, number of missing rows.
     pub rows: usize,
     /// Time of the first row, s; `None` without a time column.
     pub from_s: Option<f64>,
-    /// Time of the row after the last, s.
+    /// Time of the row after the last one, s.
     pub to_s: Option<f64>,
 }
 
-/// One finding.
+/// A data-quality problem found in the columns or channels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct QualityIssue {
     /// Kind of the problem.
     pub kind: QualityIssueKind,
-    /// Channel; empty for the time and for all channels.
+    /// Name of the channel; empty if the problem concerns the time or all channels.
     pub channel: String,
-    /// Number of rows concerned.
+    /// Number of affected rows.
     pub rows: usize,
-    /// Their share of the rows examined.
+    /// Affected fraction of the examined rows.
     pub share: f64,
-    /// Size, in `unit`: RMS jitter in s; longest duration of a gap, stall or saturation in s;
-    /// relative deviation of a clock or drift; quantisation step; otherwise the number of rows.
+    /// Size in `unit`, depending on the kind: RMS jitter in s; longest duration of a gap, stall or saturation in s;
+    /// relative deviation or drift of a clock; quantisation step; otherwise the number of rows.
     pub size: f64,
     /// Unit of the size.
     pub unit: String,
-    /// Locations.
+    /// Locations of the problem.
     pub places: Vec<RowSpan>,
-    /// A sentence without a full stop.
+    /// Description as a sentence without a full stop.
     pub text: String,
 }
 
@@ -156,7 +156,7 @@ impl Serialize for QualityIssue {
     }
 }
 
-/// "row 12 (0.11 s)".
+/// Formats a location, such as "row 12 (0.11 s)".
 pub(super) fn at(place: &RowSpan) -> String {
     match place.from_s {
         Some(s) => format!("row {} ({} s)", place.row, decimal(s)),

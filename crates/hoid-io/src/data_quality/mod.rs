@@ -1,19 +1,19 @@
-//! Quality of recorded data: problems of the sampling and the values, their locations and sizes; data are changed only
-//! on request.
+//! Quality of recorded data: problems with sampling and values, their locations and sizes. Data are changed only on
+//! request.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `issue` | [`QualityIssue`]: a finding |
+//! | `issue` | [`QualityIssue`]: a problem |
 //! | `signals` | the columns that are examined |
-//! | `grid` | the even grid after a time |
-//! | `timing` | jitter, missing rows, a time that is constant or decreases, a clock that is off or drifts |
-//! | `holds` | rows that are duplicated, and channels that all hold their values |
+//! | `grid` | the evenly spaced grid fitted to a time |
+//! | `timing` | jitter, missing rows, a clock with a wrong or drifting rate |
+//! | `holds` | duplicated rows, a time that is constant or decreases, and rows in which all channels hold their values |
 //! | `values` | saturation, quantisation, constants, missing values |
-//! | `search` | all of these, for columns that belong together, and for the channels of a record |
-//! | `in_table` | the same for the columns that a record is made of |
+//! | `search` | search for all these problems in columns that share a time and in the channels of a record |
+//! | `in_table` | search in the table columns from which a record is made |
 //!
-//! An operator's channel may legitimately be smooth, quiet or constant: the rules are designed so that simulated
-//! operators without faults give no finding (tested), and a finding describes the problem without interpreting it.
+//! Signals of an operator may legitimately be smooth, quiet or constant: the rules are designed so that no problem is
+//! found in simulated operators without faults (tested). A problem is described without interpretation.
 
 mod grid;
 mod holds;

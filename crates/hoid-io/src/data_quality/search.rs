@@ -1,4 +1,4 @@
-//! All problems of columns that belong together, and of the channels of a record.
+//! Search for all problems in columns that share a time and in the channels of a record.
 
 use hoid_model::Record;
 
@@ -8,7 +8,7 @@ use super::signals::{Signal, Signals};
 use super::values::Levels;
 use super::{holds, timing, values};
 
-/// All problems of columns that belong together.
+/// Returns all problems found in columns that share a time.
 pub(crate) fn issues_of(signals: &Signals<'_>) -> Vec<QualityIssue> {
     let mut found = Vec::new();
     if signals.rows() == 0 {
@@ -16,7 +16,7 @@ pub(crate) fn issues_of(signals: &Signals<'_>) -> Vec<QualityIssue> {
     }
     let grid = signals.time.map(|time| Grid::of(time.values));
     if let Some(grid) = &grid {
-        holds::standing(signals, grid, &mut found);
+        holds::without_advance(signals, grid, &mut found);
         timing::find(signals, grid, &mut found);
     }
     let levels: Vec<Levels> = signals.columns.iter().map(|signal| Levels::of(signal.values)).collect();
@@ -28,8 +28,8 @@ pub(crate) fn issues_of(signals: &Signals<'_>) -> Vec<QualityIssue> {
     found
 }
 
-/// Problems with the values of e and u: saturation, quantisation, constants. The time of a record is known only to be
-/// even.
+/// Returns the problems with the values of e and u: saturation, quantisation, constants. The times are not examined,
+/// since the samples of a record are always evenly spaced.
 pub fn quality_of_record(record: &Record) -> Vec<QualityIssue> {
     let channels = record.input_channel().into_iter().chain([record.output_channel()]);
     let columns = channels
@@ -45,7 +45,7 @@ pub fn quality_of_record(record: &Record) -> Vec<QualityIssue> {
     })
 }
 
-/// True if a name denotes a column of times.
+/// True if a name denotes a time column.
 pub(crate) fn names_a_clock(name: &str) -> bool {
     let name = name.to_ascii_lowercase();
     ["time", "clock", "stamp"].iter().any(|word| name.contains(word))

@@ -1,4 +1,4 @@
-//! The columns to examine, and the prior knowledge of their time.
+//! The columns to examine, and the known properties of their time.
 
 use std::ops::Range;
 
@@ -12,18 +12,18 @@ pub(crate) struct Signal<'a> {
     pub(crate) values: &'a [f64],
 }
 
-/// Columns of equal length, and the prior knowledge of their time.
+/// Columns of equal length, and the known properties of their time.
 #[derive(Default)]
 pub(crate) struct Signals<'a> {
     pub(crate) columns: Vec<Signal<'a>>,
     pub(crate) time: Option<Signal<'a>>,
-    /// Precision with which the time is printed.
+    /// Precision with which the times are printed in the file.
     pub(crate) precision: Precision,
-    /// Given or stated sampling frequency, Hz.
+    /// Sampling frequency given by the user or stated in the file, Hz.
     pub(crate) nominal_hz: Option<f64>,
     /// Other columns of times.
     pub(crate) clocks: Vec<Signal<'a>>,
-    /// Rows before the first one examined.
+    /// Number of rows before the first examined row.
     pub(crate) before: usize,
 }
 

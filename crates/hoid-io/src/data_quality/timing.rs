@@ -1,4 +1,4 @@
-//! The time compared with its even grid: jitter, missing rows, a clock offset or drift.
+//! The time compared with its evenly spaced grid: jitter, missing rows, a clock with a wrong or drifting rate.
 
 use super::grid::{Grid, slope};
 use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
@@ -6,12 +6,13 @@ use super::signals::Signals;
 use crate::table::Precision;
 use crate::wording::{counted, decimal, short};
 
-/// Deviation from the grid above which jitter is reported, sample times; the same limit as in `sampling`.
+/// Deviation from the grid, in sample times, above which jitter is reported; `sampling` has the same limit.
 const JITTER: f64 = 1e-3;
-/// Relative deviation of a clock from a given rate above which it is reported; crystals are within 1e-4.
+/// Relative deviation of a clock from a given rate above which the deviation is reported; crystals are accurate to
+/// 1e-4.
 const OFF: f64 = 2e-4;
-/// The same for a typical rate that was not given, and the largest deviation at which the rate still counts as that
-/// typical rate.
+/// Limits of the relative deviation from the nearest common rate, if no rate was given: a deviation between them is
+/// reported as a clock error, while a larger one means another rate.
 const OFF_COMMON: (f64, f64) = (5e-4, 1e-2);
 /// Common sampling rates of recorders, Hz.
 const COMMON_HZ: [f64; 42] = [
@@ -20,7 +21,8 @@ const COMMON_HZ: [f64; 42] = [
     500.0, 512.0, 600.0, 1000.0, 1024.0, 2000.0,
 ];
 
-/// Largest rounding error of a time: one unit of the last printed digit, or of single precision.
+/// Largest rounding error of a time: one unit of the last printed digit, or the resolution of single precision if
+/// larger.
 fn rounding(t: &[f64], precision: Precision) -> f64 {
     let largest = t
         .iter()
@@ -102,10 +104,10 @@ fn gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     });
 }
 
-/// Compares the rate with the given one, or with the nearest common rate.
+/// Compares the sampling rate with the given rate, or else with the nearest common rate.
 fn rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec<QualityIssue>) {
     let (ts, n) = (grid.sample_time_s, grid.rows.len() as f64);
-    // Standard error of the slope, and the effect of rounding at the ends.
+    // Uncertainty of the slope from jitter, and from rounding of the first and the last time.
     let uncertain = 5.0 * (rms * 12_f64.sqrt() / n.powf(1.5)).max(unit / n / 5.0) / ts;
     let hz = 1.0 / ts;
     let typical = || {
@@ -152,7 +154,7 @@ fn rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec
     });
 }
 
-/// Compares the rate of the first third with that of the last.
+/// Compares the sample time in the first third with that in the last third.
 fn drift(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec<QualityIssue>) {
     let Some(time) = signals.time else { return };
     let third = grid.rows.len() / 3;
@@ -190,7 +192,7 @@ fn drift(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Ve
     });
 }
 
-/// Other columns of times, in s, ms, us or ns.
+/// Compares the other time columns, in s, ms, us or ns, with the time.
 fn second_clocks(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     let Some(time) = signals.time else { return };
     for clock in &signals.clocks {
@@ -211,7 +213,7 @@ fn second_clocks(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssu
         else {
             continue;
         };
-        // The ends determine the rate up to the jitter of one row.
+        // The first and last times determine the rate up to the jitter of one row.
         let uncertain = 2.0 / pairs.len() as f64;
         if off.abs() <= OFF.max(uncertain) {
             continue;

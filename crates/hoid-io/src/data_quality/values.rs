@@ -1,14 +1,14 @@
 //! Saturation, quantisation, constants and missing values of one channel.
 //!
-//! A channel is quantised if its values, fewer than half as many as its rows (of a long channel: its first
-//! [`EXAMINED`]), lie on a grid within `1e-3 q`, where q is the smallest step between two of them; the smallest and the
-//! largest may lie off the grid, like the end stops of a stick.
+//! A channel is quantised if at most half of its finite values are distinct (of a long channel, see [`EXAMINED`]) and
+//! these lie on a grid within `1e-3 q`, where q is the smallest step between two of them. The smallest and the largest
+//! value may lie off the grid, like the end stops of a stick.
 //!
-//! It is saturated at a limit if it stays there longer than a peak can. In full precision no two consecutive values are
-//! equal by chance: three rows at the extreme value are saturation. In a quantised channel a peak stays longest at its
-//! top: a parabola with its top at the far edge of the last step stays 3 times as long there as on average at the next
-//! three steps. Saturation is reported if the rows at the extreme are at least 6 times as many as that average, with
-//! one stay of at least 5 rows, and if the channel reached the extreme and stayed there more than once.
+//! A channel is saturated at a limit if it stays there longer than a peak can. In full precision no two consecutive
+//! values are equal by chance: three successive rows at the extreme value are saturation. In a quantised channel a peak
+//! stays longest at its top: a parabola with its top at the far edge of the last step stays 3 times as long there as on
+//! average at the next three steps. Saturation of a quantised channel is reported if the rows at the extreme are at
+//! least 6 times as many as that average, with one stay of at least 5 rows and at least two stays of 3 or more rows.
 
 use std::ops::Range;
 
@@ -16,12 +16,13 @@ use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
 use super::signals::{Signal, Signals};
 use crate::wording::{counted, short};
 
-/// Smallest quantisation step that is reported, relative to the standard deviation: its noise has
-/// 1e-5 of the power.
+/// Smallest reported quantisation step, relative to the standard deviation: the quantisation noise has 1e-5 of the
+/// power.
 const COARSE: f64 = 1e-2;
-/// Consecutive rows at the extreme that count as saturation, for values in full precision and quantised values.
-const STAY: (usize, usize) = (3, 5);
-/// Ratio of the rows at the limit to the average of the next steps.
+/// Number of consecutive rows at the extreme that count as saturation, for channels in full precision and for quantised
+/// channels.
+const SATURATED_ROWS: (usize, usize) = (3, 5);
+/// Least ratio of the number of rows at the limit to the average number at each of the next three levels.
 const PEAK: usize = 6;
 
 /// Rows examined in a long channel (hours of recording). If more than half of their values are distinct, the channel
@@ -29,40 +30,40 @@ const PEAK: usize = 6;
 const EXAMINED: usize = 1 << 20;
 
 /// A saturation limit of a channel.
-pub(crate) struct Rail {
+pub(crate) struct SaturationLimit {
     /// The value at the limit.
     pub(crate) value: f64,
     pub(crate) is_upper: bool,
-    /// Stays at the limit, as rows.
+    /// Row ranges in which the channel stays at the limit.
     pub(crate) stays: Vec<Range<usize>>,
 }
 
-impl Rail {
+impl SaturationLimit {
     /// Number of rows at the limit.
     pub(crate) fn rows(&self) -> usize {
         self.stays.iter().map(Range::len).sum()
     }
 }
 
-/// Distinct finite values of a channel; values that differ by rounding only are one.
+/// Distinct finite values of a channel; values that differ only by rounding count as one.
 pub(crate) struct Levels {
     count: usize,
-    /// Number of rows of the channel, and of rows with a finite value.
+    /// Number of rows of the channel, and number of rows with a finite value.
     rows: usize,
     finite: usize,
-    /// In increasing order: all levels of a coarse channel, otherwise those at both ends.
+    /// Levels in increasing order: all levels of a coarse channel, otherwise those at both ends.
     kept: Vec<f64>,
 }
 
 impl Levels {
-    /// Number of levels kept at each end for a channel in full precision.
+    /// Number of levels kept at each end of a channel in full precision.
     const END: usize = 4;
 
     pub(crate) fn of(values: &[f64]) -> Self {
         Self::examined(values, EXAMINED)
     }
 
-    /// The levels, by the first rows where these are different.
+    /// Determines the levels; if most of the first `most` rows are distinct, all rows count as distinct.
     fn examined(values: &[f64], most: usize) -> Self {
         let rows = values.len();
         let finite = values.iter().filter(|v| v.is_finite()).count();
@@ -91,12 +92,12 @@ impl Levels {
         }
     }
 
-    /// True if there are fewer than half as many levels as rows.
-    pub(super) fn is_coarse(&self) -> bool {
+    /// True if there are at most half as many levels as rows.
+    pub(super) fn is_quantised(&self) -> bool {
         2 * self.count <= self.rows
     }
 
-    /// Step of the grid on which all values lie, and the number of levels.
+    /// Returns the step of the grid on which all values lie, and the number of levels; `None` if there is no such grid.
     pub(crate) fn quantum(&self) -> Option<(f64, usize)> {
         if self.count < 2 || 2 * self.count > self.finite {
             return None;
@@ -118,7 +119,7 @@ impl Levels {
     }
 }
 
-/// The levels of some values, in increasing order.
+/// Returns the distinct finite values in increasing order.
 fn distinct(values: &[f64]) -> Vec<f64> {
     let mut levels: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     levels.sort_unstable_by(f64::total_cmp);
@@ -137,7 +138,8 @@ fn distinct(values: &[f64]) -> Vec<f64> {
     levels
 }
 
-/// The levels at both ends of many values, from those of the first ones: no level beyond these is at an end.
+/// Returns the levels at both ends of all values. Only values at or beyond the end levels of the first rows (`first`)
+/// are sorted.
 fn ends(values: &[f64], first: &[f64]) -> Vec<f64> {
     let (lower, upper) = (first[Levels::END - 1], first[first.len() - Levels::END]);
     let outer: Vec<f64> = values.iter().copied().filter(|v| *v <= lower || *v >= upper).collect();
@@ -146,13 +148,13 @@ fn ends(values: &[f64], first: &[f64]) -> Vec<f64> {
     levels
 }
 
-/// Lower and upper saturation limits of a channel.
-pub(crate) fn rails(values: &[f64], levels: &Levels) -> Vec<Rail> {
+/// Returns the saturation limits of a channel, the lower one first.
+pub(crate) fn rails(values: &[f64], levels: &Levels) -> Vec<SaturationLimit> {
     if levels.count < 4 {
-        // A switch or a constant stays at its ends by nature.
+        // A switch or a constant signal stays at its extremes by nature.
         return Vec::new();
     }
-    let (coarse, levels) = (levels.is_coarse(), &levels.kept);
+    let (coarse, levels) = (levels.is_quantised(), &levels.kept);
     let count = |level: f64| values.iter().filter(|v| **v == level).count();
     let rail = |is_upper: bool| {
         let (extreme, next) = if is_upper {
@@ -169,7 +171,7 @@ pub(crate) fn rails(values: &[f64], levels: &Levels) -> Vec<Rail> {
         }
         let rows: usize = stays.iter().map(Range::len).sum();
         let beside: usize = next.iter().map(|level| count(*level)).sum();
-        // A stay at the start or end of the record may be a settled value.
+        // A stay at the start or end of the record may be a value that the signal has settled to.
         let inner = || {
             stays
                 .iter()
@@ -177,13 +179,13 @@ pub(crate) fn rails(values: &[f64], levels: &Levels) -> Vec<Rail> {
                 .map(Range::len)
         };
         let longest = inner().max().unwrap_or(0);
-        let stayed = inner().filter(|length| *length >= STAY.0).count();
+        let stayed = inner().filter(|length| *length >= SATURATED_ROWS.0).count();
         let is_rail = if coarse {
-            longest >= STAY.1 && 3 * rows >= PEAK * beside && stayed > 1
+            longest >= SATURATED_ROWS.1 && 3 * rows >= PEAK * beside && stayed > 1
         } else {
-            longest >= STAY.0
+            longest >= SATURATED_ROWS.0
         };
-        is_rail.then_some(Rail {
+        is_rail.then_some(SaturationLimit {
             value: extreme,
             is_upper,
             stays,
@@ -245,7 +247,7 @@ pub(super) fn find(signals: &Signals<'_>, signal: Signal<'_>, levels: &Levels, f
     let deviation = finite().map(|v| (v - mean).powi(2) / count).sum::<f64>().sqrt();
     if let Some((step, count)) = levels.quantum().filter(|(step, _)| *step >= COARSE * deviation) {
         let text = format!(
-            "{name} is quantised: {count} levels in steps of {} ({} % of its deviation)",
+            "{name} is quantised: {count} levels in steps of {} ({} % of its standard deviation)",
             short(step),
             short(100.0 * step / deviation)
         );
@@ -291,7 +293,7 @@ mod tests {
         for most in [64, 1000, 3999] {
             let (quick, all) = (Levels::examined(&values, most), Levels::of(&values));
             assert_eq!((&quick.kept, quick.finite), (&all.kept, 3999));
-            assert!(!quick.is_coarse() && quick.quantum().is_none());
+            assert!(!quick.is_quantised() && quick.quantum().is_none());
             let found = rails(&values, &quick);
             assert_eq!((found.len(), found[0].value, found[0].stays.len()), (1, 2.0, 1));
             assert_eq!(found[0].stays[0], 3000..3005);
@@ -300,6 +302,6 @@ mod tests {
         let mut coarse: Vec<f64> = values.iter().map(|v| (10.0 * v).round() / 10.0).collect();
         coarse[3990] = 7.0;
         let found = Levels::examined(&coarse, 64);
-        assert!(found.is_coarse() && found.kept.last() == Some(&7.0));
+        assert!(found.is_quantised() && found.kept.last() == Some(&7.0));
     }
 }

@@ -1,4 +1,4 @@
-//! The archive of a unit: its description, a library for each platform, and its resources.
+//! The FMU archive: its description, a library for each platform, and its resources.
 
 use std::{
     io::{Cursor, Write as _},
@@ -27,7 +27,7 @@ struct Platform {
     ending: &'static str,
 }
 
-/// First bytes of ELF, offset and values of the machine field.
+/// First bytes of a little-endian 64-bit ELF file; each entry of LINUX starts with a value of its machine field.
 const ELF: &[u8] = b"\x7fELF\x02\x01";
 const LINUX: [(u16, Platform); 2] = [
     (
@@ -53,7 +53,7 @@ const WINDOWS: Platform = Platform {
     ending: "dll",
 };
 const MACHINE_OF_WINDOWS: u16 = 0x8664;
-/// Magic number of 64-bit Mach-O and its machines.
+/// Magic number of 64-bit Mach-O; each entry of MAC starts with a CPU type.
 const MACH_O: &[u8] = b"\xcf\xfa\xed\xfe";
 const MAC: [(u32, Platform); 2] = [
     (
@@ -74,11 +74,11 @@ const MAC: [(u32, Platform); 2] = [
     ),
 ];
 
-/// Functions that the library of a unit exports: of hoid, of FMI 2 and of FMI 3. Their names are in its symbol table,
-/// each terminated by a 0, on every system.
+/// Functions that the library of an FMU exports: one each of the C interface of hoid, of FMI 2 and of FMI 3. On every
+/// platform the symbol table contains their names, each terminated by a null byte.
 const FUNCTIONS: [&str; 3] = ["hoid_abi_version", "fmi2Instantiate", "fmi3InstantiateCoSimulation"];
 
-fn hands_out(bytes: &[u8], function: &str) -> bool {
+fn exports(bytes: &[u8], function: &str) -> bool {
     let name = [function.as_bytes(), &[0]].concat();
     let first = name[0];
     let starts = bytes.iter().enumerate().filter(|(_, byte)| **byte == first);
@@ -96,7 +96,7 @@ fn four_bytes(bytes: &[u8], at: usize) -> Option<u32> {
 }
 
 impl Platform {
-    /// Determines the platform from the header of a shared library: ELF, PE or Mach-O.
+    /// Determines the platform from the header of a shared library (ELF, PE or Mach-O).
     fn of(bytes: &[u8]) -> Option<Self> {
         if bytes.starts_with(ELF) {
             let machine = two_bytes(bytes, 18)?;
@@ -116,14 +116,14 @@ impl Library {
     /// Reads a library and determines its platform from its header.
     ///
     /// # Errors
-    /// [`IoError::Unreadable`]; [`IoError::NoLibrary`] for a file that is not a shared library of a known platform;
-    /// [`IoError::OtherLibrary`] for another library.
+    /// [`IoError::Unreadable`] if the file cannot be read; [`IoError::NoLibrary`] if it is not a shared library for a
+    /// known platform; [`IoError::OtherLibrary`] if the library is not that of hoid.
     pub fn read(path: &Path) -> Result<Self, IoError> {
         let bytes = read_bytes(path)?;
         let platform = Platform::of(&bytes).ok_or_else(|| IoError::NoLibrary {
             file: path.display().to_string(),
         })?;
-        if let Some(missing) = FUNCTIONS.into_iter().find(|function| !hands_out(&bytes, function)) {
+        if let Some(missing) = FUNCTIONS.into_iter().find(|function| !exports(&bytes, function)) {
             return Err(IoError::OtherLibrary {
                 file: path.display().to_string(),
                 missing,
@@ -133,10 +133,10 @@ impl Library {
     }
 }
 
-/// Writes a unit with sample time `step_s`. The same parts give the same bytes.
+/// Writes an FMU with sample time `step_s`. The same contents give the same bytes.
 ///
 /// # Errors
-/// File errors; [`IoError::NoLibrary`] for contradictory settings, or two libraries of one platform.
+/// File errors; [`IoError::NoLibrary`] for contradictory settings or for two libraries for the same platform.
 pub fn write_fmu(
     path: &Path,
     version: FmiVersion,
@@ -171,11 +171,11 @@ pub fn write_fmu(
         }
         parts.push((name, &library.bytes));
     }
-    let packed = packed(&parts).map_err(|error| wrong(error.to_string()))?;
+    let packed = compressed(&parts).map_err(|error| wrong(error.to_string()))?;
     write_atomically(path, |file| file.write_all(&packed))
 }
 
-fn packed(parts: &[(String, &[u8])]) -> Result<Vec<u8>, ZipError> {
+fn compressed(parts: &[(String, &[u8])]) -> Result<Vec<u8>, ZipError> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .last_modified_time(DateTime::default())

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::variables::{FmuKind, FmuStart, FmuVariable, Role};
 
-/// FMI version that a unit describes; the library implements both.
+/// FMI version that an FMU describes; the library implements both versions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FmiVersion {
     /// 2.0.
@@ -18,9 +18,9 @@ hoid_model::named_choice!(FmiVersion, "version of FMI", 2, {
     Three => "3",
 });
 
-/// Name of the library in a unit.
+/// Name of the library in an FMU.
 pub(super) const MODEL: &str = "hoid";
-/// Units with their exponents of kg, m, s, A, K, mol, cd, rad, and their factor.
+/// Units with their nonzero exponents of the SI base units and rad, and their factor.
 const UNITS: [(&str, &str); 3] = [
     ("s", r#"s="1""#),
     ("rad/s", r#"s="-1" rad="1""#),
@@ -28,7 +28,7 @@ const UNITS: [(&str, &str); 3] = [
 ];
 
 impl FmuKind {
-    /// Token shared by description and library: version and kind.
+    /// Returns the token that description and library share: version of hoid and kind of FMU.
     pub fn token(self) -> String {
         format!("hoid-{}-{}", env!("CARGO_PKG_VERSION"), self.name())
     }
@@ -41,7 +41,7 @@ impl FmuKind {
     }
 }
 
-/// Returns the description of a unit with sample time `step_s`.
+/// Returns the description of an FMU with sample time `step_s`.
 pub(super) fn description(version: FmiVersion, kind: FmuKind, variables: &[FmuVariable], step_s: f64) -> String {
     let mut xml = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
     let (token, help, hoid) = (kind.token(), kind.help(), env!("CARGO_PKG_VERSION"));
@@ -99,7 +99,7 @@ pub(super) fn description(version: FmiVersion, kind: FmuKind, variables: &[FmuVa
             for (open, close) in [("<Outputs>", "</Outputs>"), ("<InitialUnknowns>", "</InitialUnknowns>")] {
                 let _ = writeln!(xml, "    {open}");
                 for reference in outputs() {
-                    // Indices count from one.
+                    // Indices in the description start at one.
                     let _ = writeln!(xml, "      <Unknown index=\"{}\" dependencies=\"\"/>", reference + 1);
                 }
                 let _ = writeln!(xml, "    {close}");
@@ -117,7 +117,7 @@ pub(super) fn description(version: FmiVersion, kind: FmuKind, variables: &[FmuVa
     xml
 }
 
-/// Causality and variability.
+/// Returns the attributes causality and variability.
 fn attributes(variable: &FmuVariable) -> &'static str {
     match variable.role {
         Role::Parameter => "causality=\"parameter\" variability=\"fixed\" initial=\"exact\"",
@@ -182,7 +182,7 @@ fn typed_variable(xml: &mut String, reference: usize, variable: &FmuVariable) {
     };
 }
 
-/// Escapes a text for use in an attribute.
+/// Escapes text for use in an attribute.
 fn escaped(text: &str) -> String {
     let mut all = String::with_capacity(text.len());
     for character in text.chars() {

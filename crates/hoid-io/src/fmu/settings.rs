@@ -1,4 +1,4 @@
-//! Settings in the resources of a unit, read by its library at start.
+//! Settings in the resources of an FMU, read by its library at start.
 
 use std::collections::BTreeMap;
 
@@ -7,17 +7,17 @@ use serde::{Deserialize, Serialize};
 
 use super::variables::{FmuKind, FmuStart, FmuVariable, Role};
 
-/// Name of the file among the resources.
+/// Name of the settings file among the resources.
 pub const FMU_SETTINGS: &str = "hoid.json";
 
-/// Settings of a unit.
+/// Settings of an FMU.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FmuSettings {
     kind: String,
     /// Parameters whose start values differ from the defaults.
     #[serde(default)]
     parameters: BTreeMap<String, SettingValue>,
-    /// Text of the scenario file of an operator.
+    /// Text of the scenario file that describes the operator.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scenario: Option<String>,
     /// A fit as printed by `hoid identify --json`, used as the initial state of a tracker.
@@ -35,7 +35,7 @@ enum SettingValue {
 }
 
 impl FmuSettings {
-    /// Creates a unit with default parameters.
+    /// Creates settings with default parameters.
     pub fn new(kind: FmuKind) -> Self {
         Self {
             kind: kind.name().to_owned(),
@@ -45,7 +45,7 @@ impl FmuSettings {
         }
     }
 
-    /// Sets the text of the scenario file of an operator.
+    /// Sets the text of the scenario file that describes the operator.
     pub fn with_scenario(self, text: String) -> Self {
         Self {
             scenario: Some(text),
@@ -53,7 +53,7 @@ impl FmuSettings {
         }
     }
 
-    /// Sets the text of the fit with which a tracker starts.
+    /// Sets the text of the fit from which a tracker starts.
     pub fn with_fit(self, text: String) -> Self {
         Self {
             fit: Some(text),
@@ -73,35 +73,35 @@ impl FmuSettings {
         self
     }
 
-    /// Parses the text of the file.
+    /// Parses the text of the settings file.
     ///
     /// # Errors
-    /// Returns the problems of the text.
+    /// A description of the problem in the text.
     pub fn parse(text: &str) -> Result<Self, String> {
         let settings: Self = serde_json::from_str(text).map_err(|error| format!("{FMU_SETTINGS}: {error}"))?;
         settings.kind()?;
         Ok(settings)
     }
 
-    /// Returns the text of the file.
+    /// Returns the text of the settings file.
     pub fn text(&self) -> String {
         let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
         text.push('\n');
         text
     }
 
-    /// Returns the kind of the unit.
+    /// Returns the kind of the FMU.
     ///
     /// # Errors
-    /// For an invalid kind.
+    /// A message if the kind is invalid.
     pub fn kind(&self) -> Result<FmuKind, String> {
         FmuKind::of_name(&self.kind).map_err(|error| format!("{FMU_SETTINGS}: {error}"))
     }
 
-    /// Returns the variables with the start values of this unit.
+    /// Returns the variables with the start values of this FMU.
     ///
     /// # Errors
-    /// For a parameter that the unit does not have, or a value of another type.
+    /// A message if the FMU does not have a parameter or a value has the wrong type.
     pub fn variables(&self) -> Result<Vec<FmuVariable>, String> {
         let mut all = self.kind()?.variables();
         for (name, given) in &self.parameters {

@@ -1,6 +1,7 @@
-//! The variables of a unit.
+//! The variables of an FMU.
 
-/// Variables that state whether the data determine a parameter of the operator, in the order of the parameters.
+/// Variables that indicate for each parameter of the operator whether the data determine it, in the order of the
+/// parameters.
 pub const DETERMINED: [&str; 6] = [
     "K_e_determined",
     "T_L_determined",
@@ -10,12 +11,12 @@ pub const DETERMINED: [&str; 6] = [
     "tau_e_determined",
 ];
 
-/// Kind of a unit.
+/// Kind of an FMU.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FmuKind {
     /// Identifies an operator from e and u.
     Tracker,
-    /// Controls like the operator of a scenario.
+    /// Controls the machine like the operator of a scenario.
     Operator,
 }
 
@@ -24,7 +25,7 @@ hoid_model::named_choice!(FmuKind, "kind of unit", 2, {
     Operator => "operator",
 });
 
-/// Role of a variable.
+/// Role of an FMU variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// Set before the start.
@@ -48,18 +49,18 @@ pub enum FmuStart {
     Text(String),
 }
 
-/// A variable; its value reference is its position in the list.
+/// An FMU variable; its value reference is its position in the list.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FmuVariable {
-    /// Its name.
+    /// Name of the variable.
     pub name: &'static str,
-    /// Its unit, empty if there is none.
+    /// Unit of the variable; empty if it has none.
     pub unit: &'static str,
-    /// Its role.
+    /// Role of the variable.
     pub role: Role,
     /// Type and start value.
     pub start: FmuStart,
-    /// Description of one line.
+    /// One-line description.
     pub help: &'static str,
 }
 
@@ -74,7 +75,7 @@ fn variable(role: Role, name: &'static str, unit: &'static str, start: FmuStart,
 }
 
 impl FmuKind {
-    /// The variables, in the order of their value references: parameters, inputs, outputs.
+    /// Returns the variables in the order of their value references: parameters, inputs, outputs.
     pub fn variables(self) -> Vec<FmuVariable> {
         match self {
             Self::Tracker => tracker(),
@@ -150,7 +151,7 @@ fn tracker() -> Vec<FmuVariable> {
         all.push(output(error, unit, Real(f64::NAN), error_help));
     }
     for name in DETERMINED {
-        all.push(output(name, "", Boolean(false), "true if the data determine it"));
+        all.push(output(name, "", Boolean(false), "true if the data determine this quantity"));
     }
     all.extend([
         output("innovation", "", Real(f64::NAN), "a-priori innovation"),
@@ -164,14 +165,14 @@ fn tracker() -> Vec<FmuVariable> {
             "change_t",
             "s",
             Real(f64::NAN),
-            "when the person changed last, as declared",
+            "time of the last declared change of the person",
         ),
-        output("changes", "", Integer(0), "changes that were declared"),
+        output("changes", "", Integer(0), "number of declared changes"),
         output("level", "", Integer(2), "0 trustworthy, 1 doubtful, 2 not determined"),
         output("ready", "", Boolean(false), "true once there is an estimate"),
         output("samples", "", Integer(0), "samples taken"),
-        output("skipped", "", Integer(0), "samples with a fault in e or u"),
-        output("held", "", Integer(0), "samples that the guard held back"),
+        output("skipped", "", Integer(0), "number of samples with a fault in e or u"),
+        output("held", "", Integer(0), "number of samples that the guard held back"),
         output(
             "restarts",
             "",
@@ -191,7 +192,7 @@ fn operator() -> Vec<FmuVariable> {
             "replication",
             "",
             Integer(0),
-            "another run with the same seed",
+            "number of the run with this seed",
         ),
         variable(Role::Input, "e", "deg", Real(0.0), "tracking error"),
         variable(Role::Output, "u", "deg", Real(0.0), "control output"),

@@ -1,26 +1,27 @@
-//! Memory limit of a file of any format: a few bytes can be made to unpack to any length.
+//! Memory limit of a file of any format, since a few bytes can be crafted to decompress to any length.
 //!
-//! A file of n bytes may unpack to `48 MB + 64 n`, at most 16 GB. The environment variable [`UNPACKED`], in megabytes,
-//! raises both limits for files that need more. Settings take many times their length while they are parsed (TOML up to
-//! a hundred times, JSON less): they may have at most 2 and 10 MB, or a share of the raised limit.
+//! A file of n bytes may decompress to `48 MB + 64 n`, at most 16 GB. The environment variable [`UNPACKED`], in
+//! megabytes, raises both limits for files that need more. Parsing settings takes many times the length of their text
+//! (TOML up to a hundred times, JSON less): their text may have at most 2 MB (TOML) or 10 MB (JSON), or a fraction of
+//! the raised limit.
 
 use crate::IoError;
 
-/// Unpacked bytes allowed for every file. Readers hold values up to four times during conversion (as stored, as
+/// Decompressed bytes allowed for every file. Readers hold values up to four times during conversion (as stored, as
 /// numbers, as columns, in a survey): a file of a few bytes stays below 300 MB.
 const AT_LEAST: u64 = 48 << 20;
-/// Additional unpacked bytes per byte of the file.
+/// Additional decompressed bytes allowed per byte of the file.
 const FACTOR: u64 = 64;
-/// Upper limit for every file.
+/// Upper limit for files of any size, in bytes.
 const CEILING: u64 = 16 << 30;
-/// Environment variable that raises the limit, MB.
+/// Environment variable that raises the limit, in MB.
 const UNPACKED: &str = "HOID_MAX_UNPACKED_MB";
-/// Overhead of a text in addition to its characters, bytes.
+/// Memory of a text in addition to its characters, in bytes.
 const TEXT: u64 = 64;
 /// Maximum nesting of structures.
 pub(super) const MOST_NESTED: usize = 32;
 
-/// Remaining memory of a file.
+/// Memory that a file may still take.
 #[derive(Debug)]
 pub(super) struct Budget {
     left: u64,
@@ -38,7 +39,7 @@ impl Budget {
         Self { left: all, all }
     }
 
-    /// Reserves memory before it is filled.
+    /// Reserves memory before it is filled; an error if the limit is exceeded.
     pub(super) fn take(&mut self, bytes: u64, file: &str) -> Result<(), IoError> {
         match self.left.checked_sub(bytes) {
             Some(left) => {
@@ -48,31 +49,31 @@ impl Budget {
             None => Err(IoError::Unsupported {
                 file: file.to_owned(),
                 found: format!("it unpacks to more than {} MB", self.all >> 20),
-                remedy: "write it without compression, or in parts; if it is meant to be so large, set \
-                         HOID_MAX_UNPACKED_MB in the environment to the number of MB allowed",
+                remedy: "write it without compression, or in parts; if this size is intended, set HOID_MAX_UNPACKED_MB \
+                         in the environment to the number of MB allowed",
             }),
         }
     }
 
-    /// Reserves the memory of `count` numbers as [`f64`] and of their `bytes_each` stored bytes.
+    /// Reserves the memory that `count` numbers need as [`f64`] in addition to their `bytes_each` stored bytes.
     pub(super) fn take_numbers(&mut self, count: usize, bytes_each: usize, file: &str) -> Result<(), IoError> {
         let more = (size_of::<f64>() as u64).saturating_sub(bytes_each as u64);
         self.take(more.saturating_mul(count as u64), file)
     }
 
-    /// Reserves the memory of `count` texts of `bytes` bytes in all.
+    /// Reserves the memory of `count` texts with `bytes` bytes in total.
     pub(super) fn take_texts(&mut self, count: usize, bytes: usize, file: &str) -> Result<(), IoError> {
         self.take(TEXT.saturating_mul(count as u64).saturating_add(bytes as u64), file)
     }
 }
 
-/// Limit from the environment, bytes.
+/// Returns the limit from the environment in bytes.
 fn raised() -> Option<u64> {
     let megabytes: u64 = std::env::var(UNPACKED).ok()?.trim().parse().ok()?;
     megabytes.checked_mul(1 << 20)
 }
 
-/// Texts of settings.
+/// Text format of a settings file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Settings {
     Json,
@@ -80,7 +81,7 @@ pub(crate) enum Settings {
 }
 
 impl Settings {
-    /// Divisor of the raised limit for such a text.
+    /// Divisor by which the raised limit gives the maximum length of the text.
     pub(crate) fn share(self) -> u64 {
         match self {
             Self::Json => 32,
@@ -88,7 +89,7 @@ impl Settings {
         }
     }
 
-    /// Maximum length, bytes.
+    /// Maximum length of the text in bytes.
     pub(crate) fn longest(self) -> u64 {
         let typical = match self {
             Self::Json => 10 << 20,

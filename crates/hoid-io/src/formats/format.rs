@@ -1,7 +1,7 @@
-//! Interface of a file format: its name, its endings, how it is read and how it is written.
+//! Interface of a file format: its name, its extensions, and its functions for reading and writing.
 //!
-//! Each [`Format`] in its own module of `formats` defines all of this; reading, writing, the survey
-//! of a file and all messages use it.
+//! Each format defines a [`Format`] in its own module of `formats`; reading, writing, the survey of a file and all
+//! messages use it.
 
 use std::io::{self, Write};
 
@@ -16,15 +16,15 @@ use crate::time::with_time;
 
 /// A file format.
 pub(crate) struct Format {
-    /// Name for display.
+    /// Name of the format for display.
     pub(crate) name: &'static str,
-    /// The extensions in lower case, the default one first.
-    pub(super) endings: &'static [&'static str],
+    /// Extensions in lower case, the default one first.
+    pub(super) extensions: &'static [&'static str],
     /// Reader of the format.
     pub(crate) reading: Reading,
     /// Writer of a table of results.
     pub(crate) writing: Writing,
-    /// Writer of a record, if it is not written as a table of its channels.
+    /// Writer of a record; `None` if a record is written as a table of its channels.
     pub(crate) record: Option<RecordWriter>,
 }
 
@@ -34,19 +34,19 @@ type TableReader = for<'a> fn(&'a mut Vec<u8>, &'a str) -> Result<Table<'a>, IoE
 type ResultsReader = fn(Vec<u8>, &str) -> Result<OutputTable, IoError>;
 /// Reads all arrays with their paths.
 type ArraysReader = fn(Vec<u8>, &str) -> Result<Contents, IoError>;
-/// Starts a file of rows.
+/// Starts a file that is written row by row.
 type RowsStart = fn(&mut dyn Write, &TableSchema) -> io::Result<Box<dyn RowWriter>>;
-/// Writes columns of one length.
+/// Writes columns of equal length.
 pub(crate) type ColumnsWriter = fn(&mut dyn Write, &TableSchema, &[Values<'_>]) -> io::Result<()>;
 type RecordWriter = fn(&mut dyn Write, &Record) -> io::Result<()>;
 
-/// Content of a file of the format.
+/// Contents of a file of this format, and the function that reads them.
 pub(crate) enum Reading {
     /// One flat table.
     Table {
         /// Numeric columns, for a record.
         record: TableReader,
-        /// Columns as written, for results.
+        /// Columns with their original kinds, for results.
         results: ResultsReader,
     },
     /// Named arrays, from which the columns are selected.
@@ -57,15 +57,15 @@ pub(crate) enum Reading {
 pub(crate) enum Writing {
     /// Row by row, in bounded memory.
     Rows(RowsStart),
-    /// Each column as one array whose length precedes it: all rows must be known.
+    /// Each column as one array preceded by its length: all rows must be known before writing.
     Columns(ColumnsWriter),
-    /// Not written; the text describes the format, as in "the format of a recorder".
+    /// No writing; the text describes the format, such as "the format of a recorder".
     ReadOnly(&'static str),
 }
 
-/// Writer of a file by groups of rows. The file is borrowed for one call at a time.
+/// Writer of a file in groups of rows. The file is borrowed only during each call.
 pub(crate) trait RowWriter {
-    /// Writes columns of one length.
+    /// Writes a group of rows as columns of equal length.
     fn rows(&mut self, file: &mut dyn Write, columns: &[Values<'_>]) -> io::Result<()>;
     /// Completes the file.
     fn finish(self: Box<Self>, file: &mut dyn Write) -> io::Result<()>;
@@ -85,11 +85,11 @@ impl Format {
         options: &ReadOptions,
     ) -> Result<Table<'a>, IoError> {
         match self.reading {
-            Reading::Table { record, .. } => finished(record(bytes, file)?, false, options),
+            Reading::Table { record, .. } => with_time_and_selection(record(bytes, file)?, false, options),
             Reading::Arrays(read) => {
                 let contents = read(std::mem::take(bytes), file)?;
                 let (contents, is_trial) = trials::of_contents(contents, options.trial.as_ref(), file)?;
-                finished(table_of(contents, options, file)?, is_trial, options)
+                with_time_and_selection(table_of(contents, options, file)?, is_trial, options)
             }
         }
     }
@@ -103,12 +103,13 @@ impl Format {
     }
 }
 
-/// The table of the requested trial and columns, with its time.
-pub(super) fn finished<'a>(table: Table<'a>, is_trial: bool, options: &ReadOptions) -> Result<Table<'a>, IoError> {
+/// Completes a table: its time is determined, and the requested columns and trial are selected.
+pub(super) fn with_time_and_selection<'a>(table: Table<'a>, is_trial: bool, options: &ReadOptions) -> Result<Table<'a>, IoError> {
     let table = with_time(table, options.time.as_ref())?;
     check_selected(&table.names(), options, table.source.file())?;
     let table = selected(table, |_, name| name == "t" || options.wants(name));
-    // Samples that are counted need no time column, and a restarting one is ignored.
+    // With a given sampling frequency the samples are counted: no time column is needed, and a time that restarts is
+    // ignored.
     let by_itself = options.trial.is_none() && options.sampling_hz.is_some();
     if is_trial || by_itself {
         return Ok(table);

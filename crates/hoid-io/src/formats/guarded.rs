@@ -1,8 +1,7 @@
-//! Isolation of crates that read untrusted bytes, so that they cannot abort a study.
+//! Isolation of crates that read untrusted bytes, so that a panic in them does not abort a study.
 //!
-//! These crates report most damage as an error, but some by a panic: an index or a sum out of range. This is the only
-//! place where a panic is caught. Partial results belong to the crate and are dropped here. With `panic = "abort"` no
-//! panic can be caught.
+//! These crates report most damage as an error, but panic at some, such as an index or a sum out of range. Panics are
+//! caught only here. The partial results of the crate are dropped. With `panic = "abort"` no panic can be caught.
 
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
@@ -10,29 +9,29 @@ use std::sync::Once;
 use std::thread;
 
 use crate::IoError;
-use crate::wording::told;
+use crate::wording::short_error;
 
 thread_local! {
     static READING: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Returns the result of a foreign reader, with a panic as [`IoError::Damaged`].
+/// Returns the result of a third-party reader; a panic becomes [`IoError::Damaged`].
 pub(super) fn guarded<T>(file: &str, read: impl FnOnce() -> Result<T, IoError>) -> Result<T, IoError> {
     without_panic(read).unwrap_or_else(|what| {
         Err(IoError::Damaged {
             file: file.to_owned(),
-            found: format!("it could not be read to its end ({})", told(&what)),
+            found: format!("it could not be read to its end ({})", short_error(&what)),
         })
     })
 }
 
-/// The result, or the message of a panic.
+/// Returns the result, or the message of a panic.
 ///
-/// The panic hook is replaced once per process; it is silent on a thread that is reading, and
-/// reports any other panic as before.
+/// The panic hook is replaced once per process. The new hook prints nothing on a thread that is reading, and reports
+/// all other panics as before.
 fn without_panic<T>(read: impl FnOnce() -> T) -> Result<T, String> {
     static HOOK: Once = Once::new();
-    // A hook cannot be set during a panic.
+    // The hook cannot be replaced while the thread is panicking.
     if !thread::panicking() {
         HOOK.call_once(|| {
             let before = panic::take_hook();
@@ -69,6 +68,6 @@ mod tests {
         });
         assert_eq!(nested, Err::<u8, _>("of one".into()));
         assert!(!READING.get());
-        assert_eq!(told("a\u{1b}[31m\nb"), "a\\u{1b}[31m");
+        assert_eq!(short_error("a\u{1b}[31m\nb"), "a\\u{1b}[31m");
     }
 }

@@ -1,32 +1,32 @@
-//! The format of a file by its extension, and the known extensions.
+//! Choice of the file format by extension, and the known extensions.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::format::{Format, Writing, finished};
+use super::format::{Format, Writing, with_time_and_selection};
 use super::{ALL, csv, packed};
 use crate::IoError;
 use crate::record::ReadOptions;
 use crate::table::Table;
 
-/// The extensions of the files that can be read, for help texts and messages:
+/// Returns the extensions of the files that can be read, for help texts and messages:
 /// `.csv (also as .txt), .tsv, ... or .xdf`.
 #[must_use]
 pub fn readable_endings() -> String {
-    endings(ALL)
+    extensions(ALL)
 }
 
-/// The extensions of the files that can be written, for help texts and messages.
+/// Returns the extensions of the files that can be written, for help texts and messages.
 #[must_use]
 pub fn writable_endings() -> String {
     let written: Vec<&Format> = ALL.iter().copied().filter(|format| format.is_written()).collect();
-    endings(&written)
+    extensions(&written)
 }
 
-/// The extensions of some formats as text.
-fn endings(formats: &[&Format]) -> String {
+/// Lists the extensions of some formats as text.
+fn extensions(formats: &[&Format]) -> String {
     let of_one = |format: &&Format| {
-        let dotted: Vec<String> = format.endings.iter().map(|ending| format!(".{ending}")).collect();
+        let dotted: Vec<String> = format.extensions.iter().map(|ending| format!(".{ending}")).collect();
         match dotted.as_slice() {
             [first, others @ ..] if !others.is_empty() => format!("{first} (also as {})", others.join(" or ")),
             all => all.concat(),
@@ -39,37 +39,37 @@ fn endings(formats: &[&Format]) -> String {
     }
 }
 
-/// Remedies for files of other programs, by extension. pyhoid reads those of `PYTHON` itself.
+/// Remedies for files of other programs, by extension. pyhoid itself reads the formats with the remedy `PYTHON`.
 const ELSEWHERE: [(&[&str], &str); 12] = [
     (&["gz", "zip", "bz2", "xz", "zst"], "unpack it first"),
     (&["arrow", "feather", "ipc", "xlsx", "xls", "ods"], PYTHON),
     (
         &["mcap"],
-        "read its topics with the Python package mcap and make a pyhoid.Record of them",
+        "read its topics with the Python package mcap and make a pyhoid.Record from them",
     ),
     (
         &["bag", "db3"],
-        "read its topics with the Python package rosbags and make a pyhoid.Record of them",
+        "read its topics with the Python package rosbags and make a pyhoid.Record from them",
     ),
     (
         &["edf"],
-        "read it with the Python package pyedflib or mne and make a pyhoid.Record of it",
+        "read it with the Python package pyedflib or mne and make a pyhoid.Record from it",
     ),
     (
         &["bdf"],
-        "read it with the Python package mne and make a pyhoid.Record of it",
+        "read it with the Python package mne and make a pyhoid.Record from it",
     ),
     (
         &["c3d"],
-        "read it with the Python package ezc3d and make a pyhoid.Record of it",
+        "read it with the Python package ezc3d and make a pyhoid.Record from it",
     ),
     (
         &["tdms"],
-        "read it with the Python package nptdms and make a pyhoid.Record of it",
+        "read it with the Python package nptdms and make a pyhoid.Record from it",
     ),
     (
         &["mf4"],
-        "read it with the Python package asammdf and make a pyhoid.Record of it",
+        "read it with the Python package asammdf and make a pyhoid.Record from it",
     ),
     (
         &["sav"],
@@ -81,21 +81,20 @@ const ELSEWHERE: [(&[&str], &str); 12] = [
 /// The remedy for files that pyhoid reads.
 const PYTHON: &str = "save it as CSV or Parquet, or read it in Python with pyhoid.read";
 
-/// The extension of a file, in lower case.
+/// Returns the extension of a file in lower case.
 fn ending_of(path: &Path) -> Option<String> {
     path.extension().map(|ending| ending.to_string_lossy().to_lowercase())
 }
 
-/// The format that corresponds to the extension of a file.
+/// Returns the format that corresponds to the extension of a file.
 fn format_of(path: &Path) -> Option<&'static Format> {
     let ending = ending_of(path)?;
     ALL.iter()
         .copied()
-        .find(|format| format.endings.contains(&ending.as_str()))
+        .find(|format| format.extensions.contains(&ending.as_str()))
 }
 
-/// Error for an extension that corresponds to no format, with the `expected` ones and the remedy,
-/// if there is one.
+/// Error for an extension that belongs to no format, with the `expected` extensions and, if there is one, the remedy.
 fn unknown(path: &Path, expected: String, remedy: Option<&str>) -> IoError {
     IoError::UnknownFormat {
         file: path.display().to_string(),
@@ -107,7 +106,7 @@ fn unknown(path: &Path, expected: String, remedy: Option<&str>) -> IoError {
     }
 }
 
-/// The format of a file to be read.
+/// Returns the format of a file that will be read.
 fn format_to_read(path: &Path) -> Result<&'static Format, IoError> {
     format_of(path).ok_or_else(|| {
         let ending = ending_of(path).unwrap_or_default();
@@ -116,8 +115,8 @@ fn format_to_read(path: &Path) -> Result<&'static Format, IoError> {
     })
 }
 
-/// The format of a file to be written, which must not be a directory. A pipe or a device with any other name is written
-/// as CSV.
+/// Returns the format of a file that will be written; the path must not be a directory. A pipe or a device without a
+/// known extension is written as CSV.
 pub(crate) fn format_to_write(path: &Path) -> Result<&'static Format, IoError> {
     let known = fs::metadata(path).ok();
     let format = match known {
@@ -132,18 +131,19 @@ pub(crate) fn format_to_write(path: &Path) -> Result<&'static Format, IoError> {
     };
     Err(IoError::UnknownFormat {
         file: path.display().to_string(),
-        found: format!("the extension is .{}, {what}", format.endings[0]),
+        found: format!("the extension is .{}, {what}", format.extensions[0]),
         expected: writable_endings(),
         remedy: String::new(),
     })
 }
 
-/// The name of a packed text without `.gz`. Only text is packed: binary formats compress their columns themselves.
+/// Returns the name of a compressed text file without `.gz`; `None` for other files. Binary formats compress their
+/// columns themselves.
 fn packed_text(path: &Path) -> Option<PathBuf> {
     packed::inner(path).filter(|inner| format_of(inner).is_some_and(|format| format.name == csv::CSV.name))
 }
 
-/// The format of a file, and its bytes.
+/// Returns the format of a file and its decompressed bytes.
 pub(crate) fn bytes_of(path: &Path) -> Result<(&'static Format, Vec<u8>), IoError> {
     let file = || path.display().to_string();
     if path.is_dir() {
@@ -154,15 +154,16 @@ pub(crate) fn bytes_of(path: &Path) -> Result<(&'static Format, Vec<u8>), IoErro
     let format = format_to_read(plain)?;
     let mut bytes = fs::read(path).map_err(|source| IoError::Unreadable { file: file(), source })?;
     if inner.is_some() {
-        bytes = packed::unpacked(&bytes, &file())?;
+        bytes = packed::decompressed(&bytes, &file())?;
     }
-    if format.endings == csv::TSV.endings {
+    if format.extensions == csv::TSV.extensions {
         bytes = packed::with_sidecar(bytes, plain);
     }
     Ok((format, bytes))
 }
 
-/// The format and the table of a long text of plain numbers, read block by block; `None` for any other file.
+/// Returns the format and the table of a long text file of plain numbers, which is read block by block; `None` for any
+/// other file.
 ///
 /// # Errors
 /// [`IoError::Unreadable`].
@@ -180,10 +181,10 @@ pub(crate) fn long_text<'a>(
     Ok(text.zip(table.map_err(unreadable)?.flatten()))
 }
 
-/// The requested columns of a file of any format, whose table may borrow from `bytes`.
+/// Returns the requested columns of a file of any format; the table may borrow from `bytes`.
 ///
 /// # Errors
-/// As for reading a record.
+/// As in reading a record.
 pub(crate) fn table_of_file<'a>(
     path: &Path,
     file: &'a str,
@@ -191,7 +192,7 @@ pub(crate) fn table_of_file<'a>(
     options: &ReadOptions,
 ) -> Result<Table<'a>, IoError> {
     if let Some((_, table)) = long_text(path, file, options)? {
-        return finished(table, false, options);
+        return with_time_and_selection(table, false, options);
     }
     let (format, read) = bytes_of(path)?;
     *bytes = read;
@@ -204,12 +205,12 @@ mod tests {
 
     #[test]
     fn each_ending_stands_for_one_format() {
-        let mut endings: Vec<&str> = ALL.iter().flat_map(|format| format.endings).copied().collect();
+        let mut endings: Vec<&str> = ALL.iter().flat_map(|format| format.extensions).copied().collect();
         let count = endings.len();
         endings.sort_unstable();
         endings.dedup();
         assert_eq!(endings.len(), count);
-        assert!(ALL.iter().all(|format| !format.endings.is_empty()));
+        assert!(ALL.iter().all(|format| !format.extensions.is_empty()));
     }
 
     #[test]
@@ -237,9 +238,9 @@ mod tests {
 
     #[test]
     fn endings_as_text() {
-        assert_eq!(endings(&[&csv::CSV]), ".csv (also as .txt)");
+        assert_eq!(extensions(&[&csv::CSV]), ".csv (also as .txt)");
         assert_eq!(
-            endings(&[&csv::CSV, &csv::TSV, &csv::TSV]),
+            extensions(&[&csv::CSV, &csv::TSV, &csv::TSV]),
             ".csv (also as .txt), .tsv or .tsv"
         );
         assert!(readable_endings().contains(".xdf"));

@@ -1,22 +1,22 @@
-//! The file formats, one module each, and what they share.
+//! The file formats, one module per format, and their common parts.
 //!
-//! To add a format: a module with a [`Format`], its `mod` line here and its line in [`ALL`].
+//! To add a format, write a module with a [`Format`] and add its `mod` line and its entry in [`ALL`] here.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `format` | [`Format`]: the self-description of a format, and all that the rest of the crate knows of it |
-//! | `lookup` | the format of a file by its extension; what to do about the formats of others |
+//! | `format` | [`Format`]: the interface through which the rest of the crate uses a format |
+//! | `lookup` | choice of the format by file extension; remedies for unsupported formats |
 //! | `csv` | text with commas, semicolons or tabs |
 //! | `parquet` | Apache Parquet |
 //! | `npz` | NPZ and NPY of numpy |
 //! | `mat` | variables of MATLAB, HDF5 |
 //! | `xdf` | streams of the Lab Streaming Layer |
-//! | `packed` | text packed by gzip, and tables of BIDS |
-//! | `arrays` | files of named arrays: paths, and the columns among them |
-//! | `budget` | how much memory a file may take |
-//! | `guarded` | panics of foreign readers as errors |
+//! | `packed` | text compressed by gzip, and tables of BIDS |
+//! | `arrays` | files of named arrays: paths, and selection of columns |
+//! | `budget` | limit of the memory that a file may take |
+//! | `guarded` | conversion of panics in third-party readers to errors |
 
-// Numbers of a file are never an index, a length or a summand before they are checked.
+// Numbers from a file are checked before they serve as an index, a length or a summand.
 #[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 pub(crate) mod arrays;
 mod budget;
@@ -42,7 +42,7 @@ pub(crate) use format::{ColumnsWriter, Format, Reading, RowWriter, Writing};
 pub(crate) use lookup::{bytes_of, format_to_write, long_text, table_of_file};
 pub use lookup::{readable_endings, writable_endings};
 
-/// All formats, in the order in which messages name them. No two share an extension.
+/// All formats, in the order in which messages list them. No two formats share an extension.
 const ALL: &[&Format] = &[
     &csv::CSV,
     &csv::TSV,

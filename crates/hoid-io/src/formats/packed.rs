@@ -1,6 +1,5 @@
-//! Text packed by gzip, and recordings of the Brain Imaging Data Structure: a table without a
-//! header whose columns and rate are in a JSON file next to it (BIDS specification, *Physiological
-//! recordings*).
+//! Text compressed by gzip, and recordings of the Brain Imaging Data Structure: a table without a header, whose column
+//! names and sampling rate are in a JSON file next to it (BIDS specification, *Physiological recordings*).
 
 use std::fmt::Write as _;
 use std::fs;
@@ -14,17 +13,17 @@ use super::budget::Budget;
 use crate::IoError;
 use crate::table::Cell;
 
-/// Bytes unpacked at a time.
+/// Number of bytes decompressed at a time.
 const PART: usize = 1 << 16;
 
-/// The name without `.gz`; `None` if it has no such extension.
+/// Returns the name without `.gz`; `None` if the file has another extension.
 pub(super) fn inner(path: &Path) -> Option<PathBuf> {
     let packed = path.extension()?.eq_ignore_ascii_case("gz");
     packed.then(|| path.with_extension(""))
 }
 
-/// Unpacks the bytes.
-pub(super) fn unpacked(bytes: &[u8], file: &str) -> Result<Vec<u8>, IoError> {
+/// Decompresses gzip data.
+pub(super) fn decompressed(bytes: &[u8], file: &str) -> Result<Vec<u8>, IoError> {
     let mut budget = Budget::of(bytes.len());
     let mut reader = MultiGzDecoder::new(bytes);
     let mut text = Vec::new();
@@ -53,7 +52,7 @@ struct Sidecar {
     columns: Vec<String>,
 }
 
-/// Adds a header and a column t to the table, if the JSON file next to it gives both.
+/// Adds a header, and a column t if there is none, to a table without a header that has a JSON file next to it.
 pub(super) fn with_sidecar(bytes: Vec<u8>, path: &Path) -> Vec<u8> {
     let said = fs::read(path.with_extension("json")).ok();
     let Some(sidecar) = said.and_then(|json| serde_json::from_slice::<Sidecar>(&json).ok()) else {
@@ -80,7 +79,7 @@ pub(super) fn with_sidecar(bytes: Vec<u8>, path: &Path) -> Vec<u8> {
     for (row, line) in text.lines().enumerate() {
         if !named_t && !line.is_empty() {
             let t = sidecar.start_s + row as f64 / sidecar.sampling_hz;
-            // Writing into a String does not fail.
+            // Writing to a String cannot fail.
             let written = write!(table, "{t}\t");
             debug_assert!(written.is_ok());
         }

@@ -1,4 +1,4 @@
-//! Atomic files: written under a temporary name in the same directory, then renamed.
+//! Atomic writing of files: a file is written under a temporary name in the same directory and then renamed.
 
 use std::fs;
 use std::io::{self, BufWriter, Write};
@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 use super::part_file::Part;
 use crate::IoError;
 
-/// Writes a file through `write`. An existing file is replaced only when everything is written and
-/// on the disk; on an error it is unchanged and no other file remains. A pipe or a device is
-/// written to directly.
+/// Writes a file by calling `write`. An existing file is replaced only after all data have been written to the disk; if
+/// an error occurs, it is unchanged and no other file remains. Pipes and devices are written to directly.
 ///
 /// # Errors
-/// [`IoError::Directory`], [`IoError::Unwritable`] for an error of the system or of `write`.
+/// [`IoError::Directory`] if the path is a directory; [`IoError::Unwritable`] for an error of the operating system or
+/// of `write`.
 ///
 /// ```
 /// let path = std::env::temp_dir().join("hoid-example.txt");
@@ -27,10 +27,10 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::R
     file.finish()
 }
 
-/// Creates a directory for results, and its parents, unless they exist.
+/// Creates a directory for results, including missing parent directories.
 ///
 /// # Errors
-/// [`IoError::Unwritable`] for errors that the operating system reports.
+/// [`IoError::Unwritable`] for errors reported by the operating system.
 pub fn make_directory(path: &Path) -> Result<(), IoError> {
     fs::create_dir_all(path).map_err(|source| IoError::Unwritable {
         file: path.display().to_string(),
@@ -38,12 +38,12 @@ pub fn make_directory(path: &Path) -> Result<(), IoError> {
     })
 }
 
-/// A file in progress: dropped before it is finished, it leaves everything unchanged.
+/// A file being written; if dropped before [`finish`](Self::finish), it leaves an existing file unchanged.
 pub(crate) struct WholeFile {
     buffer: BufWriter<fs::File>,
-    /// Name as the user gave it.
+    /// Path as given by the user.
     name: String,
-    /// The final path and the temporary file; `None` for a pipe or a device.
+    /// Final path and temporary file; `None` for a pipe or a device.
     part_file: Option<PartFile>,
 }
 
@@ -56,7 +56,7 @@ struct PartFile {
 impl WholeFile {
     pub(crate) fn create(path: &Path) -> Result<Self, IoError> {
         let name = path.display().to_string();
-        // A link is kept: the file that it refers to is replaced.
+        // A symbolic link is kept: the file to which it points is replaced.
         let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         let known = fs::metadata(&place).ok();
         let opened = match known {
@@ -77,7 +77,7 @@ impl WholeFile {
         }
     }
 
-    /// Writes through `write`, after the existing data.
+    /// Appends the data written by `write`.
     pub(crate) fn write<T>(&mut self, write: impl FnOnce(&mut dyn Write) -> io::Result<T>) -> Result<T, IoError> {
         write(&mut self.buffer).map_err(|source| IoError::Unwritable {
             file: self.name.clone(),
@@ -85,7 +85,7 @@ impl WholeFile {
         })
     }
 
-    /// Moves the file to its final path once everything is on the disk.
+    /// Renames the file to its final path after all data have been written to the disk.
     pub(crate) fn finish(self) -> Result<(), IoError> {
         let Self {
             buffer,
@@ -119,7 +119,7 @@ fn part(place: PathBuf, permissions: Option<fs::Permissions>) -> io::Result<(fs:
     ))
 }
 
-/// The directory of a file to be written.
+/// Returns the directory of a file that will be written.
 pub(super) fn directory_of(place: &Path) -> io::Result<PathBuf> {
     if place.file_name().is_none() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "the path names no file"));

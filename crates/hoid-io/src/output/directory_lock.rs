@@ -1,7 +1,7 @@
 //! Exclusive use of a directory of results by one process.
 //!
-//! The lock is that of the operating system on the directory itself (on a file `.hoid-lock` in it
-//! where directories cannot be opened), so that a killed process leaves no lock. On a file system without locks,
+//! The lock is an operating-system lock on the directory itself (on a file `.hoid-lock` in the directory where
+//! directories cannot be opened), so that a killed process leaves no lock. On a file system that does not support locks
 //! nothing is locked.
 
 use std::fs::{File, TryLockError};
@@ -9,7 +9,7 @@ use std::path::Path;
 
 use crate::IoError;
 
-/// A directory that is locked against other processes until this is dropped.
+/// A directory that is locked against other processes until this value is dropped.
 #[derive(Debug)]
 pub struct DirectoryLock(#[allow(dead_code)] Option<File>);
 
@@ -17,7 +17,7 @@ impl DirectoryLock {
     /// Locks an existing directory.
     ///
     /// # Errors
-    /// [`IoError::InUse`] if another process, or another run in this one, has locked it.
+    /// [`IoError::InUse`] if another process, or another run in the same process, has locked the directory.
     pub fn take(directory: &Path) -> Result<Self, IoError> {
         #[cfg(unix)]
         let opened = File::open(directory);

@@ -1,11 +1,11 @@
-//! Rules for all files and directories that are written.
+//! Writing of files and directories without loss of data.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `atomic` | [`write_atomically`]: files that are whole or not there |
-//! | `part_file` | files on their way, and what dead processes left of them |
-//! | `place` | [`check_output`]: no result in the place of an input |
-//! | `directory_lock` | [`DirectoryLock`]: one process a directory |
+//! | `atomic` | [`write_atomically`]: files that are either complete or absent |
+//! | `part_file` | temporary files, and removal of those left by ended processes |
+//! | `place` | [`check_output`]: protection of inputs from being overwritten |
+//! | `directory_lock` | [`DirectoryLock`]: use of a directory by one process at a time |
 
 mod atomic;
 mod directory_lock;

@@ -1,10 +1,10 @@
-//! Files in progress: `.hoid-*.part` in the directory of their final path.
+//! Temporary files for output in progress: `.hoid-*.part` in the directory of the final path.
 //!
-//! A part is locked during the life of its writer; the system releases the locks of a process that
-//! ended, for any reason. A part that can be locked therefore has no owner, and the next process
-//! that writes to its directory removes it. After locking, a writer checks that its part still
-//! exists, so that a part is never removed between its creation and its lock. On a file system
-//! without locks, parts are left alone.
+//! A temporary file is locked while its writer exists; the operating system releases the locks of a process when the
+//! process ends for any reason. A temporary file that can be locked therefore has no owner, and the next process that
+//! writes to its directory removes it. After locking, a writer checks that its file still exists, because another
+//! process may have removed the file before it was locked. On a file system that does not support locks, temporary
+//! files are left in place.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -17,10 +17,11 @@ use tempfile::{NamedTempFile, TempPath};
 const PREFIX: &str = ".hoid-";
 const SUFFIX: &str = ".part";
 
-/// Attempts to create a part that another process removes before it is locked; normally one suffices.
+/// Maximum number of attempts to create a temporary file, in case another process removes it before it is locked;
+/// normally one attempt suffices.
 const ATTEMPTS: usize = 16;
 
-/// Files in progress of this process, and the directories that it has cleaned.
+/// Temporary files of this process, and the directories that this process has cleaned.
 struct PartFiles {
     parts: BTreeSet<PathBuf>,
     swept: BTreeSet<PathBuf>,
@@ -35,26 +36,28 @@ fn known() -> MutexGuard<'static, PartFiles> {
     KNOWN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes the partial output of this process when it is interrupted, since nothing is dropped when a process exits.
+/// Removes the temporary files of this process. It must be called on an interrupt, since values are not dropped when a
+/// process exits.
 pub fn remove_unfinished_files() {
     for part in std::mem::take(&mut known().parts) {
-        // A part that was already renamed, or cannot be removed now, is removed later.
+        // A file that has already been renamed needs no removal; one that cannot be removed now is removed by a later
+        // process.
         let _ = fs::remove_file(part);
     }
 }
 
-/// A file in progress, removed when it is dropped.
+/// A temporary file, removed when this value is dropped.
 pub(super) struct Part {
     path: Option<TempPath>,
 }
 
 impl Part {
-    /// Creates a locked part in a directory, after removing the parts of ended processes.
+    /// Creates a locked temporary file in a directory, after removing the temporary files of processes that have ended.
     pub(super) fn create_in(directory: &Path) -> io::Result<(File, Self)> {
         sweep_once(directory);
         let mut made = make(directory)?;
         for _ in 1..ATTEMPTS {
-            // Without locks no process removes it.
+            // If the file cannot be locked, locks are not supported, and no process removes the file.
             if made.as_file().lock().is_err() || made.path().exists() {
                 break;
             }
@@ -65,7 +68,7 @@ impl Part {
         Ok((file, Self { path: Some(path) }))
     }
 
-    /// Renames the part to its final path.
+    /// Renames the temporary file to its final path.
     pub(super) fn persist(mut self, file: File, place: &Path, permissions: Option<fs::Permissions>) -> io::Result<()> {
         let Some(path) = self.path.take() else {
             return Err(io::Error::other("the file was already put in its place"));
@@ -87,8 +90,8 @@ impl Drop for Part {
     }
 }
 
-/// Creates a file with default permissions (those of the umask); temporary files are otherwise
-/// private to their owner.
+/// Creates a file with default permissions (according to the umask), since temporary files are otherwise private to
+/// their owner.
 fn make(directory: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(PREFIX).suffix(SUFFIX);
@@ -100,8 +103,7 @@ fn make(directory: &Path) -> io::Result<NamedTempFile> {
     builder.tempfile_in(directory).map_err(without_path)
 }
 
-/// The error of the system without the name of the part, which is of no interest to the user: the message names the
-/// requested path.
+/// Returns the system error without the name of the temporary file; the message contains the requested path instead.
 fn without_path(error: io::Error) -> io::Error {
     let text = error.to_string();
     match text.split_once(" at path ") {
@@ -110,7 +112,7 @@ fn without_path(error: io::Error) -> io::Error {
     }
 }
 
-/// Cleans a directory the first time that this process writes to it.
+/// Cleans a directory the first time this process writes to it.
 fn sweep_once(directory: &Path) {
     let directory = fs::canonicalize(directory).unwrap_or_else(|_| directory.to_owned());
     if known().swept.insert(directory.clone()) {
@@ -118,7 +120,7 @@ fn sweep_once(directory: &Path) {
     }
 }
 
-/// Removes the parts of ended processes. A part that cannot be examined is left.
+/// Removes the temporary files of processes that have ended. A file that cannot be opened is left.
 fn sweep(directory: &Path) {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     for entry in entries {
@@ -129,7 +131,8 @@ fn sweep(directory: &Path) {
             continue;
         }
         let path = entry.path();
-        // The lock is held during the removal: the owner of the part waits for it, and creates another.
+        // The lock is held during the removal: the writer of the file waits for the lock, and then creates another
+        // file.
         if let Ok(file) = File::options().read(true).write(true).open(&path)
             && file.try_lock().is_ok()
         {

@@ -1,8 +1,8 @@
-//! Checks before the work starts whether a result can be written to a path: a result never replaces its own input, and
-//! an unwritable directory is detected at once.
+//! Checks, before the work starts, whether a result can be written to a path: a result never replaces its own input,
+//! and an unwritable directory is detected at once.
 //!
-//! Two paths denote the same file if the system gives them the same device and number (so that
-//! symbolic and hard links count), on other systems if their full paths agree.
+//! Two paths denote the same file if the system reports the same device and file number for both (so that symbolic and
+//! hard links are recognised), or, on other systems, if their full paths are equal.
 
 use std::fs;
 use std::io;
@@ -12,7 +12,7 @@ use super::atomic::directory_of;
 use super::part_file::Part;
 use crate::IoError;
 
-/// True if two paths denote the same existing file, also through a link.
+/// True if two paths denote the same existing file, directly or through a link.
 #[must_use]
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     let (Ok(known_a), Ok(known_b)) = (fs::metadata(a), fs::metadata(b)) else {
@@ -30,11 +30,11 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
     }
 }
 
-/// Checks that a file can be written to a path without replacing one of `inputs`. No file is left there; pipes and
+/// Checks that a file can be written to a path without replacing one of `inputs`. The check leaves no file; pipes and
 /// devices are not opened.
 ///
 /// # Errors
-/// [`IoError::OutputIsInput`], [`IoError::Directory`], [`IoError::Unwritable`].
+/// [`IoError::OutputIsInput`], [`IoError::Directory`] or [`IoError::Unwritable`].
 pub fn check_output(output: &Path, inputs: &[&Path]) -> Result<(), IoError> {
     let file = || output.display().to_string();
     match fs::metadata(output) {
@@ -53,11 +53,11 @@ pub fn check_output(output: &Path, inputs: &[&Path]) -> Result<(), IoError> {
     tried.map_err(|source| IoError::Unwritable { file: file(), source })
 }
 
-/// Checks that files can be written to a directory, which may have to be created, without replacing
-/// one of `inputs`: none may lie in it.
+/// Checks that files can be written to a directory, which may not exist yet. None of `inputs` may lie in the directory,
+/// so that no input is replaced.
 ///
 /// # Errors
-/// [`IoError::OutputAmongInputs`], [`IoError::Unwritable`].
+/// [`IoError::OutputAmongInputs`] or [`IoError::Unwritable`].
 pub fn check_output_directory(directory: &Path, inputs: &[&Path]) -> Result<(), IoError> {
     let file = || directory.display().to_string();
     let lies_in = |input: &&&Path| directory_of(input).is_ok_and(|of| is_same_file(&of, directory));
@@ -71,7 +71,7 @@ pub fn check_output_directory(directory: &Path, inputs: &[&Path]) -> Result<(), 
     tried.map_err(|source| IoError::Unwritable { file: file(), source })
 }
 
-/// The directory, or its nearest existing parent.
+/// Returns the directory, or its nearest existing parent.
 fn nearest(directory: &Path) -> io::Result<PathBuf> {
     let mut at = directory;
     loop {

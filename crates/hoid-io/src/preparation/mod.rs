@@ -1,20 +1,21 @@
-//! Treatment of a record between the file and the estimator, and the list of the steps.
+//! Preparation of a record between file and estimator, and the list of applied steps.
 //!
 //! The steps are applied in a fixed order, independent of the order in which they were requested:
 //!
-//! | step | module | what it does |
+//! | step | module | effect |
 //! |---|---|---|
-//! | units | `scaling` | units that the file does not report |
-//! | scale | `scaling` | a channel times a factor, or from one unit to another |
-//! | offset | `offset` | channels that were recorded late are put next to the others |
-//! | rate | `rate` | every M-th sample, or a new sampling frequency, after a low-pass filter |
-//! | run-in | `run_in` | the first seconds are dropped |
-//! | detrend | [`Record::detrended`](hoid_model::Record::detrended) | mean or straight line out of input and output |
+//! | units | `scaling` | sets units that the file does not give |
+//! | scale | `scaling` | multiplies a channel by a factor, or converts its unit |
+//! | offset | `offset` | aligns channels that were recorded late |
+//! | rate | `rate` | low-pass filters, then keeps every M-th sample or resamples to a new frequency |
+//! | run-in | `run_in` | drops the run-in at the start |
+//! | detrend | [`Record::detrended`](hoid_model::Record::detrended) | removes the mean or a straight line from input and output |
 //!
-//! [`Preparation`] in `pipeline` applies them to the channels of a record, separated by `record_parts`. The filter of
-//! the two steps that need one, and the decimation, are those of [`hoid_model::resampling`]. For an offset and for a
-//! new frequency, samples whose filter would reach beyond the record are cut and never extrapolated; decimation keeps
-//! all samples. Each applied step is a [`Step`] with its numbers; reading adds its repairs before them.
+//! [`Preparation`] in `pipeline` applies the steps to the channels of a record, which `record_parts` separates. The
+//! interpolation filter of the steps offset and rate, and the decimation, are in [`hoid_model::resampling`]. For an
+//! offset or a new frequency, samples whose filter would reach beyond the record are cut and never extrapolated;
+//! decimation cuts nothing at the ends. Each applied step is a [`Step`] with its numbers; the repairs made in reading
+//! precede these steps in the list.
 
 mod offset;
 mod pipeline;

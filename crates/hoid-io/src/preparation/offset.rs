@@ -1,10 +1,10 @@
 //! Alignment of channels that were recorded late.
 //!
-//! A channel with the offset d was recorded d samples late: its sample k + d corresponds to sample k of the others,
-//! `x'(k) = x(k + d)`. An offset of whole samples moves rows and changes no number. Between samples the band-limited
+//! A channel with offset d was recorded d samples late: its sample k + d belongs to sample k of the other channels,
+//! `x'(k) = x(k + d)`. An offset of whole samples shifts rows and changes no value. For other offsets the band-limited
 //! signal is interpolated by the windowed sinc of [`Kernel`]: up to 0.8 of the Nyquist frequency its error is below
-//! 1e-4 of the amplitude (80 dB); above, the channel is distorted. Rows for which a channel lacks a sample, or samples
-//! that the filter needs, are cut.
+//! 1e-4 of the amplitude (80 dB); components above are distorted. Rows in which a channel has no sample, or lacks
+//! samples that the filter needs, are cut.
 
 use std::str::FromStr;
 
@@ -15,19 +15,19 @@ use super::step::Step;
 use crate::IoError;
 use crate::wording::decimal;
 
-/// Distance from a whole number of samples that counts as zero.
+/// Largest deviation from a whole number of samples at which an offset counts as whole.
 const WHOLE: f64 = 1e-6;
 
 /// Recording delay of a channel; negative if it was recorded early.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Offset {
-    /// In samples of the record as read.
+    /// Delay in samples of the record as read.
     Samples(f64),
-    /// In s.
+    /// Delay in s.
     Seconds(f64),
 }
 
-/// `1`, `-0.5`, `0.0167s`.
+/// Parses a delay in samples (`1`, `-0.5`) or in s (`0.0167s`).
 impl FromStr for Offset {
     type Err = IoError;
 
@@ -44,7 +44,7 @@ impl FromStr for Offset {
     }
 }
 
-/// An offset as whole samples and a remainder.
+/// An offset as a whole number of samples and a remainder.
 #[derive(Clone, Copy)]
 struct Shift {
     samples: f64,
@@ -80,8 +80,8 @@ impl RecordParts {
         let kernel = Kernel::interpolating();
         let half = |shift: Shift| if shift.interpolated { kernel.half() as f64 } else { 0.0 };
         let last = self.len() as f64 - 1.0;
-        // The rows for which every channel has the samples it needs; in floating point, since an
-        // offset may be of any size.
+        // First and last row for which every channel has the samples it needs; in floating point, since an offset may
+        // be arbitrarily large.
         let (mut from, mut to) = (0.0_f64, last);
         for (_, shift) in &shifts {
             from = from.max((half(*shift) - shift.samples).ceil());

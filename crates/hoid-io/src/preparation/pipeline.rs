@@ -1,4 +1,4 @@
-//! The preparation steps in their order.
+//! The preparation steps in the order of application.
 
 use std::collections::BTreeMap;
 
@@ -13,33 +13,33 @@ use crate::IoError;
 
 /// Preparation steps of a record. By default there are none.
 ///
-/// A channel is given by its name; `e` and `u` are the input and the output, regardless of their
-/// column names.
+/// Channels are given by name; `e` and `u` denote the input and the output regardless of their column names.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Preparation {
-    /// Units by channel, where the file gives none.
+    /// Unit by channel, for channels whose unit the file does not give.
     pub units: BTreeMap<String, String>,
-    /// Factors and units by channel.
+    /// Factor and new unit by channel.
     pub scale: BTreeMap<String, Scaling>,
     /// Recording delay by channel.
     pub offset: BTreeMap<String, Offset>,
     /// New sampling rate.
     pub rate: NewRate,
-    /// Time from the first sample that is dropped, s. The samples cut by the filters are part of it.
+    /// Length of the initial part of the record that is dropped, s. It includes the samples cut by filters at the
+    /// start.
     pub run_in_s: f64,
     /// Trend removed from input and output, as the last step.
     pub detrend: Detrend,
-    /// True if duplicated rows, including the time, are dropped before anything is read.
+    /// True if rows that equal the row before, including the time, are dropped when the file is read.
     pub drop_repeated: bool,
 }
 
 impl Preparation {
-    /// Returns the prepared record and the applied steps. [`Preparation::drop_repeated`] is applied in reading and is
-    /// ignored here.
+    /// Returns the prepared record and the applied steps. [`Preparation::drop_repeated`] takes effect when the file is
+    /// read and is ignored here.
     ///
     /// # Errors
-    /// [`IoError::Preparation`] with the step, the value found and the expected value;
-    /// [`IoError::Model`] if the numbers leave the range of floating point.
+    /// [`IoError::Preparation`] with the step, the value found and the expected value; [`IoError::Model`] if values
+    /// exceed the floating-point range.
     pub fn apply(&self, record: Record) -> Result<(Record, Vec<Step>), IoError> {
         let begin_s = record.time_s(0);
         let mut parts = RecordParts::new(record);

@@ -1,19 +1,18 @@
-//! A new sampling rate, with a low-pass filter against aliasing; the same for all channels.
+//! Change of the sampling rate, with the same anti-aliasing filter for all channels.
 //!
-//! **Every M-th sample** is the decimation of [`hoid_model::resampling`]: no sample is lost, and
-//! the input is taken in the middle of its longer hold, so that the delay of a model is unchanged.
+//! **Every M-th sample** is the decimation of [`hoid_model::resampling`]: nothing is cut at the ends, and the input is
+//! taken in the middle of its longer hold, so that the delay of a model is unchanged.
 //!
-//! **A new sampling frequency** is interpolated from the record by the windowed sinc of [`Kernel`]. Its pass band ends
-//! at 0.8 of the lower one of the old and the new Nyquist frequency, where the ripple is below 1e-4 (0.001 dB). If the
-//! frequency decreases, its stop band starts at the new Nyquist frequency: aliases are attenuated by 80 dB. The filter
-//! has linear phase, its delay is compensated, and it is the same for all channels, so that the relation between e and
-//! u is preserved. New samples lie on the grid that starts with the first sample of the record; those whose filter
-//! would reach beyond the record are cut.
+//! **A new sampling frequency** is obtained by interpolating the record with the windowed sinc of [`Kernel`]. Its pass
+//! band ends at 0.8 of the lower of the old and the new Nyquist frequencies; the ripple in the pass band is below 1e-4
+//! (0.001 dB). If the frequency decreases, the stop band starts at the new Nyquist frequency, and aliases are
+//! attenuated by 80 dB. The filter has linear phase, its delay is compensated, and it is the same for all channels, so
+//! that the relation between e and u is preserved. The new samples lie on a grid that starts at the first sample of the
+//! record; samples whose filter would reach beyond the record are cut.
 //!
-//! A model with a hold (all models of this project) has an input that is held over the new sample
-//! time T, while the input of the operator was held over the old Ts, if at all. A hold of T delays
-//! by T/2: to agree with the data, the delay of the model is shorter by `(T - Ts) / 2` than the one
-//! identified at the old rate.
+//! In a model with a hold (all models of hoid) the input is held over the new sample time T, whereas the input of the
+//! operator was held over the old sample time Ts, if at all. A hold over T delays by T/2: to agree with the data, the
+//! delay of the model must be shorter by `(T - Ts) / 2` than the delay identified at the old rate.
 
 use hoid_model::{
     Detrend, SampleTime,
@@ -25,18 +24,18 @@ use super::step::Step;
 use crate::IoError;
 use crate::wording::decimal;
 
-/// Largest ratio of the number of new samples to old ones.
+/// Maximum number of new samples per old sample.
 const LARGEST_FACTOR: f64 = 100.0;
 
 /// New sampling rate.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum NewRate {
-    /// The rate of the record.
+    /// The rate of the record is kept.
     #[default]
     Kept,
-    /// Every M-th sample.
+    /// Only every M-th sample is kept.
     Decimated(usize),
-    /// A sampling frequency, Hz.
+    /// New sampling frequency, Hz.
     Hz(f64),
 }
 
@@ -79,7 +78,7 @@ impl RecordParts {
         if factor < 1.0 / LARGEST_FACTOR {
             return Err(self.error(
                 step,
-                format!("{} samples out of one", decimal(1.0 / factor)),
+                format!("{} samples from one sample", decimal(1.0 / factor)),
                 format!("at most {LARGEST_FACTOR}"),
             ));
         }
@@ -100,8 +99,7 @@ impl RecordParts {
             Kernel::interpolating()
         };
         let half = kernel.half() as f64;
-        // On the grid that starts with the first sample of the record; a bound that falls on a
-        // sample, up to rounding, includes it.
+        // The new grid starts at the first sample of the record; a sample at a bound, up to rounding, is included.
         let first = ((half - 1e-10) / factor).ceil();
         let end = ((last - half + 1e-10) / factor).floor();
         if first > end {

@@ -12,7 +12,7 @@ pub(super) struct RecordParts {
     pub(super) start_s: f64,
     pub(super) sample_time: SampleTime,
     pub(super) channels: Vec<Channel>,
-    /// True if the first channel is an input; then the second is the output, otherwise the first.
+    /// True if the first channel is an input; the output is then the second channel, otherwise the first.
     has_input: bool,
     pub(super) steps: Vec<Step>,
 }
@@ -45,7 +45,7 @@ impl RecordParts {
         }
     }
 
-    /// The channels that the names of a step denote.
+    /// Returns the index of each channel that a step names, with its value.
     pub(super) fn find<T: Copy>(
         &self,
         step: &'static str,
@@ -76,7 +76,7 @@ impl RecordParts {
         Ok(found)
     }
 
-    /// Keeps some samples of all channels.
+    /// Keeps a range of samples of all channels.
     pub(super) fn keep(&mut self, samples: std::ops::Range<usize>) {
         self.start_s += samples.start as f64 * self.sample_time.s();
         for channel in &mut self.channels {

@@ -1,4 +1,4 @@
-//! Removal of the first seconds.
+//! Removal of the run-in at the start of a record.
 
 use super::record_parts::RecordParts;
 use super::step::Step;
@@ -6,7 +6,7 @@ use crate::IoError;
 use crate::wording::decimal;
 
 impl RecordParts {
-    /// Drops everything before the end of the run-in.
+    /// Drops all samples before the end of the run-in.
     pub(super) fn run_in(&mut self, begin_s: f64, run_in_s: f64) -> Result<(), IoError> {
         const STEP: &str = "run-in";
         if run_in_s == 0.0 {
@@ -16,7 +16,7 @@ impl RecordParts {
             return Err(self.error(STEP, format!("{run_in_s} s"), "a positive time in s"));
         }
         let ts = self.sample_time.s();
-        // A bound that falls on a sample, up to rounding, includes it.
+        // A sample at the end of the run-in, up to rounding, is kept.
         let first = ((begin_s + run_in_s - self.start_s) / ts - 1e-6).ceil().max(0.0);
         if first >= self.len() as f64 {
             return Err(self.error(

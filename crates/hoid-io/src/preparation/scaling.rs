@@ -1,8 +1,8 @@
 //! Factors and units of channels: `u=12.5`, `u=12.5:deg`, `e=rad:deg`.
 //!
-//! The factor multiplies the numbers of the file; the new unit follows after a colon. Two known
-//! units of the same kind define the factor exactly: `rad:deg` is 180 / pi. Parameters of the
-//! operator are ratios of u and e: with e in deg and u in V the gain K_e is in V/deg.
+//! The factor multiplies the values in the file; the new unit follows the colon. Two known units of the same kind
+//! define the factor exactly: `rad:deg` means 180 / pi. Gains of the operator are ratios of u to e: with e in deg and u
+//! in V the gain K_e is in V/deg.
 
 use std::f64::consts::PI;
 use std::str::FromStr;
@@ -47,7 +47,7 @@ const OTHER_NAMES: [(&[&str], &str); 9] = [
     (&["newton", "newtons"], "N"),
 ];
 
-/// A unit by its default name; an unknown one unchanged.
+/// Returns the standard name of a unit; an unknown unit is returned unchanged.
 fn canonical(unit: &str) -> &str {
     let small = unit.to_lowercase();
     let other = OTHER_NAMES
@@ -56,19 +56,19 @@ fn canonical(unit: &str) -> &str {
     other.map_or(unit, |(_, canonical)| canonical)
 }
 
-/// Factor of a channel, and its new unit.
+/// Factor by which a channel is multiplied, and the new unit of the channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scaling {
     /// The factor, finite and not 0.
     factor: f64,
-    /// Unit that the file must not contradict.
+    /// Unit that the channel must have if the file gives one.
     from: Option<&'static str>,
     /// New unit; `None` if it is unknown, since the old one no longer applies.
     to: Option<String>,
 }
 
 impl Scaling {
-    /// Multiplication by a factor, after which the unit is `unit`, or unknown.
+    /// Creates a multiplication by a factor; the new unit is `unit`, or unknown if `unit` is `None`.
     ///
     /// # Errors
     /// [`IoError::Scaling`] unless the factor is finite and not 0.
@@ -76,7 +76,7 @@ impl Scaling {
         if factor == 0.0 || !factor.is_finite() {
             return Err(refused(
                 &factor.to_string(),
-                "a factor that is finite and not 0, since a channel times 0 carries no information",
+                "a finite nonzero factor, since a channel times 0 carries no information",
             ));
         }
         Ok(Self {
@@ -97,7 +97,7 @@ impl Scaling {
     }
 }
 
-/// `FACTOR`, `FACTOR:UNIT` or `UNIT:UNIT`.
+/// Parses `FACTOR`, `FACTOR:UNIT` or `UNIT:UNIT`.
 impl FromStr for Scaling {
     type Err = IoError;
 
@@ -109,7 +109,7 @@ impl FromStr for Scaling {
             None => (text.trim(), None),
         };
         let known = |name: &str| UNITS.into_iter().find(|(unit, ..)| *unit == canonical(name));
-        // A number is tried first: "1:deg" sets the unit and changes no value.
+        // The left part is tried as a number first: "1:deg" sets the unit and changes no value.
         if let Ok(factor) = left.parse::<f64>() {
             if right == Some("") {
                 return Err(refused(text, "a unit after the colon, such as 12.5:deg"));
@@ -117,7 +117,7 @@ impl FromStr for Scaling {
             return Self::by(factor, right).map_err(|_| {
                 refused(
                     text,
-                    "a factor that is finite and not 0, since a channel times 0 carries no information",
+                    "a finite nonzero factor, since a channel times 0 carries no information",
                 )
             });
         }
@@ -156,7 +156,7 @@ fn refused(found: &str, expected: &str) -> IoError {
 }
 
 impl RecordParts {
-    /// Sets the units given for the file; a unit in the file takes precedence.
+    /// Sets the units declared for channels; a declared unit that contradicts the file is an error.
     pub(super) fn declare_units(&mut self, units: &std::collections::BTreeMap<String, String>) -> Result<(), IoError> {
         const STEP: &str = "unit";
         let named = units.iter().map(|(name, unit)| (name.clone(), unit.as_str()));
@@ -188,7 +188,7 @@ impl RecordParts {
                 return Err(self.error(
                     STEP,
                     format!(
-                        "{} is in {found} according to its file, but to be converted from {from}",
+                        "{} is in {found} according to its file, but the conversion is from {from}",
                         self.channels[channel].name
                     ),
                     format!("the unit of the file, or a factor such as {}", decimal(scaling.factor)),

@@ -1,4 +1,4 @@
-//! The list of the steps applied to a record: as text, and as JSON with its numbers.
+//! The steps applied to a record, as text and as JSON with their numbers.
 
 use std::fmt;
 
@@ -7,88 +7,87 @@ use serde::Serialize;
 
 use crate::wording::{decimal, short};
 
-/// A step; steps are listed in the order of application.
+/// A preparation step; steps are listed in the order of application.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "step", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Step {
-    /// Duplicated rows, including the time, were dropped.
+    /// Rows that equal the row before, including the time, were dropped.
     DropRepeated {
-        /// Rows dropped.
+        /// Number of dropped rows.
         rows: usize,
-        /// The first of them, from 1.
+        /// First dropped row, counted from 1.
         first_row: usize,
     },
     /// Only a segment between faults was used.
     Mask {
-        /// Kinds of faults that are excluded.
+        /// Kinds of excluded faults.
         what: Vec<&'static str>,
         /// Time of the first sample of the segment, s.
         from_s: f64,
-        /// Time after its last sample, s.
+        /// Time of the first sample after the segment, s.
         to_s: f64,
     },
-    /// The values of a column logged at its own instants were extended to all rows, or the rows without one were
-    /// dropped.
+    /// A column logged at its own times was filled in for all rows, or rows in which it has no value were dropped.
     Sparse {
-        /// The column.
+        /// Name of the column.
         channel: String,
         /// "hold", "linear" or "drop".
         how: &'static str,
-        /// Number of its own values.
+        /// Number of values logged in the column.
         own: usize,
-        /// Rows between them without a value; with "drop" these rows are omitted.
+        /// Number of rows without a value between the logged ones; with "drop" these rows are omitted.
         rows: usize,
-        /// Longest time from one own value to the next with rows between them, s.
+        /// Longest time between two successive logged values that have rows between them, s.
         longest_s: f64,
-        /// Age of a value on average over all rows, if values are held, s.
+        /// Mean age of the values over all rows, s; `None` unless values are held.
         mean_age_s: Option<f64>,
     },
     /// Missing values were interpolated linearly.
     Fill {
-        /// The column.
+        /// Name of the column.
         channel: String,
         /// Number of interpolated values.
         values: usize,
         /// Longest run of missing values.
         longest: usize,
     },
-    /// Samples with uneven times were interpolated linearly to an even grid.
+    /// Unevenly spaced samples were interpolated linearly onto an evenly spaced grid.
     Interpolate {
-        /// Number of samples before.
+        /// Number of samples before the interpolation.
         from_samples: usize,
-        /// Number of samples after.
+        /// Number of samples after the interpolation.
         to_samples: usize,
         /// Sampling frequency of the grid, Hz.
         to_hz: f64,
-        /// Longest step between two samples, s.
+        /// Longest time between two successive samples, s.
         longest_step_s: f64,
     },
-    /// A channel was multiplied.
+    /// A channel was multiplied by a factor.
     Scale {
-        /// The channel.
+        /// Name of the channel.
         channel: String,
         /// The factor.
         factor: f64,
-        /// The new unit, if known.
+        /// New unit of the channel, if known.
         unit: Option<String>,
     },
     /// A channel that was recorded late was aligned with the others.
     Offset {
-        /// The channel.
+        /// Name of the channel.
         channel: String,
-        /// Delay, samples.
+        /// Delay of the channel in samples.
         samples: f64,
-        /// Delay, s.
+        /// Delay of the channel in s.
         seconds: f64,
         /// True if values between samples were obtained by band-limited interpolation.
         interpolated: bool,
         /// End of the band in which the interpolation is exact to 1e-4, Hz.
         pass_hz: Option<f64>,
-        /// Samples cut at the start and at the end of the record.
+        /// Numbers of samples cut at the start and at the end of the record.
         cut_samples: (usize, usize),
     },
-    /// Another sampling rate.
+    /// The sampling rate was changed.
     Rate {
         /// Ratio of the new sample time to the old one.
         factor: f64,
@@ -102,21 +101,21 @@ pub enum Step {
         stop_hz: Option<f64>,
         /// Attenuation in the stop band, dB.
         stop_db: f64,
-        /// Length of the filter, samples of the old rate.
+        /// Length of the filter, in samples at the old rate.
         taps: usize,
-        /// Time cut at the start and at the end, s.
+        /// Lengths cut at the start and at the end, s.
         cut_s: (f64, f64),
-        /// Reduction of the delay of a model with a hold compared with the old rate, s.
+        /// Time by which the delay of a model with a hold is shorter than at the old rate, s.
         delay_s: f64,
-        /// Time by which a sample of the input is later than that of the output in the same row, so that the delay is
-        /// the same at both rates, s.
+        /// Time by which the input in a row is sampled later than the output, s. With it the delay is the same at both
+        /// rates.
         input_lead_s: f64,
     },
-    /// The first seconds were dropped.
+    /// The run-in at the start was dropped.
     RunIn {
         /// Length of the run-in, s.
         seconds: f64,
-        /// Samples dropped, in addition to those cut by a filter.
+        /// Number of dropped samples, without those cut by a filter.
         samples: usize,
     },
     /// The mean or the linear trend of input and output was removed.
@@ -127,7 +126,7 @@ pub enum Step {
 }
 
 impl Step {
-    /// The step for a removed trend; `None` if none was removed.
+    /// Returns the step for a removed trend; `None` if no trend was removed.
     pub(super) fn of_detrend(how: Detrend) -> Option<Self> {
         match how {
             Detrend::None => None,
@@ -169,7 +168,7 @@ impl From<Decimated> for Step {
     }
 }
 
-/// The step as a phrase without a full stop.
+/// Describes the step in a phrase without a full stop.
 impl fmt::Display for Step {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -197,7 +196,7 @@ impl fmt::Display for Step {
                 )?;
                 match *how {
                     "drop" => write!(f, "dropped"),
-                    "hold" => write!(f, "hold the last one"),
+                    "hold" => write!(f, "hold the last value"),
                     _ => write!(f, "on straight lines"),
                 }?;
                 write!(f, "; at most {} s from one to the next", decimal(*longest_s))?;

@@ -1,9 +1,9 @@
-//! Alignment of channels that were recorded late, without losing an end of the span.
+//! Alignment of channels that were recorded late, without losing samples at the ends of the span.
 //!
-//! A channel that is moved by d samples lacks d rows at one end of the read data. A span of whole periods would thereby
-//! lose its last period. If the file extends beyond the span, as much of it is read as the offsets need, channels are
-//! moved, and the span is cut out afterwards: it keeps its length. Otherwise, or if the rate changes (whose filters cut
-//! more than the offsets do), rows are lost as in any other record.
+//! If a channel is shifted by d samples, d rows are missing at one end of the data. A span of whole periods would then
+//! lose its last period. If the file extends beyond the span, additional rows are therefore read, the channels are
+//! shifted, and the span is cut out afterwards, so that it keeps its length. If the file does not extend far enough, or
+//! if the rate changes (its filters cut more samples than the offsets), the missing rows are cut.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,10 +17,10 @@ use crate::IoError;
 use crate::formats::table_of_file;
 use crate::preparation::{NewRate, Offset, Preparation, Step};
 
-/// Additional rows beyond the span for an offset between samples.
+/// Number of additional rows beyond each end of the span for interpolation at a fractional offset.
 const FOR_INTERPOLATION: f64 = 64.0;
 
-/// Reads and prepares a record, with its output moved earlier by `late_samples` in addition.
+/// Reads and prepares a record whose output is additionally shifted earlier by `late_samples`.
 ///
 /// # Errors
 /// As [`read_prepared`](crate::read_prepared).
@@ -62,7 +62,7 @@ pub fn read_aligned(
     }
 }
 
-/// Reads the record as recorded.
+/// Reads the record without preparation.
 pub(super) fn read_as_recorded(path: &Path, options: &ReadOptions, drop_repeated: bool) -> Result<ReadRecord, IoError> {
     let file = path.display().to_string();
     let mut bytes = Vec::new();
@@ -76,7 +76,7 @@ pub(super) fn read_as_recorded(path: &Path, options: &ReadOptions, drop_repeated
     })
 }
 
-/// Largest number of samples by which a channel is moved, including those that interpolation needs.
+/// Returns the largest shift of a channel in samples, including the samples needed for interpolation.
 fn reach(preparation: &Preparation, late_samples: f64, ts_s: f64) -> f64 {
     let samples = |offset: &Offset| match offset {
         Offset::Samples(samples) => *samples,
@@ -88,8 +88,8 @@ fn reach(preparation: &Preparation, late_samples: f64, ts_s: f64) -> f64 {
     most.ceil() + if between { 2.0 * FOR_INTERPOLATION } else { 0.0 }
 }
 
-/// Moves the channels of the longer record, cuts out the span, and applies the steps after the
-/// offsets; `None` if that is not possible, and the shorter record gives the reason.
+/// Shifts the channels of the longer record, cuts out the span, and applies the remaining steps; `None` if this fails,
+/// in which case processing the shorter record gives the error.
 fn moved_within(
     wide: Record,
     narrow: &Record,

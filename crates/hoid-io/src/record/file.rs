@@ -1,9 +1,8 @@
 //! Reading and writing of records.
 //!
-//! Reading selects the requested columns, determines the sampling, checks every value in use and
-//! returns a [`Record`], or an error that names the place. Data are repaired only if
-//! [`Repair`](crate::Repair) requests it, and repairs are reported in the notes. The extension
-//! determines the format.
+//! Reading selects the requested columns, determines the sampling, checks every value in use and returns a [`Record`],
+//! or an error with its place in the file. Data are repaired only if [`Repair`](crate::Repair) requests it, and the
+//! repairs are reported in the notes. The extension determines the format.
 
 use std::io::Write;
 use std::path::Path;
@@ -20,8 +19,8 @@ use crate::output::write_atomically;
 use crate::preparation::Preparation;
 use crate::results::{ColumnKind, ColumnSchema, TableSchema, Values, write_values};
 
-/// Reads a record with the defaults of the command line: columns e, u and t, and each other numeric
-/// column as a separate channel.
+/// Reads a record with the defaults of the command line: columns e, u and t, and every other numeric column as a
+/// separate channel.
 ///
 /// # Errors
 /// As [`read_record`].
@@ -29,30 +28,30 @@ pub fn read(path: impl AsRef<Path>) -> Result<Record, IoError> {
     Ok(read_record(path.as_ref(), &ReadOptions::default())?.record)
 }
 
-/// Reads a record from a file: input, output, and each other numeric column as a separate channel.
+/// Reads a record from a file: the input, the output, and every other numeric column as a separate channel.
 ///
 /// # Errors
-/// [`IoError`], naming the place in the file.
+/// [`IoError`] with the place in the file.
 pub fn read_record(path: &Path, options: &ReadOptions) -> Result<ReadRecord, IoError> {
     read_prepared(path, options, &Preparation::default())
 }
 
-/// Reads a record and prepares it for the estimator: units, alignment and rate. A span keeps its
-/// length under offsets if the file extends beyond it.
+/// Reads a record and prepares it for the estimator: units, alignment and rate. With offsets a span keeps its length if
+/// the file extends beyond it.
 ///
 /// # Errors
-/// [`IoError`], naming the place in the file or the preparation step.
+/// [`IoError`] with the place in the file or the preparation step.
 pub fn read_prepared(path: &Path, options: &ReadOptions, preparation: &Preparation) -> Result<ReadRecord, IoError> {
     read_aligned(path, options, preparation, 0.0)
 }
 
-/// Writes a record: t, then `f_t` if there is one, input, output, and the other channels in their
-/// order, with digits that reproduce the same numbers. Units and sample time are written as
-/// comments; the label is not written.
+/// Writes a record: t, then `f_t` if there is one, the input, the output, and the other channels in their order, with
+/// enough digits to reproduce the numbers exactly. Units and sample time are written as comments; the label is not
+/// written.
 ///
 /// # Errors
-/// [`IoError::UnknownFormat`], [`IoError::ChannelName`] for a channel that could not be read back,
-/// and those of [`write_atomically`].
+/// [`IoError::UnknownFormat`]; [`IoError::ChannelName`] for a channel that could not be read back; the errors of
+/// [`write_atomically`].
 pub fn write_record(path: &Path, record: &Record) -> Result<(), IoError> {
     let format = format_to_write(path)?;
     check_names(record, || path.display().to_string())?;
@@ -62,7 +61,7 @@ pub fn write_record(path: &Path, record: &Record) -> Result<(), IoError> {
     }
 }
 
-/// Writes a record as a table of its channels, with the comments of CSV.
+/// Writes a record as a table of its channels, with the same comments as in CSV.
 fn write_columns(path: &Path, record: &Record) -> Result<(), IoError> {
     let channels = channels(record);
     let t = record.times_s();
@@ -80,11 +79,10 @@ fn write_columns(path: &Path, record: &Record) -> Result<(), IoError> {
     write_values(path, schema, &values.collect::<Vec<_>>())
 }
 
-/// Writes a record as CSV to an open output, such as standard output.
+/// Writes a record as CSV to a stream, such as standard output.
 ///
 /// # Errors
-/// [`IoError::ChannelName`]; [`IoError::Unwritable`] for an error of `out`. Both name the output
-/// `name`.
+/// [`IoError::ChannelName`]; [`IoError::Unwritable`] for an error of `out`. Both refer to the stream as `name`.
 pub fn write_record_csv(out: &mut dyn Write, name: &str, record: &Record) -> Result<(), IoError> {
     check_names(record, || name.to_owned())?;
     write_record_as_csv(out, record).map_err(|source| IoError::Unwritable {

@@ -1,4 +1,4 @@
-//! From the columns of a file to a record: selection of rows, grid and values.
+//! Conversion of the columns of a file to a record: selection of rows, grid and values.
 
 use hoid_model::{Channel, Record};
 
@@ -17,16 +17,15 @@ use crate::wording::{list, named};
 pub struct ReadRecord {
     /// The record, labelled with the name of the file without extension.
     pub record: Record,
-    /// Notes on parts that were not read or look wrong, one sentence each.
+    /// Notes on parts of the file that were not read or look wrong, one sentence each.
     pub notes: Vec<String>,
-    /// Steps applied to the numbers of the file, in this order.
+    /// Steps applied to the values of the file, in the order of application.
     pub steps: Vec<Step>,
-    /// Problems with the input, the output and their time in the file, before any step; within the
-    /// span that is read.
+    /// Problems with the input, the output and their time in the span that is read, as in the file before any step.
     pub quality_issues: Vec<QualityIssue>,
 }
 
-/// Makes the record of a table, without duplicated rows if requested.
+/// Converts a table to a record, without duplicated rows if requested.
 pub(super) fn record_of(
     mut table: Table<'_>,
     options: &ReadOptions,
@@ -74,7 +73,7 @@ pub(super) fn record_of(
 }
 
 impl ReadRecord {
-    /// The prepared record, with the preparation steps after those of reading.
+    /// Prepares the record, and appends the preparation steps to those applied in reading.
     pub(super) fn prepared(mut self, preparation: &Preparation) -> Result<Self, IoError> {
         let (record, steps) = preparation.apply(self.record)?;
         self.steps.extend(steps);
@@ -122,7 +121,7 @@ impl TableReader<'_> {
                 }
             }
         }
-        // Expressions of columns first; after that a column that is itself a signal can be moved.
+        // Expressions are evaluated first; afterwards a column that is itself a signal can be moved.
         let mut made: Vec<Channel> = signals()
             .map(|(signal, expression)| combine(signal, expression, &columns))
             .collect();
@@ -149,13 +148,13 @@ impl TableReader<'_> {
     }
 }
 
-/// A channel without samples, which no record accepts.
+/// Returns a channel without samples, which no record accepts.
 fn nothing() -> Channel {
     Channel::new("", "", Vec::new())
 }
 
-/// The signal of an expression of columns; nothing if it is a column itself. Its name is the
-/// expression; a difference has a unit if both terms share it.
+/// Evaluates an expression of columns; an expression that is a single column gives an empty channel here. The channel
+/// is named after the expression; a difference has a unit if both terms have the same unit.
 fn combine(signal: Signal, expression: &ColumnExpression, columns: &[Option<Channel>]) -> Channel {
     let nothing = nothing();
     let column = |index: usize| columns.get(index).and_then(Option::as_ref).unwrap_or(&nothing);

@@ -1,20 +1,20 @@
-//! Records from the columns of a file, and into files.
+//! Conversion of the columns of a file to records, and writing of records to files.
 //!
-//! A trial is selected, its rows are placed on an even grid, and each value in use is checked; data are repaired only
-//! on request.
+//! A trial is selected, its rows are placed on an evenly spaced grid, and each value in use is checked; data are
+//! repaired only on request.
 //!
 //! | module | contents |
 //! |---|---|
 //! | `file` | [`read_record`], [`read_prepared`], [`write_record`] |
 //! | `read_options` | [`ReadOptions`], [`TrialChoice`]: selection of the data, and options for reading them |
-//! | `trials` | the trials of a file |
-//! | `from_table` | [`ReadRecord`]: from the columns of a file to a record |
-//! | `table_reader` | the columns on this way, one by one |
-//! | `time_grid` | the rows of a record, and its even grid |
-//! | `sparse` | columns that were logged at instants of their own: `--sparse` |
-//! | `repair` | rows that are duplicated, missing values, an uneven time: `--fill` and `--resample` |
-//! | `alignment` | [`read_aligned`]: channels that were recorded late, within a span that keeps its length |
-//! | `segments` | [`read_segments`]: the records between faults of the recording |
+//! | `trials` | division of a file into trials |
+//! | `from_table` | [`ReadRecord`]: conversion of the columns of a file to a record |
+//! | `table_reader` | checks and repairs of the columns, one by one |
+//! | `time_grid` | the rows of a record, and the evenly spaced grid of its samples |
+//! | `sparse` | columns that were logged at their own times: `--sparse` |
+//! | `repair` | duplicated rows, missing values and an unevenly spaced time: `--fill` and `--resample` |
+//! | `alignment` | [`read_aligned`]: alignment of channels recorded late, without shortening the span |
+//! | `segments` | [`read_segments`]: records between faults of the recording |
 //! | `channels` | the channels of a record as the columns of a file |
 
 mod alignment;

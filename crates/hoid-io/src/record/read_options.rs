@@ -1,5 +1,4 @@
-//! Options of reading a record: columns of input and output, trials, sampling, and permitted
-//! repairs.
+//! Options for reading a record: columns of input and output, trials, sampling, and permitted repairs.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -12,19 +11,19 @@ use crate::time::TimeChoice;
 /// Repairs of a damaged record. Default: none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Repair {
-    /// Interpolate linearly from an uneven t, also over gaps, to an even grid. The grid starts at
-    /// the first t; its sample time is the typical step, or that of [`ReadOptions::sampling_hz`].
+    /// Interpolate linearly from an unevenly spaced t, also over gaps, onto an evenly spaced grid. The grid starts at
+    /// the first t; its sample time is the typical step, or follows from [`ReadOptions::sampling_hz`].
     pub resample: bool,
     /// Interpolate missing values (empty, NaN, NA) linearly between the values before and after.
     pub fill: bool,
 }
 
-/// Treatment of a column that lacks a value in some rows.
+/// Treatment of a column that has no value in some rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sparse {
-    /// The last value is held until the next.
+    /// The last value is held until the next value.
     Hold,
-    /// A straight line from one value to the next.
+    /// Values are interpolated linearly.
     Linear,
     /// Rows without a value are dropped.
     Drop,
@@ -36,30 +35,29 @@ hoid_model::named_choice!(Sparse, "handling of a sparse column", 3, {
     Drop => "drop",
 });
 
-/// Options of reading a record.
+/// Options for reading a record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadOptions {
-    /// Input of the operator; `e` by default. `None` reads only an output, for the structures
-    /// without input.
+    /// Input of the operator; `e` by default. `None` reads only an output, for structures without input.
     pub input: Option<ColumnExpression>,
     /// Output of the operator; `u` by default.
     pub output: ColumnExpression,
-    /// The time column and its unit; by default it is found by names and types.
+    /// Time column and its unit; by default both are determined from names and types.
     pub time: Option<TimeChoice>,
-    /// Trials of the file to read; by default they are recognised by a t that restarts. A record is
-    /// one of them, [`read_segments`](crate::read_segments) gives all.
+    /// Trials to read; by default trials are recognised by a t that restarts. A record holds one trial;
+    /// [`read_segments`](crate::read_segments) returns all trials.
     pub trial: Option<TrialChoice>,
-    /// Sampling frequency in Hz. It takes precedence over the column t, which then gives only the
-    /// time of the first sample (0 if there is none); with [`Repair::resample`] it is the frequency
-    /// of the new grid. By default the sampling is that of t.
+    /// Sampling frequency in Hz. It takes precedence over the column t, from which only the time of the first sample is
+    /// then taken (0 if there is no t); with [`Repair::resample`] it is the frequency of the new grid. By default the
+    /// column t determines the sampling.
     pub sampling_hz: Option<f64>,
-    /// Uses the samples with `from <= t < to`, s. By default all.
+    /// Selects the samples with `from <= t < to`, s. By default all samples.
     pub span_s: (Option<f64>, Option<f64>),
-    /// Columns that were logged at their own instants, so that some rows lack their value; `e` and `u` are input and
-    /// output where no column has that name. By default none.
+    /// Columns that were logged at their own times and therefore have no value in some rows; `e` and `u` denote input
+    /// and output unless a column has that name. By default there are none.
     pub sparse: BTreeMap<String, Sparse>,
-    /// Columns to keep in addition to input, output and time, by their names; by default all. The other columns of a
-    /// CSV file are not kept in memory.
+    /// Names of columns to keep in addition to input, output and time; by default all columns are kept. Other columns
+    /// of a CSV file are not kept in memory.
     pub columns: Option<Vec<String>>,
     /// Permitted repairs.
     pub repair: Repair,
@@ -94,8 +92,8 @@ impl ReadOptions {
     }
 }
 
-/// Trials of a file to read: `COLUMN` for each value of a column (`t`: where the time restarts),
-/// `COLUMN=VALUE` for one.
+/// Trials of a file to read: `COLUMN` selects a trial for each value of a column (`t`: for each restart of the time),
+/// `COLUMN=VALUE` a single trial.
 ///
 /// ```
 /// let trial: hoid_io::TrialChoice = "trial=3".parse()?;
@@ -109,7 +107,7 @@ pub struct TrialChoice {
 }
 
 impl TrialChoice {
-    /// One trial.
+    /// Selects a single trial.
     pub(super) fn one(column: &str, value: &str) -> Self {
         Self {
             column: column.to_owned(),
@@ -117,7 +115,7 @@ impl TrialChoice {
         }
     }
 
-    /// True if it selects a single trial.
+    /// True if the choice selects a single trial.
     pub(super) fn is_one(&self) -> bool {
         self.value.is_some()
     }
@@ -127,7 +125,7 @@ impl FromStr for TrialChoice {
     type Err = IoError;
 
     /// # Errors
-    /// [`IoError::Expression`] if no column or no value is given.
+    /// [`IoError::Expression`] if the column or the value is missing.
     fn from_str(text: &str) -> Result<Self, IoError> {
         let (column, value) = match text.rsplit_once('=') {
             Some((column, value)) => (column.trim(), Some(value.trim().to_owned())),

@@ -1,8 +1,8 @@
-//! Repairs of damaged records, applied only on request: duplicated rows are dropped, missing values
-//! are interpolated linearly, and samples with an uneven t are interpolated to an even grid.
+//! Repairs of damaged records, applied only on request: duplicated rows are dropped, missing values are interpolated
+//! linearly, and samples with an unevenly spaced t are interpolated onto an evenly spaced grid.
 //!
-//! Interpolated data are invented. Over a gap of one or two samples this does little harm; a long straight line looks
-//! to every estimator like the behaviour of the operator.
+//! Interpolated data are not measured. Over a gap of one or two samples this does little harm, but every estimator
+//! takes a long straight line for behaviour of the operator.
 
 use std::ops::Range;
 
@@ -10,27 +10,27 @@ use crate::preparation::Step;
 use crate::table::{Table, kept};
 use crate::time::sampling::pairs;
 
-/// Fraction of a step within which a time on the grid counts as that of a row: the rounding of times.
+/// Fraction of a step by which rounding may shift a time: a grid point this close before a row counts as the row.
 const ROUNDING: f64 = 1e-6;
 
-/// Reason why missing values could not be interpolated: there is no value on one side.
+/// Reason why missing values could not be interpolated: they reach the start or the end of the column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum OpenEnd {
     Start,
     End,
 }
 
-/// The interpolated values.
+/// Counts of interpolated values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Bridged {
-    /// Number of values.
+    /// Number of interpolated values.
     pub(super) values: usize,
-    /// Longest run of them.
+    /// Length of the longest run of interpolated values.
     pub(super) longest: usize,
 }
 
-/// Replaces each run of NaN by the straight line between its neighbours, along `t` if it is known,
-/// otherwise by rows.
+/// Replaces each run of NaN by a straight line between its neighbours, as a function of `t` if it is known, otherwise
+/// of the row number.
 pub(super) fn fill(values: &mut [f64], t: Option<&[f64]>) -> Result<Bridged, OpenEnd> {
     let mut bridged = Bridged::default();
     let mut at = 0;
@@ -86,8 +86,9 @@ fn next_run(values: &[f64], from: usize) -> Option<Range<usize>> {
     Some(start..end.map_or(values.len(), |(end, _)| end))
 }
 
-/// Values between the points `(t, value)` at `start + k step`, k = 0 .. n; t increases. They are on straight lines, or
-/// those of the last point if the signal is held, which counts as reached [`ROUNDING`] of a step before it.
+/// Interpolates the points `(t, value)`, where t increases, at the times `start + k step`, k = 0 .. n - 1: linearly, or
+/// with the value of the last point if the signal is held. A held signal changes [`ROUNDING`] of a step before each
+/// point, to allow for rounding.
 pub(super) fn resample(t: &[f64], values: &[f64], (start, step): (f64, f64), n: usize, is_held: bool) -> Vec<f64> {
     let early = if is_held { ROUNDING * step } else { 0.0 };
     let mut lines = pairs(t).zip(pairs(values));
@@ -110,7 +111,7 @@ pub(super) fn resample(t: &[f64], values: &[f64], (start, step): (f64, f64), n: 
 }
 
 fn line(a: f64, b: f64, share: f64) -> f64 {
-    // This form gives exactly a and b at the ends and does not overflow between them.
+    // This form gives exactly a and b at the ends and does not overflow in between.
     a * (1.0 - share) + b * share
 }
 

@@ -1,10 +1,10 @@
-//! Records between faults of the recording: a file is cut where samples are missing, constant or
-//! clipped, and each segment is a record.
+//! Records between faults of a recording: a file is cut where samples are missing, constant or clipped, and each
+//! segment becomes a record.
 //!
-//! No data are invented, and each segment has its own initial states in a fit. But the excluded samples depend on the
-//! recorded data: without the samples at saturation the largest responses are missing, which biases the estimate from
-//! the rest (the lead of C1 clipped at 1.5 standard deviations by 9 %; for the clipped record itself the gain is 12 %
-//! too small).
+//! No data are invented, and each segment has its own initial states in a fit. However, the choice of the excluded
+//! samples depends on the recorded data: without the samples at saturation the largest responses are missing, which
+//! biases the estimate from the rest (the lead of C1, clipped at 1.5 standard deviations, by 9 %; if the clipped
+//! samples are included, the gain is 12 % too small).
 
 use std::ops::Range;
 use std::path::Path;
@@ -20,15 +20,14 @@ use crate::formats::table_of_file;
 use crate::preparation::{Preparation, Step};
 use crate::wording::{decimal, list};
 
-/// Reads the segments of a file between faults of these kinds that last at least `shortest_s`, in
-/// their order; the whole record if no kind is given. The first carries the problems of the file as
-/// a whole.
+/// Reads the segments of a file that lie between faults of the given kinds and last at least `shortest_s`, in their
+/// order; the whole record if no kind is given. The first segment carries the problems of the file as a whole.
 ///
-/// In a file with several trials, each is read in this way, one after the other.
+/// In a file with several trials the trials are read in this way one after the other.
 ///
 /// # Errors
-/// As [`read_prepared`]; [`IoError::Preparation`] for kinds without a location (a clock, a constant), for a run-in, and
-/// if no segment is left.
+/// As [`read_prepared`]; [`IoError::Preparation`] for kinds without a location (such as a clock error or a constant
+/// channel), for a run-in, and if no segment is left.
 pub fn read_segments(
     path: &Path,
     options: &ReadOptions,
@@ -72,7 +71,7 @@ fn list_of(trials: &[String]) -> String {
     list(&trials.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
-/// The segments of a file with a single trial.
+/// Reads the segments of a file with a single trial.
 fn read_trial(
     path: &Path,
     options: &ReadOptions,
@@ -109,7 +108,7 @@ fn read_trial(
     let time = table.names().iter().position(|name| *name == "t");
     let at = |row: usize| match (time, options.sampling_hz) {
         (Some(time), None) => table.value(time, row),
-        // Samples are counted from the first t.
+        // Samples are counted from the first time.
         (time, Some(hz)) => {
             let first = time.map_or(0.0, |time| table.value(time, 0));
             if first.is_finite() { first } else { 0.0 }.max(f64::MIN) + row as f64 / hz
@@ -119,7 +118,7 @@ fn read_trial(
     let mut segments = Vec::new();
     for segment in between(&quality_issues, mask, rows.clone()) {
         let (from, last) = (at(segment.start), at(segment.end.saturating_sub(1)));
-        // NaN also counts as too short.
+        // The comparison is false for NaN, so that such a segment is skipped.
         let is_long = last - from >= shortest_s;
         if !is_long {
             continue;
@@ -133,7 +132,7 @@ fn read_trial(
             span_s: (Some(from), to),
             ..options.clone()
         };
-        // The masked rows are adjacent: rows beyond them are not used for an offset.
+        // The rows next to a segment are masked; rows beyond the segment are therefore not used for an offset.
         let read = read_as_recorded(path, &span, preparation.drop_repeated)?.prepared(preparation)?;
         let to_s = to.unwrap_or(last);
         let mut steps = vec![Step::Mask {
@@ -163,14 +162,14 @@ fn read_trial(
     Ok(segments)
 }
 
-/// Rows between faults of these kinds.
+/// Returns the row ranges between faults of the given kinds.
 fn between(issues: &[QualityIssue], mask: &[QualityIssueKind], rows: Range<usize>) -> Vec<Range<usize>> {
-    // Excluded rows, and rows before which the record is cut.
+    // Excluded rows, and rows at which the record is cut.
     let mut out = vec![false; rows.len()];
     let mut cut = out.clone();
     for found in issues.iter().filter(|found| mask.contains(&found.kind)) {
         for place in &found.places {
-            // Its rows count from 1.
+            // Rows of a location are counted from 1.
             let first = place.row.saturating_sub(1).saturating_sub(rows.start);
             if found.kind == QualityIssueKind::Gap {
                 cut.iter_mut().skip(first).skip(1).take(1).for_each(|cut| *cut = true);

@@ -1,17 +1,17 @@
-//! Columns that were logged at their own instants: topics with several rates in one table, as produced by an outer
-//! join.
+//! Columns that were logged at their own times: topics with several rates in one table, as produced by an outer join.
 //!
-//! Let the own values of a column be `x_i` at the times `t_i`, and t a row between `t_i` and `t_{i+1}`:
+//! Let `x_i` be the values logged in a column at the times `t_i`, and t the time of a row between `t_i` and `t_{i+1}`:
 //!
-//! | handling | value in that row |
+//! | treatment | value in that row |
 //! |---|---|
-//! | [`Sparse::Hold`] | `x_i`, what a display or an actuator does that is renewed at `t_i` |
-//! | [`Sparse::Linear`] | `x_i + (x_{i+1} - x_i) (t - t_i)/(t_{i+1} - t_i)`, for a signal that is smooth between the samples |
+//! | [`Sparse::Hold`] | `x_i`, as for a display or an actuator that is updated at `t_i` |
+//! | [`Sparse::Linear`] | `x_i + (x_{i+1} - x_i) (t - t_i)/(t_{i+1} - t_i)`, for a signal that is smooth between samples |
 //! | [`Sparse::Drop`] | none: the row is left out |
 //!
-//! A held value is late by half the time between values on average. Rows before the first and after the last own value
-//! are cut. All values are computed before rows and the span are cut, so that a row at the start of a span takes the
-//! value logged before it. Text and infinite numbers are not missing values: they remain, and reading refuses them.
+//! A held value is late on average by half the time between logged values. Rows before the first and after the last
+//! logged value are cut. All values are computed before the rows and the span are cut, so that a row at the start of a
+//! span takes the value logged before it. Text and infinite numbers do not count as missing values: they remain, and
+//! reading refuses them.
 
 use std::ops::Range;
 
@@ -23,11 +23,11 @@ use crate::wording::{list, named};
 
 const STEP: &str = "sparse";
 
-/// The table without gaps in the columns named as sparse, and the steps applied.
+/// Fills in or drops the rows without a value in the columns named as sparse; returns the table and the applied steps.
 ///
 /// # Errors
-/// [`IoError::Preparation`] for a column that does not exist, is the time, is named twice or is empty throughout, and
-/// if no row is left; [`IoError::NoSuchColumn`].
+/// [`IoError::Preparation`] if a column does not exist, is the time, is named twice or is completely empty, or if no
+/// row is left; [`IoError::NoSuchColumn`].
 pub(super) fn without_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> Result<(Table<'a>, Vec<Step>), IoError> {
     if options.sparse.is_empty() {
         return Ok((table, Vec::new()));
@@ -98,7 +98,8 @@ fn refused(table: &Table<'_>, found: String, expected: &str) -> IoError {
     }
 }
 
-/// The columns named, each with its handling. `e` and `u` are those of input and output where no column has that name.
+/// Returns the named columns with their treatment. `e` and `u` denote the input and the output unless a column has that
+/// name.
 fn columns(table: &Table<'_>, options: &ReadOptions) -> Result<Vec<(usize, Sparse)>, IoError> {
     let names = table.names();
     let file = table.source.file();
@@ -137,7 +138,7 @@ fn columns(table: &Table<'_>, options: &ReadOptions) -> Result<Vec<(usize, Spars
     Ok(all)
 }
 
-/// The time of each row in s, as the record will have it: that of t, unless samples are counted.
+/// Returns the time of each row in the record, s: the time t, unless samples are counted.
 fn abscissa(table: &Table<'_>, options: &ReadOptions) -> Vec<f64> {
     let time = table.columns.iter().find(|column| column.name == "t");
     match (time, options.sampling_hz) {
@@ -147,16 +148,16 @@ fn abscissa(table: &Table<'_>, options: &ReadOptions) -> Vec<f64> {
     }
 }
 
-/// The value of a row; NaN if there is none.
+/// Returns the value in a row; NaN if the row does not exist.
 fn at(values: &[f64], row: usize) -> f64 {
     values.get(row).copied().unwrap_or(f64::NAN)
 }
 
-/// The rows in which a column has values.
+/// Rows of a column with and without a value.
 struct Gaps {
-    /// From the first to after the last row with a value; `None` if there is none.
+    /// Range from the first to the last row with a value; `None` if no row has a value.
     own: Option<Range<usize>>,
-    /// Rows without one.
+    /// Rows without a value.
     missing: Vec<usize>,
 }
 
@@ -172,7 +173,7 @@ impl Gaps {
         }
     }
 
-    /// Runs of missing rows with a value on both sides, each with the row before it.
+    /// Returns the runs of missing rows that have a value on both sides, each with the row before the run.
     fn runs(&self) -> Vec<(usize, Range<usize>)> {
         let own = self.own.clone().unwrap_or_default();
         let mut runs: Vec<(usize, Range<usize>)> = Vec::new();
@@ -204,7 +205,7 @@ impl Gaps {
         }
     }
 
-    /// Gives each missing row inside a value.
+    /// Fills in a value in each missing row that has values on both sides.
     fn close(&self, column: &mut Column, how: Sparse, x: &[f64]) {
         let values = &mut column.values;
         for (before, run) in self.runs() {
@@ -213,13 +214,13 @@ impl Gaps {
             for (value, x) in (values.iter_mut().zip(x)).take(run.end).skip(run.start) {
                 let share = (x - from) / (to - from);
                 *value = match how {
-                    // There is no line between two equal times.
+                    // Between two equal times linear interpolation is undefined.
                     Sparse::Linear if share.is_finite() => a * (1.0 - share) + b * share,
                     _ => a,
                 };
             }
         }
-        column.made.clone_from(&self.missing);
+        column.filled_rows.clone_from(&self.missing);
         column.is_held = how == Sparse::Hold;
     }
 }
@@ -250,7 +251,7 @@ mod tests {
             for (found, expected) in e.values.iter().zip(expected) {
                 assert!((found - expected).abs() < 1e-14, "{how}: {:?}", e.values);
             }
-            assert_eq!((e.made, e.is_held), (vec![1, 2, 4], how == Sparse::Hold));
+            assert_eq!((e.filled_rows, e.is_held), (vec![1, 2, 4], how == Sparse::Hold));
         }
         // Times that stand.
         let mut e = column(&[1.0, GONE, 2.0]);

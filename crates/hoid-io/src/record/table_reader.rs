@@ -1,4 +1,4 @@
-//! Conversion of a table to a record: its columns are taken one by one, checked and repaired.
+//! Conversion of a table to a record: the columns are taken one by one, checked and repaired.
 
 use std::ops::Range;
 
@@ -11,13 +11,13 @@ use crate::preparation::Step;
 use crate::table::{Column, Table};
 use crate::wording::{named, sparse_option};
 
-/// The table, and the steps applied to it.
+/// The table to be converted, and the steps applied to it.
 pub(super) struct TableReader<'a> {
     pub(super) table: Table<'a>,
     pub(super) options: &'a ReadOptions,
     pub(super) file: String,
     pub(super) steps: Vec<Step>,
-    /// Columns of the input and the output.
+    /// Indices of the columns of the input and the output.
     pub(super) signals: Vec<usize>,
 }
 
@@ -29,8 +29,8 @@ impl TableReader<'_> {
         }
     }
 
-    /// The range of these rows in which all signals have values on both sides, if missing ones are interpolated: two
-    /// topics in one table do not start and end in the same row.
+    /// If missing values are interpolated, returns the range of rows in which all signals have values on both sides:
+    /// two topics in one table do not start and end in the same row.
     pub(super) fn between_values(&mut self, rows: Range<usize>, time: Option<usize>) -> Range<usize> {
         if !self.options.repair.fill {
             return rows;
@@ -55,7 +55,7 @@ impl TableReader<'_> {
                 names.join(" and ")
             ));
         }
-        // The first and the last row of the range lie between values outside it.
+        // In the first and the last row of the range a missing value lies between values outside the range.
         for at in [first, last] {
             for &column in &self.signals {
                 let value = self.between(column, at, &rows, time);
@@ -68,8 +68,8 @@ impl TableReader<'_> {
         kept
     }
 
-    /// A missing value of a column in a row, interpolated between its neighbours; `None` if it is not missing, or one
-    /// side has no value.
+    /// Returns a missing value interpolated between its neighbours; `None` if the value is not missing, or if there is
+    /// no value on one side.
     fn between(&self, column: usize, at: usize, rows: &Range<usize>, time: Option<usize>) -> Option<f64> {
         let source = self.table.columns.get(column)?;
         if !source.values.get(at)?.is_nan() || source.texts.binary_search(&at).is_ok() {
@@ -87,16 +87,17 @@ impl TableReader<'_> {
         value.is_finite().then_some(value)
     }
 
-    /// The times of the signal with the most samples, if it has fewer samples than there are rows: each of two topics
-    /// in one table has its own clock.
+    /// Returns the times of the signal with the most samples, if it has fewer samples than the table has rows: if two
+    /// topics share a table, each has its own clock.
     pub(super) fn own_times(&self, rows: &Range<usize>, time: usize, t: &[f64]) -> Option<Vec<f64>> {
-        // As a signal the time has a sample in each row. Its values were taken from the table.
+        // If the time itself is a signal, it has a sample in each row; its values have already been moved out of the
+        // table.
         if self.signals.contains(&time) {
             return None;
         }
         let of = |column: &Column| -> Vec<f64> {
             let values = column.own_values(rows.clone());
-            // The first and the last row may be filled.
+            // The first and the last row are excluded because they may have been filled in.
             let inside = values.iter().zip(t).skip(1).take(values.len().saturating_sub(2));
             let own = inside.filter(|(value, _)| value.is_finite());
             own.map(|(_, t)| *t).collect()
@@ -106,7 +107,7 @@ impl TableReader<'_> {
         (densest.len() > 2 && t.len().saturating_sub(densest.len()) > 2).then_some(densest)
     }
 
-    /// The values of a column in use: all finite, the missing ones interpolated if requested.
+    /// Returns the values of a column in use: all values are finite, and missing values are interpolated if requested.
     pub(super) fn values(&mut self, column: usize, rows: Range<usize>, t: Option<&[f64]>) -> Result<Vec<f64>, IoError> {
         let Some(source) = self.table.columns.get_mut(column) else {
             return Ok(Vec::new());
@@ -118,7 +119,7 @@ impl TableReader<'_> {
         if let Some(row) = rows.clone().find(bad) {
             return Err(self.table.bad_value(column, row, rows));
         }
-        // A column is read only once: long files are not copied.
+        // The values are moved out of the table, since a column is read only once; long columns are thus not copied.
         let mut values = std::mem::take(&mut source.values);
         values.truncate(rows.end);
         values.drain(..rows.start);

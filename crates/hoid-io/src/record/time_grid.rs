@@ -1,4 +1,4 @@
-//! The rows of a table that form a record, and the even grid of its samples.
+//! The rows of a table that form a record, and the evenly spaced grid of its samples.
 
 use std::ops::Range;
 
@@ -11,18 +11,18 @@ use crate::table::Precision;
 use crate::time::sampling::{self, Uneven};
 use crate::wording::list;
 
-/// Largest ratio of resampled to recorded samples.
+/// Maximum number of resampled samples per recorded sample.
 const LARGEST_FACTOR: usize = 100;
 
-/// Origin of the samples of a record.
+/// Rows and times from which the samples of a record are taken.
 pub(super) struct TimeGrid {
     /// Rows of the table in use.
     pub(super) rows: Range<usize>,
     pub(super) start_s: f64,
     pub(super) sample_time: SampleTime,
-    /// Number of samples to interpolate from rows with an uneven t.
+    /// Number of samples to interpolate from rows with an unevenly spaced t.
     pub(super) resampled: Option<usize>,
-    /// The t of the rows if it is known to increase.
+    /// Values of t in these rows, if t is known to increase.
     pub(super) t: Option<Vec<f64>>,
 }
 
@@ -46,7 +46,7 @@ impl TableReader<'_> {
         }
     }
 
-    /// Samples counted from the first at a given frequency.
+    /// Counts the samples from the first one at a given frequency.
     fn counted_grid(&mut self, time: Option<usize>, sample_time: SampleTime) -> Result<TimeGrid, IoError> {
         let t = time
             .and_then(|time| self.table.columns.get(time))
@@ -57,13 +57,13 @@ impl TableReader<'_> {
         match (t, first) {
             (None, _) if self.options.repair.resample => {
                 self.table.notes.push(String::from(
-                    "there is no column t to resample along: the samples are taken as even",
+                    "there is no column t to resample along: the samples are taken as evenly spaced",
                 ));
             }
             (Some(t), Some(first)) if first.is_finite() => {
                 let last = t.last().copied().unwrap_or(first);
                 let stated = (last - first) / t.len().saturating_sub(1) as f64;
-                // More than one percent is more than a clock error.
+                // A deviation above one percent exceeds any clock error.
                 if (stated - ts).abs() > 0.01 * ts {
                     self.table.notes.push(format!(
                         "the given sampling frequency of {} Hz is used; t gives {:.6} Hz on average",
@@ -93,7 +93,7 @@ impl TableReader<'_> {
         })
     }
 
-    /// The sampling of the column t, or the sampling to which it is resampled.
+    /// Determines the sampling from the column t, or the sampling to which t is resampled.
     fn grid_of_t(&mut self, time: usize, given: Option<SampleTime>) -> Result<TimeGrid, IoError> {
         let too_few = |this: &Self| this.uneven(Uneven::TooFew, &(0..0), &[]);
         let column = self.table.columns.get(time).ok_or_else(|| too_few(self))?;
@@ -136,7 +136,7 @@ impl TableReader<'_> {
         sample_time: SampleTime,
         precision: Precision,
     ) -> Result<TimeGrid, IoError> {
-        // A single sample does not define a line.
+        // Interpolation needs at least two samples.
         let &[start_s, .., end_s] = t.as_slice() else {
             return Err(self.uneven(Uneven::TooFew, &rows, &t));
         };
@@ -161,10 +161,11 @@ impl TableReader<'_> {
             to_hz: 1.0 / ts,
             longest_step_s: longest,
         });
-        // Half as many samples or fewer: frequencies above the new Nyquist frequency alias.
+        // At half the frequency or less, signal power above the new Nyquist frequency aliases.
         if 2.0 * samples <= t.len() as f64 {
             self.table.notes.push(String::from(
-                "resampling to the lower frequency applied no low-pass filter: read at the old frequency and give the new one with --new-fs if the recording holds power above half of it",
+                "resampling to the lower frequency applied no low-pass filter: read at the old frequency and give the \
+                 new frequency with --new-fs if the recording holds power above half of it",
             ));
         }
         Ok(TimeGrid {
@@ -222,7 +223,7 @@ impl TableReader<'_> {
         SampleTime::new(ts_s).map_err(|source| self.model(source))
     }
 
-    /// The rows inside the span.
+    /// Returns the rows inside the span.
     fn rows(&self, times: &[f64]) -> Result<Range<usize>, IoError> {
         let (from, to) = self.options.span_s;
         let mut finite = times.iter().copied().filter(|t| t.is_finite());
@@ -230,7 +231,7 @@ impl TableReader<'_> {
             finite.next().unwrap_or(f64::NAN),
             finite.next_back().unwrap_or(f64::NAN),
         );
-        // A bound that falls on a sample, up to rounding, includes it.
+        // Tolerance so that a bound that falls on a sample is not affected by rounding.
         let slack = ((end_s - start_s).abs() / times.len() as f64 * 1e-6).min(1e-6);
         let slack = if slack.is_finite() { slack } else { 0.0 };
         let start = match from {

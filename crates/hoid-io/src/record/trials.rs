@@ -1,11 +1,11 @@
-//! Trials in one file: separated by a column that counts them, a time that restarts, or an array of
-//! structures in MATLAB.
+//! Trials in one file, distinguished by a column that numbers them, by a time that restarts, or by the elements of an
+//! array of structures.
 //!
-//! Each trial is a separate record with its own initial states; in one record over all of them the output after each
-//! seam would depend on inputs that never occurred. A part starts where the value of the column changes or where t
-//! decreases. Without `--trial`, parts are only searched for where t decreases: each must have [`SHORTEST`] rows, and t
-//! must decrease by at least half of its range, which a clock correction never does. The column that changes with the
-//! parts, if there is one, gives their names.
+//! Each trial becomes a separate record with its own initial states; in a single record of all trials the output after
+//! each boundary would depend on inputs that never occurred. A trial starts where the value of the column changes or
+//! where t decreases. Without `--trial`, trials are recognised only where t decreases: each trial must have at least
+//! [`SHORTEST`] rows, and t must decrease by at least half of its range, which never occurs in a clock correction. If a
+//! column changes exactly where t decreases, it names the trials.
 
 use std::ops::Range;
 
@@ -16,13 +16,13 @@ use crate::table::{Column, Table, kept};
 use crate::time::sampling::pairs;
 use crate::wording::{did_you_mean, list, shown};
 
-/// Smallest number of rows of a part that is recognised as a trial automatically.
+/// Minimum number of rows of a trial that is recognised automatically.
 const SHORTEST: usize = 8;
 
-/// Trials found: their names and rows.
+/// Names and rows of the trials found.
 type Parts = Vec<(String, Range<usize>)>;
 
-/// The requested trial of a table; the table itself if it holds only one.
+/// Returns the requested trial of a table, or the table itself if it contains a single trial.
 pub(crate) fn of_table<'a>(table: Table<'a>, choice: Option<&TrialChoice>) -> Result<Table<'a>, IoError> {
     let file = || table.source.file().to_owned();
     let (by, parts) = match choice {
@@ -71,14 +71,14 @@ fn falls(table: &Table<'_>) -> Vec<usize> {
         .collect()
 }
 
-/// Rows between the starting positions.
+/// Returns the row ranges between the starting positions.
 fn between(begins: &[usize], rows: usize) -> Vec<Range<usize>> {
     let from = std::iter::once(0).chain(begins.iter().copied());
     let to = begins.iter().copied().chain([rows]);
     from.zip(to).map(|(from, to)| from..to).collect()
 }
 
-/// Content of a cell; nothing if it is empty.
+/// Returns the contents of a cell; `None` if the cell is empty.
 fn cell(table: &Table<'_>, at: usize, row: usize) -> Option<String> {
     let column = table.columns.get(at)?;
     if let Some(value) = column.values.get(row).filter(|value| value.is_finite()) {
@@ -88,7 +88,7 @@ fn cell(table: &Table<'_>, at: usize, row: usize) -> Option<String> {
     is_text.then(|| table.source.cell(row, at))
 }
 
-/// The parts by a column, or by t only.
+/// Divides a table into trials by a column, or by t only.
 fn parts_by(table: &Table<'_>, choice: &TrialChoice) -> Result<Parts, IoError> {
     let mut begins = falls(table);
     if choice.column == "t" {
@@ -114,14 +114,13 @@ fn parts_by(table: &Table<'_>, choice: &TrialChoice) -> Result<Parts, IoError> {
     }))
 }
 
-/// Parts named by their number.
+/// Names the trials by their number.
 fn numbered(parts: Vec<Range<usize>>) -> Parts {
     let counted = (1_usize..).zip(parts);
     counted.map(|(number, rows)| (number.to_string(), rows)).collect()
 }
 
-/// Parts named by the value in their first row, without those that have none; repeated values are
-/// numbered.
+/// Names each trial by the value in its first row and omits trials without one; repeated values are numbered.
 fn named(parts: Vec<Range<usize>>, label: impl Fn(usize) -> Option<String>) -> Parts {
     let mut found: Vec<(String, usize, Range<usize>)> = Vec::new();
     for rows in parts {
@@ -136,7 +135,7 @@ fn named(parts: Vec<Range<usize>>, label: impl Fn(usize) -> Option<String>) -> P
     found.into_iter().map(name).collect()
 }
 
-/// The parts between restarts of t, and the column that counts them; `t` if there is none.
+/// Returns the trials between restarts of t, and the column that names them; `t` if no column does.
 fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
     let begins = falls(table);
     let time = table.columns.iter().position(|column| column.name == "t")?;
@@ -155,7 +154,7 @@ fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
             first.is_some() && rows.clone().all(|row| cell(table, at, row) == first)
         };
         let steps = |row: &usize| cell(table, at, *row) != cell(table, at, row.saturating_sub(1));
-        // The changes first: they are few.
+        // The changes are compared first because they are few.
         begins.iter().all(steps) && parts.iter().all(same)
     };
     let is_named = |column: &Column| !column.name.is_empty() && column.name != "t";
@@ -166,13 +165,14 @@ fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
     })
 }
 
-/// The trial of an array of structures, `trial(3).e`, and whether it was the request.
+/// Selects a trial from an array of structures, such as `trial(3).e`; also returns whether the user requested this
+/// array.
 pub(crate) fn of_contents(
     mut contents: Contents,
     choice: Option<&TrialChoice>,
     file: &str,
 ) -> Result<(Contents, bool), IoError> {
-    // The array and the index of a structure in it.
+    // Returns the name of an array of structures and the index of a structure in it.
     let element = |parent: &str| -> Option<(String, String)> {
         let (array, rest) = parent.split_once('(')?;
         let (number, _) = rest.split_once(')')?;
@@ -209,7 +209,7 @@ pub(crate) fn of_contents(
                 available: list(&numbers),
             });
         }
-        // For a single array the paths are unique without a choice.
+        // An array with a single element needs no choice.
         None if numbers.len() < 2 => return Ok((contents, asked.is_some())),
         None => return Err(several(file.to_owned(), &array, numbers)),
     };

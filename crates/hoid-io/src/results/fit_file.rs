@@ -1,7 +1,7 @@
-//! A fit of an operator as printed by `hoid identify --json`: read as a prior or an initial state.
+//! A fit of an operator as printed by `hoid identify --json`, read as a prior or an initial state.
 //!
-//! The object holds more data than are read here; unknown keys are ignored, so that files of later versions can be
-//! read.
+//! The JSON object contains more data than are read here; unknown keys are ignored, so that files from later versions
+//! can be read.
 
 use std::path::Path;
 
@@ -15,11 +15,11 @@ use crate::{IoError, read_settings};
 /// A parameter of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitParameter {
-    /// Its name.
+    /// Name of the parameter.
     pub name: String,
     /// Value and standard error.
     pub estimate: Estimate,
-    /// True if the data determine it.
+    /// True if the data determine the parameter.
     pub determined: bool,
 }
 
@@ -28,7 +28,7 @@ pub struct FitParameter {
 pub struct FitFile {
     /// Parameters that have a value.
     pub parameters: Vec<FitParameter>,
-    /// The response to the target, of a fit with one such input.
+    /// Response to the target; `None` unless the fit has exactly one feedforward input.
     pub feedforward: Option<Feedforward>,
     operator: Result<FittedOperator, String>,
     source: String,
@@ -38,14 +38,13 @@ impl FitFile {
     /// Returns the operator with its covariance.
     ///
     /// # Errors
-    /// [`IoError::NoFit`] for a fit of another structure, one without covariance, and one without
-    /// determined parameters.
+    /// [`IoError::NoFit`] for a fit of another structure, without covariance, or without determined parameters.
     pub fn operator(self) -> Result<FittedOperator, IoError> {
         self.operator.map_err(|reason| no_fit(&self.source, reason))
     }
 }
 
-/// True for the name of a fit file, by its ending.
+/// True if a name has the extension of a fit file.
 pub fn is_fit_file(name: &str) -> bool {
     Path::new(name)
         .extension()
@@ -158,8 +157,9 @@ struct NoiseObject {
 }
 
 impl FitObject {
-    /// The response to the only target. Its delay `tau_f` is relative to the present target, and is negative if the
-    /// future target is displayed; that of [`Feedforward`] is relative to the end of the preview.
+    /// Returns the response to the target if there is a single one. In the file the delay `tau_f` is relative to the
+    /// present target, and is negative if the person uses the future target; the delay in [`Feedforward`] is relative
+    /// to the end of the preview.
     fn feedforward(&self) -> Option<Feedforward> {
         let mut seen = self.channels.iter().filter(|channel| channel.role == "feedforward");
         let channel = seen.next().filter(|_| seen.next().is_none())?;
@@ -171,7 +171,7 @@ impl FitObject {
         };
         let tau_f_s = value("tau_f")?;
         let preview_s = channel.preview.unwrap_or(0.0).max(-tau_f_s);
-        // Without parameters that are products of others.
+        // Parameters that are products of other parameters are omitted.
         let is_own = |name: &&str| !(*name == "K_e_dot" || *name == "K" && form.has_lag());
         let names = form.parameters(self.neuromuscular?).into_iter().filter(is_own);
         let pairs: Option<Vec<(String, f64)>> = names

@@ -1,10 +1,10 @@
-//! Writing and reading of result files of hoid.
+//! Writing and reading of the result files of hoid.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `output_table` | [`OutputTable`]: columns of results, and how each format keeps them |
+//! | `output_table` | [`OutputTable`]: columns of results, and their representation in each format |
 //! | `table_file` | [`write_table`], [`read_table`]: tables of results |
-//! | `table_writer` | [`TableWriter`]: the same in bounded memory |
+//! | `table_writer` | [`TableWriter`]: writing of tables in bounded memory |
 //! | `fit_file` | [`read_fit`]: a fit printed by `hoid identify --json` |
 
 mod fit_file;

@@ -2,32 +2,32 @@
 //!
 //! | | CSV | Parquet |
 //! |---|---|---|
-//! | real | the fewest digits that give the number back, always with a point or an exponent; empty for NaN | DOUBLE, null for NaN |
-//! | whole | digits | INT64 without sign |
-//! | text | quoted where that is needed | BYTE_ARRAY in UTF-8 |
-//! | comments | lines above the header, behind `# ` | lines under the key `hoid.comments` |
+//! | real | the fewest digits that reproduce the number, always with a point or an exponent; empty for NaN | DOUBLE, null for NaN |
+//! | whole | digits | unsigned INT64 |
+//! | text | quoted if necessary | BYTE_ARRAY in UTF-8 |
+//! | comments | lines above the header, after `# ` | lines under the key `hoid.comments` |
 //!
-//! Parquet reproduces the written data. CSV stores no types: a column contains integers if each cell is an integer,
-//! reals if each cell is a number or empty, otherwise text. Data written by hoid are reproduced except for a column of
-//! text that looks like numbers, and one without rows.
+//! Parquet reproduces the written data. CSV stores no types: a column is read as integers if each cell is an integer,
+//! as reals if each cell is a number or empty, otherwise as text. Tables written by hoid are reproduced, except text
+//! columns in which all cells look like numbers, and columns without rows.
 
 use std::ops::Range;
 
 use crate::IoError;
 
-/// Columns to be written.
+/// Table of columns to be written.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OutputTable {
-    /// Comments on the table, one per line.
+    /// Comments of the table, one per line.
     pub comments: Vec<String>,
-    /// The columns, of equal length.
+    /// Columns of equal length.
     pub columns: Vec<OutputColumn>,
 }
 
-/// One column of a table.
+/// Column of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutputColumn {
-    /// Its name, unique in the table.
+    /// Name of the column, unique in the table.
     pub name: String,
     /// One value per row.
     pub values: ColumnValues,
@@ -36,7 +36,7 @@ pub struct OutputColumn {
 /// Values of one kind.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ColumnValues {
-    /// NaN is an empty cell.
+    /// Real numbers; NaN is written as an empty cell.
     Real(Vec<f64>),
     /// Counts and flags.
     Whole(Vec<u64>),
@@ -58,7 +58,7 @@ pub enum ColumnKind {
 /// Schema of a table.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct TableSchema {
-    /// Comments on the table, one per line.
+    /// Comments of the table, one per line.
     pub comments: Vec<String>,
     /// The columns.
     pub columns: Vec<ColumnSchema>,
@@ -67,9 +67,9 @@ pub struct TableSchema {
 /// Name and kind of a column.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ColumnSchema {
-    /// Its name.
+    /// Name of the column.
     pub name: String,
-    /// Kind of its values.
+    /// Kind of the values.
     pub kind: ColumnKind,
 }
 
@@ -93,7 +93,7 @@ impl OutputTable {
         self.columns.iter().find(|c| c.name == name).map(|c| &c.values)
     }
 
-    /// Number of rows of all columns; an error if they differ.
+    /// Returns the number of rows; an error if the columns differ in length.
     pub(super) fn rows(&self, file: &str) -> Result<usize, IoError> {
         let expected = self.columns.first().map_or(0, |column| column.values.len());
         match self.columns.iter().find(|column| column.values.len() != expected) {
@@ -145,7 +145,8 @@ impl ColumnValues {
 }
 
 impl TableSchema {
-    /// The schema in a form that can be written: each comment one line, names unique.
+    /// Returns the schema in a form that can be written (each comment on one line), after checking that names are
+    /// unique.
     pub(super) fn checked(self, file: &str) -> Result<Self, IoError> {
         if self.columns.is_empty() {
             return Err(IoError::NoColumns { file: file.to_owned() });
@@ -183,7 +184,7 @@ impl TableSchema {
     }
 }
 
-/// Values of a column, borrowed.
+/// Borrowed values of a column.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Values<'a> {
     Real(&'a [f64]),

@@ -1,4 +1,4 @@
-//! Writing and reading of tables of results, in the format given by the extension.
+//! Writing and reading of tables of results, in the format determined by the extension.
 
 use std::path::Path;
 
@@ -7,21 +7,20 @@ use super::table_writer::write_values;
 use crate::IoError;
 use crate::formats::{bytes_of, format_to_write};
 
-/// Checks that a table can be written to a file of this name, before long computations.
+/// Checks that a table can be written to a file with this name, before long computations.
 ///
 /// # Errors
-/// [`IoError::UnknownFormat`] for an extension that does not correspond to any format,
-/// [`IoError::Directory`].
+/// [`IoError::UnknownFormat`] for an extension of no known format, [`IoError::Directory`].
 pub fn check_table_path(path: &Path) -> Result<(), IoError> {
     format_to_write(path).map(drop)
 }
 
-/// Writes a table atomically: as CSV (`.csv`, `.txt`, with tabs `.tsv`), Parquet (`.parquet`,
-/// `.pq`), NPZ (`.npz`) or for MATLAB (`.mat`). The same table gives the same bytes.
+/// Writes a table atomically: as CSV (`.csv`, `.txt`; with tabs `.tsv`), Parquet (`.parquet`, `.pq`), NPZ (`.npz`) or
+/// MATLAB (`.mat`). The same table gives the same bytes.
 ///
 /// # Errors
-/// The errors of [`check_table_path`]; [`IoError::ColumnLength`], [`IoError::NoColumns`],
-/// [`IoError::DuplicateColumn`] or [`IoError::ChannelName`] for failures of writing; those of
+/// The errors of [`check_table_path`]; [`IoError::ColumnLength`], [`IoError::NoColumns`], [`IoError::DuplicateColumn`]
+/// or [`IoError::ChannelName`] for a table that cannot be written; the errors of
 /// [`write_atomically`](crate::write_atomically).
 ///
 /// ```
@@ -45,12 +44,12 @@ pub fn write_table(path: &Path, table: &OutputTable) -> Result<(), IoError> {
     write_values(path, table.schema(), &table.values())
 }
 
-/// Reads a table, with the kinds with which it was written; see the table of this module for those
-/// of CSV. A column of integers in a Parquet file of other origin is read as integers if no value is missing or
-/// negative, otherwise as reals.
+/// Reads a table with the column kinds with which it was written; see `output_table` for the kinds in CSV. An integer
+/// column in a Parquet file from another program is read as integers if no value is missing or negative, otherwise as
+/// reals.
 ///
 /// # Errors
-/// [`IoError`], naming the place in the file.
+/// [`IoError`] with the place in the file.
 pub fn read_table(path: &Path) -> Result<OutputTable, IoError> {
     let file = path.display().to_string();
     let (format, bytes) = bytes_of(path)?;

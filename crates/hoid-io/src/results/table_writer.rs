@@ -1,5 +1,4 @@
-//! Tables written incrementally: CSV and Parquet in bounded memory, the array formats once all rows
-//! are known.
+//! Incremental writing of tables: CSV and Parquet in bounded memory, the array formats once all rows are known.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -9,16 +8,16 @@ use crate::IoError;
 use crate::formats::{ColumnsWriter, Format, RowWriter, Writing, format_to_write};
 use crate::output::{WholeFile, write_atomically};
 
-/// Rows written at a time. The file depends on the rows, not on how they were appended.
+/// Number of rows written at a time. The contents of the file do not depend on how the rows were appended.
 const GROUP: usize = 1 << 16;
 
-/// State of a file between its groups of rows.
+/// State of a file between groups of rows.
 enum Sink {
     Rows(Box<dyn RowWriter>),
     Columns(WaitingColumns),
 }
 
-/// Columns kept until the end, since the length of an array precedes its values.
+/// Columns kept until the end, since the length of an array is written before its values.
 struct WaitingColumns {
     write: ColumnsWriter,
     schema: TableSchema,
@@ -61,7 +60,7 @@ impl Sink {
     }
 }
 
-/// Writes columns of one length.
+/// Writes columns of equal length.
 pub(crate) fn write_values(path: &Path, schema: TableSchema, values: &[Values<'_>]) -> Result<(), IoError> {
     let format = format_to_write(path)?;
     let schema = schema.checked(&path.display().to_string())?;
@@ -80,17 +79,17 @@ pub(crate) fn write_values(path: &Path, schema: TableSchema, values: &[Values<'_
     })
 }
 
-/// A table written incrementally, for studies larger than memory; NPZ and .mat keep their rows in
-/// memory until the end. The file is in place after [`finish`](Self::finish); a writer dropped
-/// earlier leaves everything unchanged. The bytes are those that
-/// [`write_table`](crate::write_table) gives for all rows at once.
+/// A table written incrementally, for studies larger than memory; for NPZ and .mat the rows are kept in memory until
+/// the end. The file appears at its path when [`finish`](Self::finish) returns; if the writer is dropped earlier, an
+/// existing file is unchanged. The file is identical to the one that [`write_table`](crate::write_table) writes for all
+/// rows at once.
 pub struct TableWriter {
     file: WholeFile,
     name: String,
     columns: Vec<ColumnSchema>,
-    /// None after an error of the system: the file may then hold part of a group.
+    /// `None` after an error of the operating system: the file may then contain an incomplete group.
     sink: Option<Sink>,
-    /// Rows that do not yet fill a group.
+    /// Rows that do not yet form a full group.
     waiting: Vec<ColumnValues>,
 }
 
@@ -103,12 +102,11 @@ impl std::fmt::Debug for TableWriter {
 }
 
 impl TableWriter {
-    /// Starts a file in the format given by its extension, as in [`write_table`](crate::write_table).
+    /// Creates a file in the format determined by its extension, as in [`write_table`](crate::write_table).
     ///
     /// # Errors
-    /// [`IoError::UnknownFormat`]; [`IoError::NoColumns`], [`IoError::DuplicateColumn`] or
-    /// [`IoError::ChannelName`] for a schema that cannot be written; [`IoError::Unwritable`] for
-    /// errors that the operating system reports.
+    /// [`IoError::UnknownFormat`]; [`IoError::NoColumns`], [`IoError::DuplicateColumn`] or [`IoError::ChannelName`] for
+    /// a schema that cannot be written; [`IoError::Unwritable`] for errors reported by the operating system.
     pub fn create(path: &Path, schema: &TableSchema) -> Result<Self, IoError> {
         let format = format_to_write(path)?;
         let name = path.display().to_string();
@@ -128,8 +126,8 @@ impl TableWriter {
     /// Appends the rows of a table with the same columns; its comments are ignored.
     ///
     /// # Errors
-    /// [`IoError::ColumnsDiffer`] and [`IoError::ColumnLength`], after which other rows may be
-    /// appended; [`IoError::Unwritable`], after which nothing can.
+    /// [`IoError::ColumnsDiffer`] and [`IoError::ColumnLength`], after which other rows may still be appended;
+    /// [`IoError::Unwritable`], after which no more rows can be appended.
     pub fn append(&mut self, table: &OutputTable) -> Result<(), IoError> {
         let schema = table.schema();
         if schema.columns != self.columns {
@@ -159,7 +157,7 @@ impl TableWriter {
     /// Completes the file and moves it to its final path.
     ///
     /// # Errors
-    /// [`IoError::Unwritable`] for errors that the operating system reports.
+    /// [`IoError::Unwritable`] for errors reported by the operating system.
     pub fn finish(mut self) -> Result<(), IoError> {
         if self.waiting.iter().any(|waiting| !waiting.is_empty()) {
             self.group()?;
@@ -201,7 +199,7 @@ fn extend(column: &mut ColumnValues, values: Values<'_>) {
         (ColumnValues::Real(column), Values::Real(values)) => column.extend_from_slice(values),
         (ColumnValues::Whole(column), Values::Whole(values)) => column.extend_from_slice(values),
         (ColumnValues::Text(column), Values::Text(values)) => column.extend_from_slice(values),
-        // The kinds were compared above.
+        // The kinds of the values were compared above.
         _ => debug_assert!(false, "values of two kinds in one column"),
     }
 }

@@ -1,4 +1,4 @@
-//! From the keys to a scenario; missing keys have the values of its condition.
+//! Conversion of the keys of a file to a scenario; missing keys have the values of its condition.
 
 use std::f64::consts::TAU;
 
@@ -14,7 +14,7 @@ use super::error::ScenarioFileError;
 use super::keys::{DefinitionKey, File, RealisationKey, RemnantTable, ScheduleTable, SinusoidTable, StateTable};
 use super::values::{Limits, Source};
 
-/// Largest number of lines of a forcing function.
+/// Maximum number of lines (sinusoids) of a forcing function.
 pub(super) const MOST_LINES: usize = 10_000;
 
 impl Source<'_> {
@@ -191,7 +191,7 @@ impl Source<'_> {
             }
             ([None, None], RemnantStrength::Gain { .. }) => {}
             _ if level.is_some() || definition.is_some() => {
-                return Err(self.keys("[remnant] has a noise level and a gain K_n: give one of them"));
+                return Err(self.keys("[remnant] has a noise level and a gain K_n: give only one of the two"));
             }
             ([Some(initial), last], strength) => {
                 if last.is_none() && scenario.schedule != Schedule::Constant {

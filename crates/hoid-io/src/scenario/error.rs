@@ -10,49 +10,49 @@ pub enum ScenarioFileError {
     /// A file that cannot be read.
     #[error("scenario file {path}: {reason}; expected a readable text file")]
     Unreadable {
-        /// The file.
+        /// Path of the file.
         path: String,
         /// Error reported by the operating system.
         reason: String,
     },
-    /// Invalid TOML, or keys and types that a scenario does not have.
+    /// Invalid TOML, unknown keys, or values of a wrong type.
     #[error("scenario file {path}, line {line}: {reason}")]
     Syntax {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// Line, from 1.
+        /// Line number, counted from 1.
         line: usize,
-        /// The problem.
+        /// Description of the problem.
         reason: String,
     },
     /// An invalid value.
     #[error("scenario file {path}, line {line}: {key} is {found}, expected {expected}")]
     Value {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// Line, from 1.
+        /// Line number, counted from 1.
         line: usize,
-        /// The key.
+        /// Key with the invalid value.
         key: String,
-        /// The value found.
+        /// Value found in the file.
         found: String,
-        /// The valid values, and the remedy.
+        /// Description of the valid values, and the remedy.
         expected: String,
     },
     /// Keys that are missing or contradict each other.
     #[error("scenario file {path}: {reason}")]
     Keys {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// Missing or surplus parts, and the remedy.
+        /// Missing or superfluous keys, and the remedy.
         reason: String,
     },
-    /// Values that are valid individually, but not together.
+    /// Values that are valid individually, but not in combination.
     #[error("scenario file {path}: {source}")]
     Model {
-        /// The file.
+        /// Path of the file.
         path: String,
-        /// The problem.
+        /// Error reported by the model.
         source: ModelError,
     },
 }

@@ -1,4 +1,4 @@
-//! From the keys to a scenario of the operator family.
+//! Conversion of the keys of a file to a scenario of the operator family.
 
 use hoid_model::{
     ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, ModelError, SampleTime,
@@ -33,7 +33,8 @@ impl Source<'_> {
             (Some(ts), None) => SampleTime::new(ts).map_err(|error| self.model(error))?,
             (None, Some(rate)) => SampleTime::new(1.0 / rate).map_err(|error| self.model(error))?,
             (Some(_), Some(_)) => {
-                return Err(self.keys("sample_time_s and sampling_rate_hz specify the same quantity: give one of them"));
+                return Err(self.keys("sample_time_s and sampling_rate_hz specify the same quantity: give only one of \
+                                      the two"));
             }
         };
         let initial = self.family_state(form, file.neuromuscular, "initial", &file.initial)?;
@@ -59,7 +60,7 @@ impl Source<'_> {
                 );
             }
             (None, _) => {
-                return Err(self.keys("[schedule] is given, but no [last]: add it with the values that change"));
+                return Err(self.keys("[schedule] is given, but no [last]: add [last] with the values that change"));
             }
             (Some(last), _) => {
                 let last = last.over(&file.initial);
@@ -71,7 +72,7 @@ impl Source<'_> {
         }
         if let Some(table) = file.feedforward {
             if scenario.target.function.sinusoids().is_empty() {
-                return Err(self.keys("[feedforward] is given, but no [target] that is displayed"));
+                return Err(self.keys("[feedforward] is given, but no displayed [target]"));
             }
             scenario.feedforward = Some(self.feedforward(table, &scenario)?);
         }
@@ -117,7 +118,7 @@ impl Source<'_> {
         given: &FamilyStateTable,
     ) -> Result<FamilyOperator, ScenarioFileError> {
         for (key, value) in given.numbers() {
-            // An infinite time constant is an integrator.
+            // A lag with an infinite time constant is an integrator.
             if let Some(value) = value.filter(|value| !(key == "T_I_s" && value.is_infinite())) {
                 self.checked(&format!("{table}.{key}"), value, limits_of(key))?;
             }
@@ -188,7 +189,7 @@ impl Source<'_> {
         })
     }
 
-    /// The response to a target, through the neuromuscular system of the operator.
+    /// Returns the response to a target, which passes through the neuromuscular system of the operator.
     fn feedforward(
         &self,
         given: FeedforwardTable,
@@ -198,7 +199,7 @@ impl Source<'_> {
         self.checked("feedforward.tau_f_s", given.tau_f_s, Limits::LEAD_S)?;
         let preview_s = self.whole("feedforward.preview_s", given.preview_s, 0.0, scenario.sample_time, 0.0)?;
         let delay_s = given.tau_f_s + preview_s;
-        // Rounding of a sum is not an error of the user.
+        // A tiny negative sum comes from rounding and is not an input error.
         let delay_s = if delay_s.abs() < 1e-12 { 0.0 } else { delay_s };
         if delay_s < 0.0 {
             return Err(self.keys(&format!(
@@ -225,7 +226,7 @@ impl Source<'_> {
         })
     }
 
-    /// Parses `90/(s(s+6))`, or `90/1,6,0` by descending powers of s.
+    /// Parses a transfer function such as `90/(s(s+6))`, or `90/1,6,0` with coefficients in descending powers of s.
     fn element(&self, key: &str, given: &Spanned<String>) -> Result<ContinuousTransferFunction, ScenarioFileError> {
         let at = given.span().start;
         let element: ContinuousTransferFunction = given.get_ref().parse().map_err(|error| match error {
@@ -411,7 +412,7 @@ impl Source<'_> {
     }
 }
 
-/// Admissible values of a parameter of an operator.
+/// Admissible range of an operator parameter.
 fn limits_of(key: &str) -> Limits {
     match key {
         "T_L_s" | "T_I_s" | "c_1_s" | "c_2_s2" | "tau_e_s" | "K_d_s" => Limits::LEAD_S,
@@ -439,8 +440,7 @@ impl FamilyStateTable {
         ]
     }
 
-    /// Takes missing settings from `base`. Of two definitions of the gain, the one given here
-    /// applies.
+    /// Takes missing settings from `base`. If both define the gain, the definition in `self` applies.
     fn over(&self, base: &Self) -> Self {
         let says_gain = self.k.is_some() || self.k_over_t_i.is_some();
         let gain = |own: Option<f64>, of_base: Option<f64>| if says_gain { own } else { of_base };

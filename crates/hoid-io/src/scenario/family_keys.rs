@@ -29,7 +29,7 @@ pub(super) struct FamilyFile {
     pub(super) last: Option<FamilyStateTable>,
     pub(super) schedule: Option<ScheduleTable>,
     pub(super) target: Option<ExcitationTable>,
-    /// Response of the person to a target that they see.
+    /// Response of the person to a displayed target.
     pub(super) feedforward: Option<FeedforwardTable>,
     pub(super) disturbance: Option<ExcitationTable>,
     #[serde(default)]
@@ -55,7 +55,7 @@ pub(super) struct FamilyStateTable {
     pub(super) k_d_s: Option<f64>,
     #[serde(rename = "T_L_s")]
     pub(super) t_l_s: Option<f64>,
-    /// `inf` is a pure integration.
+    /// Lag time constant in s; `inf` makes the lag a pure integrator.
     #[serde(rename = "T_I_s")]
     pub(super) t_i_s: Option<f64>,
     pub(super) c_1_s: Option<f64>,
@@ -64,16 +64,16 @@ pub(super) struct FamilyStateTable {
     pub(super) omega_nm_rad_s: Option<f64>,
     pub(super) zeta_nm: Option<f64>,
     pub(super) tau_e_s: Option<f64>,
-    /// In s, such as `90/(s(s+6))`, or `NUM/DEN` by descending powers of s, such as `90/1,6,0`.
+    /// Transfer function in s, such as `90/(s(s+6))`, or `NUM/DEN` in descending powers of s, such as `90/1,6,0`.
     #[schemars(with = "Option<String>")]
     pub(super) controlled_element: Option<Spanned<String>>,
 }
 
-/// It has the neuromuscular system of the operator.
+/// Response to a target; it includes the neuromuscular system of the operator.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct FeedforwardTable {
-    /// `gain`, `lead`, `lag`, `derivative`, `derivative-lead` ...
+    /// Form of the response: `gain`, `lead`, `lag`, `derivative`, `derivative-lead` ...
     #[schemars(with = "String")]
     pub(super) form: Spanned<String>,
     #[serde(rename = "K")]
@@ -86,15 +86,15 @@ pub(super) struct FeedforwardTable {
     pub(super) t_l_s: Option<f64>,
     #[serde(rename = "T_I_s")]
     pub(super) t_i_s: Option<f64>,
-    /// Delay relative to the present target; not below `-preview_s`.
+    /// Delay relative to the present target, s; at least `-preview_s`.
     #[serde(default)]
     pub(super) tau_f_s: f64,
-    /// Length of the future target that is displayed. Default: zero.
+    /// Time for which the future target is displayed ahead, s. Default: zero.
     #[schemars(with = "Option<f64>")]
     pub(super) preview_s: Option<Number>,
 }
 
-/// A multi-sine at primes, or given lines.
+/// A multisine with prime multiples of the base frequency, or with given lines.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ExcitationTable {
@@ -102,11 +102,11 @@ pub(super) struct ExcitationTable {
     pub(super) largest_multiple: Option<u32>,
     pub(super) rms: Option<f64>,
     pub(super) lines: Option<Vec<LineTable>>,
-    /// Selected primes: `all`, or every other prime, `even` or `odd`, so that target and disturbance have no common
-    /// lines.
+    /// Selection of primes: `all`, or every other prime, `even` or `odd`, so that target and disturbance have no common
+    /// frequencies.
     #[schemars(with = "Option<String>")]
     pub(super) interleaved: Option<Spanned<String>>,
-    /// Whether new phases are drawn for each run. Default: true without lines.
+    /// Whether new phases are drawn for each run. Default: true if no lines are given.
     pub(super) random_phases: Option<bool>,
 }
 
@@ -139,7 +139,7 @@ pub(super) enum FollowsKey {
 #[serde(deny_unknown_fields)]
 pub(super) struct PartTable {
     pub(super) shape: ShapeKey,
-    /// Share of the variance of u; or the gain.
+    /// Share of the variance of u; give either this or the gain.
     pub(super) share: Option<f64>,
     pub(super) gain: Option<f64>,
     /// Default: `gain`.

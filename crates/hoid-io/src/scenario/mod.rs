@@ -1,7 +1,7 @@
-//! Scenarios in TOML.
+//! Scenario files in TOML.
 //!
-//! A file starts from a condition C1-C6 and changes the given keys, or describes everything itself. Units are part of
-//! the keys, times are relative to the start of the measurement, and an unknown key is an error.
+//! A file names a condition C1-C6 and overrides some of its keys, or defines all keys itself. Names of keys include the
+//! unit, times are relative to the start of the measurement, and an unknown key is an error.
 //!
 //! ```toml
 //! condition = "C4"          # without it, tau_e_s and all keys of [initial] are required
@@ -24,24 +24,24 @@
 //! |---|---|
 //! | (top) | `condition`, `name`, `sample_time_s`, `measurement_s`, `run_in_s`, `tau_e_s`, `realisation` |
 //! | `[initial]`, `[last]` | `K_e`, `T_L_s`, `omega_nm_rad_s`, `zeta_nm`, `tau_e_s`, `K_c`, `omega_b_rad_s` |
-//! | `[schedule]` | `rate_per_s` (G), `midpoint_s` (t_M), `interval_s` (T, for changes there and back again) |
+//! | `[schedule]` | `rate_per_s` (G), `midpoint_s` (t_M), `interval_s` (T, for changes back and forth) |
 //! | `[remnant]` | `order`, `T_n_s`; `noise_level` and `noise_definition` ("response", "remnant"), or `K_n_initial_deg` and `K_n_last_deg` |
 //! | `[[forcing]]` | `amplitude_deg`, `phase_rad`, and `omega_rad_s` or `cycles` (within `measurement_s`); `forcing = []` is a target at rest |
 //!
-//! A file with the key `form` describes an operator of the family with any controlled element
-//! ([`AnyScenario`]); its keys are in `family_keys`.
+//! A file with the key `form` describes an operator of the family with any controlled element ([`AnyScenario`]); the
+//! module `family_keys` defines its keys.
 //!
-//! Missing keys have the values of the condition; without a condition, the parameters of `[last]` are those of
-//! `[initial]`, and all others are as in C1.
+//! Missing keys have the values of the condition. In a file without a condition the parameters of `[last]` default to
+//! those of `[initial]`, and all other keys to the values of C1.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `reading` | [`read_scenario`]: from a file or its text to a scenario; the schemas of both kinds |
+//! | `reading` | [`read_scenario`]: reading of a scenario from a file or from text; the schemas of both kinds |
 //! | `keys` | the keys of a scenario |
-//! | `condition` | from the keys to a scenario, what it leaves out from its condition |
-//! | `family_keys` | the keys of a scenario of the family |
-//! | `family` | from the keys to a scenario of the family |
-//! | `values` | numbers and their [`Limits`](values::Limits), with their place in the file |
+//! | `condition` | conversion of the keys to a scenario; missing keys are taken from its condition |
+//! | `family_keys` | the keys of a scenario of the operator family |
+//! | `family` | conversion of the keys to a scenario of the operator family |
+//! | `values` | checks of numbers against their [`Limits`](values::Limits), with the line in the file |
 //! | `error` | [`ScenarioFileError`] |
 
 mod condition;

@@ -1,4 +1,4 @@
-//! Reading and checking a scenario file.
+//! Reading and validation of scenario files.
 
 use std::path::Path;
 
@@ -10,16 +10,16 @@ use super::keys::File;
 use super::values::{Source, line_of};
 use crate::wording::printable;
 
-/// A scenario of either kind.
+/// A scenario of the thesis task or of the operator family.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AnyScenario {
-    /// The task of the thesis, or a similar one.
+    /// The task of the thesis, or a similar task.
     Reference(Box<Scenario>),
-    /// An operator of the family: a file with the key `form`.
+    /// An operator of the family, from a file with the key `form`.
     Family(Box<FamilyScenario>),
 }
 
-/// Reads and checks a scenario of either kind. Without a `name` it is named after its file.
+/// Reads and checks a scenario of either kind. A scenario without a `name` is named after its file.
 ///
 /// # Errors
 /// [`ScenarioFileError`], which names the file and, if known, the line and the key.
@@ -28,7 +28,7 @@ pub fn read_any_scenario(path: &Path) -> Result<AnyScenario, ScenarioFileError> 
     parse_any_scenario(&text, &shown, &name)
 }
 
-/// Parses a scenario of either kind from text; `path` is for messages, `name` for a text without a
+/// Parses a scenario of either kind from text; `path` appears in messages, and `name` is used if the text gives no
 /// name.
 ///
 /// # Errors
@@ -50,7 +50,7 @@ fn has_form(text: &str) -> bool {
         .is_ok_and(|table| table.contains_key("form"))
 }
 
-/// Reads and checks a scenario. Without a `name` it is named after its file.
+/// Reads and checks a scenario. A scenario without a `name` is named after its file.
 ///
 /// # Errors
 /// [`ScenarioFileError`], which names the file and, if known, the line and the key.
@@ -59,7 +59,7 @@ pub fn read_scenario(path: &Path) -> Result<Scenario, ScenarioFileError> {
     parse_scenario(&text, &shown, &name)
 }
 
-/// The text of a file, its path for messages, and its name.
+/// Returns the text of a file, its path for messages, and the default name of its scenario.
 fn text_of(path: &Path) -> Result<(String, String, String), ScenarioFileError> {
     let shown = path.display().to_string();
     let text = crate::input_file::settings_text(path).map_err(|error| ScenarioFileError::Unreadable {
@@ -71,7 +71,7 @@ fn text_of(path: &Path) -> Result<(String, String, String), ScenarioFileError> {
     Ok((text, shown, name))
 }
 
-/// Parses a scenario from text; `path` is for messages, `name` for a text without a name.
+/// Parses a scenario from text; `path` appears in messages, and `name` is used if the text gives no name.
 ///
 /// # Errors
 /// As [`read_scenario`].
@@ -97,13 +97,13 @@ fn syntax(text: &str, path: &str, error: &toml::de::Error) -> ScenarioFileError 
     }
 }
 
-/// Returns the JSON schema of a scenario file of the family.
+/// Returns the JSON schema of scenario files of the operator family.
 pub fn family_scenario_schema() -> String {
     let schema = schemars::schema_for!(FamilyFile);
     format!("{:#}", schema.as_value())
 }
 
-/// Returns the JSON schema of a scenario file.
+/// Returns the JSON schema of scenario files of the thesis task.
 pub fn scenario_schema() -> String {
     let schema = schemars::schema_for!(File);
     format!("{:#}", schema.as_value())

@@ -184,7 +184,7 @@ fn keys_that_do_not_fit_are_refused() {
         ),
         (
             format!("{c1}[remnant]\nnoise_level = 0.1\nK_n_initial_deg = 1"),
-            "give one of them",
+            "give only one of the two",
         ),
         (format!("{c1}[remnant]\nK_n_last_deg = 1"), "give both"),
         (

@@ -1,4 +1,4 @@
-//! The numbers of a file, traced back to their lines.
+//! Checks of the numbers in a scenario file; errors give the line.
 
 use hoid_model::{ModelError, SampleTime};
 
@@ -6,11 +6,10 @@ use super::error::ScenarioFileError;
 use super::keys::Number;
 use crate::wording::printable;
 
-/// Maximum number of samples of a run, so that an error of the unit does not exhaust the memory.
+/// Maximum number of samples of a run, so that a wrong unit does not exhaust the memory.
 const MOST_SAMPLES: f64 = 1e7;
 
-/// Admissible values of a number of a scenario, so that an error of the unit is reported and not
-/// simulated.
+/// Admissible range of a number of a scenario, so that a wrong unit is reported instead of simulated.
 #[derive(Clone, Copy)]
 pub(super) struct Limits(f64, f64);
 
@@ -18,12 +17,12 @@ impl Limits {
     /// Sample times: from 1 us (1 MHz) to 10 s.
     pub(super) const SAMPLE_TIME_S: Self = Self(1e-6, 10.0);
     pub(super) const RATE_HZ: Self = Self(0.1, 1e6);
-    /// Gains of an operator, an element or a remnant, and amplitudes.
+    /// Gains of an operator, a controlled element or a remnant, and amplitudes.
     pub(super) const GAIN: Self = Self(-1e6, 1e6);
     pub(super) const NOISE_GAIN: Self = Self(0.0, 1e6);
-    /// Leads and other times of an operator.
+    /// Lead times and other times of an operator.
     pub(super) const LEAD_S: Self = Self(-1e3, 1e3);
-    /// Break frequencies of an element; below zero it is unstable.
+    /// Break frequencies of a controlled element, which is unstable if they are negative.
     pub(super) const BREAK_RAD_S: Self = Self(-1e4, 1e4);
     /// Frequencies of an operator and of forcing functions.
     pub(super) const FREQUENCY_RAD_S: Self = Self(1e-6, 1e4);
@@ -34,11 +33,11 @@ impl Limits {
     /// Var(u_n)/var(u), or var(n)/var(u).
     pub(super) const NOISE_LEVEL: Self = Self(0.0, 100.0);
     pub(super) const PHASE_RAD: Self = Self(-1e6, 1e6);
-    /// Rate of a change; 1e6 in 1/s is a step.
+    /// Rate of a change; 1e6 in 1/s is effectively a step.
     pub(super) const CHANGE_PER_S: Self = Self(1e-6, 1e9);
     pub(super) const INSTANT_S: Self = Self(-1e9, 1e9);
     pub(super) const INTERVAL_S: Self = Self(1e-6, 1e9);
-    /// A coefficient of a transfer function, and anything else.
+    /// Coefficients of a transfer function, and all other numbers.
     pub(super) const ANY: Self = Self(-1e12, 1e12);
 
     pub(super) fn hold(self, value: f64) -> bool {
@@ -63,7 +62,7 @@ impl std::fmt::Display for Limits {
     }
 }
 
-/// Formats a number with an exponent if its digits would fill the line.
+/// Formats a number, with an exponent if it would otherwise have many digits.
 fn in_short(value: f64) -> String {
     if value == 0.0 || !value.is_finite() || (1e-5..1e16).contains(&value.abs()) {
         value.to_string()
@@ -72,20 +71,20 @@ fn in_short(value: f64) -> String {
     }
 }
 
-/// Line of a byte of a text, from 1.
+/// Returns the line, counted from 1, of a byte offset in a text.
 pub(super) fn line_of(text: &str, offset: usize) -> usize {
     1 + text.bytes().take(offset).filter(|b| *b == b'\n').count()
 }
 
-/// The text in which the lines of values are found.
+/// The text of a scenario file, in which the lines of values are located.
 pub(super) struct Source<'a> {
     pub(super) text: &'a str,
     pub(super) path: &'a str,
 }
 
 impl Source<'_> {
-    /// A time of `least` to ten million samples, a whole number of them. A default time can fail as
-    /// well, if the file gives the sample time.
+    /// Returns a time that is a whole number of samples, from `least` to ten million. A default time may also fail this
+    /// check, if the file gives the sample time.
     pub(super) fn whole(
         &self,
         key: &str,
@@ -100,7 +99,7 @@ impl Source<'_> {
             return Ok(time_s);
         }
         let expected = format!(
-            "{least} to 1e7 samples of {} s, a whole number of them: round it or change sample_time_s",
+            "{least} to 1e7 samples of {} s, a whole number of samples: round it or change sample_time_s",
             sample_time.s()
         );
         Err(match given {
@@ -111,7 +110,7 @@ impl Source<'_> {
         })
     }
 
-    /// An optional number of the file.
+    /// Returns an optional number, after checking its limits.
     pub(super) fn limited(
         &self,
         key: &str,
@@ -129,7 +128,7 @@ impl Source<'_> {
         Err(self.value(key, given.span().start, &in_short(value), &limits.to_string()))
     }
 
-    /// A number without a known line.
+    /// Checks the limits of a number whose line is unknown.
     pub(super) fn checked(&self, key: &str, value: f64, limits: Limits) -> Result<(), ScenarioFileError> {
         if limits.hold(value) {
             return Ok(());

@@ -1,8 +1,7 @@
 //! Contents of a file before any selection: columns, their sampling and ranges, and suspicious values.
 //!
-//! The survey gives no final verdict: a channel may legitimately be constant. Suspicious values are
-//! found by `data_quality`, in columns that share a time; a constant column is only marked, because
-//! many files have some.
+//! The survey gives no final verdict: a channel may legitimately be constant. `data_quality` finds suspicious values in
+//! columns that share a time. A constant column is only marked, because many files have constant columns.
 
 use std::path::Path;
 
@@ -19,13 +18,13 @@ use crate::time::with_time;
 /// Contents of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FileSurvey {
-    /// Name of its format, as in "Parquet".
+    /// Name of the file format, such as "Parquet".
     pub format: &'static str,
-    /// Its columns, in their order.
+    /// Columns in the order of the file.
     pub columns: Vec<ColumnSurvey>,
-    /// The sampling of each structure with a time; one for a flat table.
+    /// Sampling of each structure that has a time; a flat table has one at most.
     pub samplings: Vec<SamplingSurvey>,
-    /// Problems with the sampling, structure by structure.
+    /// Problems with the sampling and the values, listed by structure.
     pub quality_issues: Vec<QualityIssue>,
     /// Notes on reading.
     pub notes: Vec<String>,
@@ -34,22 +33,22 @@ pub struct FileSurvey {
 /// One column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColumnSurvey {
-    /// Its name, or its path in the file.
+    /// Name of the column, or its path in the file.
     pub path: String,
-    /// Unit; empty when unknown.
+    /// Unit of the column; empty if unknown.
     pub unit: String,
-    /// The type of its values, such as "double" or "text".
+    /// Type of the values, such as "double" or "text".
     pub kind: String,
     /// Number of rows; 0 for unsupported content.
     pub rows: usize,
-    /// Statistics of its finite numbers, if there are any.
+    /// Statistics of the finite values, if there are any.
     pub values: Option<ValueSurvey>,
 }
 
 /// Surveys a file of any supported format.
 ///
 /// # Errors
-/// As for reading: [`IoError`], naming the place in the file.
+/// [`IoError`] as in reading a record, with the place in the file.
 pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
     let file = path.display().to_string();
     let (format, columns, notes) = columns_of(path, &file)?;
@@ -76,7 +75,7 @@ pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
     })
 }
 
-/// Format, columns and notes of a file.
+/// Returns format, columns and notes of a file.
 fn columns_of(path: &Path, file: &str) -> Result<(&'static Format, Vec<RawColumn>, Vec<String>), IoError> {
     if let Some((format, table)) = long_text(path, file, &ReadOptions::default())? {
         let (columns, notes) = of_table(with_time(table, None)?);
@@ -97,7 +96,7 @@ fn signal(column: &RawColumn) -> Signal<'_> {
     }
 }
 
-/// Problems with the columns that belong together, by structure and length.
+/// Returns the problems found in the columns, grouped by structure and length.
 fn quality_issues(columns: &[RawColumn]) -> Vec<QualityIssue> {
     let mut seen: Vec<(&str, usize)> = Vec::new();
     let mut found = Vec::new();

@@ -2,10 +2,10 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | `file` | [`survey()`]: all that is found in a file |
-//! | `read` | its columns, as they were read |
-//! | `values` | [`ValueSurvey`]: the numbers of a column |
-//! | `sampling` | [`SamplingSurvey`]: the sampling of columns that belong together |
+//! | `file` | [`survey()`]: contents of a file |
+//! | `read` | the columns of a file, as read |
+//! | `values` | [`ValueSurvey`]: statistics of a column |
+//! | `sampling` | [`SamplingSurvey`]: the sampling of columns that share a time |
 
 mod file;
 mod read;

@@ -16,7 +16,7 @@ pub(super) struct RawColumn {
     pub(super) precision: Precision,
 }
 
-/// The columns of a flat table, with notes for the reader.
+/// Returns the columns of a flat table, and notes about problems in reading it.
 pub(super) fn of_table(mut table: Table<'_>) -> (Vec<RawColumn>, Vec<String>) {
     let rows = table.rows;
     let commas = decimal_commas(&table);
@@ -43,7 +43,7 @@ pub(super) fn of_table(mut table: Table<'_>) -> (Vec<RawColumn>, Vec<String>) {
     (table.columns.into_iter().map(read).collect(), table.notes)
 }
 
-/// Columns of text that would be numeric if each comma were a point.
+/// Describes text columns that would be numeric if each decimal comma were a point.
 fn decimal_commas(table: &Table<'_>) -> Vec<String> {
     let first_text = |(at, column): (usize, &Column)| {
         let row = *column.texts.first()?;
@@ -57,7 +57,7 @@ fn decimal_commas(table: &Table<'_>) -> Vec<String> {
     table.columns.iter().enumerate().filter_map(first_text).collect()
 }
 
-/// Numeric columns with some text or infinite cells: reading them is refused with the same message.
+/// Describes numeric columns with some text or infinite cells, with the message with which reading would refuse them.
 fn unusable(table: &Table<'_>) -> Vec<String> {
     let first = |(at, column): (usize, &Column)| {
         let numbers = column.values.iter().any(|value| value.is_finite());
@@ -70,7 +70,7 @@ fn unusable(table: &Table<'_>) -> Vec<String> {
     table.columns.iter().enumerate().filter_map(first).collect()
 }
 
-/// The columns of a file of named arrays.
+/// Returns the columns of a file of named arrays.
 pub(super) fn of_arrays(contents: &Contents) -> (Vec<RawColumn>, Vec<String>) {
     let column_paths = contents.column_paths();
     let read = |column_path: ColumnPath| {

@@ -1,34 +1,34 @@
-//! Sampling of columns that belong together.
+//! Sampling of columns that share a time.
 
 use super::read::RawColumn;
 use crate::data_quality::Grid;
 
-/// Sampling of columns that belong together.
+/// Sampling of columns that share a time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SamplingSurvey {
-    /// Path of the time.
+    /// Path of the time column.
     pub path: String,
     /// Number of rows.
     pub rows: usize,
     /// First and last finite time, s.
     pub span_s: (f64, f64),
-    /// Sample time of the even grid after the time, s.
+    /// Sample time of the evenly spaced grid fitted to the time, s.
     pub sample_time_s: f64,
-    /// Largest deviation of a time from the even grid, s.
+    /// Largest deviation of a time from the evenly spaced grid, s.
     pub jitter_s: f64,
     /// Number of gaps.
     pub gaps: usize,
-    /// Number of rows missing in them.
+    /// Total number of rows missing in the gaps.
     pub missing: u64,
     /// Time of the row before the first gap, s.
     pub first_gap_s: Option<f64>,
     /// Number of rows in which the time is constant or runs backwards.
     pub not_increasing: usize,
-    /// Number of rows in which each other non-constant column repeats the row before.
+    /// Number of rows in which every other column that is not constant repeats the value of the row before.
     pub repeated: usize,
 }
 
-/// The sampling given by a time; `None` if it has fewer than two finite values.
+/// Returns the sampling determined by a time; `None` if fewer than two times are finite or none advances.
 pub(super) fn sampling(time: &RawColumn, columns: &[RawColumn]) -> Option<SamplingSurvey> {
     let t: Vec<f64> = time
         .values

@@ -1,12 +1,12 @@
-//! The numbers of a column: missing values, range and course, quantisation and saturation.
+//! Statistics of a column: missing values, range, course over time, quantisation and saturation.
 
 use crate::data_quality::{Levels, rails};
 
-/// Characters of a sketch.
+/// Number of characters of a sketch.
 const SKETCH: usize = 32;
 const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
-/// The numbers of a column, in its unit.
+/// Statistics of a column, in the unit of the column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ValueSurvey {
     /// Number of values that are missing, text or not finite.
@@ -27,11 +27,11 @@ pub struct ValueSurvey {
     pub saturated_low: usize,
     /// Number of rows in which a saturated column has its largest value.
     pub saturated_high: usize,
-    /// The course of the values in block characters.
+    /// Course of the values over time, in block characters.
     pub sketch: String,
 }
 
-/// Statistics of a column; `None` if no value is finite.
+/// Returns the statistics of a column; `None` if no value is finite.
 pub(super) fn values(all: &[f64]) -> Option<ValueSurvey> {
     let finite: Vec<f64> = all.iter().copied().filter(|value| value.is_finite()).collect();
     let (min, max) = finite.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), v| {
@@ -41,7 +41,7 @@ pub(super) fn values(all: &[f64]) -> Option<ValueSurvey> {
         return None;
     }
     let n = finite.len() as f64;
-    // Scaled, so that no sum overflows.
+    // Scaled so that the sum does not overflow.
     let mean = if min == max {
         min
     } else {
@@ -70,7 +70,7 @@ pub(super) fn values(all: &[f64]) -> Option<ValueSurvey> {
     })
 }
 
-/// Means of equal parts as bars; a blank if no value is finite.
+/// Draws the means of equal parts as bars; a part without finite values is blank.
 fn sketch(all: &[f64], min: f64, max: f64) -> String {
     let parts = SKETCH.min(all.len());
     let bar = |part: usize| {

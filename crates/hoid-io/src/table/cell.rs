@@ -1,4 +1,4 @@
-//! Interpretation of the text of a cell: a number with a point or a comma, a missing value, or text.
+//! Interpretation of the text of a cell: a number with a decimal point or comma, a missing value, or text.
 
 use std::borrow::Cow;
 
@@ -7,30 +7,30 @@ use std::borrow::Cow;
 pub(crate) enum Cell {
     /// A number, finite or infinite.
     Number(f64),
-    /// An empty cell, or a word for a missing value.
+    /// A missing value: an empty cell, or a word that denotes a missing value.
     Missing,
     /// Any other text.
     Text,
 }
 
-/// Words for missing values: R, pandas, databases, spreadsheets, statistics packages, the C library of Windows.
+/// Words for missing values in R, pandas, databases, spreadsheets, statistics packages and the C library of Windows.
 const MISSING: [&str; 16] = [
     "", "na", "n/a", "null", "none", "<na>", "#n/a", "#na", "-", "--", ".", "?", "1.#ind", "-1.#ind", "1.#qnan",
     "-1.#qnan",
 ];
 
-/// U+2212.
+/// Typographic minus sign, U+2212.
 const MINUS: char = '\u{2212}';
 
 impl Cell {
-    /// Interprets the text of a cell: empty cells, NaN and the words of [`MISSING`] are missing values.
+    /// Interprets the text of a cell; an empty cell, NaN and the words in [`MISSING`] denote missing values.
     pub(crate) fn parse(text: &str) -> Self {
         let text = text.trim();
         match text.parse::<f64>() {
             Ok(value) if value.is_nan() => Self::Missing,
             Ok(value) => Self::Number(value),
             Err(_) if MISSING.iter().any(|word| text.eq_ignore_ascii_case(word)) => Self::Missing,
-            // The minus sign of typography, which spreadsheets of some languages write.
+            // Spreadsheets in some languages write the typographic minus sign.
             Err(_) if text.contains(MINUS) => match text.replace(MINUS, "-").parse::<f64>() {
                 Ok(value) if !value.is_nan() => Self::Number(value),
                 _ => Self::Text,
@@ -40,15 +40,15 @@ impl Cell {
     }
 }
 
-/// The remedy for [`has_decimal_comma`].
+/// Remedy for cells for which [`has_decimal_comma`] is true.
 pub(crate) const DECIMAL_COMMA: &str = "write the numbers with a decimal point instead of a comma";
 
-/// True if a text cell would be a number with a point instead of its comma.
+/// True if a text cell would be a number if its comma were a point.
 pub(crate) fn has_decimal_comma(cell: &str) -> bool {
     cell.contains(',') && matches!(Cell::parse(&cell.replacen(',', ".", 1)), Cell::Number(_))
 }
 
-/// A number with a decimal point instead of a comma; any other cell unchanged.
+/// Replaces the decimal comma of a number by a point; other cells are returned unchanged.
 pub(crate) fn with_decimal_point(cell: &str, commas: bool) -> Cow<'_, str> {
     if commas && has_decimal_comma(cell) {
         Cow::Owned(cell.replacen(',', ".", 1))
@@ -57,7 +57,7 @@ pub(crate) fn with_decimal_point(cell: &str, commas: bool) -> Cow<'_, str> {
     }
 }
 
-/// True if a cell looks like a date or a clock time: `2024-03-01 10:00:00.5`, `10:00:00,5`.
+/// True if a cell looks like a date or a clock time, such as `2024-03-01 10:00:00.5` or `10:00:00,5`.
 pub(super) fn is_moment(cell: &str) -> bool {
     let parts = |marks: &[char]| {
         cell.split(marks)

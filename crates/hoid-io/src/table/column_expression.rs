@@ -1,7 +1,7 @@
-//! Selection of input and output: `NAME`, `-NAME` or `NAME-NAME`.
+//! Selection of input and output by an expression: `NAME`, `-NAME` or `NAME-NAME`.
 //!
 //! Laboratories often record the target r and the output y of the controlled element instead of the tracking error
-//! `e = r - y`, or use the opposite sign of the control. A column whose name is the whole text takes precedence, so
+//! `e = r - y`, or use the opposite sign of the control. A column whose name equals the whole text takes precedence, so
 //! that a name may contain a hyphen.
 
 use std::fmt;
@@ -10,8 +10,8 @@ use std::str::FromStr;
 use crate::IoError;
 use crate::wording::{did_you_mean, list};
 
-/// A column, its negative, or the difference of two columns. It remains text until the columns of a
-/// file are known.
+/// A column, its negative, or the difference of two columns. The expression is kept as text until the columns of a file
+/// are known.
 ///
 /// ```
 /// let error: hoid_io::ColumnExpression = "r-y".parse()?;
@@ -23,7 +23,7 @@ pub struct ColumnExpression {
     text: String,
 }
 
-/// An expression in terms of the columns of one file, counted from 0.
+/// An expression resolved to the columns of one file, which are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Signal {
     Column(usize),
@@ -32,7 +32,7 @@ pub(crate) enum Signal {
 }
 
 impl Signal {
-    /// The columns of the expression.
+    /// Returns the columns in the expression.
     pub(crate) fn columns(self) -> impl Iterator<Item = usize> {
         let (a, b) = match self {
             Self::Column(a) | Self::Negative(a) => (a, None),
@@ -43,12 +43,12 @@ impl Signal {
 }
 
 impl ColumnExpression {
-    /// The column with this name.
+    /// Selects the column with this name.
     pub fn column(name: impl Into<String>) -> Self {
         Self { text: name.into() }
     }
 
-    /// All parts of the text that may be the name of a column.
+    /// Returns all parts of the text that may be a column name.
     pub(crate) fn terms(&self) -> Vec<&str> {
         let mut terms = vec![self.text.as_str()];
         terms.extend(self.text.strip_prefix('-'));
@@ -58,7 +58,7 @@ impl ColumnExpression {
         terms
     }
 
-    /// The texts on both sides of each hyphen.
+    /// Returns the texts before and after each hyphen.
     fn splits(&self) -> impl Iterator<Item = (&str, &str)> {
         let hyphens = self.text.match_indices('-');
         hyphens.filter_map(|(at, hyphen)| {
@@ -73,10 +73,10 @@ impl ColumnExpression {
         self.resolve(names, "").is_ok()
     }
 
-    /// The columns of the expression, each with its sign and its index in `names`.
+    /// Returns the columns in the expression, each with its sign and its index in `names`.
     ///
     /// # Errors
-    /// [`IoError`] if the expression is not valid for them; `file` is their origin.
+    /// [`IoError`] if the expression is not valid for these columns; `file` is the file from which they were read.
     pub fn signed_columns(&self, names: &[&str], file: &str) -> Result<Vec<(f64, usize)>, IoError> {
         Ok(match self.resolve(names, file)? {
             Signal::Column(one) => vec![(1.0, one)],
@@ -110,8 +110,8 @@ impl ColumnExpression {
         match (meanings.as_slice(), splits.as_slice()) {
             ([one], _) => Ok(*one),
             ([], splits) => {
-                // With one hyphen it is clear which of the two names is wrong; otherwise the
-                // message quotes the text unchanged.
+                // With a single hyphen the wrong one of the two names is known; otherwise the message quotes the whole
+                // text.
                 let parts = match splits {
                     [(left, right)] => vec![*left, *right],
                     _ => vec![self.text.strip_prefix('-').unwrap_or(&self.text)],

@@ -1,8 +1,8 @@
 //! Columns of numbers as stored in a file, before selection, checks and repair.
 //!
-//! Each format fills a [`Table`]; everything after it (selection of columns, sampling, repair) is
-//! the same for all formats. A value that is missing or not a number is NaN here; the file is
-//! consulted again only when an error message quotes the cell, so that a million rows are cheap.
+//! Each format fills a [`Table`]; all further processing (selection of columns, sampling, repair) is the same for all
+//! formats. A value that is missing or not a number is stored as NaN; the file is read again only if an error message
+//! quotes the cell, so that tables of a million rows are processed quickly.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -13,38 +13,39 @@ use super::precision::Precision;
 use crate::IoError;
 use crate::wording::{named, shown};
 
-/// Number of separate gaps and share of the rows from which on missing values are those of a sparse column. A dropout
-/// is one gap.
+/// Minimum number of separate gaps, and minimum fraction of rows with missing values, in a sparse column. A dropout is
+/// a single gap.
 const SPARSE: (usize, f64) = (5, 0.05);
 
-/// One column.
+/// A column of a table.
 #[derive(Debug, Default)]
 pub(crate) struct Column {
-    /// Name; empty when the header has none.
+    /// Name of the column; empty if the header has none.
     pub(crate) name: String,
-    /// Unit; empty when unknown.
+    /// Unit of the column; empty if unknown.
     pub(crate) unit: String,
-    /// One value per row, NaN if there is no number.
+    /// One value per row; NaN if the cell contains no number.
     pub(crate) values: Vec<f64>,
-    /// Rows that hold text, in increasing order.
+    /// Rows that contain text, in increasing order.
     pub(crate) texts: Vec<usize>,
-    /// True if the values are clock times, in s from the first.
+    /// True if the values are clock times, converted to s from the first one.
     pub(crate) moments: bool,
-    /// Rows whose value was not recorded but follows from the column's other values (`--sparse`), in increasing order.
-    pub(crate) made: Vec<usize>,
-    /// True if these values are held, so that the signal is constant between the rows as well.
+    /// Rows whose value was not recorded but computed from other values of the column (`--sparse`), in increasing
+    /// order.
+    pub(crate) filled_rows: Vec<usize>,
+    /// True if the computed values are held, so that the signal is also constant between rows.
     pub(crate) is_held: bool,
     /// Precision of the printed values; kept only for the time.
     pub(crate) precision: Precision,
 }
 
 impl Column {
-    /// True if a row holds nothing: neither a number nor a text.
+    /// True if a row contains neither a number nor text.
     pub(crate) fn is_missing(&self, row: usize) -> bool {
         self.values.get(row).is_none_or(|value| value.is_nan()) && self.texts.binary_search(&row).is_err()
     }
 
-    /// True if values are missing in many places, as for a topic with another rate, and not in a dropout.
+    /// True if values are missing in many places, as in a topic with another rate, and not only in a dropout.
     pub(crate) fn is_sparse(&self, rows: Range<usize>) -> bool {
         let missing = |row: &usize| self.is_missing(*row);
         let follows = |row: &usize| {
@@ -56,23 +57,23 @@ impl Column {
         places.count() >= SPARSE.0 && count as f64 >= SPARSE.1 * rows.len() as f64
     }
 
-    /// The values of some rows, NaN where they are not the column's own.
+    /// Returns the values of some rows, with NaN for values that were not recorded.
     pub(crate) fn own_values(&self, rows: Range<usize>) -> Cow<'_, [f64]> {
         let values = self.values.get(rows.clone()).unwrap_or_default();
-        if self.made.is_empty() {
+        if self.filled_rows.is_empty() {
             return Cow::Borrowed(values);
         }
-        let is_made = |row: &usize| self.made.binary_search(row).is_ok();
+        let is_made = |row: &usize| self.filled_rows.binary_search(row).is_ok();
         let own = |(row, value): (usize, &f64)| if is_made(&row) { f64::NAN } else { *value };
         Cow::Owned(rows.zip(values).map(own).collect())
     }
 }
 
-/// Origin of the rows, for messages.
+/// Source of the rows, for messages.
 pub(crate) trait Source {
     /// Name of the file.
     fn file(&self) -> &str;
-    /// "line 12" or "row 12".
+    /// Place of a row in the file: "line 12" or "row 12".
     fn place(&self, row: usize) -> String;
     /// Contents of a cell, shortened to a readable length.
     fn cell(&self, row: usize, column: usize) -> String;
@@ -86,19 +87,19 @@ pub(crate) trait Source {
 pub(crate) struct Table<'a> {
     pub(crate) columns: Vec<Column>,
     pub(crate) rows: usize,
-    /// Sample time stated in the file, s.
+    /// Sample time stated in the file, s; `None` if the file states none.
     pub(crate) sample_time_s: Option<f64>,
     pub(crate) source: Box<dyn Source + 'a>,
     pub(crate) notes: Vec<String>,
 }
 
 impl Table<'_> {
-    /// Names of all columns in order.
+    /// Returns the names of all columns in order.
     pub(crate) fn names(&self) -> Vec<&str> {
         self.columns.iter().map(|c| c.name.as_str()).collect()
     }
 
-    /// The value of a column in a row; NaN if there is none.
+    /// Returns the value of a column in a row; NaN if the row does not exist.
     pub(crate) fn value(&self, column: usize, row: usize) -> f64 {
         let value = self.columns.get(column).and_then(|column| column.values.get(row));
         value.copied().unwrap_or(f64::NAN)
@@ -119,13 +120,14 @@ impl Table<'_> {
         let found = self.source.cell(row, at);
         let is_last_cell = self.columns.len().checked_sub(1) == Some(at);
         let name = named(&column.name);
-        // At the end of a truncated file a sign or a point is the start of a number.
+        // If the file is truncated, a sign or a point at its end is the start of a number.
         let begun = is_last_cell && self.source.is_open(row) && matches!(found.as_str(), "-" | ".");
         if begun || column.texts.binary_search(&row).is_ok() {
             let remedy = if has_decimal_comma(&found) {
                 DECIMAL_COMMA
             } else if is_moment(&found) {
-                "a date or time of a clock among numbers: write the whole column in one way, or give --fs HZ where the samples are even"
+                "a date or clock time among numbers: write the whole column in one format, or give --fs HZ if the \
+                 samples are evenly spaced"
             } else if row == 0 && self.rows > 1 && self.has_no_number_in(row) {
                 UNITS_ROW
             } else if is_last_cell && self.source.is_open(row) {
@@ -174,11 +176,11 @@ impl Table<'_> {
     }
 }
 
-/// The remedy for a first row without numbers.
+/// Remedy for a first row without numbers.
 pub(crate) const UNITS_ROW: &str =
     "no column has a number there: if that line names the units, remove it and give them with --unit e=deg,u=deg";
 
-/// Checks that the names are unique, and notes the columns without one.
+/// Checks that the names are unique, and adds a note on columns without a name.
 pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>) -> Result<(), IoError> {
     check_number(names.len(), file)?;
     let mut known: HashMap<&str, usize> = HashMap::new();
@@ -197,10 +199,10 @@ pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>)
     Ok(())
 }
 
-/// Maximum number of columns of a table; recordings have some tens.
+/// Maximum number of columns of a table; recordings typically have some tens of columns.
 const MOST_COLUMNS: usize = 10_000;
 
-/// Checks the number of columns before they are created.
+/// Checks the number of columns before memory is allocated for them.
 pub(crate) fn check_number(columns: usize, file: &str) -> Result<(), IoError> {
     if columns <= MOST_COLUMNS {
         return Ok(());
@@ -212,16 +214,15 @@ pub(crate) fn check_number(columns: usize, file: &str) -> Result<(), IoError> {
     })
 }
 
-/// Takes the units from the comments above a table, and returns the sample time that they state.
-pub(crate) fn asides<'a>(comments: impl Iterator<Item = &'a str>, columns: &mut [Column]) -> Option<f64> {
+/// Reads the units from the comments above a table, and returns the sample time stated in the comments.
+pub(crate) fn read_comments<'a>(comments: impl Iterator<Item = &'a str>, columns: &mut [Column]) -> Option<f64> {
     let mut sample_time_s = None;
     for line in comments {
         let line = line.trim_start_matches('#').trim();
         if let Some(units) = line.strip_prefix("units:") {
-            // If there are more parts than columns, the rest is ignored.
+            // Parts in excess of the number of columns are ignored.
             for part in units.split(',').take(columns.len()).map(str::trim) {
-                // A name or a unit may contain blanks: the matching column with the longest name
-                // applies.
+                // Names and units may contain blanks: of the matching columns the one with the longest name is used.
                 let unit_of = |column: &Column| {
                     let unit = part.strip_prefix(column.name.as_str())?;
                     unit.starts_with(char::is_whitespace).then(|| unit.trim().to_owned())
@@ -241,7 +242,7 @@ pub(crate) fn asides<'a>(comments: impl Iterator<Item = &'a str>, columns: &mut 
     sample_time_s
 }
 
-/// A table without some of its rows; messages still refer to the rows of the file.
+/// Source of a table from which rows were removed; messages still refer to the rows of the file.
 struct Kept<'a> {
     source: Box<dyn Source + 'a>,
     rows: Vec<usize>,
@@ -261,7 +262,7 @@ impl Source for Kept<'_> {
     }
 }
 
-/// Some rows of a table.
+/// Returns a table with only the given rows.
 pub(crate) fn kept(table: Table<'_>, rows: Vec<usize>) -> Table<'_> {
     let Table {
         mut columns, source, ..
@@ -272,7 +273,7 @@ pub(crate) fn kept(table: Table<'_>, rows: Vec<usize>) -> Table<'_> {
             let found = rows.iter().enumerate().filter(|(_, row)| of.binary_search(row).is_ok());
             found.map(|(at, _)| at).collect()
         };
-        (column.texts, column.made) = (still(&column.texts), still(&column.made));
+        (column.texts, column.filled_rows) = (still(&column.texts), still(&column.filled_rows));
     }
     Table {
         columns,

@@ -1,9 +1,10 @@
-//! Error and control recognised by common column names.
+//! Recognition of error and control by common column names.
 //!
-//! A column matches if its whole name is a typical one, regardless of case; otherwise the only one with a common name
-//! as a word, as in `Tracking error`, `stick [V]` or `e (deg)`. A single letter counts only as the first word.
+//! A column matches if its whole name is a common name, regardless of case; otherwise the only column that contains a
+//! common name as a word matches, such as `Tracking error`, `stick [V]` or `e (deg)`. A single letter counts only as
+//! the first word.
 
-/// Names of the error, the most specific first.
+/// Common names of the error, the most specific first.
 const ERRORS: [&str; 10] = [
     "e",
     "error",
@@ -16,7 +17,7 @@ const ERRORS: [&str; 10] = [
     "regelabweichung",
     "erreur",
 ];
-/// Names of the control.
+/// Common names of the control.
 const CONTROLS: [&str; 13] = [
     "u",
     "control",
@@ -33,13 +34,13 @@ const CONTROLS: [&str; 13] = [
     "manche",
 ];
 
-/// The column whose name denotes the tracking error.
+/// Returns the column whose name denotes the tracking error.
 #[must_use]
 pub fn error_among<'a>(columns: &[&'a str]) -> Option<&'a str> {
     among(columns, &ERRORS)
 }
 
-/// The column whose name denotes the control.
+/// Returns the column whose name denotes the control.
 #[must_use]
 pub fn control_among<'a>(columns: &[&'a str]) -> Option<&'a str> {
     among(columns, &CONTROLS)

@@ -1,19 +1,19 @@
 //! Precision of the printed numbers of a column.
 
-/// Largest number of decimals searched for in rounded times: a µs.
+/// Largest number of decimals at which rounding of times is recognised (1 µs).
 const MOST_DECIMALS: i32 = 6;
 
 /// Precision with which a column of decimal numbers is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Precision {
-    /// Largest number of decimals of any value; `None` if the values were not printed.
+    /// Largest number of decimals of any value; `None` if the values come from binary numbers that were not rounded.
     decimals: Option<i32>,
     /// Largest number of significant digits of any value.
     significant: i32,
 }
 
 impl Precision {
-    /// Precision of binary numbers in single precision, seven digits.
+    /// Precision of binary single-precision numbers: seven significant digits.
     pub(crate) fn single() -> Self {
         Self {
             decimals: Some(45),
@@ -21,10 +21,10 @@ impl Precision {
         }
     }
 
-    /// Precision of times in a file of binary numbers. If a recorder rounds its values, for example to tenths of a ms,
-    /// all times are multiples of its last digit, by which the rounding is recognised. The remainder of a rounded
-    /// number is below two units of its last binary digit; with the number of digits searched for here no such
-    /// remainder occurs by chance.
+    /// Determines the precision of times stored as binary numbers. If a recorder rounds its times, for example to
+    /// tenths of a ms, all times are multiples of one unit of the last decimal, from which the rounding is recognised.
+    /// The deviation of a rounded number from the multiple is below two units of its last binary digit; for the numbers
+    /// of decimals tried here such a small deviation does not occur by chance.
     pub(crate) fn of_times(values: &[f64], single: bool) -> Self {
         if single {
             return Self::single();
@@ -40,12 +40,12 @@ impl Precision {
         }
     }
 
-    /// Takes another printed number into account.
+    /// Includes another printed number.
     pub(crate) fn add(&mut self, text: &str) {
         self.add_bytes(text.trim().as_bytes());
     }
 
-    /// Takes another printed number without surrounding blanks into account.
+    /// Includes another printed number, which must have no surrounding blanks.
     pub(crate) fn add_bytes(&mut self, text: &[u8]) {
         let mut parts = text.splitn(2, |byte| matches!(byte, b'e' | b'E'));
         let digits = parts.next().unwrap_or_default();
@@ -66,18 +66,18 @@ impl Precision {
         self.significant = self.significant.max(count(significant));
     }
 
-    /// Takes all numbers of another part of the column into account.
+    /// Includes the numbers of another part of the column.
     pub(crate) fn join(&mut self, other: Self) {
         self.decimals = self.decimals.max(other.decimals);
         self.significant = self.significant.max(other.significant);
     }
 
-    /// Takes another number with the given number of decimals into account.
+    /// Includes another number with the given number of decimals.
     pub(crate) fn add_decimals(&mut self, decimals: usize) {
         self.decimals = Some(self.decimals.unwrap_or(0).max(decimals as i32));
     }
 
-    /// Precision of the same numbers times a power of ten.
+    /// Returns the precision of the same numbers multiplied by a power of ten.
     pub(crate) fn shifted(self, power: i32) -> Self {
         Self {
             decimals: self.decimals.map(|decimals| decimals.saturating_sub(power)),
@@ -85,7 +85,7 @@ impl Precision {
         }
     }
 
-    /// The size below which the unit is that of fixed decimals, and this unit.
+    /// Returns the magnitude below which the number of decimals determines the unit, and this unit.
     pub(crate) fn fixed_unit(self) -> (f64, f64) {
         match self.decimals {
             None => (f64::INFINITY, 0.0),
@@ -97,8 +97,8 @@ impl Precision {
         }
     }
 
-    /// One unit of the last printed digit of a value of this size. Fixed decimals give the same
-    /// unit everywhere; with a fixed number of significant digits the unit grows with the value.
+    /// Returns one unit of the last printed digit of a value. With a fixed number of decimals the unit is constant;
+    /// with a fixed number of significant digits it grows with the value.
     pub(crate) fn unit(self, value: f64) -> f64 {
         let Some(decimals) = self.decimals else { return 0.0 };
         let fixed = last_digit(decimals);
@@ -111,7 +111,7 @@ impl Precision {
     }
 }
 
-/// One unit of the last of some decimals.
+/// Returns one unit of the last decimal.
 fn last_digit(decimals: i32) -> f64 {
     10_f64.powi(decimals.saturating_neg())
 }

@@ -1,11 +1,11 @@
-//! The columns of a table that are kept, if not all are.
+//! Selection of the columns of a table that are kept.
 
 use super::columns::{Source, Table};
 use crate::IoError;
 use crate::record::ReadOptions;
 use crate::wording::{did_you_mean, list};
 
-/// Some columns of a table; messages still refer to the columns of the file.
+/// Source of a table from which columns were removed; messages still refer to the columns of the file.
 struct Selected<'a> {
     source: Box<dyn Source + 'a>,
     columns: Vec<usize>,
@@ -30,7 +30,7 @@ impl Source for Selected<'_> {
     }
 }
 
-/// The table with the columns for which `keep` is true.
+/// Returns the table with only the columns for which `keep` is true.
 pub(crate) fn selected<'a>(table: Table<'a>, keep: impl Fn(usize, &str) -> bool) -> Table<'a> {
     let names = table.names();
     let columns = names.iter().enumerate().filter(|(at, name)| keep(*at, name));
@@ -54,10 +54,10 @@ pub(crate) fn selected<'a>(table: Table<'a>, keep: impl Fn(usize, &str) -> bool)
     }
 }
 
-/// Checks that the requested columns are among these.
+/// Checks that the requested columns are among `names`.
 ///
 /// # Errors
-/// [`IoError::NoSuchColumn`] for a column that is not: of the input, the output or an additional one.
+/// [`IoError::NoSuchColumn`] if a column of the input or the output, or an additional column, is not among `names`.
 pub(crate) fn check_selected(names: &[&str], options: &ReadOptions, file: &str) -> Result<(), IoError> {
     let Some(kept) = &options.columns else { return Ok(()) };
     for signal in options.input.iter().chain([&options.output]) {

@@ -1,11 +1,11 @@
-//! The time of a recording: its column, its unit, and whether it is evenly spaced.
+//! The time of a recording: its column, its unit, and a check that it is evenly spaced.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `time_choice` | [`TimeChoice`]: the column and its unit as a person types them |
-//! | `time_column` | the time under another name, in another unit |
-//! | `moment` | dates and times of a clock |
-//! | `sampling` | the sample time of an evenly spaced t, and the reasons why t may be unevenly spaced |
+//! | `time_choice` | [`TimeChoice`]: the column and its unit as typed by the user |
+//! | `time_column` | recognition of the time under another name or in another unit |
+//! | `moment` | dates and clock times |
+//! | `sampling` | the sample time of an evenly spaced t, and the reasons why t is not evenly spaced |
 
 mod moment;
 pub(crate) mod sampling;

@@ -1,24 +1,23 @@
-//! Dates and clock times in text: `2024-03-05T10:11:12.020Z`, `05.03.2024 10:11:12,02`,
-//! `10:11:12.5`.
+//! Dates and clock times in text, such as `2024-03-05T10:11:12.020Z`, `05.03.2024 10:11:12,02` or `10:11:12.5`.
 //!
-//! A clock time is counted in ns since 1970 (since midnight without a date), by the proleptic
-//! Gregorian calendar. Days are counted from 1 March, so that the leap day is the last of its year:
-//! with `y`, `m` shifted in this way, `365 y + y/4 - y/100 + y/400 + (153 m + 2)/5 + d` (H.
-//! Hinnant, *chrono-compatible low-level date algorithms*).
+//! A clock time is counted in ns from the start of 1970 (from midnight if there is no date) in the proleptic Gregorian
+//! calendar. The year is taken to start on 1 March, so that the leap day is its last day: with `y` and `m` shifted in
+//! this way, the number of days is `365 y + y/4 - y/100 + y/400 + (153 m + 2)/5 + d` (H. Hinnant, *chrono-compatible
+//! low-level date algorithms*).
 
 use crate::table::{Column, Precision};
 
-/// ns in a s.
+/// Number of ns in a second.
 const NS_PER_S: i64 = 1_000_000_000;
 
-/// A clock time and the number of decimals of its seconds.
+/// A clock time, and the number of decimals of its seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Moment {
     ns: i64,
     decimals: usize,
 }
 
-/// Parses a cell as a clock time; `None` if it is not one. A date without a time is midnight.
+/// Parses a cell as a clock time; `None` if the cell is not a clock time. A date without a time means midnight.
 fn parse(cell: &str) -> Option<Moment> {
     let cell = cell.trim();
     if !cell.starts_with(|c: char| c.is_ascii_digit()) || cell.len() > 40 {
@@ -38,20 +37,20 @@ fn parse(cell: &str) -> Option<Moment> {
     })
 }
 
-/// Interpretation of the texts of a column, row by row: clock times unless a cell is anything else.
+/// Interpretation of the texts of a column, row by row: they are clock times unless some cell has other contents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Moments {
-    /// Only missing values so far.
+    /// All values so far are missing.
     #[default]
     Unknown,
-    /// Clock times, counted from the first, which is kept in ns.
+    /// Clock times; the first one, from which the others are counted, is stored here in ns.
     From(i64),
-    /// Numbers, or texts.
+    /// The column contains numbers or other texts.
     No,
 }
 
 impl Moments {
-    /// Takes a text cell, and appends its value to the column.
+    /// Interprets a text cell and appends its value to the column.
     pub(crate) fn push(&mut self, column: &mut Column, cell: &str) {
         let moment = parse(cell).filter(|_| *self != Self::No);
         let row = column.values.len();
@@ -67,7 +66,7 @@ impl Moments {
         };
         *self = Self::From(first);
         column.moments = true;
-        // Fixed decimals, regardless of the size.
+        // The number of decimals does not depend on the size of the value.
         column.precision.add_decimals(decimals);
         column.values.push(seconds(ns, first));
     }
@@ -87,13 +86,13 @@ impl Moments {
     }
 }
 
-/// Time between two clock times, s.
+/// Returns the time between two clock times in s.
 pub(crate) fn seconds(ns: i64, from: i64) -> f64 {
-    // Exact below 2^53 ns, a hundred days.
+    // The result is exact below 2^53 ns, about a hundred days.
     i128::from(ns).saturating_sub(i128::from(from)) as f64 / NS_PER_S as f64
 }
 
-/// Days since 1970: year first between hyphens or slashes, day first between points.
+/// Returns the number of days since 1970. Year first with hyphens or slashes, day first with points.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "numbers of at most five digits, in 64 bits"
@@ -106,11 +105,11 @@ fn days_of(date: &str) -> Option<i64> {
     let (year, month, day) = match mark {
         '.' => (c, b, a),
         _ if a.len() == 4 => (a, b, c),
-        // Month or day first: the order is not known, and does not matter within a day.
+        // Otherwise month or day comes first; which of them is unknown, and does not matter within one day.
         _ => (c, a, b),
     };
     let (year, month, day) = (year.len() == 4).then_some((number(year)?, number(month)?, number(day)?))?;
-    // With slashes the day may be first.
+    // With slashes the day may come first.
     let (month, day) = if mark == '/' && month > 12 {
         (day, month)
     } else {
@@ -125,11 +124,12 @@ fn days_of(date: &str) -> Option<i64> {
         (year - 1, month + 9)
     };
     let of_years = 365 * year + year.div_euclid(4) - year.div_euclid(100) + year.div_euclid(400);
-    // 719 468 days lie between 1 March of the year 0 and 1970.
+    // There are 719 468 days from 1 March of the year 0 to 1 January 1970.
     Some(of_years + (153 * month + 2) / 5 + day - 1 - 719_468)
 }
 
-/// ns since midnight UTC, and decimals: `10:11:12.5`, optionally followed by `Z`, `+02:00`, AM or PM.
+/// Parses a time of day such as `10:11:12.5`, optionally followed by `Z`, `+02:00`, AM or PM; returns ns since midnight
+/// UTC and the number of decimals.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "numbers of at most three digits and a fraction of 1e9 ns, in 64 bits"
@@ -160,12 +160,12 @@ fn time_of_day(text: &str) -> Option<(i64, usize)> {
         return None;
     }
     let ns = format!("{fraction:0<9}")[..9].parse::<i64>().ok()?;
-    // A leap second is counted as the first of the next minute.
+    // A leap second counts as the first second of the next minute.
     let s = (hour * 60 + whole(minute, 60)? - zone_min) * 60 + whole(second, 61)?;
     Some((s * NS_PER_S + ns, fraction.len()))
 }
 
-/// Minutes east of UTC: `Z`, `+02:00`, `-0530`, `+02`.
+/// Returns the offset in minutes east of UTC from `Z`, `+02:00`, `-0530` or `+02`.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "numbers of at most three digits, in 64 bits"

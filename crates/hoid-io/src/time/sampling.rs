@@ -1,18 +1,19 @@
-//! The sampling given by a column t, and whether t is evenly spaced.
+//! Sampling determined by a column t, and the check that t is evenly spaced.
 //!
-//! `Ts = (t_last - t_first) / (N - 1)`, and each t must lie on the grid `t_first + k Ts` within the larger of `1e-3 Ts`
-//! and one unit of the last printed decimal of t: files print t rounded (0.0167 at 60 Hz), and a rounded t still counts
-//! as evenly spaced. If `1 / Ts` is a whole number of Hz within `1e-4`, or within the rounding of t, that number is
-//! used, so that all runs of a laboratory have the same sample time.
+//! The sample time is `Ts = (t_last - t_first) / (N - 1)`. Each t must lie on the grid `t_first + k Ts` within a
+//! tolerance, which is the larger of `1e-3 Ts` and one unit of the last printed decimal of t: files contain rounded
+//! times (0.0167 at 60 Hz), which still count as evenly spaced. If `1 / Ts` is a whole number of Hz within a relative
+//! deviation of `1e-4`, or within the rounding of t, that number is used, so that all runs of a laboratory have the
+//! same sample time.
 
 use crate::table::Precision;
 
-/// Largest deviation from the even grid, in sample times.
+/// Largest permitted deviation from the evenly spaced grid, in sample times.
 const JITTER: f64 = 1e-3;
-/// Largest relative deviation from a whole number of Hz that is rounded to it.
+/// Largest relative deviation at which a frequency is rounded to a whole number of Hz.
 const WHOLE_HZ: f64 = 1e-4;
 
-/// Reason why the samples are not evenly spaced. Rows count from the first in use.
+/// Reason why the samples are not evenly spaced. Rows are counted from the first row in use.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Uneven {
     TooFew,
@@ -33,15 +34,15 @@ pub(crate) enum Uneven {
     },
 }
 
-/// A sample time, and a note if it was not simply read from the file.
+/// A sample time, and a note if it was not taken unchanged from the file.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sampling {
     pub(crate) sample_time_s: f64,
     pub(crate) note: Option<String>,
 }
 
-/// Returns the sample time of evenly spaced times that come from no file, in s, by the rules of files: their rounding
-/// is detected.
+/// Returns the sample time in s of evenly spaced times that do not come from a file. The rules are those for files:
+/// rounding of the times is detected.
 ///
 /// # Errors
 /// The row, counted from 0, at which the spacing is uneven.
@@ -54,7 +55,7 @@ pub fn even_times(t: &[f64]) -> Result<f64, usize> {
     }
 }
 
-/// The sample time of an even t. A sample time stated in the file is used if t agrees with it.
+/// Returns the sampling of an evenly spaced t. A sample time stated in the file is used if t agrees with it.
 pub(crate) fn even(t: &[f64], precision: Precision, stated_s: Option<f64>) -> Result<Sampling, Uneven> {
     let (&[first, .., last], steps) = (t, t.len().saturating_sub(1) as f64) else {
         return match stated_s {
@@ -72,7 +73,8 @@ pub(crate) fn even(t: &[f64], precision: Precision, stated_s: Option<f64>) -> Re
     let mean_s = (last - first) / steps;
     let first_unit = rounding.unit(first);
     let tolerance = |t: f64| (JITTER * mean_s).max(rounding.unit(t).max(first_unit) * (1.0 + 1e-6));
-    // The excess over the tolerance decides; NaN, from times that overflow, is excess as well.
+    // The largest excess of the deviation over the tolerance decides; NaN, which results if times overflow, counts as
+    // an excess.
     let deviation = |k: usize, t: f64| (t - (first + k as f64 * mean_s)).abs();
     let excess = t
         .iter()
@@ -115,7 +117,7 @@ pub(crate) fn even(t: &[f64], precision: Precision, stated_s: Option<f64>) -> Re
     Ok(Sampling { sample_time_s, note })
 }
 
-/// The sample time for resampling an uneven t: that of its typical step.
+/// Returns the sample time for resampling an unevenly spaced t, which is its typical step.
 pub(crate) fn typical(t: &[f64], precision: Precision) -> Result<f64, Uneven> {
     let &[first, .., last] = t else {
         return Err(Uneven::TooFew);
@@ -127,7 +129,7 @@ pub(crate) fn typical(t: &[f64], precision: Precision) -> Result<f64, Uneven> {
 }
 
 fn increasing(t: &[f64]) -> Result<(), Uneven> {
-    // Written so that NaN fails as well.
+    // Written so that NaN also counts as not increasing.
     let standing =
         |(_, (before, next)): &(usize, (f64, f64))| next.partial_cmp(before) != Some(std::cmp::Ordering::Greater);
     match (1..).zip(pairs(t)).find(standing) {
@@ -136,27 +138,27 @@ fn increasing(t: &[f64]) -> Result<(), Uneven> {
     }
 }
 
-/// Each value with the next one.
+/// Returns each value together with the next value.
 pub(crate) fn pairs(values: &[f64]) -> impl Iterator<Item = (f64, f64)> {
     let next = values.get(1..).unwrap_or_default();
     values.iter().copied().zip(next.iter().copied())
 }
 
-/// The steps from each value to the next one.
+/// Returns the steps from each value to the next value.
 pub(crate) fn steps(values: &[f64]) -> impl Iterator<Item = f64> {
     pairs(values).map(|(value, next)| next - value)
 }
 
-/// Every how many steps of a long time suffice for its median: a million.
+/// Stride at which about a million steps of a long time are used for its median.
 pub(crate) fn every(times: usize) -> usize {
     (times >> 20).max(1)
 }
 
-/// Largest rounding error of a printed t.
+/// Rounding error of a printed t.
 #[derive(Clone, Copy)]
 struct Rounding {
     precision: Precision,
-    /// [`Precision::fixed_unit`]: for nearly all times no logarithm is needed.
+    /// Result of [`Precision::fixed_unit`], with which nearly all times need no logarithm.
     fixed: (f64, f64),
     median_step_s: f64,
 }
@@ -172,8 +174,8 @@ impl Rounding {
         }
     }
 
-    /// One unit of the last digit of t, but at most the median step: a coarser t would have been
-    /// constant.
+    /// Returns one unit of the last digit of t, but at most the median step: with a larger unit t would be constant
+    /// over several rows.
     fn unit(self, t: f64) -> f64 {
         let (limit, fixed) = self.fixed;
         let unit = if t.abs() < limit { fixed } else { self.precision.unit(t) };
@@ -181,8 +183,8 @@ impl Rounding {
     }
 }
 
-/// The mean of the steps that are not gaps: of those below 1.5 times the median step, plus one unit
-/// for the rounding of t.
+/// Returns the mean of all steps except gaps, which are steps of at least 1.5 times the median step plus one unit for
+/// the rounding of t.
 fn typical_step(t: &[f64], rounding: Rounding) -> f64 {
     let median = rounding.median_step_s;
     let (sum, count) = pairs(t)
@@ -192,9 +194,8 @@ fn typical_step(t: &[f64], rounding: Rounding) -> f64 {
     if count == 0.0 { median } else { sum / count }
 }
 
-/// Detects missing samples. Rounding makes steps longer than the sample time by one unit, as in
-/// 0.00, 0.02, 0.03 at 60 Hz, but not by a whole unit if the sample time is itself a multiple of
-/// the unit.
+/// Detects missing samples. Rounding may make a step longer than the sample time by up to one unit, as in 0.00, 0.02,
+/// 0.03 at 60 Hz, but not by a full unit if the sample time is a multiple of the unit.
 fn gap(t: &[f64], rounding: Rounding, typical_s: f64) -> Result<(), Uneven> {
     let is_gap = |(_, (before, next)): &(usize, (f64, f64))| {
         let step = next - before;
@@ -212,8 +213,8 @@ fn gap(t: &[f64], rounding: Rounding, typical_s: f64) -> Result<(), Uneven> {
     })
 }
 
-/// `ts`, or the sample time of the nearest whole number of Hz; `slack_s` is the uncertainty of `ts`
-/// due to the rounding of t.
+/// Returns the sample time of the nearest whole number of Hz if `ts` is close enough, otherwise `ts`; `slack_s` is the
+/// uncertainty of `ts` due to the rounding of t.
 fn whole_hz(ts: f64, slack_s: f64) -> f64 {
     let frequency = (1.0 / ts).round();
     let near = (1.0 / ts - frequency).abs() <= WHOLE_HZ * frequency || (1.0 / frequency - ts).abs() <= slack_s;

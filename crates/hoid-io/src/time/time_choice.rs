@@ -1,4 +1,4 @@
-//! Selection of the time column and its unit by the user: `clock:ms`.
+//! Selection of the time column and its unit by the user, such as `clock:ms`.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,13 +8,13 @@ use crate::IoError;
 /// Unit of a time column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Unit {
-    /// Seconds, times a power of ten.
+    /// Seconds multiplied by a power of ten.
     Power(i32),
     Minutes,
     Hours,
     /// Dates and clock times.
     Iso,
-    /// Whole seconds, with nanoseconds in another column.
+    /// Whole seconds in this column and nanoseconds in another column.
     SecondsAndNanoseconds,
 }
 
@@ -66,7 +66,7 @@ impl FromStr for TimeChoice {
     type Err = IoError;
 
     /// # Errors
-    /// [`IoError::Expression`] for an unknown unit, or no column.
+    /// [`IoError::Expression`] for an unknown unit or a missing column.
     fn from_str(text: &str) -> Result<Self, IoError> {
         let refuse = |expected: &str| IoError::Expression {
             found: text.to_owned(),
@@ -76,7 +76,7 @@ impl FromStr for TimeChoice {
         let (column, unit) = match text.rsplit_once(':') {
             Some((column, unit)) => match Unit::of(unit.trim()) {
                 Some(unit) => (column.trim(), Some(unit)),
-                // MATLAB and numpy names of lines contain colons: `ans(1,:)`.
+                // Paths of matrix rows and columns in MATLAB and numpy contain colons: `ans(1,:)`.
                 None if unit.starts_with([')', ',', ']']) => (text, None),
                 None => {
                     return Err(refuse(

@@ -1,17 +1,18 @@
-//! The time column, with the name and in the unit that a recorder uses.
+//! Recognition of the time column under the name and in the unit that a recorder uses.
 //!
-//! The time is the column t, in s. If there is no such column, the first of these is used:
-//! 1. the only one whose name denotes a time, with or without a unit: `Time (s)`, `Zeit [s]`,
-//!    `time_ns`, `elapsed`, `%time`;
-//! 2. the only one with time stamps: dates and clock times in text or as a type, or numbers that
-//!    count from 1970 in a column `timestamp`, `header.stamp`;
-//! 3. whole seconds with nanoseconds in the next column: `stamp.sec`, `stamp.nanosec`;
-//! 4. a first column without a name, or the first line of a matrix, that increases from row to row and is not a row
-//!    number.
+//! The time is the column t, in s. If there is no such column, the first of these columns that exists is used:
+//! 1. the only column whose name denotes a time, with or without a unit: `Time (s)`, `Zeit [s]`, `time_ns`, `elapsed`,
+//!    `%time`;
+//! 2. the only column with time stamps: dates and clock times as text or as a data type, or numbers counted from 1970
+//!    in a column such as `timestamp` or `header.stamp`;
+//! 3. whole seconds in one column and nanoseconds in another with the same prefix: `stamp.sec`, `stamp.nanosec`;
+//! 4. the first column if it has no name, or the first row or column of a matrix, if its values increase from row to
+//!    row and are not row numbers.
 //!
-//! `--time COLUMN[:unit]` takes precedence. The unit is that of the name; otherwise it follows from the size of numbers
-//! that count from 1970 (1e11 s would be the year 5138); otherwise from the steps: integers at least 5 apart are not s,
-//! but in the unit in which a second has 2 to 2000 steps. The choice is reported.
+//! `--time COLUMN[:unit]` takes precedence. The unit is taken from the name. Without a unit in the name, it follows
+//! from the size of numbers counted from 1970 (1e11 s would be the year 5138), or else from the steps: integers at
+//! least 5 apart are not taken as s, but in the unit that gives a sampling frequency from 2 to 2000 Hz. The choice is
+//! reported.
 
 use super::sampling::{pairs, steps};
 use super::time_choice::{TimeChoice, Unit};
@@ -19,14 +20,14 @@ use crate::IoError;
 use crate::table::{Column, Precision, Table};
 use crate::wording::{did_you_mean, list, named, shown};
 
-/// Numbers in a time stamp column above this limit count from 1970: 1e8 s is in 1973.
+/// Numbers above this limit in a time stamp column are counted from 1970: 1e8 s falls in 1973.
 const STAMP: f64 = 1e8;
-/// Smallest step of integers that are not in s.
+/// Median step from which on integer times are assumed not to be in s.
 const STEP_OF_NO_SECONDS: f64 = 5.0;
-/// Largest sampling frequency for which a unit follows from the steps, Hz.
+/// Largest sampling frequency in Hz at which the unit is inferred from the steps.
 const MOST_HZ: f64 = 2000.0;
 
-/// Words for the time.
+/// Column names that denote a time.
 const WORDS: [&str; 9] = [
     "t",
     "time",
@@ -38,10 +39,10 @@ const WORDS: [&str; 9] = [
     "elapsed time",
     "elapsedtime",
 ];
-/// Words for a time stamp, which may also be the time of day, or a count.
+/// Column names that denote a time stamp; such a column may also hold the time of day or a count.
 const STAMPS: [&str; 5] = ["timestamp", "stamp", "datetime", "date time", "date"];
 
-/// Role of a column according to its name.
+/// Role of a column, as its name suggests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum ColumnRole {
     Time(Option<Unit>),
@@ -71,12 +72,12 @@ fn column_role(name: &str) -> ColumnRole {
     }
 }
 
-/// True if the values of a column may become the time.
+/// True if a column with this name may become the time.
 pub(crate) fn is_time(name: &str) -> bool {
     column_role(name) != ColumnRole::Other
 }
 
-/// True if a column may be the time or a part of it, by its name and position or as chosen.
+/// True if a column may be the time or a part of it, because of its name, its position or the choice of the user.
 pub(crate) fn may_be_time(at: usize, name: &str, choice: Option<&TimeChoice>) -> bool {
     let last = name.to_lowercase();
     let last = last.rsplit(['.', '_', '/', ' ']).next().unwrap_or_default();
@@ -89,7 +90,7 @@ pub(crate) fn may_be_time(at: usize, name: &str, choice: Option<&TimeChoice>) ->
         || (at == 0 && name.is_empty())
 }
 
-/// The table with a column t in s, if a column is a time or was selected as such.
+/// Returns the table with a column t in s, if a column was recognised or selected as the time.
 pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -> Result<Table<'a>, IoError> {
     let found = match choice {
         Some(choice) => Some(chosen(&table, choice)?),
@@ -101,9 +102,9 @@ pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -
         None => found(&table),
     };
     if let Some((at, unit)) = found {
-        take(&mut table, at, unit);
+        make_time(&mut table, at, unit);
     }
-    // Clock times that are not the time are not numbers.
+    // Clock times in other columns do not count as numbers.
     for column in table.columns.iter_mut().filter(|column| column.moments) {
         column.values.fill(f64::NAN);
         column.texts = (0..table.rows).collect();
@@ -111,7 +112,7 @@ pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -
     Ok(table)
 }
 
-/// The selected column.
+/// Returns the column that the user selected, and its unit.
 fn chosen(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize, Option<Unit>), IoError> {
     let position = |name: &str| table.columns.iter().position(|column| column.name == name);
     let unit = choice.unit;
@@ -142,14 +143,14 @@ fn chosen(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize, Option<Unit>
     })
 }
 
-/// The only column that is meant; `None` if there are several.
+/// Returns the only column that satisfies the condition; `None` if there are none or several.
 fn only(table: &Table<'_>, is_meant: impl Fn(usize, &Column) -> bool) -> Option<usize> {
     let all = table.columns.iter().enumerate();
     let mut meant = all.filter(|(at, column)| is_meant(*at, column)).map(|(at, _)| at);
     meant.next().filter(|_| meant.next().is_none())
 }
 
-/// The column that is the time by its name, type or position.
+/// Finds the time column by its name, type or position.
 fn found(table: &Table<'_>) -> Option<(usize, Option<Unit>)> {
     let is_constant = |values: &[f64]| values.iter().all(|value| values.first() == Some(value));
     let unit = |at: usize| match table.columns.get(at).map(|column| column_role(&column.name)) {
@@ -177,7 +178,7 @@ fn found(table: &Table<'_>) -> Option<(usize, Option<Unit>)> {
         .or_else(|| first_line(table).map(|at| (at, None)))
 }
 
-/// The column of nanoseconds that accompanies one of whole seconds.
+/// Finds the column of nanoseconds that belongs to a column of whole seconds.
 fn nanoseconds_of(table: &Table<'_>, at: usize) -> Option<usize> {
     let split = |name: &str| -> Option<(String, Option<Unit>)> {
         let lower = name.to_lowercase();
@@ -196,7 +197,8 @@ fn nanoseconds_of(table: &Table<'_>, at: usize) -> Option<usize> {
     })
 }
 
-/// A first column without a name, or the first line of a matrix, that increases like a time.
+/// Returns the first column if it has no name, or the first row or column of a matrix, if its values increase like a
+/// time.
 fn first_line(table: &Table<'_>) -> Option<usize> {
     let is_first = |at: usize, column: &Column| {
         let line = ["(1,:)", "(:,1)", "[0,:]", "[:,0]", "[0]"];
@@ -209,7 +211,7 @@ fn first_line(table: &Table<'_>) -> Option<usize> {
     (values.len() > 2 && rises && !counts && values.iter().all(|value| value.is_finite())).then_some(first)
 }
 
-/// The unit of numbers without a stated one.
+/// Infers the unit of times whose unit is not stated.
 fn unit_of(values: &[f64]) -> Unit {
     let first = values.iter().copied().find(|value| value.is_finite()).unwrap_or(0.0);
     match first {
@@ -230,7 +232,7 @@ fn unit_of(values: &[f64]) -> Unit {
     if step < STEP_OF_NO_SECONDS {
         return Unit::Power(0);
     }
-    // Steps of 0.5 ms to 0.5 s: each unit has its own three decades.
+    // Sample times from 0.5 ms to 0.5 s are assumed; each unit then covers its own three decades of steps.
     let power = [-3, -6, -9].into_iter().find(|power| {
         let seconds = step * 10_f64.powi(*power);
         (1.0 / MOST_HZ..1000.0 / MOST_HZ).contains(&seconds)
@@ -238,8 +240,8 @@ fn unit_of(values: &[f64]) -> Unit {
     Unit::Power(power.unwrap_or(0))
 }
 
-/// Makes a column the time t.
-fn take(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
+/// Converts a column to the time t.
+fn make_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
     let beside = nanoseconds_of(table, at).filter(|_| unit == Some(Unit::SecondsAndNanoseconds));
     let beside = beside.and_then(|beside| table.columns.get(beside));
     let nanoseconds = beside.map(|column| (column.name.clone(), column.values.clone()));
@@ -316,7 +318,7 @@ fn take(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
             format!("{name} is {taken}in s{origin}, from {unit}")
         }
     };
-    // Contents of s, as t is, needs no unit.
+    // The unit s is the default for t and is not stored.
     time.unit = String::from(if unit == Unit::Power(0) { "" } else { "s" });
     table
         .notes

@@ -133,7 +133,7 @@ const steps = {
     await startRun(page);
     await page.evaluate(operator, { injected: true, until: 45_000 });
     await picture(page, "run");
-    await experimenter.getByText(/Run 1 goes on/).waitFor();
+    await experimenter.getByText(/Run 1 is in progress/).waitFor();
     await picture(experimenter, "experimenter");
     await page.evaluate(operator, { injected: true });
     await heading(page, /^Score/);
@@ -154,11 +154,11 @@ const steps = {
     await startRun(page);
     await page.evaluate(operator, { injected: true, until: 8000 });
     await page.reload();
-    await page.getByText("The last run was broken off").waitFor();
+    await page.getByText("The last run was interrupted").waitFor();
     await picture(page, "broken-off");
     // A second window takes over while nothing runs; the first looks on.
     const second = await open(server.address);
-    await page.getByText("This window looks on").waitFor();
+    await page.getByText("This window only watches").waitFor();
     await picture(page, "looks-on");
     await second.close();
     await server.end("SIGKILL");
@@ -170,7 +170,7 @@ const steps = {
     let server = await lab(program, "--out", join(folder, "a"), "--config", config);
     let page = await open(server.address);
     await picture(page, "go-on");
-    await page.getByRole("button", { name: /Go on with sub-A1/ }).click();
+    await page.getByRole("button", { name: /Continue sub-A1/ }).click();
     await startRun(page);
     await page.evaluate(operator, { injected: false, until: 4000 });
     await server.end("SIGKILL");
@@ -182,8 +182,8 @@ const steps = {
 
     server = await lab(program, "--out", join(folder, "a"), "--config", config);
     page = await open(server.address);
-    await page.getByRole("button", { name: /Go on with sub-A1/ }).click();
-    await page.getByText("The last run was broken off").waitFor();
+    await page.getByRole("button", { name: /Continue sub-A1/ }).click();
+    await page.getByText("The last run was interrupted").waitFor();
     const experimenter = await open(`${server.address}experimenter`);
     await startRun(page);
     const tracked = page.evaluate(operator, { injected: false });
@@ -209,7 +209,7 @@ const steps = {
     assert.ok(Math.max(...pad.u) > 1, "the stick moved nothing");
 
     await page.getByRole("link", { name: /: identify/ }).first().waitFor({ timeout: 240_000 });
-    await page.getByText("Reports are being made").waitFor({ state: "detached", timeout: 400_000 });
+    await page.getByText("Reports are being written").waitFor({ state: "detached", timeout: 400_000 });
     const links = await page.locator("li a").evaluateAll((all) => all.map((a) => a.href));
     for (const name of ["identify", "track", "describe"]) {
       const href = links.find((href) => href.includes(`/${name}/`));

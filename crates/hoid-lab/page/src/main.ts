@@ -52,7 +52,7 @@ function gone(): void {
   show(
     "",
     h("h1", {}, "The program has ended"),
-    h("p", {}, "Start it again and open the address that it prints. Everything up to the last second is stored, and the session goes on with the next run."),
+    h("p", {}, "Start it again and open the address that it prints. Everything up to the last second is stored, and the session continues with the next run."),
   );
 }
 
@@ -80,7 +80,7 @@ function hear(message: FromServer): void {
     case "refused":
       if (message.elsewhere) {
         elsewhere = true;
-        show("", h("h1", {}, "This window looks on"), h("p", {}, message.words), button("Try here", () => location.reload()));
+        show("", h("h1", {}, "This window only watches"), h("p", {}, message.words), button("Try here", () => location.reload()));
       } else if (screen === "run") {
         // As where the disk is full: there is no use in going on.
         stop(message.words);
@@ -134,7 +134,7 @@ function consent(): void {
     id: "begin",
   });
   const open = s.open.map((session) =>
-    button(`Go on with ${session}`, () => wire.say({ type: "resume", session }), { class: "quiet" }),
+    button(`Continue ${session}`, () => wire.say({ type: "resume", session }), { class: "quiet" }),
   );
   show(
     "",
@@ -144,7 +144,7 @@ function consent(): void {
     h("label", {}, "Made-up name (letters and digits)", name),
     h("label", { class: "check" }, agree, h("span", {}, s.calibrate ? "Start it." : "I have read this and take part.")),
     wire.alone && h("p", {}, "Your runs stay in this window until you close it. Nothing is sent, and nothing is stored unless you save it."),
-    !s.calibrate && !wire.alone && h("label", { class: "check" }, cc0, h("span", {}, "My data may be given to everybody without conditions (CC0). Leave this empty if you are not sure.")),
+    !s.calibrate && !wire.alone && h("label", { class: "check" }, cc0, h("span", {}, "My data may be shared with anyone, without conditions (CC0). Leave this box empty if you are not sure.")),
     go,
     !s.calibrate && !wire.alone && h("p", { class: "soft" }, h("a", { href: "experimenter", target: "_blank" }, "Window for the experimenter")),
   );
@@ -218,8 +218,8 @@ addEventListener("keydown", (event) => {
 });
 
 const DISPLAYS: Record<Condition["display"], string> = {
-  compensatory: "The ring in the middle is you, the line is where to be. Move to the side where the line is.",
-  pursuit: "The ring is you, the line is where to be. Bring the ring onto the line.",
+  compensatory: "The ring in the middle is you, the line is where you should be. Move to the side where the line is.",
+  pursuit: "The ring is you, the line is where you should be. Bring the ring onto the line.",
   preview: "The ring is you. The line comes down to you: you see ahead where it will be.",
 };
 
@@ -231,7 +231,7 @@ function ready(): void {
   show(
     "",
     h("h1", {}, `Run ${(next ?? 0) + 1} of ${planned.length}${training ? " (training)" : ""}`),
-    last?.how === "interrupted" && h("p", { class: "box" }, "The last run was broken off. It is made again."),
+    last?.how === "interrupted" && h("p", { class: "box" }, "The last run was interrupted. It is repeated."),
     h("p", {}, condition.text),
     h("p", {}, DISPLAYS[condition.display]),
     h("p", { class: "soft" }, h("kbd", {}, "Space"), " starts, ", h("kbd", {}, "Esc"), " ends a run early. A countdown of three seconds comes first. Keep this window in front."),
@@ -309,8 +309,8 @@ function links(): HTMLElement {
     "div",
     {},
     h("h2", {}, "Reports"),
-    s.reporting && h("p", { class: "soft" }, "Reports are being made; this takes a minute or two."),
-    all.length > 0 ? h("ul", {}, ...all) : !s.reporting && h("p", { class: "soft" }, "There are none yet."),
+    s.reporting && h("p", { class: "soft" }, "Reports are being written; this takes a minute or two."),
+    all.length > 0 ? h("ul", {}, ...all) : !s.reporting && h("p", { class: "soft" }, "There are no reports yet."),
   );
 }
 
@@ -325,7 +325,7 @@ function finished(): void {
     h("h1", {}, s.calibrate ? "Calibrated" : "Done. Thank you."),
     ...(s.calibration.length > 0
       ? [h("table", {}, ...s.calibration.map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, value)))),
-         h("p", { class: "soft" }, "This latency stands in every delay that is identified here. Screen and device add to it what only a light sensor can measure.")]
+         h("p", { class: "soft" }, "This latency is part of every delay identified here. Screen and device add a latency that only a light sensor can measure.")]
       : []),
     runsTable(s.done),
     h("div", { id: "person" }),
@@ -346,7 +346,7 @@ function experimenter(): void {
   show(
     "wide",
     h("h1", {}, `${s.name}: ${s.session ?? "no session yet"}`),
-    h("p", { id: "status", "aria-live": "polite" }, s.running ? `Run ${s.running} goes on.` : s.phase === "finished" ? "The session is done." : `${s.done.length} runs ended, ${s.planned.length} planned.`),
+    h("p", { id: "status", "aria-live": "polite" }, s.running ? `Run ${s.running} is in progress.` : s.phase === "finished" ? "The session is done." : `${s.done.length} runs ended, ${s.planned.length} planned.`),
     h("p", { id: "waiting", class: "soft" }),
     plotsCanvas,
     s.done.length > 0 && runsTable(s.done),

@@ -1,4 +1,4 @@
-//! A run on the server: sent, started, received in batches, ended.
+//! Stages of a run on the server: sent, started, received in batches, ended.
 
 use std::{collections::BTreeMap, sync::Arc, thread};
 
@@ -10,7 +10,7 @@ use crate::{
     live::{LiveRun, Samples, start},
     record::record,
     reports,
-    session::{Batch, How, Logged, RunLog, RunStart, Session},
+    session::{Batch, RunEnd, Logged, RunLog, RunStart, Session},
     task::{TICKS_PER_SAMPLE, Task},
     utc,
     verify::Measures,
@@ -84,10 +84,10 @@ impl Shared {
             .take()
             .filter(|ready| ready.number == number && state.run.is_none());
         let Some(Ready { planned, task, .. }) = ready else {
-            return Err(LabError::Order(format!("run {number} was not asked for")));
+            return Err(LabError::Order(format!("run {number} was not requested")));
         };
-        // Until the log exists.
-        state.over = Some(number);
+        // Until the log exists, batches of this run are ignored.
+        state.last_ended_run = Some(number);
         let session = session_of(state)?;
         let Some((plan, condition)) = session.facts.run(planned) else {
             return Err(LabError::Order(format!("the session has no run {planned}")));
@@ -113,8 +113,8 @@ impl Shared {
             phases: task.phases.clone(),
             condition,
         };
-        begun.write(&stem, &task).map_err(not_taken)?;
-        let log = RunLog::create(&stem, task.ticks).map_err(not_taken)?;
+        begun.write(&stem, &task).map_err(unverified_run_error)?;
+        let log = RunLog::create(&stem, task.ticks).map_err(unverified_run_error)?;
         let live = LiveRun::new(&session.facts.config.method, begun.condition.course()?)?;
         let teller = Arc::downgrade(self);
         let live = start(live, &stem, move |line| {
@@ -133,13 +133,14 @@ impl Shared {
     }
 
     pub(super) fn take(&self, state: &mut Current, number: usize, batch: &Batch) -> Result<(), LabError> {
-        if state.run.is_none() && state.over == Some(number) {
+        if state.run.is_none() && state.last_ended_run == Some(number) {
             return Ok(());
         }
         state.running(number)?;
         let Some(run) = &mut state.run else { return Ok(()) };
         run.log.continued_by(batch)?;
-        // First the estimate, which is awaited; the disk may take its time.
+        // The samples are passed to the estimate before the data are written, since the estimate is displayed live and
+        // writing may take time.
         let samples = (batch.first..)
             .zip(batch.u.iter().zip(&batch.e))
             .filter(|(tick, _)| tick.is_multiple_of(TICKS_PER_SAMPLE))
@@ -150,19 +151,19 @@ impl Shared {
             });
         let samples: Samples = samples.collect();
         if let (Some(live), false) = (&run.live, samples.is_empty()) {
-            // An estimate that ended early is recognised by its missing lines.
+            // If the estimate has ended early, its missing lines show this.
             let _ = live.send(samples);
         }
         let refused = match run.log.append(batch) {
-            Err(error @ LabError::File { .. }) => not_taken(error),
+            Err(error @ LabError::File { .. }) => unverified_run_error(error),
             other => return other,
         };
-        // If the disk is full now, the run is closed when the session is opened again.
-        let _ = self.end_run(state, How::Interrupted, BTreeMap::new());
+        // If the disk is full, the run is closed when the session is next opened.
+        let _ = self.end_run(state, RunEnd::Interrupted, BTreeMap::new());
         Err(refused)
     }
 
-    /// Ends a run with all its ticks.
+    /// Ends a run that has all its ticks.
     pub(super) fn finish(
         self: &Arc<Self>,
         state: &mut Current,
@@ -178,10 +179,10 @@ impl Shared {
         }
         if counted.len() > 16 || counted.values().any(|v| !v.is_finite()) {
             return Err(LabError::Message(
-                "the counts of the page are not a few numbers".to_owned(),
+                "the counts sent by the page are too many or not finite".to_owned(),
             ));
         }
-        self.end_run(state, How::Finished, counted)?;
+        self.end_run(state, RunEnd::Finished, counted)?;
         if state.session.as_ref().is_some_and(|session| session.next().is_none()) {
             self.report(state);
         }
@@ -192,12 +193,12 @@ impl Shared {
     pub(super) fn end_run(
         &self,
         state: &mut Current,
-        how: How,
+        how: RunEnd,
         counted: BTreeMap<String, f64>,
     ) -> Result<(), LabError> {
         let Some(run) = state.run.take() else { return Ok(()) };
-        state.over = Some(run.begun.number);
-        let measures = self.close(state, run, how, counted).map_err(not_taken)?;
+        state.last_ended_run = Some(run.begun.number);
+        let measures = self.close(state, run, how, counted).map_err(unverified_run_error)?;
         let done = state.session.as_ref().and_then(|session| session.done.last());
         if let (Some(done), Some(measures)) = (done, &measures) {
             self.tell(&ToPage::Verdict { done, measures }, |_, page| page.role.is_some());
@@ -208,12 +209,12 @@ impl Shared {
         Ok(())
     }
 
-    /// Writes the end of a run: first its record, so that every run reported as verified has one.
+    /// Closes a run. Its record is written before its verdict, so that every run reported as verified has a record.
     fn close(
         &self,
         state: &mut Current,
         mut run: Running,
-        how: How,
+        how: RunEnd,
         counted: BTreeMap<String, f64>,
     ) -> Result<Option<Measures>, LabError> {
         run.live = None;
@@ -230,13 +231,13 @@ impl Shared {
             hoid_io::write_record(&run.stem.file("beh.parquet"), record)?;
         }
         let checked = session.end(&run.stem, how, counted)?;
-        if let (Mode::Calibrate, How::Finished, Some(record)) = (&self.mode, how, &record) {
+        if let (Mode::Calibrate, RunEnd::Finished, Some(record)) = (&self.mode, how, &record) {
             state.calibration = Some(calibrate::judge(&self.out, record, &logged)?);
         }
         Ok(Some(checked.measures))
     }
 
-    /// Creates the pages about the session, on a separate thread.
+    /// Creates the pages about the session on a separate thread.
     pub(super) fn report(self: &Arc<Self>, state: &mut Current) {
         let (Some(program), Some(session)) = (&self.program, &state.session) else {
             return;
@@ -261,15 +262,16 @@ impl Shared {
     }
 }
 
-/// Error for a run that cannot be written and therefore cannot be verified: it ends, and the session continues.
-fn not_taken(error: LabError) -> LabError {
+/// Creates the error for a run that cannot be written and is therefore unverified: the run ends, and the session
+/// continues.
+fn unverified_run_error(error: LabError) -> LabError {
     let what = match &error {
         LabError::File { file, source } => format!("{file}: {source}"),
         LabError::Io(error) => error.to_string(),
         _ => return error,
     };
     LabError::Order(format!(
-        "{what}. The run was ended and does not count; free space on the disk and start it again"
+        "{what}. The run was ended and does not count; free space on the disk and start the run again"
     ))
 }
 

@@ -13,15 +13,15 @@ use crate::{
 };
 
 impl Shared {
-    /// Sends to the pages that `wants` selects.
+    /// Sends a message to the pages selected by `wants`.
     pub(super) fn tell(&self, message: &ToPage<'_>, wants: impl Fn(u64, &Page) -> bool) {
-        // All messages can be written as JSON.
+        // Every message can be serialised as JSON.
         let Ok(text) = serde_json::to_string(message) else {
             return;
         };
         for (id, page) in &*self.pages() {
             if wants(*id, page) {
-                // A closed page leaves by itself.
+                // A page that has been closed is removed by its socket thread.
                 let _ = page.sender.send(Outgoing::Text(text.clone()));
             }
         }
@@ -36,7 +36,7 @@ impl Shared {
         });
     }
 
-    /// Sessions that can be resumed, such as `sub-P01/ses-01`.
+    /// Returns the names of the sessions that can be resumed, such as `sub-P01/ses-01`.
     pub(super) fn open_sessions(&self) -> Vec<String> {
         if self.mode != Mode::Sessions {
             return Vec::new();
@@ -95,7 +95,7 @@ impl Shared {
     }
 }
 
-/// The runs with verdicts from the present state of their files.
+/// Returns the runs with new verdicts from the current state of their files.
 fn judged_again(session: &Session) -> Vec<Done> {
     let again = |done: &Done| {
         let checked = check(&session.stem(&done.condition, done.number));
@@ -112,7 +112,7 @@ fn judged_again(session: &Session) -> Vec<Done> {
     session.done.iter().map(again).collect()
 }
 
-/// `sub-P01/ses-01`.
+/// Returns the name of a session, such as `sub-P01/ses-01`.
 fn name_of(folder: &Path) -> String {
     let last = |path: &Path| {
         path.file_name()

@@ -1,38 +1,39 @@
-//! Heads of requests, and replies.
+//! Request heads and replies.
 
 use std::{
     io::{self, Write as _},
     net::TcpStream,
 };
 
-/// Maximum length of a head, bytes.
+/// Maximum length of a head in bytes.
 const LONGEST: usize = 16 * 1024;
 /// Maximum number of lines of a head.
 const MOST_LINES: usize = 64;
 
-/// The used parts of a request.
+/// The parts of a request that are used.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Request {
     pub method: String,
-    /// Without the query.
+    /// Path of the request without the query.
     pub path: String,
     pub host: Option<String>,
     pub origin: Option<String>,
-    /// The key of a request for a WebSocket of version 13.
+    /// Key of a request for a WebSocket of version 13.
     pub socket_key: Option<String>,
 }
 
 impl Request {
-    /// Parses the received part of a head: the request, or the refusal; nothing while the head is incomplete.
+    /// Parses the part of a head received so far and returns the request or the refusal; `None` while the head is
+    /// incomplete.
     pub fn of(head: &[u8]) -> Option<Result<Self, Reply>> {
         if !head.windows(4).any(|four| four == b"\r\n\r\n") {
             let long = head.len() > LONGEST;
-            return long.then(|| Err(Reply::refused(431, "the head of the request is too long")));
+            return long.then(|| Err(Reply::refused(431, "the header of the request is too long")));
         }
-        Some(Self::parse(head).ok_or_else(|| Reply::refused(400, "not a request of HTTP")))
+        Some(Self::parse(head).ok_or_else(|| Reply::refused(400, "not an HTTP request")))
     }
 
-    /// The token, and the path after it.
+    /// Returns the token, and the path after it.
     pub fn token(&self) -> (&str, &str) {
         let path = self.path.trim_start_matches('/');
         path.split_once('/').unwrap_or((&self.path, ""))
@@ -46,7 +47,7 @@ impl Request {
         }
         let path = parsed.path?.split('?').next()?.to_owned();
         let method = parsed.method?.to_owned();
-        // An honest client does not duplicate a header.
+        // A legitimate client does not send a header twice.
         let header = |name: &str| {
             let mut all = parsed.headers.iter().filter(|h| h.name.eq_ignore_ascii_case(name));
             let value = std::str::from_utf8(all.next()?.value).ok()?.trim().to_owned();
@@ -64,19 +65,19 @@ impl Request {
     }
 }
 
-/// An answer.
+/// Reply to a request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reply {
     status: u16,
     kind: &'static str,
     policy: String,
-    /// New location.
+    /// New location, for a redirection.
     location: Option<String>,
     body: Vec<u8>,
 }
 
 impl Reply {
-    /// The page.
+    /// Creates a reply with the page.
     pub fn page(html: &str, policy: &str) -> Self {
         Self {
             status: 200,
@@ -87,7 +88,7 @@ impl Reply {
         }
     }
 
-    /// A file of the session. Pages of results hold their styles and figures and no script.
+    /// Creates a reply with a file of the session. Pages of results contain their styles and figures and no scripts.
     pub fn file(body: Vec<u8>, kind: &'static str) -> Self {
         Self {
             status: 200,
@@ -99,7 +100,7 @@ impl Reply {
         }
     }
 
-    /// A refusal as text.
+    /// Creates a refusal as text.
     pub fn refused(status: u16, words: &str) -> Self {
         Self {
             status,
@@ -110,7 +111,7 @@ impl Reply {
         }
     }
 
-    /// A redirection.
+    /// Creates a redirection to another address.
     pub fn moved(address: &str) -> Self {
         Self {
             location: Some(address.to_owned()),
@@ -118,7 +119,7 @@ impl Reply {
         }
     }
 
-    /// Writes the reply; the connection ends after it.
+    /// Writes the reply, after which the connection is closed.
     pub fn write(&self, stream: &mut TcpStream) -> io::Result<()> {
         let reason = match self.status {
             200 => "OK",
@@ -133,7 +134,7 @@ impl Reply {
             _ => "Internal Server Error",
         };
         let location = (self.location.as_ref()).map_or_else(String::new, |to| format!("Location: {to}\r\n"));
-        // Isolation from other origins gives the page a precise clock.
+        // Isolation from other origins gives the page access to a precise clock.
         let head = format!(
             "HTTP/1.1 {} {reason}\r\n{location}Content-Type: {}\r\nContent-Length: {}\r\nConnection: close\r\n\
              Cache-Control: no-store\r\nContent-Security-Policy: {}\r\nCross-Origin-Opener-Policy: same-origin\r\n\

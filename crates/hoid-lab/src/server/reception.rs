@@ -1,9 +1,10 @@
-//! Clients that have not presented the token: one thread for all of them, which never waits for any.
+//! Clients that have not presented the token: a single thread handles all of them and never blocks on any client.
 //!
-//! While there are none it waits for the next one. Otherwise it accepts connections, examines each once (a complete
-//! head, one that is too long or too late, a closed peer), and pauses for [`PAUSE`] if nothing has happened. New
-//! connections are examined before any is closed: so the page, whose head arrives at once, is served however many
-//! others connect, and the oldest of [`MOST`] incomplete ones is closed for the next.
+//! While no client is connected, the thread waits for the next connection. Otherwise it accepts connections, examines
+//! each client once (complete head, head too long or too late, connection closed by the client), and pauses for
+//! [`PAUSE`] if nothing has happened. New connections are examined before any connection is closed. The page, whose
+//! head arrives at once, is therefore served regardless of the number of other clients; if there are more than [`MOST`]
+//! incomplete connections, the oldest ones are closed.
 
 use std::{
     collections::VecDeque,
@@ -15,12 +16,12 @@ use std::{
 
 use super::http::{Reply, Request};
 
-/// Maximum number of them, and of those accepted before all are examined.
+/// Maximum number of connections with an incomplete head, and number of connections accepted before all are examined.
 const MOST: usize = 256;
 const AT_ONCE: usize = 64;
-/// Timeout of a complete head.
-const PATIENCE: Duration = Duration::from_secs(5);
-/// Pause if nothing happens, or if the system provides no connection.
+/// Time within which a complete head must arrive.
+const HEAD_TIMEOUT: Duration = Duration::from_secs(5);
+/// Pause if nothing has happened, and pause if the operating system provides no connection.
 const PAUSE: Duration = Duration::from_millis(1);
 const BACK_OFF: Duration = Duration::from_millis(50);
 
@@ -31,7 +32,7 @@ struct Stranger {
     came: Instant,
 }
 
-/// State of a stranger after an examination.
+/// Result of an examination of a stranger.
 enum Look {
     Waits,
     Gone,
@@ -53,20 +54,21 @@ impl Stranger {
                 Err(_) => return Look::Gone,
             }
         }
-        if self.came.elapsed() > PATIENCE {
-            return Look::Said(Err(Reply::refused(408, "the request did not come in time")));
+        if self.came.elapsed() > HEAD_TIMEOUT {
+            return Look::Said(Err(Reply::refused(408, "the request did not arrive in time")));
         }
         Look::Waits
     }
 }
 
-/// Accepts connections while the program runs; `admitted` takes a request with its connection, or returns the refusal.
+/// Accepts connections while the program runs. `admitted` takes over a request with its connection, or returns the
+/// refusal.
 pub fn receive(listener: &TcpListener, mut admitted: impl FnMut(Request, TcpStream) -> Result<(), (Reply, TcpStream)>) {
     let mut all: VecDeque<Stranger> = VecDeque::new();
     loop {
         let mut idle = match take(listener, &mut all) {
             Ok(came) => came == 0,
-            // No descriptor is left: an incomplete connection is closed.
+            // If no file descriptor is left, the oldest incomplete connection is closed.
             Err(_) => {
                 drop(all.pop_front());
                 thread::sleep(BACK_OFF);
@@ -90,7 +92,7 @@ pub fn receive(listener: &TcpListener, mut admitted: impl FnMut(Request, TcpStre
                 Err(reply) => Some((reply, stream)),
             };
             if let Some((reply, mut stream)) = refused {
-                // It fits into the send buffer; a client that does not read it needs none.
+                // The reply fits into the send buffer; if the client does not read the reply, the error is ignored.
                 let _ = reply.write(&mut stream);
             }
         }
@@ -104,7 +106,7 @@ pub fn receive(listener: &TcpListener, mut admitted: impl FnMut(Request, TcpStre
     }
 }
 
-/// Accepts waiting connections; waits for one if there are none.
+/// Accepts pending connections; waits for one if no client is connected.
 fn take(listener: &TcpListener, all: &mut VecDeque<Stranger>) -> io::Result<usize> {
     let first = all.is_empty();
     listener.set_nonblocking(!first)?;
@@ -112,7 +114,7 @@ fn take(listener: &TcpListener, all: &mut VecDeque<Stranger>) -> io::Result<usiz
         let stream = match listener.accept() {
             Ok((stream, _)) => stream,
             Err(error) if error.kind() == ErrorKind::WouldBlock => return Ok(came),
-            // A peer that is already closed.
+            // The client has already closed the connection.
             Err(error) if matches!(error.kind(), ErrorKind::ConnectionAborted | ErrorKind::Interrupted) => continue,
             Err(error) => return Err(error),
         };

@@ -1,5 +1,5 @@
-//! The socket of a page: messages from the page go to the lab, and messages from the lab to the page. One thread does
-//! both: it waits for the page for a hundredth of a second at a time.
+//! The socket of a page: it passes messages from the page to the lab, and messages from the lab to the page. One thread
+//! does both; it waits for messages from the page for 10 ms at a time.
 
 use std::{
     io::{ErrorKind, Write as _},
@@ -52,7 +52,7 @@ pub fn run(mut stream: TcpStream, key: &str, lab: &Lab) {
             break;
         }
         let answer = match socket.read() {
-            Ok(Message::Text(text)) => heard(lab, id, text.as_str()),
+            Ok(Message::Text(text)) => process_message(lab, id, text.as_str()),
             Ok(Message::Binary(_)) => Err(LabError::Message("a binary frame".to_owned())),
             Ok(Message::Close(_)) => break,
             Ok(_) => Ok(()),
@@ -65,20 +65,20 @@ pub fn run(mut stream: TcpStream, key: &str, lab: &Lab) {
                 elsewhere: false,
             };
             let told = serde_json::to_string(&words).map(|text| socket.send(Message::text(text)));
-            // A page that violates the protocol is not part of this program.
+            // A page that violates the protocol is not the page of this program and is disconnected.
             if matches!(error, LabError::Message(_)) || !matches!(told, Ok(Ok(()))) {
                 break;
             }
         }
     }
-    // First: a page that reconnects after its connection closed finds its run ended.
+    // The page leaves before the socket is closed: if it reconnects afterwards, its run has already ended.
     lab.leave(id);
     let _ = socket.close(None);
     let _ = socket.flush();
 }
 
-fn heard(lab: &Lab, id: u64, text: &str) -> Result<(), LabError> {
+fn process_message(lab: &Lab, id: u64, text: &str) -> Result<(), LabError> {
     let message: FromPage =
         serde_json::from_str(text).map_err(|error| LabError::Message(hoid_io::printable(&error.to_string())))?;
-    lab.hear(id, message)
+    lab.receive(id, message)
 }

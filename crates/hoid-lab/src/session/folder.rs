@@ -1,15 +1,15 @@
-//! Names of the files and folders of a session, following BIDS where it defines them.
+//! Names of the files and folders of a session; they follow BIDS where BIDS defines them.
 
 use std::path::{Path, PathBuf};
 
 use crate::LabError;
 
-/// The folder of a session.
+/// Returns the folder of a session.
 pub fn session_folder(out: &Path, subject: &str, session: usize) -> PathBuf {
     out.join(format!("sub-{subject}")).join(format!("ses-{session:02}"))
 }
 
-/// Checks a pseudonym: 1 to 20 letters and digits.
+/// Checks that a pseudonym consists of 1 to 20 letters and digits.
 ///
 /// # Errors
 /// [`LabError::Order`].
@@ -32,7 +32,7 @@ pub struct Stem {
 }
 
 impl Stem {
-    /// For the run with this number in a session.
+    /// Creates the stem for the run with this number in a session.
     pub fn new(folder: &Path, subject: &str, session: usize, condition: &str, number: usize) -> Self {
         Self {
             folder: folder.to_owned(),
@@ -40,22 +40,22 @@ impl Stem {
         }
     }
 
-    /// The stem itself.
+    /// Returns the stem as text.
     pub fn text(&self) -> &str {
         &self.stem
     }
 
-    /// Path of one of its files, such as `ticks.csv`.
+    /// Returns the path of a file of the run, such as `ticks.csv`.
     pub fn file(&self, end: &str) -> PathBuf {
         self.folder.join(format!("{}_{end}", self.stem))
     }
 
-    /// The folder of its pages.
+    /// Returns the folder of the pages of the run.
     pub fn reports(&self) -> PathBuf {
         self.folder.join("reports").join(&self.stem)
     }
 
-    /// All started runs of a folder, by their number.
+    /// Returns all started runs in a folder, in the order of their numbers.
     ///
     /// # Errors
     /// [`LabError::Io`].
@@ -64,7 +64,7 @@ impl Stem {
             .iter()
             .filter_map(|name| {
                 let stem = name.strip_suffix("_run.json")?;
-                // No session has as many runs as would overflow the number of the next one.
+                // The 32-bit range leaves room for the number of the next run.
                 let number: u32 = stem.rsplit_once("_run-")?.1.parse().ok()?;
                 let number = usize::try_from(number).ok()?;
                 let own = Self {

@@ -1,14 +1,13 @@
 //! Journal of a run in progress: each line is complete or absent.
 //!
-//! A line is complete with its line end. A batch that cannot be written completely is undone: the
-//! files are cut to the last complete batch, and its ticks count only once all three files have
-//! them. A temporarily full disk therefore leaves no partial line before later ones; the run is
-//! ended, and *unverified*. After a power cut the files are cut to the last complete line when they
-//! are read.
+//! A line is complete if it has its line end. If a batch cannot be written completely, it is undone: the files are
+//! truncated to the last complete batch, and the ticks of a batch count only once all three files contain them. A
+//! temporarily full disk therefore leaves no partial line before later lines; the run is ended and is *unverified*.
+//! After a power failure the files are used only up to the last complete line.
 //!
-//! A batch is passed to the system when it arrives, so that a killed server loses nothing of it,
-//! and to the disk at least every second, which limits the loss if the computer stops. Numbers are
-//! written with the digits that reproduce the same bits.
+//! A batch is passed to the operating system when it arrives, so that nothing is lost if the server is killed. It is
+//! flushed to the disk at least every second, which limits the loss if the computer fails. Numbers are written with
+//! enough digits to reproduce every bit.
 
 use std::{
     fs::{File, OpenOptions},
@@ -22,20 +21,20 @@ use serde::Deserialize;
 use super::{folder::Stem, run_start::APPENDED};
 use crate::LabError;
 
-/// Maximum time until appended data are on the disk.
+/// Maximum time until appended data are flushed to the disk.
 const SYNC: Duration = Duration::from_millis(900);
 
-/// An input event.
+/// An event of the input device.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(from = "(f64, f64, f64, f64)")]
 pub struct Event {
-    /// The first tick at which it takes effect.
+    /// First tick at which the event takes effect.
     pub tick: f64,
-    /// Its own time stamp, ms from tick 0.
+    /// Time stamp of the event, ms from tick 0.
     pub stamp_ms: f64,
-    /// Time at which the page received it, ms from tick 0.
+    /// Time at which the page received the event, ms from tick 0.
     pub handled_ms: f64,
-    /// Value of the device.
+    /// Raw value of the device.
     pub raw: f64,
 }
 
@@ -50,13 +49,13 @@ impl From<(f64, f64, f64, f64)> for Event {
     }
 }
 
-/// A frame.
+/// A frame drawn by the page.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(from = "(f64, f64, f64, f64)")]
 pub struct Frame {
-    /// The browser's time of the frame, ms from tick 0.
+    /// Time of the frame according to the browser, ms from tick 0.
     pub frame_ms: f64,
-    /// Time at which it was drawn, ms from tick 0.
+    /// Time at which the frame was drawn, ms from tick 0.
     pub drawn_ms: f64,
     /// The displayed tick.
     pub tick: f64,
@@ -75,11 +74,11 @@ impl From<(f64, f64, f64, f64)> for Frame {
     }
 }
 
-/// One message of a page.
+/// Data in one message from a page.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Batch {
-    /// The first tick.
+    /// Number of the first tick.
     pub first: usize,
     /// u from the first tick on.
     pub u: Vec<f64>,
@@ -91,11 +90,11 @@ pub struct Batch {
     pub frames: Vec<Frame>,
 }
 
-/// The files of the current run.
+/// The appended files of the current run.
 #[derive(Debug)]
 pub struct RunLog {
     files: [(PathBuf, File); 3],
-    /// Size of the complete batches in each file, bytes.
+    /// Size of the complete batches in each file in bytes.
     whole: [u64; 3],
     synced: Instant,
     logged: usize,
@@ -133,15 +132,15 @@ impl RunLog {
         })
     }
 
-    /// Checks that a batch continues the log; returns the tick after its last.
+    /// Checks that a batch continues the log; returns the number of the tick after the batch.
     ///
     /// # Errors
-    /// [`LabError::Message`] for a batch that does not continue the last one or exceeds the end.
+    /// [`LabError::Message`] for a batch that does not continue the previous one or extends beyond the end of the run.
     pub fn continued_by(&self, batch: &Batch) -> Result<usize, LabError> {
         let end = batch.first.saturating_add(batch.u.len());
         if batch.first != self.logged || batch.u.len() != batch.e.len() || end > self.planned {
             return Err(LabError::Message(format!(
-                "ticks {} to {end} with {} of e, expected ticks from {} to at most {}",
+                "ticks {} to {end} with {} values of e, expected ticks from {} to at most {}",
                 batch.first,
                 batch.e.len(),
                 self.logged,
@@ -154,7 +153,8 @@ impl RunLog {
     /// Appends a batch completely or not at all.
     ///
     /// # Errors
-    /// The errors of [`RunLog::continued_by`]; [`LabError::File`], after which the files hold the previous batches.
+    /// The errors of [`RunLog::continued_by`]; [`LabError::File`], after which the files contain only the previous
+    /// batches.
     pub fn append(&mut self, batch: &Batch) -> Result<(), LabError> {
         let end = self.continued_by(batch)?;
         let mut texts = [String::new(), String::new(), String::new()];
@@ -172,7 +172,7 @@ impl RunLog {
         }
         let written = (self.files.iter_mut().zip(&texts)).try_for_each(|((path, file), text)| append(path, file, text));
         if let Err(error) = written {
-            self.take_back();
+            self.truncate_to_last_batch();
             return Err(error);
         }
         for (whole, text) in self.whole.iter_mut().zip(&texts) {
@@ -185,8 +185,8 @@ impl RunLog {
         Ok(())
     }
 
-    /// Cuts the files to the last complete batch. If this fails, it is done when the session is opened.
-    fn take_back(&self) {
+    /// Truncates the files to the last complete batch. If this fails, it is done when the session is next opened.
+    fn truncate_to_last_batch(&self) {
         for ((_, file), whole) in self.files.iter().zip(self.whole) {
             let _ = file.set_len(whole);
         }
@@ -215,7 +215,7 @@ fn append(path: &Path, file: &mut File, text: &str) -> Result<(), LabError> {
         .map_err(|source| LabError::file(path, source))
 }
 
-/// The bytes up to the end of the last complete line.
+/// Returns the bytes up to the end of the last complete line.
 pub(super) fn whole_lines(bytes: &[u8]) -> &[u8] {
     let end = bytes.iter().rposition(|byte| *byte == b'\n');
     end.and_then(|end| bytes.get(..=end)).unwrap_or_default()

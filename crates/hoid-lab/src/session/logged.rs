@@ -11,7 +11,7 @@ use crate::{LabError, task::Signals};
 /// The log of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Logged {
-    /// The number of each tick, as logged.
+    /// Number of each tick as logged.
     pub numbers: Vec<f64>,
     /// u and e of each tick.
     pub signals: Signals,
@@ -24,11 +24,11 @@ pub struct Logged {
 }
 
 impl Logged {
-    /// Reads the complete part of the log: up to the last complete or first invalid line, and nothing of a missing
-    /// file, which is reported in `faults`.
+    /// Reads each file of the log up to its last complete line, or up to its first invalid line. A missing file counts
+    /// as empty and is reported in `faults`.
     ///
     /// # Errors
-    /// [`LabError::Io`] for errors of the operating system with an existing file.
+    /// [`LabError::Io`] if the operating system cannot read an existing file.
     pub fn read(stem: &Stem) -> Result<Self, LabError> {
         let mut logged = Self::default();
         let mut faults = Vec::new();
@@ -48,8 +48,8 @@ impl Logged {
     }
 }
 
-/// Calls `each` with the numbers of every complete line after the header, up to an invalid one; returns the problem of
-/// the file, if any.
+/// Calls `each` with the numbers in every complete line after the header, up to the first invalid line; returns a
+/// description of the problem if there is one.
 fn rows<const N: usize>(path: &Path, mut each: impl FnMut([f64; N])) -> Result<Option<String>, LabError> {
     let name = || {
         path.file_name()

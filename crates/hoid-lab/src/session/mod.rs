@@ -1,4 +1,4 @@
-//! A session as a folder.
+//! Storage of a session in a folder.
 //!
 //! ```text
 //! OUT/                                     one experiment, any number of people
@@ -15,14 +15,14 @@
 //!       beh.parquet                        the record at 100 Hz, for all commands of hoid
 //! ```
 //!
-//! Appended files are passed to the system with each batch of the page and to the disk every
-//! second. Other files are written atomically. A folder therefore shows the progress of the session
-//! at any instant: a run without `end.json` was interrupted.
+//! Appended files are passed to the operating system with each batch from the page and flushed to the disk every
+//! second. Other files are written atomically. A folder therefore always shows the progress of the session: a run
+//! without `end.json` was interrupted.
 //!
 //! | file | contents |
 //! |---|---|
 //! | `folder` | the names of files and folders |
-//! | `run_start` | [`RunStart`]: facts known before a run; [`Ended`]: facts known after it |
+//! | `run_start` | [`RunStart`]: data known before a run; [`Ended`]: data known after it |
 //! | `log` | [`RunLog`]: the appended data |
 //! | `logged` | [`Logged`]: the appended data, read back |
 //! | `state` | [`Session`]: the session as a whole |
@@ -36,5 +36,5 @@ mod state;
 pub use folder::{Stem, session_folder};
 pub use log::{Batch, Event, Frame, RunLog};
 pub use logged::Logged;
-pub use run_start::{Ended, How, RunStart, digest};
-pub use state::{Done, Facts, Session};
+pub use run_start::{Ended, RunEnd, RunStart, digest};
+pub use state::{Done, SessionPlan, Session};

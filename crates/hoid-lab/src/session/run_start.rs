@@ -1,4 +1,4 @@
-//! Data of a run before its start and after its end, each written at once.
+//! Data of a run that are known before its start or after its end, each written as one file.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -14,82 +14,82 @@ use crate::{
     task::{Phase, Task},
 };
 
-/// Data before a run: `run.json`, and `forcing.parquet` in the same folder.
+/// Data known before a run, stored in `run.json`, with `forcing.parquet` in the same folder.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunStart {
     /// Version of hoid.
     pub hoid: String,
-    /// Number of the run in its session, from 1.
+    /// Number of the run in its session, counted from 1.
     pub number: usize,
-    /// Its index in the plan of the session.
+    /// Index of the run in the plan of the session.
     pub planned: usize,
     /// True for a training run.
     pub training: bool,
-    /// Time in UTC.
+    /// Time of the start in UTC.
     pub utc: String,
-    /// The condition.
+    /// Condition of the run.
     pub condition: Condition,
-    /// Index of the condition in the configuration, and the replication: with its seed they
-    /// determine the phases.
+    /// Index of the condition in the configuration. With the seed of the condition and the replication it determines
+    /// the phases.
     pub cell: u64,
-    /// See `cell`.
+    /// Replication; see `cell`.
     pub replication: u64,
     /// Number of ticks before the measurement.
     pub run_in: usize,
-    /// Number of all ticks.
+    /// Total number of ticks.
     pub ticks: usize,
-    /// Map from the device to u.
+    /// Map from raw device values to u.
     pub input: InputMap,
-    /// The device.
+    /// Kind of device, such as `mouse`.
     pub device: String,
-    /// `browser`, or `injected` if a program provides the time.
+    /// Source of the time: `browser`, or `injected` if a program provides it.
     pub clock: String,
-    /// Time between frames measured before the run, ms.
+    /// Interval between frames measured before the run, ms.
     pub refresh_ms: f64,
-    /// The clock of the browser at tick 0, ms.
+    /// Reading of the browser clock at tick 0, ms.
     pub zero_ms: f64,
-    /// Limits of the verdict.
+    /// Limits for the verdict.
     pub limits: Limits,
-    /// The controlled elements.
+    /// Controlled elements with their first ticks.
     pub phases: Vec<Phase>,
 }
 
-/// How a run ended.
+/// Whether a run was completed or interrupted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum How {
+pub enum RunEnd {
     /// Completed.
     Finished,
-    /// Aborted by the person, a closed window, or the end of the server.
+    /// Aborted by the person, by closing the window, or by the end of the server.
     Interrupted,
 }
 
-/// Data after a run: `end.json`.
+/// Data known after a run, stored in `end.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ended {
-    /// How it ended.
-    pub how: How,
-    /// Time in UTC.
+    /// Whether the run was completed or interrupted.
+    pub how: RunEnd,
+    /// Time of the end in UTC.
     pub utc: String,
-    /// Counters of the page: events not made by hand, megabytes of its memory.
+    /// Numbers counted by the page, such as events not made by hand, or the memory of the page in MB.
     #[serde(default)]
     pub counted: BTreeMap<String, f64>,
-    /// SHA-256 of ticks, events and frames, in that order.
+    /// SHA-256 hashes of the files of ticks, events and frames, in that order.
     pub sha256: Vec<String>,
 }
 
-/// The three appended files.
+/// Names of the three appended files.
 pub(super) const APPENDED: [&str; 3] = ["ticks.csv", "events.csv", "frames.csv"];
 
 impl RunStart {
-    /// Writes the file, and the tables of the task.
+    /// Writes `run.json` and the tables of the task.
     ///
     /// # Errors
     /// [`LabError::Io`].
     pub fn write(&self, stem: &Stem, task: &Task) -> Result<(), LabError> {
-        // Both have the length of the target, which a preview shows beyond the end.
+        // Both tables get the length of the target, which extends beyond the end of the run by the preview.
         let mut disturbance = task.disturbance.clone();
         disturbance.resize(task.target.len(), 0.0);
         let column = |name: &str, values: Vec<f64>| OutputColumn {
@@ -115,19 +115,16 @@ impl RunStart {
         read_json(&stem.file("run.json"))
     }
 
-    /// The task, from the data written before the run.
+    /// Returns the task, from the data written before the run.
     ///
     /// # Errors
-    /// [`LabError::Damaged`] for tables of another length.
+    /// [`LabError::Damaged`] for tables of a wrong length.
     pub fn task(&self, stem: &Stem) -> Result<Task, LabError> {
         let path = stem.file("forcing.parquet");
         let table = hoid_io::read_table(&path)?;
         let column = |name: &str| match table.column(name) {
             Some(ColumnValues::Real(values)) => Ok(values.clone()),
-            _ => Err(LabError::damaged(
-                &path,
-                format!("there is no column {name} of numbers"),
-            )),
+            _ => Err(LabError::damaged(&path, format!("there is no numeric column {name}"))),
         };
         let (target, mut disturbance) = (column("target")?, column("disturbance")?);
         disturbance.truncate(self.ticks);
@@ -136,9 +133,10 @@ impl RunStart {
             return Err(LabError::damaged(&path, reason));
         }
         let order = self.phases.first().map(|phase| phase.plant.order());
-        let fits = |phase: &Phase| phase.plant.is_sound() && Some(phase.plant.order()) == order;
+        let fits = |phase: &Phase| phase.plant.is_valid() && Some(phase.plant.order()) == order;
         if order.is_none() || !self.phases.iter().all(fits) {
-            let reason = "the matrices of its controlled element do not fit each other; it is not as hoid lab wrote it";
+            let reason = "the matrices of its controlled element do not fit each other; the file is not as hoid lab \
+                          wrote it";
             return Err(LabError::damaged(&stem.file("run.json"), reason));
         }
         Ok(Task {
@@ -160,7 +158,7 @@ impl Ended {
         write_json(&stem.file("end.json"), self)
     }
 
-    /// Reads the file; nothing if the run has not ended.
+    /// Reads the file; `None` if the run has not ended.
     ///
     /// # Errors
     /// [`LabError::Damaged`], [`LabError::Io`].
@@ -172,7 +170,7 @@ impl Ended {
         read_json(&path).map(Some)
     }
 
-    /// The hashes of the present files; empty for a missing one.
+    /// Returns the hashes of the current files; an empty text for a missing file.
     ///
     /// # Errors
     /// [`LabError::Io`].
@@ -187,7 +185,7 @@ impl Ended {
     }
 }
 
-/// SHA-256 in hexadecimal digits.
+/// Returns the SHA-256 hash in hexadecimal digits.
 pub fn digest(bytes: &[u8]) -> String {
     data_encoding::HEXLOWER.encode(&Sha256::digest(bytes))
 }
@@ -200,5 +198,5 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<(), LabError> {
 
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, LabError> {
     serde_json::from_str(&hoid_io::read_settings(path)?)
-        .map_err(|error| LabError::damaged(path, format!("{error}; it is not as hoid lab wrote it")))
+        .map_err(|error| LabError::damaged(path, format!("{error}; the file is not as hoid lab wrote it")))
 }

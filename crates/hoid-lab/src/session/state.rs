@@ -1,4 +1,4 @@
-//! The session as a whole: planned and finished runs, and its continuation after an interruption.
+//! The session as a whole: planned and finished runs, and resumption after an interruption.
 
 use std::{
     collections::BTreeMap,
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     folder::{Stem, check_subject, session_folder},
     log::{RunLog, whole_lines},
-    run_start::{APPENDED, Ended, How, RunStart},
+    run_start::{APPENDED, Ended, RunEnd, RunStart},
 };
 use crate::{
     LabError,
@@ -22,54 +22,55 @@ use crate::{
     verify::{Checked, check},
 };
 
-/// The file of the plan, and its backup copy.
+/// Name of the file with the plan, and name of its backup copy.
 const FACTS: &str = "lab.toml";
 const FACTS_AGAIN: &str = "lab.copy.toml";
 
-/// True for the folder of a session.
+/// True if a folder contains a session.
 fn is_session(folder: &Path) -> bool {
     [FACTS, FACTS_AGAIN].iter().any(|name| folder.join(name).exists())
 }
 
-/// Contents of `lab.toml` in a session.
+/// Contents of `lab.toml` in the folder of a session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Facts {
+pub struct SessionPlan {
     /// Version of hoid.
     pub hoid: String,
-    /// Pseudonym.
+    /// Pseudonym of the person.
     pub subject: String,
-    /// Number of the session of this person, from 1.
+    /// Number of the session of this person, counted from 1.
     pub session: usize,
     /// Start time in UTC.
     pub began: String,
-    /// Confirmation of the consent, and its time.
+    /// Confirmation of the consent, with its time.
     pub consent: String,
     /// `CC0-1.0` if the person donates the data; otherwise empty.
     pub licence: String,
-    /// Row of the Latin square.
+    /// Row of the Latin square used for this person.
     pub row: usize,
-    /// True when all runs are done.
+    /// True if all planned runs are done.
     #[serde(default)]
     pub finished: bool,
-    /// Browser and screen, as the page reports them.
+    /// Browser and screen data sent by the page.
     #[serde(default)]
     pub browser: BTreeMap<String, String>,
     /// All planned runs.
     pub plan: Vec<Planned>,
-    /// The experiment.
+    /// Configuration of the experiment.
     pub config: Config,
 }
 
-impl Facts {
+impl SessionPlan {
     fn read(path: &Path) -> Result<Self, LabError> {
         let text = hoid_io::read_settings(path)?;
-        let facts: Self = toml::from_str(&text)
-            .map_err(|error| LabError::damaged(path, format!("{}; expected that of a session", error.message())))?;
+        let facts: Self = toml::from_str(&text).map_err(|error| {
+            LabError::damaged(path, format!("{}; expected the lab.toml of a session", error.message()))
+        })?;
         let conditions = facts.config.condition.len();
         if let Some(wrong) = facts.plan.iter().find(|run| run.condition >= conditions) {
             let reason = format!(
-                "the plan names condition {} of {conditions}; it is not as hoid lab wrote it",
+                "the plan names condition {} of {conditions}; the file is not as hoid lab wrote it",
                 wrong.condition
             );
             return Err(LabError::damaged(path, reason));
@@ -77,56 +78,56 @@ impl Facts {
         Ok(facts)
     }
 
-    /// A planned run, by its index in the plan, and its condition.
+    /// Returns a planned run, by its index in the plan, with its condition.
     pub fn run(&self, place: usize) -> Option<(&Planned, &Condition)> {
         let planned = self.plan.get(place)?;
         Some((planned, self.config.condition.get(planned.condition)?))
     }
 }
 
-/// A run that has ended: a line of `runs.csv`.
+/// A run that has ended, as a line of `runs.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Done {
-    /// Its number.
+    /// Number of the run.
     pub number: usize,
-    /// Its index in the plan.
+    /// Index of the run in the plan.
     pub planned: usize,
-    /// Name of its condition.
+    /// Name of the condition.
     pub condition: String,
     /// True for a training run.
     pub training: bool,
-    /// How it ended.
-    pub how: How,
-    /// Time in UTC.
+    /// Whether the run was completed or interrupted.
+    pub how: RunEnd,
+    /// Time of the end of the run in UTC.
     pub utc: String,
     /// `verified` or `unverified`.
     pub verdict: String,
-    /// Reasons of the verdict `unverified`.
+    /// Reasons for the verdict `unverified`.
     pub reasons: String,
     /// Additional notes.
     pub notes: String,
-    /// Root mean square of e.
+    /// Root mean square of e during the measurement.
     pub rms_e: f64,
-    /// 100 for no error, 0 for the error without control.
+    /// Score from 0 to 100: 100 for zero error, 0 for the error without control.
     pub score: f64,
 }
 
 /// A session and its folder.
 #[derive(Debug)]
 pub struct Session {
-    /// The folder.
+    /// Folder of the session.
     pub folder: PathBuf,
-    /// Contents of its `lab.toml`.
-    pub facts: Facts,
-    /// The finished runs, in their order.
+    /// Contents of `lab.toml`.
+    pub facts: SessionPlan,
+    /// Runs that have ended, in the order in which they were recorded.
     pub done: Vec<Done>,
 }
 
 impl Session {
-    /// Starts a session of a person who has confirmed the consent.
+    /// Starts a session for a person who has confirmed the consent.
     ///
     /// # Errors
-    /// [`LabError::Order`] for a pseudonym that is invalid; those of files.
+    /// [`LabError::Order`] for an invalid pseudonym; errors of reading or writing files.
     pub fn begin(out: &Path, config: &Config, subject: &str, cc0: bool) -> Result<Self, LabError> {
         check_subject(subject)?;
         hoid_io::make_directory(out)?;
@@ -137,7 +138,7 @@ impl Session {
         hoid_io::make_directory(&folder)?;
         let now = utc::now();
         let begun = Self {
-            facts: Facts {
+            facts: SessionPlan {
                 hoid: env!("CARGO_PKG_VERSION").to_owned(),
                 subject: subject.to_owned(),
                 session,
@@ -157,11 +158,11 @@ impl Session {
         Ok(begun)
     }
 
-    /// Opens a session; runs interrupted by the end of a server, or with missing or truncated files, are closed as
-    /// unverified.
+    /// Opens a session. Runs that were interrupted by the end of a server, or whose files are missing or truncated, are
+    /// closed as unverified.
     ///
     /// # Errors
-    /// [`LabError::Damaged`] for a folder without a session; errors of files that cannot be written.
+    /// [`LabError::Damaged`] for a folder without a session; errors of writing files.
     pub fn open(folder: &Path) -> Result<Self, LabError> {
         let mut session = Self::read(folder)?;
         for (number, stem) in Stem::all(folder)? {
@@ -173,7 +174,7 @@ impl Session {
             } else if Ended::read(&stem).is_ok_and(|ended| ended.is_some()) {
                 session.note(&stem, &check(&stem)?)?;
             } else {
-                session.end(&stem, How::Interrupted, BTreeMap::new())?;
+                session.end(&stem, RunEnd::Interrupted, BTreeMap::new())?;
             }
         }
         Ok(session)
@@ -184,10 +185,10 @@ impl Session {
     /// # Errors
     /// [`LabError::Damaged`].
     pub fn read(folder: &Path) -> Result<Self, LabError> {
-        // The copy is used only if the file is unreadable: it is at most one change behind the file.
-        let facts = match Facts::read(&folder.join(FACTS)) {
+        // The copy is used only if the file is unreadable; it lags the file by at most one change.
+        let facts = match SessionPlan::read(&folder.join(FACTS)) {
             Ok(facts) => facts,
-            Err(damaged) => Facts::read(&folder.join(FACTS_AGAIN)).map_err(|_| damaged)?,
+            Err(damaged) => SessionPlan::read(&folder.join(FACTS_AGAIN)).map_err(|_| damaged)?,
         };
         Ok(Self {
             done: read_runs(&folder.join("runs.csv"))?,
@@ -209,17 +210,17 @@ impl Session {
         Ok(())
     }
 
-    /// The index in the plan of the next run; nothing if all are done.
+    /// Returns the index of the next run in the plan; `None` if all runs are done.
     pub fn next(&self) -> Option<usize> {
         let finished = |place: &usize| {
             self.done
                 .iter()
-                .any(|done| done.planned == *place && done.how == How::Finished)
+                .any(|done| done.planned == *place && done.how == RunEnd::Finished)
         };
         (0..self.facts.plan.len()).find(|place| !finished(place))
     }
 
-    /// A number for a new run.
+    /// Returns a number for a new run.
     ///
     /// # Errors
     /// [`LabError::Io`].
@@ -228,18 +229,18 @@ impl Session {
         Ok(last.saturating_add(1))
     }
 
-    /// The names of the files of a run.
+    /// Returns the common prefix of the file names of a run.
     pub fn stem(&self, condition: &str, number: usize) -> Stem {
         Stem::new(&self.folder, &self.facts.subject, self.facts.session, condition, number)
     }
 
-    /// Ends a run: seals its files, checks it and records the result.
+    /// Ends a run: hashes its files, verifies it and records the result.
     ///
     /// # Errors
-    /// The errors of files.
-    pub fn end(&mut self, stem: &Stem, how: How, counted: BTreeMap<String, f64>) -> Result<Checked, LabError> {
+    /// Errors of reading or writing files.
+    pub fn end(&mut self, stem: &Stem, how: RunEnd, counted: BTreeMap<String, f64>) -> Result<Checked, LabError> {
         if !APPENDED.iter().any(|end| stem.file(end).exists()) {
-            // It ended before its first tick.
+            // The run ended before its first tick.
             drop(RunLog::create(stem, 0)?);
         }
         Ended {
@@ -266,7 +267,7 @@ impl Session {
             planned: begun.planned,
             condition: begun.condition.name.clone(),
             training: begun.training,
-            how: Ended::read(stem)?.map_or(How::Interrupted, |ended| ended.how),
+            how: Ended::read(stem)?.map_or(RunEnd::Interrupted, |ended| ended.how),
             utc: utc::now(),
             verdict: checked.word().to_owned(),
             reasons: checked.reasons(),
@@ -277,7 +278,7 @@ impl Session {
         self.write_down(done)
     }
 
-    /// Records a run of which only the name is known.
+    /// Records a run of which only the file names are known.
     fn lost(&mut self, number: usize, stem: &Stem) -> Result<(), LabError> {
         let condition = stem
             .text()
@@ -285,11 +286,11 @@ impl Session {
             .and_then(|(_, rest)| rest.rsplit_once("_run-"));
         self.write_down(Done {
             number,
-            // An index that no plan has.
+            // No plan contains this index.
             planned: u32::MAX as usize,
             condition: condition.map_or_else(String::new, |(name, _)| name.to_owned()),
             training: false,
-            how: How::Interrupted,
+            how: RunEnd::Interrupted,
             utc: utc::now(),
             verdict: "unverified".to_owned(),
             reasons: "run.json is truncated or not as hoid lab wrote it".to_owned(),
@@ -299,7 +300,7 @@ impl Session {
         })
     }
 
-    /// Appends a line completely or not at all, after the last complete one.
+    /// Appends a line, completely or not at all, after the last complete line.
     fn write_down(&mut self, done: Done) -> Result<(), LabError> {
         let path = self.folder.join("runs.csv");
         let whole = if path.exists() {
@@ -319,7 +320,7 @@ impl Session {
             .and_then(|()| file.write_all(&line))
             .and_then(|()| file.sync_data());
         if let Err(source) = written {
-            // If it cannot be cut now, it is when the next line is written.
+            // If the file cannot be truncated now, it is truncated when the next line is written.
             let _ = file.set_len(whole as u64);
             return Err(LabError::file(&path, source));
         }
@@ -327,7 +328,7 @@ impl Session {
         Ok(())
     }
 
-    /// All sessions of an experiment, in the order of their folders.
+    /// Returns the folders of all sessions of an experiment, in alphabetical order.
     ///
     /// # Errors
     /// [`LabError::Io`].
@@ -344,7 +345,7 @@ impl Session {
     }
 }
 
-/// The subdirectories whose names start with `prefix`, sorted.
+/// Returns the subdirectories whose names start with `prefix`, sorted.
 fn directories(of: &Path, prefix: &str) -> Result<Vec<PathBuf>, LabError> {
     if !of.exists() {
         return Ok(Vec::new());
@@ -359,7 +360,7 @@ fn directories(of: &Path, prefix: &str) -> Result<Vec<PathBuf>, LabError> {
     Ok(found)
 }
 
-/// The row of a person: that of their first session, otherwise the number of previous people.
+/// Returns the row of a person: the row in their first session, or else the number of people before them.
 fn row_of(out: &Path, subject: &str) -> Result<usize, LabError> {
     let mut others = 0_usize;
     for person in directories(out, "sub-")? {
@@ -382,7 +383,7 @@ fn read_runs(path: &Path) -> Result<Vec<Done>, LabError> {
     if !path.exists() {
         return Ok(Vec::new());
     }
-    // A truncated or invalid line is omitted: its run is evaluated again when the session is opened.
+    // A truncated or invalid line is skipped; its run is evaluated again when the session is opened.
     let bytes = hoid_io::read_bytes(path)?;
     let mut reader = csv::Reader::from_reader(whole_lines(&bytes));
     Ok(reader.deserialize().flatten().collect())

@@ -182,7 +182,7 @@ impl Hostile {
             }
             // Invalid messages are refused at once.
             if let Ok(message) = serde_json::from_slice::<FromPage>(&text) {
-                let _ = self.person.lab.hear(self.person.page, message);
+                let _ = self.person.lab.receive(self.person.page, message);
             }
         }
     }
@@ -205,7 +205,7 @@ impl Hostile {
             };
             let page = lab.join(channel().0);
             let hello = serde_json::from_value(json!({"type": "hello", "role": "experimenter"})).unwrap();
-            let _ = lab.hear(page, hello);
+            let _ = lab.receive(page, hello);
             for name in ["1.json", "2.json"] {
                 let _ = lab.data(name);
             }

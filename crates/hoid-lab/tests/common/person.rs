@@ -41,7 +41,7 @@ impl Person {
 
     pub fn say(&self, message: Value) -> Result<(), String> {
         let message: FromPage = serde_json::from_value(message).map_err(|error| error.to_string())?;
-        self.lab.hear(self.page, message).map_err(|error| error.to_string())
+        self.lab.receive(self.page, message).map_err(|error| error.to_string())
     }
 
     /// Starts the next run, which has this number.

@@ -4,8 +4,9 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::ContinuousTransferFunction;
 
-/// Returns the system after a hold with a delay of a `fraction` of a sample, in ascending powers of `z^-1`; a nonzero
-/// fraction makes the numerator longer by one. `None` if the matrix exponential is not finite.
+/// Returns numerator and denominator of the held system in ascending powers of `z^-1`, for a delay of a `fraction` of a
+/// sample. A nonzero fraction makes the numerator longer by one coefficient. `None` if the matrix exponential is not
+/// finite.
 pub(super) fn hold(
     h: &ContinuousTransferFunction,
     ts: f64,
@@ -41,7 +42,7 @@ pub(super) fn hold(
     for i in 0..n {
         difference[(i, i)] -= 1.0;
     }
-    // The triangle hold feeds u(k) and u(k + 1) into the state; x - Gamma_2 u needs only u(k).
+    // With the triangle hold, the state depends on u(k) and u(k + 1), but x - Gamma_2 u depends only on u(k).
     let drive = if triangle {
         &over_sample.constant + &difference * &over_sample.slope
     } else {
@@ -75,7 +76,7 @@ pub(super) fn hold(
         num[i + 1] += b;
     }
     if fraction != 0.0 {
-        // The output read within the sample depends on the input at the start of the sample; `ahead` is the coefficient
+        // An output read within a sample depends on the input at the start of that sample; `ahead` is the coefficient
         // of the input at its end.
         num.insert(0, 0.0);
         for (n, d) in num.iter_mut().zip(&den) {
@@ -111,8 +112,8 @@ impl Propagation {
     }
 }
 
-/// Numerator (degree n - 1) and denominator (degree n) of `row (delta I - m)^-1 column` by
-/// descending powers of delta, by the Faddeev-LeVerrier recursion.
+/// Numerator (degree n - 1) and denominator (degree n) of `row (delta I - m)^-1 column` in descending powers of delta,
+/// by the Faddeev-LeVerrier recursion.
 fn transfer_function_in_delta(row: &DVector<f64>, m: &DMatrix<f64>, column: &DVector<f64>) -> (Vec<f64>, Vec<f64>) {
     let n = m.nrows();
     let (mut num, mut den) = (Vec::with_capacity(n), vec![1.0]);

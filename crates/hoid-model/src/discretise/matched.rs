@@ -1,10 +1,11 @@
-//! Poles and zeros by `z = e^{s Ts}`.
+//! The matched method: poles and zeros are mapped by `z = e^{s Ts}`.
 
 use num_complex::Complex64;
 
 use crate::{ContinuousTransferFunction, polynomial};
 
-/// Maps poles and zeros by `z = e^{s Ts}`, in descending powers of z. `None` if the roots cannot be found.
+/// Maps poles and zeros by `z = e^{s Ts}` and returns numerator and denominator in descending powers of z. `None` if
+/// the roots cannot be found.
 pub(super) fn matched(h: &ContinuousTransferFunction, ts: f64) -> Option<(Vec<f64>, Vec<f64>)> {
     let poles = polynomial::roots(h.den())?;
     let leading = h.num()[0];
@@ -29,7 +30,7 @@ fn image(roots: &[Complex64], ts: f64) -> Vec<f64> {
     polynomial::from_roots(&roots.iter().map(|p| (p * ts).exp()).collect::<Vec<_>>())
 }
 
-/// `prod p / (e^{p Ts} - 1)`, the ratio of the factors `s - p` to their images at s = 0.
+/// `prod p / (e^{p Ts} - 1)`: the factors `s - p` at s = 0, divided by their images at z = 1.
 fn static_ratio(roots: &[Complex64], ts: f64) -> f64 {
     let ratio = |p: &Complex64| {
         let z = p * ts;

@@ -1,4 +1,4 @@
-//! The methods of Table 5.2, and the substitutions `s = c (z - 1) / q(z)` among them.
+//! The methods of Table 5.2; some of them are substitutions `s = c (z - 1) / q(z)`.
 
 use super::hold::hold;
 use super::matched::matched;
@@ -15,22 +15,22 @@ pub enum Method {
     Tustin,
     /// Trapezoid rule scaled to be exact at one frequency.
     TustinPrewarped {
-        /// The frequency omega_p in rad/s, between 0 and pi/Ts.
+        /// Frequency omega_p in rad/s, between 0 and pi/Ts.
         omega_rad_s: f64,
     },
     /// Exact for an input that is held over each sample.
     ZeroOrderHold,
     /// Exact for an input that is linear over each sample.
     FirstOrderHold,
-    /// Poles and zeros by `z = e^{s Ts}`.
+    /// Poles and zeros are mapped by `z = e^{s Ts}`.
     Matched,
 }
 
-/// Longest delay that is represented by leading zeros of a numerator.
+/// Longest delay, in samples, that is represented by leading zeros of a numerator.
 const LONGEST_DELAY_SAMPLES: f64 = 1e6;
 
-/// Returns the discrete transfer function of `h` by one of the methods of Table 5.2. The numerator starts with as many
-/// zeros as there are samples of delay.
+/// Returns the discrete transfer function of `h` by one of the methods of Table 5.2. The numerator starts with one zero
+/// coefficient for each sample of delay.
 ///
 /// # Errors
 /// [`ModelError::OutOfRange`] if the delay is not an integer number of samples (the two holds accept any delay) or the
@@ -96,13 +96,13 @@ fn no_finite_result(h: &ContinuousTransferFunction) -> ModelError {
     }
 }
 
-/// Numerator and denominator, in descending powers of z, after `s = c (z - 1) / q(z)`.
+/// Returns numerator and denominator in descending powers of z after the substitution `s = c (z - 1) / q(z)`.
 fn substitute(h: &ContinuousTransferFunction, c: f64, q: [f64; 2]) -> Result<(Vec<f64>, Vec<f64>), ModelError> {
     let order = h.den().len() - 1;
     let den = substitute_in_polynomial(h.den(), order, c, q);
     let powers = (0..=order).rev().map(|k| c.powi(k as i32));
     let size: f64 = h.den().iter().zip(powers).map(|(a, c)| (a * c).abs()).sum();
-    // The leading coefficient is the denominator at s = c (backward Euler, Tustin): zero when a
+    // The leading coefficient is the value of the denominator at s = c (backward Euler, Tustin), which is zero if a
     // pole lies there.
     if q[0] != 0.0 && den[0].abs() <= 1e-13 * size {
         return Err(ModelError::TransferFunction {
@@ -115,7 +115,7 @@ fn substitute(h: &ContinuousTransferFunction, c: f64, q: [f64; 2]) -> Result<(Ve
     Ok((substitute_in_polynomial(h.num(), order, c, q), den))
 }
 
-/// `q(z)^order p(s)` for p in descending powers of s, of degree `order` or less.
+/// `q(z)^order p(c (z - 1) / q(z))` for p in descending powers of s, of degree `order` or less.
 fn substitute_in_polynomial(p: &[f64], order: usize, c: f64, q: [f64; 2]) -> Vec<f64> {
     let mut result = vec![p[0]];
     let mut q_power = vec![1.0];

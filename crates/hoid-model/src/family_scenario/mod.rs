@@ -1,18 +1,18 @@
-//! Tasks of people: any operator of the family around any proper controlled element, with a remnant
-//! of several parts and a stick that drifts.
+//! Tasks of people: any operator of the family in a loop with any proper controlled element, with a remnant of several
+//! parts and a stick that drifts.
 //!
-//! `e = f - y`, `u = Y e + F f + n`, `y = P (u + d)`: a target f, which the person may see (F, [`Feedforward`]), and a
-//! disturbance d at the input of the controlled element P. Changes follow the sigmoid of eq. 5 as in
-//! [`Scenario`](crate::scenario::Scenario), which is the task of the thesis and remains separate: its operator has the
-//! form of the lead, and its element is `K_c/(s(s + omega_b))`.
+//! `e = f - y`, `u = Y e + F f + n`, `y = P (u + d)`, where f is a target that the person may see (F, [`Feedforward`])
+//! and d is a disturbance at the input of the controlled element P. Changes follow the sigmoid of eq. 5, as in
+//! [`Scenario`](crate::scenario::Scenario). `Scenario` is the task of the thesis and remains a separate type: its
+//! operator is a gain with a lead, and its controlled element is `K_c/(s(s + omega_b))`.
 //!
 //! | file | contents |
 //! |---|---|
 //! | `state` | [`FamilyState`]: operator and controlled element at one instant |
-//! | `display` | [`Display`]: what the person sees |
-//! | `multi_sine` | [`MultiSine`], [`Excitation`]: targets and disturbances as in recorded tasks |
-//! | `remnant` | [`RemnantPart`], [`Stick`]: components of u other than the response |
-//! | `scenario` | [`FamilyScenario`] and its quantities for a simulation |
+//! | `display` | [`Display`]: the signals that the person sees |
+//! | `multi_sine` | [`MultiSine`], [`Excitation`]: targets and disturbances as used in experiments with people |
+//! | `remnant` | [`RemnantPart`], [`Stick`]: components of u other than the response to e and f |
+//! | `scenario` | [`FamilyScenario`] and the quantities derived from it for a simulation |
 
 mod display;
 mod multi_sine;

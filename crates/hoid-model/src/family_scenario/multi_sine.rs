@@ -1,11 +1,11 @@
-//! Sums of sines at prime multiples of one frequency, as in tasks with people.
+//! Sums of sines at prime multiples of one frequency, as used in experiments with people.
 //!
-//! `d(t) = sum over primes p of A_p sin(2 pi p t/T + phi_p)`, `A_p` proportional to `1/p`: no line
-//! is a harmonic of another, so that a nonlinear response of a person to one line does not fall on another, and the
-//! power lies where people follow (D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics 8 (1967)
-//! 231-249; M. M. van Paassen and M. Mulder, *Identification of Human Control Behaviour*, 2006; M. Yamagami et al.,
-//! IEEE Trans. Cybernetics 53 (2023) 2039-2050 with primes times 0.05 Hz). Phases are random in each run, so that no
-//! one can memorise the signal.
+//! `d(t) = sum over primes p of A_p sin(2 pi p t/T + phi_p)` with `A_p` proportional to `1/p`. No line is a harmonic of
+//! another, so that a nonlinear response of a person to one line does not fall on another line, and most of the power
+//! is at low frequencies, which people can follow (D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics
+//! 8 (1967) 231-249; M. M. van Paassen and M. Mulder, *Identification of Human Control Behaviour*, 2006; M. Yamagami et
+//! al., IEEE Trans. Cybernetics 53 (2023) 2039-2050 with primes times 0.05 Hz). The phases are random in each run, so
+//! that no one can memorise the signal.
 
 use std::f64::consts::TAU;
 
@@ -17,9 +17,9 @@ use crate::{
 /// A target or a disturbance.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Excitation {
-    /// Its sinusoids; empty for no signal.
+    /// Sinusoids of the signal; empty for no signal.
     pub function: ForcingFunction,
-    /// True if each run draws new phases, uniform over the circle.
+    /// True if new phases, uniform over the circle, are drawn for each run.
     pub random_phases: bool,
 }
 
@@ -28,23 +28,23 @@ pub struct Excitation {
 pub struct MultiSine {
     /// Period T, s. Default 20 s.
     pub period_s: f64,
-    /// The largest multiple. Default 31: 1.55 Hz.
+    /// Largest multiple of 1/T. Default 31, which is 1.55 Hz for the default period.
     pub largest: u32,
-    /// Root mean square. Default 1.
+    /// Root mean square of the signal. Default 1.
     pub rms: f64,
-    /// The primes that it contains. Default all.
+    /// Primes that are used as multiples. Default: all primes.
     pub interleaved: Interleaved,
 }
 
-/// Selection of the primes, for separate lines of a target and of a disturbance.
+/// Selection of primes, which gives a target and a disturbance separate lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Interleaved {
     /// All primes.
     #[default]
     All,
-    /// The second, fourth, ... of them: 3, 7, 13 ...
+    /// The second, fourth, ... prime: 3, 7, 13 ...
     Even,
-    /// The first, third, ... of them: 2, 5, 11 ...
+    /// The first, third, ... prime: 2, 5, 11 ...
     Odd,
 }
 
@@ -73,7 +73,7 @@ impl MultiSine {
         (2..=self.largest).filter(is_prime).skip(from).step_by(step).collect()
     }
 
-    /// Returns the excitation, with new phases in each run.
+    /// Returns the excitation; its phases are random in each run.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] for a period that is not positive, an rms that is not finite, or a largest multiple

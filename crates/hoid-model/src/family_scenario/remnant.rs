@@ -1,20 +1,20 @@
-//! Components of u other than the response to the error: the remnant, and drift and offsets of the stick.
+//! Components of u other than the response to e and f: the remnant, and drift and offsets of the stick.
 //!
-//! The remnant is a sum of independent parts. Each part is a sequence of unit variance through a
+//! The remnant is a sum of independent parts. Each part is a white sequence w of unit variance, passed through a
 //! shaping filter and a gain,
 //!
 //! `n(k) = K G(q) w(k)`, `w = m(k) [sqrt(1 - p) g(k) + sqrt(p) b(k) h(k)/sqrt(lambda Ts)] s(k)/sqrt(D)`,
 //!
-//! with g and h normal, b = 1 with probability `lambda Ts` (Poisson pulses; else 0), s on or off
-//! for times that are exponential with means `T_on`, `T_off`, `D = T_on/(T_on + T_off)`, and
-//! `m^2 = 1 - c + c r^2/E r^2`, where r^2 is the running mean square of u or of its rate, and `E r^2` is its mean over
-//! the whole run. All factors of g and h are known before sample k: w is white and of unit variance, so that spectrum
-//! and strength of the remnant are those of the filter.
+//! where g and h are normal, b = 1 with probability `lambda Ts` and 0 otherwise (Poisson pulses), and s is 1 or 0 (on
+//! or off) for exponentially distributed times with means `T_on` and `T_off`, `D = T_on/(T_on + T_off)`. The factor m
+//! is given by `m^2 = 1 - c + c r^2/E r^2`, where r^2 is the running mean square of u or of its rate and `E r^2` is its
+//! mean over the whole run. The factors of g(k) and h(k) do not depend on these two numbers, so that w is white with
+//! unit variance, and the filter alone determines the spectrum and the strength of the remnant.
 //!
 //! | part | source |
 //! |---|---|
 //! | broad band, `1/(T_n s + 1)^m` | eq. 3 of the thesis; W. H. Levison, S. Baron and D. L. Kleinman, IEEE Trans. Man-Machine Systems 10 (1969) 101-108 |
-//! | peak near omega_nm | the tremor that the neuromuscular loop lets through: R. E. Magdaleno and D. T. McRuer, NASA CR-1757 (1971) |
+//! | peak near omega_nm | tremor that the neuromuscular loop passes: R. E. Magdaleno and D. T. McRuer, NASA CR-1757 (1971) |
 //! | slow drift | `1/(T_n s + 1)` with T_n of many seconds |
 //! | signal-dependent | C. M. Harris and D. M. Wolpert, Nature 394 (1998) 780-784; Levison et al. for the scaling with the signals |
 //! | pulses | L. R. Young and J. L. Meiry, IEEE Trans. Automatic Control 10 (1965) 336-341; R. A. Hess, J. Guidance and Control 2 (1979) 221-227 |
@@ -27,37 +27,37 @@ use crate::{ModelError, polynomial, remnant::HIGHEST_ORDER};
 pub enum RemnantShape {
     /// `1`: white.
     White,
-    /// `1/(T_n s + 1)^m`, exactly held. With a T_n of many seconds it is a drift.
+    /// `1/(T_n s + 1)^m`, discretised by an exact hold. With a T_n of many seconds, the part is a slow drift.
     Lag {
-        /// T_n, s.
+        /// Time constant T_n, s.
         time_constant_s: f64,
-        /// m, 1 to 4.
+        /// Order m, 1 to 4.
         order: usize,
     },
-    /// `omega^2/(s^2 + 2 zeta omega s + omega^2)`, exactly held.
+    /// `omega^2/(s^2 + 2 zeta omega s + omega^2)`, discretised by an exact hold.
     Resonance {
-        /// omega, rad/s.
+        /// Natural frequency omega, rad/s.
         omega_rad_s: f64,
-        /// zeta.
+        /// Damping ratio zeta.
         zeta: f64,
     },
     /// `1/(1 + d_1 q^-1 + d_2 q^-2 + ...)`.
     Ar {
-        /// d_1, d_2, ...
+        /// Coefficients d_1, d_2, ...
         coefficients: Vec<f64>,
     },
 }
 
-/// Strength of a part.
+/// Strength of a part of the remnant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PartStrength {
-    /// Share of this part in the variance of u, through the closed loop.
+    /// Share of the variance of u that this part causes through the closed loop.
     Share(f64),
     /// The gain K itself, before and after the change.
     Gain {
-        /// K of the initial state.
+        /// Gain K before the change.
         initial: f64,
-        /// K of the last state.
+        /// Gain K after the change.
         last: f64,
     },
 }
@@ -73,14 +73,14 @@ pub enum Followed {
 
 crate::named_choice!(Followed, "signal that a remnant follows", 2, { Control => "control", Rate => "rate" });
 
-/// A standard deviation that depends on u.
+/// Dependence of the standard deviation of a part on u.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SignalDependence {
-    /// The signal followed.
+    /// Signal that determines the standard deviation.
     pub follows: Followed,
     /// c: share of the variance that depends on the signal, 0 to 1.
     pub part: f64,
-    /// Memory of the running mean square, s.
+    /// Memory length of the running mean square, s.
     pub memory_s: f64,
 }
 
@@ -89,7 +89,7 @@ pub struct SignalDependence {
 pub struct Pulses {
     /// p: share of the variance in pulses, 0 to 1.
     pub part: f64,
-    /// lambda: mean number per second.
+    /// lambda: mean number of pulses per second.
     pub rate_per_s: f64,
 }
 
@@ -105,9 +105,9 @@ pub struct Intermittence {
 /// A part of the remnant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RemnantPart {
-    /// Its filter.
+    /// Shaping filter of the part.
     pub shape: RemnantShape,
-    /// Its strength.
+    /// Strength of the part.
     pub strength: PartStrength,
     /// Dependence on u, if any.
     pub signal_dependence: Option<SignalDependence>,
@@ -117,13 +117,14 @@ pub struct RemnantPart {
     pub intermittence: Option<Intermittence>,
 }
 
-/// Drift of a stick, and offsets of records. The first two act in the loop: the controlled element receives them, and
-/// the person responds to the effect. The others are added by the recorder only.
+/// Drift of the stick, and offsets of the recording. Bias and random walk act in the loop: the controlled element
+/// receives them, and the person responds to their effect. The offsets of e and u are only added to the recorded
+/// signals.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Stick {
     /// Constant part of u.
     pub bias: f64,
-    /// Standard deviation of the random walk of u per root of a second.
+    /// Standard deviation of the random walk of u after 1 s; it grows with the square root of time.
     pub walk_per_root_s: f64,
     /// Offset of the recorded e.
     pub offset_e: f64,
@@ -154,7 +155,7 @@ impl RemnantPart {
     /// Checks the parameters.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] or [`ModelError::Operator`] with the quantity.
+    /// [`ModelError::OutOfRange`] or [`ModelError::Operator`], which name the quantity.
     pub(super) fn check(&self) -> Result<(), ModelError> {
         let positive = "a positive finite number";
         let part = "a number from 0 to 1";
@@ -202,7 +203,7 @@ impl RemnantPart {
         }
         match self.strength {
             PartStrength::Share(share) => demand(
-                "share of the remnant in the variance of u",
+                "share of the variance of u due to the remnant",
                 share,
                 (0.0..1.0).contains(&share),
                 "zero or more, below one",
@@ -220,11 +221,11 @@ impl RemnantPart {
         }
         if let Some(SignalDependence { part: c, memory_s, .. }) = self.signal_dependence {
             demand("part of the remnant that follows u", c, (0.0..=1.0).contains(&c), part)?;
-            let quantity = "memory of the rms that the remnant follows in s";
+            let quantity = "memory length in s of the rms that the remnant follows";
             demand(quantity, memory_s, memory_s > 0.0, positive)?;
         }
         if let Some(Pulses { part: p, rate_per_s }) = self.pulses {
-            demand("part of the remnant in pulses", p, (0.0..=1.0).contains(&p), part)?;
+            demand("part of the remnant that consists of pulses", p, (0.0..=1.0).contains(&p), part)?;
             demand("rate of pulses in 1/s", rate_per_s, rate_per_s > 0.0, positive)?;
         }
         if let Some(Intermittence { on_s, off_s }) = self.intermittence {
@@ -235,8 +236,8 @@ impl RemnantPart {
         if self.signal_dependence.is_some() && self.intermittence.is_some() {
             return Err(ModelError::Operator {
                 reason:
-                    "a part of the remnant follows u and is intermittent: u is larger while it is present, so that \
-                     its strength would differ from the requested one; split it into two parts"
+                    "a part of the remnant follows u and is intermittent: u is larger while this part is present, so \
+                     that its strength would differ from the requested strength; split it into two parts"
                         .to_owned(),
             });
         }
@@ -260,7 +261,7 @@ impl Stick {
                 return Err(ModelError::OutOfRange {
                     quantity,
                     found,
-                    expected: "a finite number, zero or more for the walk",
+                    expected: "a finite number, nonnegative for the random walk",
                 });
             }
         }

@@ -1,4 +1,4 @@
-//! The task of an operator of the family.
+//! The task with an operator of the family.
 
 use super::{
     multi_sine::Excitation,
@@ -22,7 +22,7 @@ pub struct FamilyScenario {
     pub name: String,
     /// State before the change.
     pub initial: FamilyState,
-    /// State after the change, of the same form.
+    /// State after the change. It has the same form as the state before the change.
     pub last: FamilyState,
     /// The change.
     pub schedule: Schedule,
@@ -34,13 +34,13 @@ pub struct FamilyScenario {
     pub disturbance: Excitation,
     /// Independent parts of the remnant.
     pub remnant: Vec<RemnantPart>,
-    /// Drift and offsets.
+    /// Drift of the stick and offsets of the recording.
     pub stick: Stick,
     /// Time between two samples.
     pub sample_time: SampleTime,
     /// Measurement time, s.
     pub measurement_s: f64,
-    /// Run-in before it, s.
+    /// Run-in before the measurement, s.
     pub run_in_s: f64,
     /// Position of the leading gain of the controlled element.
     pub realisation: Realisation,
@@ -49,7 +49,7 @@ pub struct FamilyScenario {
 /// Response of a person to the displayed target.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Feedforward {
-    /// The response; its delay is relative to the end of the preview.
+    /// Operator from the target to u; its delay is relative to the end of the preview.
     pub operator: FamilyOperator,
     /// Preview time, s.
     pub preview_s: f64,
@@ -59,14 +59,15 @@ pub struct Feedforward {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResolvedFamilyScenario {
     scenario: FamilyScenario,
-    /// Whole samples and a fraction of one, before and after the change.
+    /// Delays in whole samples and a fraction of a sample, before and after the change.
     delays: [(usize, f64); 2],
     run_in_samples: usize,
     measurement_samples: usize,
 }
 
 impl FamilyScenario {
-    /// Returns a task of 40 s at 60 Hz after 5 s of run-in, with only an operator and an element.
+    /// Returns a task of 40 s after a run-in of 5 s, with an operator and a controlled element but no excitation,
+    /// remnant or change.
     pub fn new(state: FamilyState, sample_time: SampleTime) -> Self {
         Self {
             name: "people".to_owned(),
@@ -85,10 +86,10 @@ impl FamilyScenario {
         }
     }
 
-    /// Checks the scenario.
+    /// Checks the scenario and computes the quantities for a simulation.
     ///
     /// # Errors
-    /// [`ModelError`] with the quantity.
+    /// [`ModelError`], which names the quantity.
     pub fn resolve(&self) -> Result<ResolvedFamilyScenario, ModelError> {
         self.schedule.check()?;
         let wrong = |quantity, found, expected| ModelError::OutOfRange {
@@ -122,7 +123,7 @@ impl FamilyScenario {
         for state in [&self.initial, &self.last] {
             let delay = state.controlled_element.delay_s();
             if delay != 0.0 {
-                let expected = "none: the delay of a task is the operator's";
+                let expected = "no delay: the delay of a task belongs to the operator";
                 return Err(wrong("delay of the controlled element in s", delay, expected));
             }
         }
@@ -134,15 +135,15 @@ impl FamilyScenario {
             *delay = if changes {
                 (tau.round() as usize, 0.0)
             } else {
-                // The remainder for an integer number is rounding.
+                // If tau is an integer number of samples, the remainder is a rounding error.
                 let late = tau - whole as f64;
                 (whole, if late < 1e-9 { 0.0 } else { late })
             };
         }
         if let Some(seen) = &self.feedforward {
-            whole("future of the target that is shown in s", seen.preview_s)?;
+            whole("displayed future of the target in s", seen.preview_s)?;
             if seen.preview_s > LONGEST_PREVIEW_S {
-                let quantity = "future of the target that is shown in s";
+                let quantity = "displayed future of the target in s";
                 return Err(wrong(quantity, seen.preview_s, "60 s at most"));
             }
         }
@@ -150,7 +151,7 @@ impl FamilyScenario {
         self.stick.check()?;
         let share: f64 = self.remnant.iter().filter_map(RemnantPart::share).sum();
         if share >= 1.0 {
-            let quantity = "share of all parts of the remnant in the variance of u";
+            let quantity = "share of the variance of u due to all parts of the remnant";
             return Err(wrong(quantity, share, "below one"));
         }
         Ok(ResolvedFamilyScenario {
@@ -183,13 +184,13 @@ impl ResolvedFamilyScenario {
         -(self.run_in_samples as f64) * self.scenario.sample_time.s() + k as f64 * self.scenario.sample_time.s()
     }
 
-    /// Returns the delay in whole samples and the fraction of a sample, before and after the change. If it changes,
-    /// both are rounded to whole samples.
+    /// Returns the delays before and after the change, each as a number of whole samples and a fraction of a sample. If
+    /// the delay changes, both are rounded to whole samples.
     pub fn delays(&self) -> [(usize, f64); 2] {
         self.delays
     }
 
-    /// Returns the delay at time `t_s`: if it changes, the nearest integer number of samples.
+    /// Returns the delay at time `t_s`, rounded to the nearest whole sample if the delay changes.
     pub fn delay_at(&self, t_s: f64) -> (usize, f64) {
         let [initial, last] = self.delays;
         if initial == last {
@@ -211,7 +212,7 @@ impl ResolvedFamilyScenario {
             sample_time,
             ..
         } = &self.scenario;
-        let state = initial.towards(last, |a, b| schedule.value(a, b, t_s))?;
+        let state = initial.interpolated(last, |a, b| schedule.value(a, b, t_s))?;
         if initial.operator.tau_e_s() == last.operator.tau_e_s() {
             return Ok(state);
         }

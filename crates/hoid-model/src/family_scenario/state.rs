@@ -24,7 +24,7 @@ impl FamilyState {
         Ok(self.operator.transfer_function()?.series(&self.controlled_element))
     }
 
-    /// Returns crossover frequency and margins in continuous time.
+    /// Returns crossover frequency and margins of the open loop in continuous time.
     ///
     /// # Errors
     /// As [`FamilyState::crossings`].
@@ -32,7 +32,7 @@ impl FamilyState {
         Ok(self.crossings()?.margins())
     }
 
-    /// Returns every crossing in continuous time.
+    /// Returns every crossing of the open loop in continuous time.
     ///
     /// # Errors
     /// As [`FamilyState::open_loop`]; [`ModelError::UnstableLoop`].
@@ -40,7 +40,7 @@ impl FamilyState {
         let open_loop = self.open_loop()?;
         if !closed_loop_is_stable(&open_loop) {
             return Err(ModelError::UnstableLoop {
-                reason: "the characteristic equation 1 + Y P = 0 has roots that are not in the left half plane"
+                reason: "the characteristic equation 1 + Y P = 0 has roots outside the left half plane"
                     .to_owned(),
             });
         }
@@ -56,15 +56,16 @@ impl FamilyState {
             && (c.num().len(), c.den().len()) == (d.num().len(), d.den().len())
     }
 
-    /// Returns the state between this one and another, with each parameter computed by `between`: those of
-    /// [`FamilyOperator::coordinates`], with omega_nm and zeta_nm instead of their logarithms; for the element its
-    /// leading gain, and numerator and denominator without it. The delay is that of this state.
-    pub(super) fn towards(&self, other: &Self, between: impl Fn(f64, f64) -> f64) -> Result<Self, ModelError> {
+    /// Returns a state between this state and another one. `between` computes each parameter of the operator
+    /// ([`FamilyOperator::coordinates`], with omega_nm and zeta_nm instead of their logarithms) and of the controlled
+    /// element (its leading gain, and the coefficients of numerator and denominator without this gain). The delay of
+    /// this state is kept.
+    pub(super) fn interpolated(&self, other: &Self, between: impl Fn(f64, f64) -> f64) -> Result<Self, ModelError> {
         let (a, b) = (&self.operator, &other.operator);
         let kinds = a.form().coordinates(a.has_neuromuscular());
         let on_its_way = |(kind, (x, y)): (&Coordinate, (&f64, &f64))| match kind {
             Coordinate::Delay => *x,
-            // Equal ends remain exact to the last bit.
+            // Equal values are kept exactly.
             _ if x == y => *x,
             Coordinate::LogOmega | Coordinate::LogZeta => between(x.exp(), y.exp()).ln(),
             _ => between(*x, *y),

@@ -7,31 +7,31 @@ use num_complex::Complex64;
 use super::crossings::{LARGEST_TURN_RAD, turn};
 use crate::{ContinuousTransferFunction, polynomial};
 
-/// Limit of the stability test, beyond which it gives no proof.
+/// Maximum number of subdivisions in the stability test; a loop that needs more is not proven stable.
 const MOST_EVALUATIONS: usize = 4_000_000;
 
 /// True if unit negative feedback around the open loop gives a stable loop: all closed-loop poles are in the open left
-/// half plane. Poles of the open loop may be anywhere, also at the origin.
+/// half plane. Poles of the open loop may be anywhere, including the origin.
 ///
-/// Stable means proven stable. A closed-loop pole so close to the imaginary axis that rounding matters counts as
-/// unstable, and so do a biproper open loop with delay whose gain at infinite frequency is one or more (it has
-/// infinitely many poles in the right half plane) and a delay of millions of radians at frequencies where the gain
-/// exceeds 1/2.
+/// The result is true only if stability is proven. Three kinds of loop therefore count as unstable: a loop with a pole
+/// so close to the imaginary axis that rounding matters; a biproper open loop with a delay whose gain at infinite
+/// frequency is one or more (it has infinitely many poles in the right half plane); and a delay that turns the phase by
+/// millions of radians over frequencies at which the gain exceeds 1/2.
 pub fn closed_loop_is_stable(open_loop: &ContinuousTransferFunction) -> bool {
     Characteristic::new(open_loop).and_then(|f| f.zeros_in_right_half_plane()) == Some(0)
 }
 
-/// Lowest frequency at which a closed loop is evaluated, relative to the magnitude of the controlled element's poles
-/// and 1 rad/s.
+/// Lowest frequency at which a closed loop is evaluated, relative to the magnitude of the largest pole of the
+/// controlled element or to 1 rad/s, whichever is lower.
 const LOWEST: f64 = 1e-4;
-/// Deviation in rad from a whole number of half turns that is too large to be rounding.
+/// Deviation of a phase in rad from an integer number of half turns that is too large to be rounding.
 const NO_HALF_TURN_RAD: f64 = 0.5;
 
-/// Returns the number of closed-loop poles in the right half plane of a stable operator with the frequency response
-/// `operator` around a controlled element, in a loop with unit negative feedback.
+/// Returns the number of closed-loop poles in the right half plane for a loop with unit negative feedback. The loop
+/// consists of a stable operator, given by its frequency response, and a controlled element.
 ///
-/// `None` if this cannot be determined: the response is not finite, `|L|` is not below one at `highest_rad_s`, or a
-/// closed-loop pole is on the imaginary axis.
+/// `None` if this number cannot be determined: the response is not finite, `|L|` is not below one at `highest_rad_s`,
+/// or a closed-loop pole is on the imaginary axis.
 pub fn unstable_poles(
     operator: impl Fn(f64) -> Complex64,
     element: &ContinuousTransferFunction,
@@ -49,7 +49,7 @@ pub fn unstable_poles(
         (horner(element.den(), s) + loop_part) / Complex64::new(scale, omega).powu(order as u32)
     };
     let low = LOWEST * scale.min(1.0);
-    // Beyond the last frequency, D/(s + a)^n is followed without the operator.
+    // Beyond `highest_rad_s` only D/(s + a)^n is followed, without the operator; this requires |L| < 1 there.
     if !(highest_rad_s > low && (operator(highest_rad_s) * element.response(highest_rad_s)).norm() < 1.0) {
         return None;
     }
@@ -77,9 +77,9 @@ fn root_size(p: &[f64]) -> f64 {
 pub(super) struct Characteristic<'a> {
     open_loop: &'a ContinuousTransferFunction,
     order: usize,
-    /// The shift a, 1/s: the magnitude of the open-loop poles.
+    /// The shift a, 1/s: the magnitude of the largest open-loop pole, or 1 if all poles are zero.
     scale: f64,
-    /// Above this frequency `F/(s + a)^n` stays near its limit and does not encircle zero.
+    /// Above this frequency `F/(s + a)^n` remains near its limit and does not encircle zero.
     last: f64,
 }
 
@@ -109,7 +109,7 @@ impl<'a> Characteristic<'a> {
                 let powers = p.iter().rev().enumerate().take(degree);
                 powers.map(|(k, c)| c.abs() / last.powi((degree - k) as i32)).sum()
             };
-            // Terms below s^n in D and in N: F/s^n is 1 + L(infinity) up to these.
+            // Terms below s^n in D and in N: F/s^n differs from 1 + L(infinity) by at most their sum.
             let rest = below(den, order) + below(num, order);
             if rest < 0.3 * clearance && scale * (order as f64) < 0.1 * last {
                 return Some(Self {
@@ -135,8 +135,8 @@ impl<'a> Characteristic<'a> {
         (f / shifted, 1e-12 * size / shifted.norm(), num.norm() / den.norm())
     }
 
-    /// Number of zeros of F in the open right half plane; `None` if one is on the imaginary axis, within rounding, or
-    /// the delay turns the phase too often to follow.
+    /// Number of zeros of F in the open right half plane; `None` if a zero is on the imaginary axis, within rounding,
+    /// or if the delay turns the phase too many times to be followed.
     pub(super) fn zeros_in_right_half_plane(&self) -> Option<usize> {
         let tau = self.open_loop.delay_s();
         let mut grid = vec![0.0];
@@ -180,7 +180,7 @@ impl<'a> Characteristic<'a> {
                 }
             }
         }
-        // From here to infinity the argument returns to that of the limit without another turn.
+        // From here to infinity the argument approaches that of the limit without another turn.
         let limit = if tau == 0.0 && self.open_loop.num().len() == self.order + 1 {
             Complex64::new(1.0 + self.open_loop.num()[0], 0.0)
         } else {

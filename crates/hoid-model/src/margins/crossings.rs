@@ -15,7 +15,7 @@ pub struct Margins {
     pub gain_margin_db: Option<f64>,
 }
 
-/// A range that contains every crossover of manual control, in rad/s.
+/// A frequency range that contains every crossover in manual control, rad/s.
 pub const MANUAL_CONTROL_RANGE_RAD_S: (f64, f64) = (1e-3, 1e3);
 
 /// A frequency at which the open loop crosses unit gain or the negative real axis.
@@ -23,11 +23,12 @@ pub const MANUAL_CONTROL_RANGE_RAD_S: (f64, f64) = (1e-3, 1e3);
 pub struct Crossing {
     /// The frequency, rad/s.
     pub omega_rad_s: f64,
-    /// The margin at this frequency: phase margin in deg at unit gain, gain margin in dB at the axis.
+    /// Margin at this frequency: phase margin in deg at a crossing of unit gain, gain margin in dB at a crossing of the
+    /// negative real axis.
     pub margin: f64,
 }
 
-/// All frequencies at which an open loop crosses, the lowest first.
+/// All crossings of an open loop, in ascending order of frequency.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Crossings {
     /// Crossings of unit gain, each with its phase margin in deg, between -180 and 180.
@@ -37,7 +38,7 @@ pub struct Crossings {
 }
 
 impl Crossings {
-    /// Returns the margins nearest to zero; of equal margins, the first.
+    /// Returns the margins nearest to zero; of equal margins, the one at the lowest frequency.
     pub fn margins(&self) -> Margins {
         let nearest = |of: &[Crossing]| {
             of.iter().copied().reduce(|held, next| {
@@ -59,22 +60,22 @@ impl Crossings {
 }
 
 const POINTS_PER_DECADE: f64 = 100.0;
-/// Largest turn of the phase between neighbouring points.
+/// Largest phase change between neighbouring points of the scan, rad.
 pub(super) const LARGEST_TURN_RAD: f64 = 0.5;
-/// Turn between neighbouring points above which its direction is not certain.
+/// Phase change between neighbouring points above which its direction is uncertain, rad.
 const MOST_TURN_RAD: f64 = 2.0;
-/// Limit of the subdivision: 4096 points per step of the grid follow a delay of 90 s at 1000 rad/s.
+/// Maximum number of halvings: 4096 points per step of the grid are enough to follow a delay of 90 s at 1000 rad/s.
 const DEEPEST_HALVING: u32 = 12;
-/// Returns the margins nearest to zero of any frequency response, as for [`crossings`].
+/// Returns the margins nearest to zero for any frequency response; the arguments are those of [`crossings`].
 pub fn margins(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> Margins {
     crossings(open_loop, range_rad_s).margins()
 }
 
-/// Returns the crossings of any frequency response: continuous with delay, or discrete with a range that ends at pi/Ts
-/// (a response there on the negative real axis counts as a phase crossover).
+/// Returns the crossings of any frequency response, continuous with delay or discrete. For a discrete response the
+/// range ends at pi/Ts, where a response on the negative real axis counts as a phase crossover.
 ///
-/// A range that is not `0 < low < high`, both finite, has no crossings; frequencies at which the response is not finite
-/// are left out.
+/// If the range is not finite with `0 < low < high`, there are no crossings. Frequencies at which the response is not
+/// finite are skipped.
 pub fn crossings(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> Crossings {
     let points = scan(&open_loop, range_rad_s);
     let mut found = Crossings::default();
@@ -92,8 +93,8 @@ pub fn crossings(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) 
             let omega = bisect(low, high, |w| above(open_loop(w)) == above(l_low));
             found.gain.push(crossing(omega, phase_margin_deg(open_loop(omega))));
         }
-        // The turn between neighbours is small, so that a change of sign in the left half plane is
-        // a crossing of its axis.
+        // The phase change between neighbours is small, so that a change of sign in the left half plane is a crossing
+        // of the negative real axis.
         let upper = |l: Complex64| l.im >= 0.0;
         if upper(l_low) != upper(l_high) && l_low.re < 0.0 && l_high.re < 0.0 {
             let omega = bisect(low, high, |w| upper(open_loop(w)) == upper(l_low));
@@ -110,8 +111,8 @@ pub fn crossings(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) 
     found
 }
 
-/// Total turn of a response from the lower to the upper end of a range, rad, with its values at both ends. `None` if it
-/// is not finite, or turns too fast to be followed.
+/// Total phase change of a response from the lower to the upper end of a range, rad, with the values at both ends.
+/// `None` if the response is not finite, or turns too fast to be followed.
 pub(super) fn turn(of: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> Option<(f64, Complex64, Complex64)> {
     let points = scan(&of, range_rad_s);
     let (first, last) = (points.first()?.l, points.last()?.l);
@@ -165,7 +166,7 @@ fn scan(open_loop: &impl Fn(f64) -> Complex64, (low, high): (f64, f64)) -> Vec<P
     points
 }
 
-/// Appends `high`, preceded by as many points in between as the phase needs.
+/// Appends `high`, preceded by as many intermediate points as are needed to follow the phase.
 fn halve(open_loop: &impl Fn(f64) -> Complex64, low: Point, high: Point, depth: u32, points: &mut Vec<Point>) {
     let turn = (high.l * low.l.conj()).arg().abs();
     let by_slope = low.slope_s.abs().max(high.slope_s.abs()) * (high.omega - low.omega);
@@ -178,7 +179,7 @@ fn halve(open_loop: &impl Fn(f64) -> Complex64, low: Point, high: Point, depth: 
     }
 }
 
-/// Returns the point at which `holds` changes from true (at `low`) to false, to rounding.
+/// Returns the point at which `holds` changes from true (at `low`) to false, up to rounding.
 fn bisect(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (low, high);
     for _ in 0..60 {

@@ -7,23 +7,23 @@
 //! - the phase crossovers are where L crosses the negative real axis (`arg L = -180 deg` modulo 360
 //!   deg); the gain margin there is `-20 log10 |L|` dB.
 //!
-//! If there are several, the phase margin nearest to 0 deg and the gain margin nearest to 0 dB are returned, each with
-//! its frequency. MATLAB's `margin` and python-control's `margin` use the same rule. Margins do not show whether a loop
-//! is stable, and have no meaning for an unstable one: see [`closed_loop_is_stable`].
+//! If there are several crossovers, the phase margin nearest to 0 deg and the gain margin nearest to 0 dB are returned,
+//! each with its frequency. MATLAB's `margin` and python-control's `margin` use the same rule. Margins do not show
+//! whether a loop is stable, and have no meaning for an unstable loop: see [`closed_loop_is_stable`].
 //!
-//! **Scan.** A logarithmic grid is halved wherever the phase changes by more than 0.5 rad between neighbours, according
-//! to their phases or to the slope of the phase at each (a whole turn between two points would look like no change), so
-//! that the phase is followed however fast a delay changes it; sign changes are refined by bisection to rounding. A
-//! pair of crossings closer together than the grid (a curve that only touches) is not detected.
+//! **Scan.** The scan starts from a logarithmic grid. A step of the grid is halved wherever the phase changes by more
+//! than 0.5 rad over it, judged by the phases at its ends and also by the slopes of the phase there (the phases alone
+//! would not show a whole turn within the step). The phase is therefore followed even with a long delay. Sign changes
+//! are refined by bisection to rounding. A pair of crossings that are closer together than the grid (a curve that only
+//! touches) is not detected.
 //!
-//! **Stability.** With `L = N e^{-s tau} / D`, the closed loop is stable when
-//! `F(s) = D + N e^{-s tau}` has no zero in the closed right half plane. `F/(s + a)^n`, where n is the degree of D, is
-//! analytic there and tends to 1, so that its argument changes by `-pi Z` along s = j omega from omega = 0 to infinity,
-//! where Z is the number of zeros (Cauchy's argument principle; Mikhailov's form of the Nyquist criterion). F has no
-//! poles, so that open-loop poles at the origin or on the axis need no detour, and common factors of N and D in the
-//! right half plane are counted correctly. For an operator of which only the frequency response Y is known
-//! ([`unstable_poles`]), stable and sampled, `F = D + N Y e^{-s tau}` is followed up to a frequency beyond which
-//! `|L| < 1`.
+//! **Stability.** With `L = N e^{-s tau} / D`, the closed loop is stable when `F(s) = D + N e^{-s tau}` has no zero in
+//! the closed right half plane. `F/(s + a)^n`, where n is the degree of D, is analytic there and, if L is strictly
+//! proper, tends to 1, so that its argument changes by `-pi Z` along s = j omega from omega = 0 to infinity, where Z is
+//! the number of zeros (Cauchy's argument principle; Mikhailov's form of the Nyquist criterion). F has no poles, so
+//! that open-loop poles at the origin or on the axis need no detour, and common factors of N and D in the right half
+//! plane are counted correctly. If only the frequency response Y of a stable, sampled operator is known
+//! ([`unstable_poles`]), `F = D + N Y e^{-s tau}` is followed up to a frequency beyond which `|L| < 1`.
 
 mod closed_loop;
 mod crossings;

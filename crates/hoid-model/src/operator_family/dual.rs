@@ -1,7 +1,7 @@
-//! Numbers with their derivatives: `x + sum_i x_i eps_i`, `eps_i eps_j = 0`.
+//! Dual numbers, which carry their derivatives: `x + sum_i x_i eps_i`, `eps_i eps_j = 0`.
 //!
-//! Results computed with them carry their exact partial derivatives (forward differentiation; A.
-//! Griewank and A. Walther, *Evaluating Derivatives*, 2008, chapter 3).
+//! Results computed with dual numbers contain their exact partial derivatives (forward differentiation; A. Griewank and
+//! A. Walther, *Evaluating Derivatives*, 2008, chapter 3).
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -13,7 +13,7 @@ pub const PARTIALS: usize = 6;
 pub struct Dual {
     /// The value.
     pub value: f64,
-    /// Its derivatives.
+    /// Partial derivatives of the value.
     pub partials: [f64; PARTIALS],
 }
 
@@ -33,7 +33,7 @@ impl Dual {
         Self { value, partials }
     }
 
-    /// Returns `f(x)` for the derivative `f'(x)` (chain rule).
+    /// Applies the chain rule: `value` is f(x), `slope` is f'(x).
     fn chain(self, value: f64, slope: f64) -> Self {
         Self {
             value,
@@ -47,7 +47,7 @@ impl Dual {
         self.chain(e, e)
     }
 
-    /// Returns a multiple.
+    /// Returns the number times a constant.
     pub fn scaled(self, factor: f64) -> Self {
         self.chain(factor * self.value, factor)
     }
@@ -76,7 +76,7 @@ impl Sub for Dual {
     }
 }
 
-// The rules of differentiation, which the lint reports as suspicious.
+// The lint reports the rules of differentiation as suspicious arithmetic.
 #[allow(clippy::suspicious_arithmetic_impl)]
 impl Mul for Dual {
     type Output = Self;

@@ -19,7 +19,7 @@ pub(super) fn operator(form: Form, neuromuscular: bool, tau_e_s: f64) -> FamilyO
     FamilyOperator::new(form, neuromuscular, &values).unwrap()
 }
 
-/// Returns all proper forms, with and without the neuromuscular part, with each of these delays.
+/// Returns operators of all proper forms, with and without the neuromuscular part, each with every given delay.
 pub(super) fn operators(delays_s: &[f64]) -> Vec<FamilyOperator> {
     let mut all = Vec::new();
     for form in Form::ALL {

@@ -3,12 +3,12 @@
 use super::operator::FamilyOperator;
 use crate::{ModelError, SampleTime};
 
-/// An operator with the covariance of its coordinates, its noise model, and the data of its fit.
+/// An operator with the covariance of its coordinates, its noise model, and information on its fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FittedOperator {
     /// The operator.
     pub operator: FamilyOperator,
-    /// Covariance of its coordinates by rows.
+    /// Covariance of the coordinates, by rows.
     pub covariance: Vec<f64>,
     /// Coefficients c and d of the noise model `v = (C/D) eps`, without the leading 1.
     pub noise: (Vec<f64>, Vec<f64>),
@@ -23,7 +23,7 @@ pub struct FittedOperator {
 }
 
 impl FittedOperator {
-    /// Returns the fit if its numbers are valid.
+    /// Returns the fit if its values are valid.
     ///
     /// # Errors
     /// [`ModelError::Operator`] for a covariance of another size, numbers that are not finite, and variances that are
@@ -55,8 +55,8 @@ impl FittedOperator {
         Ok(self)
     }
 
-    /// Refuses samples that differ from those of the fit: another sample time, or other units if both are declared.
-    /// `units` are those of e and u.
+    /// Checks that sample time and units are those of the fit; units are compared only if both are declared. `units`
+    /// are the units of e and u.
     ///
     /// # Errors
     /// [`ModelError::Operator`] with the difference and the remedy.
@@ -64,8 +64,9 @@ impl FittedOperator {
         let wrong = |reason: String| Err(ModelError::Operator { reason });
         if !self.sample_time.matches(sample_time) {
             return wrong(format!(
-                "{} was identified at {:.6} Hz, but the samples here come at {:.6} Hz: its noise model is not valid \
-                 here; identify the person at this rate, or resample the record to that one with --resample",
+                "{} was identified at {:.6} Hz, but the samples here come at {:.6} Hz: the noise model of the fit is \
+                 not valid here; identify the person at this rate, or resample the record to the rate of the fit \
+                 with --resample",
                 self.source,
                 1.0 / self.sample_time.s(),
                 1.0 / sample_time.s()
@@ -74,8 +75,9 @@ impl FittedOperator {
         for (signal, (of_fit, here)) in ["e", "u"].into_iter().zip(self.units.iter().zip(units)) {
             if !of_fit.is_empty() && !here.is_empty() && of_fit != here {
                 return wrong(format!(
-                    "{} was identified with {signal} in {of_fit}, but here {signal} is in {here}: its gains differ \
-                     here; scale one of them, for example with --scale {signal}={here}:{of_fit}",
+                    "{} was identified with {signal} in {of_fit}, but {signal} of this record is in {here}, so its \
+                     gains are not valid here; convert one of the signals, for example with --scale \
+                     {signal}={here}:{of_fit}",
                     self.source
                 ));
             }

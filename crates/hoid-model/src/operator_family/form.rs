@@ -2,7 +2,8 @@
 
 use super::dual::{Dual, PARTIALS};
 
-/// A form of the operator, without its delay and neuromuscular part; p is the power of the lead, q that of the lag.
+/// A form of the operator, without its delay and neuromuscular part; p is the power of the lead, q the power of the
+/// lag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum Form {
     /// `K` (p = 0, q = 0).
@@ -17,11 +18,11 @@ pub enum Form {
     LeadLag,
     /// `K (T_L s + 1)^2 / (T_I s + 1)` (p = 2, q = 1).
     Lead2Lag,
-    /// `K_I (1 + c_1 s + c_2 s^2) / s`: a free quadratic numerator over s. The integration in this and the following
-    /// forms has a leak of 1e-4 1/s.
+    /// `K_I (1 + c_1 s + c_2 s^2) / s`: a free quadratic numerator over s. Here and in [`Form::LeadDroop`], the
+    /// integration has a leak of 1e-4 1/s.
     QuadraticIntegral,
-    /// `K (T_L s + 1) (1 + alpha/s)`: a lead with the droop of the phase at low frequencies,
-    /// `e^{-j alpha/omega}` by its rational approximation.
+    /// `K (T_L s + 1) (1 + alpha/s)`: a lead with a phase droop at low frequencies; `1 + alpha/s` approximates
+    /// `e^{-j alpha/omega}`.
     LeadDroop,
     /// `K_d s`: the response to the rate of a displayed target.
     Derivative,
@@ -42,14 +43,14 @@ crate::named_choice!(Form, "form of the operator", 10, {
     DerivativeLead => "derivative-lead",
 });
 
-/// Pole of an integration, 1/s: a leak too slow to be seen in a record keeps the discrete model stable.
+/// Leak rate of an integration, 1/s. It is too low to be visible in a record, but keeps the discrete model stable.
 const LEAK: f64 = 1e-4;
 
 /// A coordinate in which an operator is fitted. Lag and neuromuscular part are fitted in coordinates whose estimates
 /// are nearly normal even if the data carry little information.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Coordinate {
-    /// K without a lag, `K/T_I` with a lag, K_d of a derivative in s.
+    /// K without a pole, `K/T_I` with a lag, K_I with an integration, K_d of a derivative in s.
     Gain,
     /// T_L, s.
     Lead,
@@ -99,8 +100,8 @@ impl Coordinate {
         }
     }
 
-    /// Returns the coordinate of a parameter by its name; `None` for K_e_dot, which is a product of two, and for
-    /// unknown names.
+    /// Returns the coordinate of a parameter by its name; `None` for K_e_dot, which is a product of two coordinates,
+    /// and for unknown names.
     pub fn of_parameter(name: &str) -> Option<Self> {
         match name {
             "K_over_T_I" | "K_I" | "K_e" | "K_d" => Some(Self::Gain),
@@ -108,7 +109,7 @@ impl Coordinate {
         }
     }
 
-    /// Returns its name: that of the parameter, or of its transformation.
+    /// Returns the name of the coordinate: the name of its parameter, or of the transformed parameter.
     pub fn name(self) -> &'static str {
         match self {
             Self::Gain => "gain",
@@ -131,7 +132,7 @@ pub(super) struct Rational {
 }
 
 impl Form {
-    /// The forms of the response to the error, without derivatives: people respond to a constant error.
+    /// Forms of the response to the error. Derivative forms are excluded, because people respond to a constant error.
     pub const OF_ERROR: [Self; 8] = [
         Self::Gain,
         Self::Lead,
@@ -143,7 +144,7 @@ impl Form {
         Self::LeadDroop,
     ];
 
-    /// The forms of the response to a displayed target: to its value, rate and acceleration.
+    /// Forms of the response to a displayed target: to its value, rate and acceleration.
     pub const OF_TARGET: [Self; 5] = [
         Self::Gain,
         Self::Lead,
@@ -152,12 +153,12 @@ impl Form {
         Self::DerivativeLead,
     ];
 
-    /// True if a constant input has no response.
+    /// True if the steady response to a constant input is zero.
     pub fn is_derivative(self) -> bool {
         matches!(self, Self::Derivative | Self::DerivativeLead)
     }
 
-    /// Returns the power p of the lead, which is the degree of the numerator.
+    /// Returns the degree of the numerator, which is the power p of the lead in forms of lead and lag.
     pub fn degree(self) -> usize {
         match self {
             Self::Gain | Self::Lag => 0,
@@ -166,7 +167,7 @@ impl Form {
         }
     }
 
-    /// True if the form has its own pole: a lag or an integration.
+    /// True if the form itself has a pole: a lag or an integration.
     pub fn has_pole(self) -> bool {
         !matches!(self, Self::Gain | Self::Lead | Self::Lead2) && !self.is_derivative()
     }
@@ -182,7 +183,7 @@ impl Form {
         self.degree() <= usize::from(self.has_pole()) + if neuromuscular { 2 } else { 0 }
     }
 
-    /// Returns the number of its coordinates without the neuromuscular part: forms with fewer are simpler.
+    /// Returns the number of coordinates without the neuromuscular part; a form with fewer coordinates is simpler.
     pub fn simplicity(self) -> usize {
         self.coordinates(false).len()
     }
@@ -205,8 +206,8 @@ impl Form {
         all
     }
 
-    /// Number of coordinates of the numerator other than the gain: T_L, or c_1 and c_2, or T_L and alpha. They follow
-    /// the gain in [`Form::coordinates`] and precede those of the poles.
+    /// Number of coordinates of the numerator other than the gain: T_L, or c_1 and c_2, or T_L and alpha. These
+    /// coordinates follow the gain in [`Form::coordinates`] and precede the coordinates of the poles.
     pub fn varying_beside_gain(self) -> usize {
         match self {
             Self::Gain | Self::Lag | Self::Derivative => 0,
@@ -215,8 +216,8 @@ impl Form {
         }
     }
 
-    /// Returns the numerator divided by its gain, `m_0 + m_1 s + m_2 s^2`, from the coordinates of the numerator after
-    /// the gain, and the derivatives of its coefficients with respect to them.
+    /// Returns the numerator divided by its gain, `m_0 + m_1 s + m_2 s^2`, and the derivatives of m_0, m_1 and m_2 with
+    /// respect to x. Here x contains the coordinates of the numerator that follow the gain.
     pub fn shape(self, x: &[f64]) -> ([f64; 3], [[f64; 3]; 2]) {
         let none = [0.0; 3];
         match self {
@@ -236,7 +237,7 @@ impl Form {
         }
     }
 
-    /// Returns numerator and pole from the first coordinates.
+    /// Returns numerator and pole from the coordinates, without the neuromuscular part and the delay.
     pub(super) fn rational(self, x: &[Dual]) -> Rational {
         let zero = Dual::constant(0.0);
         let k = x[0];

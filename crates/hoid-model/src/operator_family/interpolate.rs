@@ -1,11 +1,11 @@
-//! The discrete model of an operator of the family for an error that is smooth between samples.
+//! The discrete model of an operator of the family for an error that is linear between samples.
 //!
-//! With a hold, the response is that to a staircase: if the operator's step response starts with a slope (relative
-//! degree 1), the model has a kink at every delay of an integer number of samples, and a search over the delay of a
-//! recorded person ends at such a kink. A person does not see a staircase. Here the error is linear from sample to
-//! sample, `e(t)`, and the operator acts on `e(t - tau - Ts/2)`: half a sample later, as after a hold, so that tau has
-//! the same meaning in both. At frequency omega the two differ by the factor `sin(x)/x`, `x = omega Ts/2` (0.5 % at 20
-//! rad/s and 60 Hz), and not in phase.
+//! With a hold, the operator responds to a staircase. If its step response starts with a slope (relative degree 1), the
+//! model has a kink at every delay of an integer number of samples, and a search over the delay of a recorded person
+//! ends at such a kink. A person does not see a staircase. Here the error `e(t)` is linear from sample to sample, and
+//! the operator acts on `e(t - tau - Ts/2)`. The half sample is the delay of a hold, so that tau has the same meaning
+//! in both models. At frequency omega the two models differ in gain by the factor `sin(x)/x`, `x = omega Ts/2` (0.5 %
+//! at 20 rad/s and 60 Hz), and not in phase.
 //!
 //! With `tau + Ts/2 = l Ts + delta`, `0 <= delta < Ts`, and times in samples,
 //!
@@ -27,7 +27,7 @@ use super::{
 use crate::{ModelError, SampleTime, delayed_operator::whole_samples};
 
 impl FamilyOperator {
-    /// Returns the numbers of coefficients of B and F in the interpolated model of this form.
+    /// Returns the numbers of coefficients of B and F in the model of this operator for an interpolated error.
     pub fn interpolated_orders(&self) -> (usize, usize) {
         (self.order() + 2, self.order())
     }
@@ -41,7 +41,7 @@ impl FamilyOperator {
         self.interpolate_within(whole_samples(late, sample_time)?, sample_time)
     }
 
-    /// As [`FamilyOperator::interpolate`], for a given sample that contains `tau + Ts/2`.
+    /// As [`FamilyOperator::interpolate`], with a given number l of whole samples in `tau + Ts/2`.
     ///
     /// # Errors
     /// As [`FamilyOperator::interpolate`].

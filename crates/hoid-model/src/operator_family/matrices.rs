@@ -1,10 +1,10 @@
-//! Small matrices of numbers with derivatives: the exponential and the characteristic polynomial.
+//! Small matrices of dual numbers: the exponential and the characteristic polynomial.
 
 use super::dual::Dual;
 
 /// Highest order of the dynamics.
 pub(super) const ORDER: usize = 3;
-/// States, input, and the slope of the input.
+/// Number of rows of the extended matrices: states, input, and slope of the input.
 pub(super) const SIZE: usize = ORDER + 2;
 /// Terms of the series at a norm of at most one: 1/20! is 4e-19.
 const TERMS: usize = 20;
@@ -12,8 +12,8 @@ const TERMS: usize = 20;
 pub(super) type Matrix = [[Dual; SIZE]; SIZE];
 pub(super) type Vector = [Dual; SIZE];
 
-/// Returns `[A B 0; 0 0 1; 0 0 0]` of the controllable canonical form, in units of a sample: the input increases with
-/// its slope.
+/// Returns `[A B 0; 0 0 1; 0 0 0]` of the controllable canonical form, with time in samples; the last state is the
+/// slope of the input.
 pub(super) fn companion(denominator: &Vector, order: usize) -> Matrix {
     let mut m = [[Dual::constant(0.0); SIZE]; SIZE];
     for i in 0..=order {
@@ -30,7 +30,7 @@ pub(super) fn exponential(m: &Matrix, h: Dual) -> Matrix {
     let m: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| m[i][j] * h));
     let row = |r: &[Dual; SIZE]| r.iter().map(|c| c.value.abs()).sum::<f64>();
     let norm = m.iter().map(row).fold(0.0, f64::max);
-    // A very large norm overflows anyway.
+    // With a very large norm, the result overflows anyway.
     let halvings = if norm > 1.0 {
         norm.log2().ceil().min(60.0) as i32
     } else {

@@ -5,19 +5,19 @@
 //! Factors in Electronics 8 (1967) 231-249), with or without the neuromuscular part, and two alternative forms for
 //! controlled elements of second order ([`Form`]).
 //!
-//! A person who integrates slow errors has a lag with a long T_I. Then K and T_I cannot be distinguished, but `K/T_I`
-//! can; an operator is therefore represented by the coordinates `[K/T_I, T_L, 1/T_I, ln omega, ln zeta, tau]`
-//! ([`Coordinate`]), in which `1/T_I = 0`, the pure integration, is an ordinary point.
+//! A person who integrates slow errors has a lag with a long T_I. Then K and T_I cannot be determined separately, but
+//! `K/T_I` can; an operator is therefore represented by the coordinates `[K/T_I, T_L, 1/T_I, ln omega, ln zeta, tau]`
+//! ([`Coordinate`]), in which the pure integration, `1/T_I = 0`, is an ordinary point.
 //!
 //! | file | contents |
 //! |---|---|
 //! | `form` | [`Form`], [`Coordinate`] |
 //! | `operator` | [`FamilyOperator`]: one operator, its response, its named parameters |
-//! | `fitted` | [`FittedOperator`]: a fitted operator |
-//! | `zoh` | its exact discrete model for a held input, with the derivatives |
-//! | `interpolate` | the same for an error that is smooth between samples |
+//! | `fitted` | [`FittedOperator`]: an operator with the results of its fit |
+//! | `zoh` | the exact discrete model of an operator for a held input, with derivatives |
+//! | `interpolate` | the discrete model for an error that is linear between samples |
 //! | `matrices` | the matrix exponential |
-//! | `dual` | numbers with their derivatives |
+//! | `dual` | dual numbers, which carry their derivatives |
 
 mod dual;
 #[cfg(test)]

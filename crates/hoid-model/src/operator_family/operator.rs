@@ -59,19 +59,19 @@ impl TryFrom<Written> for FamilyOperator {
 pub struct FamilyResponse {
     /// `Y(j omega)`.
     pub value: Complex64,
-    /// A derivative for each coordinate.
+    /// Derivative of Y with respect to each coordinate.
     pub gradient: Vec<Complex64>,
 }
 
 impl FamilyResponse {
-    /// Returns the covariance of the real and imaginary part of `dY/Y = d ln Y`, i.e. of gain and phase, from the
-    /// covariance of the coordinates by rows.
+    /// Returns the covariance of the real and imaginary part of `dY/Y = d ln Y`, which are the relative error of the
+    /// gain and the error of the phase, from the covariance of the coordinates by rows.
     pub fn relative_covariance(&self, covariance: &[f64]) -> [[f64; 2]; 2] {
         let along = |part: fn(Complex64) -> f64| -> Vec<f64> {
             let gradient = self.gradient.iter().map(|g| part(g / self.value));
             gradient.collect()
         };
-        // The variance of the sum contains the covariance of the two twice.
+        // The variance of the sum of both parts contains their covariance twice.
         let [a, c, both] = [along(|z| z.re), along(|z| z.im), along(|z| z.re + z.im)]
             .map(|gradient| variance_along(&gradient, covariance));
         let b = 0.5 * (both - a - c);
@@ -84,16 +84,16 @@ impl FamilyResponse {
 pub struct NamedParameter {
     /// K, K_over_T_I, T_L, T_I, omega_nm, zeta_nm, tau_e and so on.
     pub name: &'static str,
-    /// Its unit; empty for a ratio of control and error.
+    /// Unit of the parameter; empty for a ratio of control and error.
     pub unit: &'static str,
-    /// Its value; infinite for T_I of a pure integration.
+    /// Value of the parameter; infinite for T_I of a pure integration.
     pub value: f64,
-    /// Its coordinate, if it is a function of a single one.
+    /// Coordinate of the parameter; `None` if the parameter depends on more than one coordinate.
     pub coordinate: Option<Coordinate>,
 }
 
 impl Form {
-    /// Returns the parameters of an operator of this form, in the order of [`FamilyOperator::named`].
+    /// Returns the names of the parameters of an operator of this form, in the order of [`FamilyOperator::named`].
     pub fn parameters(self, neuromuscular: bool) -> Vec<&'static str> {
         let any = FamilyOperator {
             form: self,
@@ -147,13 +147,13 @@ impl FamilyOperator {
         })
     }
 
-    /// Creates an operator from the parameters by name: `K` (or `K_over_T_I`, or `K_e`), `T_L`, `T_I`, `omega_nm`,
-    /// `zeta_nm`, `tau_e`, `c_1`, `c_2`, `alpha`, as far as the form has them. It has a neuromuscular part if omega_nm
-    /// is given. A missing tau_e is zero.
+    /// Creates an operator from the named parameters of its form: a gain (`K`, `K_over_T_I`, `K_e`, `K_I` or `K_d`),
+    /// `T_L`, `T_I`, `omega_nm`, `zeta_nm`, `tau_e`, `c_1`, `c_2`, `alpha`. The operator has a neuromuscular part if
+    /// omega_nm or zeta_nm is given. A missing tau_e is zero.
     ///
     /// # Errors
-    /// [`ModelError::Operator`] for a name that is unknown, missing, or given twice, and for invalid values; otherwise
-    /// as [`FamilyOperator::new`].
+    /// [`ModelError::Operator`] for a name that is unknown or missing, for a gain given under two names, and for
+    /// invalid values; otherwise as [`FamilyOperator::new`].
     pub fn of_names(form: Form, pairs: &[(String, f64)]) -> Result<Self, ModelError> {
         let wrong = |reason: String| ModelError::Operator { reason };
         let find = |name: &str| pairs.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
@@ -202,12 +202,12 @@ impl FamilyOperator {
         Self::new(form, neuromuscular, &values)
     }
 
-    /// The form.
+    /// Form of the operator.
     pub fn form(&self) -> Form {
         self.form
     }
 
-    /// True with the neuromuscular part.
+    /// True if the operator has a neuromuscular part.
     pub fn has_neuromuscular(&self) -> bool {
         self.neuromuscular
     }
@@ -228,7 +228,7 @@ impl FamilyOperator {
         self.coordinates[self.coordinates.len() - 1]
     }
 
-    /// Neuromuscular frequency in rad/s and damping ratio.
+    /// Neuromuscular frequency in rad/s and damping ratio; `None` without a neuromuscular part.
     pub fn neuromuscular(&self) -> Option<(f64, f64)> {
         let (log_omega, log_zeta) = (
             self.coordinate(Coordinate::LogOmega)?,
@@ -306,8 +306,9 @@ impl FamilyOperator {
         self.named().into_iter().map(with).collect()
     }
 
-    /// Returns the parameters of [`FamilyOperator::named`] with their errors to first order, from the covariance of the
-    /// coordinates by rows; without an error if there is no covariance or if a parameter is infinite.
+    /// Returns the parameters of [`FamilyOperator::named`] with their standard errors to first order, from the
+    /// covariance of the coordinates by rows. There is no standard error without a covariance or if a parameter is
+    /// infinite.
     pub fn named_estimates(&self, covariance: Option<&[f64]>) -> Vec<(NamedParameter, Estimate)> {
         let of = |(parameter, gradient): (NamedParameter, Vec<f64>)| {
             let estimate = match covariance {

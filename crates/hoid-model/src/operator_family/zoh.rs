@@ -1,22 +1,22 @@
 //! The exact discrete model of an operator of the family after a zero-order hold, with a delay of
 //! any fraction of a sample, and its derivatives.
 //!
-//! In controllable canonical form `x' = A x + B e(t - tau)`, `u = C x + D e(t - tau)` with
-//! `tau = l Ts + delta`, `0 <= delta < Ts`. Over a sample the delayed input is `e(k-l-1)` for
-//! delta, then `e(k-l)`, so that
+//! In controllable canonical form `x' = A x + B e(t - tau)`, `u = C x + D e(t - tau)` with `tau = l Ts + delta`,
+//! `0 <= delta < Ts`. Within a sample the delayed input is `e(k-l-1)` for a time delta and `e(k-l)` for the rest, so
+//! that
 //!
 //! `x(k+1) = Phi x(k) + Gamma_1 e(k-l-1) + Gamma_0 e(k-l)`,
 //! `Phi = Phi_2 Phi_1`, `Gamma_1 = Phi_2 Gamma(delta)`, `Gamma_0 = Gamma(Ts - delta)`
 //!
 //! (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 3.2). The matrices are blocks of the
 //! exponential of `[A B; 0 0] h`, computed by scaling and squaring of its series. F is the characteristic polynomial of
-//! Phi, B the product of F and the impulse response. Everything is computed with numbers that carry their derivatives
-//! with respect to the coordinates ([`super::dual`]).
+//! Phi, and B is the product of F and the impulse response. All computations use dual numbers ([`super::dual`]), which
+//! carry the derivatives with respect to the coordinates.
 //!
-//! **Direct part.** A form whose numerator has the degree of its denominator has a direct feedthrough of e. For the
-//! held error, at a sampling instant this would be one sample or the next, with a step if the delay is an integer
-//! number of samples. Its direct part is therefore computed from the error interpolated between the samples around
-//! `t - tau - Ts/2`: the delay that the hold gives to all other parts.
+//! **Direct part.** If numerator and denominator of a form have the same degree, the operator has a direct feedthrough
+//! of e. With a held error, the output would jump from one value of e to the next when the delay passes an integer
+//! number of samples. The direct part is therefore computed from the error interpolated linearly between the samples
+//! around `t - tau - Ts/2`. The additional delay Ts/2 is the delay that the hold gives to all other parts.
 
 use super::{
     dual::{Dual, PARTIALS},
@@ -39,7 +39,7 @@ pub struct HeldFamily {
     pub jacobian: Vec<[f64; PARTIALS]>,
 }
 
-/// Response of poles and delay over a sample, for any numerator.
+/// Dynamics of poles and delay over one sample, for any numerator.
 struct HeldPoles {
     /// omega^2, if there is a neuromuscular part.
     gain: Option<Dual>,
@@ -53,7 +53,7 @@ struct HeldPoles {
 }
 
 impl HeldFamily {
-    /// Returns the model with this impulse response from lag nk on, and these poles: `B = F h`.
+    /// Returns the model with this impulse response from lag nk on and with the denominator F: `B = F h`.
     pub(super) fn of_impulse_response(nk: usize, impulse: &[Dual], f: &[Dual]) -> Result<Self, ModelError> {
         let order = f.len();
         let b: Vec<Dual> = (0..impulse.len())
@@ -63,7 +63,7 @@ impl HeldFamily {
             return Err(ModelError::OutOfRange {
                 quantity: "the discrete model of the operator",
                 found: f64::INFINITY,
-                expected: "finite coefficients; check omega_nm, zeta_nm and 1/T_I against the sample time",
+                expected: "finite numbers; check omega_nm, zeta_nm and 1/T_I against the sample time",
             });
         }
         Ok(Self {
@@ -76,8 +76,8 @@ impl HeldFamily {
 }
 
 impl FamilyOperator {
-    /// Returns the numbers of coefficients of B and F in the discrete model of this form, for any parameters, and the
-    /// difference between nk and the whole samples of tau.
+    /// Returns the numbers of coefficients of B and F in the discrete model, which do not depend on the values of the
+    /// parameters, and the difference between nk and the whole samples of tau.
     pub fn held_orders(&self) -> (usize, usize, usize) {
         let order = self.order();
         if self.has_direct_part() {
@@ -104,8 +104,8 @@ impl FamilyOperator {
         self.zoh_within(whole_samples(self.tau_e_s(), sample_time)?, sample_time)
     }
 
-    /// As [`FamilyOperator::zoh`], for a given sample that contains the delay: `delta = tau - sample Ts` may be 0 or
-    /// Ts at the borders, where the two models are equal.
+    /// As [`FamilyOperator::zoh`], with a given number of whole samples in the delay: `delta = tau - sample Ts` may be
+    /// 0 or Ts, where the models of neighbouring samples are equal.
     ///
     /// # Errors
     /// As [`FamilyOperator::zoh`].
@@ -116,9 +116,10 @@ impl FamilyOperator {
         self.held(&poles, numerator, sample, sample_time.s())
     }
 
-    /// Returns the exact discrete models with `s^i` instead of the numerator, i from 0 to its degree, with the poles
-    /// and the delay of this operator, and a common F: the response from e to u is `sum_i n_i(t) (B_i/F) q^-nk e` even
-    /// if the coefficients n_i of the numerator change with time, as long as the poles do not.
+    /// Returns exact discrete models with the numerators `s^i`, i from 0 to the degree of the numerator, and with the
+    /// poles and the delay of this operator. All models have the same F: the response from e to u is
+    /// `sum_i n_i(t) (B_i/F) q^-nk e` even if the coefficients n_i of the numerator change with time, as long as the
+    /// poles do not.
     ///
     /// # Errors
     /// As [`FamilyOperator::zoh`].
@@ -130,10 +131,10 @@ impl FamilyOperator {
             .collect()
     }
 
-    /// Returns the response of the poles and the delay over a sample.
+    /// Returns the dynamics of the poles and the delay over one sample.
     fn held_poles(&self, variables: &[Dual], sample: usize, ts: f64) -> HeldPoles {
         let delay = variables[variables.len() - 1];
-        // In units of a sample, all matrices have entries of moderate size.
+        // With time in samples, all matrices have entries of moderate size.
         let delta = delay.scaled(1.0 / ts) - Dual::constant(sample as f64);
         let denominator = self.denominator_by_samples(variables, ts);
         let order = self.order();
@@ -160,7 +161,7 @@ impl FamilyOperator {
         }
     }
 
-    /// Returns the model of this numerator with these poles.
+    /// Returns the model with this numerator and these poles.
     fn held(&self, poles: &HeldPoles, numerator: [Dual; 3], sample: usize, ts: f64) -> Result<HeldFamily, ModelError> {
         let (zero, one) = (Dual::constant(0.0), Dual::constant(1.0));
         let order = self.order();
@@ -171,7 +172,7 @@ impl FamilyOperator {
             .map(|i| numerator[i] - direct * poles.denominator[i])
             .collect();
 
-        // Impulse response from e(k-l-1), then B = F h; h ends where B does.
+        // Impulse response from e(k-l-1), of the length of B; then B = F h.
         let (nb, _, shift) = self.held_orders();
         let first_dynamic = 1 - shift;
         let mut impulse = vec![zero; nb];
@@ -206,7 +207,7 @@ impl FamilyOperator {
         )
     }
 
-    /// Returns omega^2, the factor of the neuromuscular part in the numerator; 1 without it.
+    /// Returns omega^2, the factor of the neuromuscular part in the numerator; `None` without a neuromuscular part.
     fn numerator_gain(&self, variables: &[Dual]) -> Option<Dual> {
         self.neuromuscular_of(variables).map(|(omega, _)| omega * omega)
     }
@@ -241,7 +242,7 @@ impl FamilyOperator {
         std::array::from_fn(|i| den[i].scaled(self.scale(i, ts)))
     }
 
-    /// `s^i = (s Ts)^i / Ts^i`, then monic again.
+    /// Factor that converts a coefficient of s^i to that of `(s Ts)^i`, for a denominator that remains monic.
     fn scale(&self, i: usize, ts: f64) -> f64 {
         ts.powi(self.order() as i32 - i as i32)
     }

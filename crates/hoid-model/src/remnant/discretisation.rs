@@ -1,8 +1,8 @@
-//! The two discretisations, each with its pole and gain.
+//! The two discretisations of the remnant filter, each with its pole and gain.
 
 use super::held_numerator::Factored;
 
-/// Smallest Ts/T_n, and inverse of the largest, for which the filter is computed.
+/// Lower limit of Ts/T_n for which the filter is computed; the upper limit is its inverse.
 pub(super) const SMALLEST_RATIO: f64 = 1e-9;
 
 /// Discretisation of the remnant filter.
@@ -40,7 +40,8 @@ impl RemnantDiscretisation {
         }
     }
 
-    /// Returns sigma' of the filter with K_n = 1, and its logarithmic derivative with respect to `a = Ts/T_n`.
+    /// Returns sigma', the standard deviation of the innovation for K_n = 1, and its logarithmic derivative with
+    /// respect to `a = Ts/T_n`.
     pub(super) fn innovation_sd(self, order: usize, a: f64) -> (f64, f64) {
         match self {
             Self::ZeroOrderHold => {

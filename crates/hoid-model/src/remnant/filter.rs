@@ -1,4 +1,4 @@
-//! The filter, its discrete transfer function and its monic noise model.
+//! The remnant filter, its discrete transfer function and its monic noise model.
 
 use super::discretisation::{RemnantDiscretisation, SMALLEST_RATIO, backward_gain, denominator};
 use super::held_numerator::{Factored, HIGHEST_ORDER, held_numerator};
@@ -63,7 +63,7 @@ impl RemnantFilter {
         Ok(())
     }
 
-    /// Returns `a = Ts/T_n` of a filter that passes the checks.
+    /// Checks the filter and returns `a = Ts/T_n`.
     pub(crate) fn ratio(&self, sample_time: SampleTime) -> Result<f64, ModelError> {
         self.check()?;
         let a = sample_time.s() / self.time_constant_s;
@@ -77,7 +77,7 @@ impl RemnantFilter {
         Ok(a)
     }
 
-    /// Returns the discrete filter from the noise, one draw per sample, to the remnant n.
+    /// Returns the discrete filter from the white noise, with one draw per sample, to the remnant n.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] as for [`RemnantFilter::new`], and if T_n is not between 1e-9 and 1e9 samples.

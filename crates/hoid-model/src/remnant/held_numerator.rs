@@ -1,4 +1,4 @@
-//! The numerator of the filter after a zero-order hold, factored with all zeros inside the unit circle.
+//! The numerator of the remnant filter after a zero-order hold, factored with all zeros inside the unit circle.
 
 use num_complex::Complex64;
 
@@ -25,8 +25,8 @@ fn moments(a: f64) -> [f64; 5] {
     let decay = (-a).exp();
     let mut m = [0.0; 5];
     if a < 8.0 {
-        // The highest from its series of positive terms, e^-a sum of a^i k!/(k + 1 + i)!; the others by downward
-        // recurrence (integration by parts).
+        // The highest moment is computed from its series of positive terms, e^-a sum of a^i k!/(k + 1 + i)!, and the
+        // others by downward recurrence (integration by parts).
         let (mut term, mut sum) = (0.2, 0.0);
         for i in 0..80 {
             sum += term;
@@ -62,7 +62,7 @@ fn held_numerator_derivative(order: usize, a: f64) -> Vec<f64> {
     let pieces = B_SPLINES[order - 1].iter().zip(&numerator).enumerate();
     pieces
         .map(|(j, (piece, n))| {
-            // The derivative of a moment is minus the next one.
+            // The derivative of a moment is minus the next moment.
             let moved: f64 = piece.iter().zip(&m[1..]).map(|(c, m)| c * m).sum();
             n * (order as f64 / a - j as f64) - a.powi(order as i32) * (-a * j as f64).exp() * moved
         })
@@ -93,9 +93,10 @@ impl Factored {
             .collect();
         let at = |p: &[f64], z: Complex64| p.iter().fold(Complex64::new(0.0, 0.0), |sum, &c| sum * z + c);
         let (mut inside, mut moves) = (Vec::with_capacity(degree), Vec::with_capacity(degree));
-        // At most three roots of positive coefficients: found unless a is so large that all but n_1 vanish.
+        // There are at most three roots, and the coefficients are positive: the roots are found unless a is so large
+        // that all coefficients but n_1 vanish.
         for zero in polynomial::roots(&numerator).unwrap_or_default() {
-            // N(zeta, a) = 0 moves the zero by -N_a/N_zeta.
+            // From N(zeta, a) = 0, the derivative of a zero is dzeta/da = -N_a/N_zeta.
             let moved = -at(&derivative, zero) / at(&slope, zero);
             if zero.norm() <= 1.0 {
                 inside.push(zero);

@@ -7,22 +7,22 @@
 //! `H(z) = K_n (n_1 z^-1 + ... + n_m z^-m) / (1 - alpha z^-1)^m`,
 //! `n_j = a^m  integral over [j-1, j] of e^{-a t} B_m(t) dt`,
 //!
-//! B_m the cardinal B-spline of order m: the numerator samples an exponential spline (Unser and
-//! Blu, IEEE Trans. Signal Processing 53, 2005). All n_j are integrals of positive functions, so that nothing cancels
-//! however fine the sampling. As a tends to 0, the zeros tend to the Euler-Frobenius zeros (m = 2: -1; m = 3: -3.73,
-//! -0.27; m = 4: -9.90, -1, -0.10).
+//! where B_m is the cardinal B-spline of order m: the numerator samples an exponential spline (Unser and Blu, IEEE
+//! Trans. Signal Processing 53, 2005). All n_j are integrals of positive functions, so that no digits cancel, however
+//! fine the sampling. As a tends to 0, the zeros tend to the Euler-Frobenius zeros (m = 2: -1; m = 3: -3.73, -0.27; m =
+//! 4: -9.90, -1, -0.10).
 //!
 //! **Backward Euler** (B.11): `H(z) = K_n (1 - alpha)^m / (1 - alpha z^-1)^m` with
 //! `alpha = T_n/(T_n + Ts)`.
 //!
-//! **Noise model.** The same spectrum as `C/D eps'`, C and D monic and stable: the delay is
-//! dropped, numerator zeros zeta outside the unit circle are reflected, and the standard deviation
-//! of eps' is `sigma' = K_n |n_1| prod over |zeta| > 1 of |zeta|`.
+//! **Noise model.** It has the same spectrum, in the form `C/D eps'` with C and D monic and stable: the delay is
+//! dropped, numerator zeros zeta outside the unit circle are reflected, and the standard deviation of eps' is
+//! `sigma' = K_n |n_1| prod over |zeta| > 1 of |zeta|`.
 //!
-//! **Retrieval.** Each coefficient `d_i = (-1)^i binom(m, i) alpha^i` of an estimated D gives an alpha and with it a
-//! time constant; T_n is their mean (eq. 16, B.14), and K_n is the ratio of sigma' to that of the filter with this T_n
-//! and K_n = 1 (backward Euler: B.16). C is not used: if D was estimated without a C, m >= 2 and the true filter is the
-//! zero-order hold, D absorbs the missing C and T_n is biased.
+//! **Retrieval.** Each coefficient `d_i = (-1)^i binom(m, i) alpha^i` of an estimated D gives an alpha and thus a time
+//! constant; T_n is the mean of these time constants (eq. 16, B.14). K_n is sigma' divided by its value for the filter
+//! with this T_n and K_n = 1 (backward Euler: B.16). C is not used: if D was estimated without a C, m >= 2 and the true
+//! filter is the zero-order hold, D absorbs the missing C and T_n is biased.
 
 mod discretisation;
 mod filter;

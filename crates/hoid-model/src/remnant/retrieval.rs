@@ -93,7 +93,7 @@ fn implied_poles(d: &[f64], innovation_sd: f64) -> Result<Vec<f64>, NotConvertib
         let alpha = power.powf(1.0 / i as f64);
         if alpha >= 1.0 {
             return Err(refuse(format!(
-                "d{i} = {:.6} implies a pole at z = {alpha:.6}, expected one between 0 and 1",
+                "d{i} = {:.6} implies a pole at z = {alpha:.6}, expected a pole between 0 and 1",
                 d[i - 1]
             )));
         }

@@ -1,4 +1,4 @@
-//! Factor of the decimation of a record: chosen by the user, or from the rate.
+//! Decimation factor of a record, chosen by the user or derived from the sampling rate.
 
 use std::fmt;
 use std::str::FromStr;
@@ -9,14 +9,14 @@ use crate::{ModelError, SampleTime};
 /// Rate above which records are decimated automatically, Hz.
 const HIGHEST_HZ: f64 = 200.0;
 /// Target rate of the automatic decimation, Hz.
-const WANTED_HZ: f64 = 100.0;
+const TARGET_HZ: f64 = 100.0;
 /// Relative difference between two rates that is too large to be rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// Choice of the decimation of a record.
+/// Choice of the decimation factor of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Decimation {
-    /// Rates above 200 Hz by the factor whose result is nearest to 100 Hz.
+    /// Rates above 200 Hz are decimated by the factor that gives the rate nearest to 100 Hz.
     #[default]
     Auto,
     /// No decimation.
@@ -26,8 +26,8 @@ pub enum Decimation {
 }
 
 impl Decimation {
-    /// Returns the choice for an estimator that uses the original samples unless a factor is given: the orders and
-    /// delays of polynomials are in samples.
+    /// Returns the choice for estimators of polynomials, whose orders and delays are in samples: these use the original
+    /// samples unless a factor is given.
     pub fn when_named(self) -> Self {
         match self {
             Self::Auto => Self::Off,
@@ -41,8 +41,8 @@ impl Decimation {
         match self {
             Self::By(factor) => factor,
             Self::Auto if hz > HIGHEST_HZ * (1.0 + ROUNDING) => {
-                let below = (hz / WANTED_HZ).floor();
-                let distance = |factor: f64| (hz / factor - WANTED_HZ).abs();
+                let below = (hz / TARGET_HZ).floor();
+                let distance = |factor: f64| (hz / factor - TARGET_HZ).abs();
                 let nearest = if distance(below + 1.0) < distance(below) {
                     below + 1.0
                 } else {
@@ -55,7 +55,7 @@ impl Decimation {
     }
 }
 
-/// `auto`, `off`, or an integer of 1 or more.
+/// Parses `auto`, `off`, or an integer of 1 or more.
 impl FromStr for Decimation {
     type Err = ModelError;
 
@@ -98,15 +98,16 @@ pub struct Decimated {
     pub to_hz: f64,
     /// End of the pass band, Hz.
     pub pass_hz: f64,
-    /// Start of the stop band, Hz: frequencies between this and the pass band fold to above the pass band.
+    /// Start of the stop band, Hz. Frequencies between the pass band and the stop band fold to frequencies above the
+    /// pass band.
     pub stop_hz: f64,
     /// Attenuation in the stop band, dB.
     pub stop_db: f64,
-    /// Length of the filter, samples of the old rate.
+    /// Length of the filter in samples at the old rate.
     pub taps: usize,
-    /// Time in s by which a sample of the input is later than the sample of the output with the same index.
+    /// Time in s by which a sample of the input was taken later than the sample of the output with the same index.
     pub lead_s: f64,
-    /// Delay of a stream, s.
+    /// Delay of the decimated values of a stream, s.
     pub lag_s: f64,
 }
 

@@ -1,11 +1,12 @@
 //! Sample-by-sample decimation, for streams.
 //!
-//! The value at `k M` is available when the filter has the samples after it: the delay of the stream is half the filter
-//! plus half of M, about 15 samples of the new rate ([`Decimated::lag_s`]). Up to the last available sample its values
-//! are identical to those of the decimated record.
+//! The output for old sample `k M` is available when the filter has received the old samples after it that it needs.
+//! The delay of the stream is half the length of the filter plus M/2 samples, about 15 samples at the new rate
+//! ([`Decimated::lag_s`]). Up to the last available sample, the values of the stream are identical to those of the
+//! decimated record.
 //!
-//! **Values that are not finite** (missing, faulty) are replaced by the last valid one within the filter; a new sample
-//! is NaN if one of its M old samples is not finite, so that it is not used for identification.
+//! **Values that are not finite** (missing, faulty) are replaced by the last valid value at the input of the filter. A
+//! new sample is NaN if one of its M old samples is not finite, so that it is not used for identification.
 
 use std::collections::VecDeque;
 
@@ -15,7 +16,7 @@ use super::decimation::Decimated;
 use super::kernel::Kernel;
 use crate::{ModelError, SampleTime};
 
-/// Longest filter of a stream on each side, samples.
+/// Largest number of samples on each side of the filter of a stream.
 const LONGEST: usize = 1_000_000;
 
 /// Decimates C channels together.
@@ -24,30 +25,31 @@ pub struct Decimator<const C: usize> {
     done: Decimated,
     kernel: Kernel,
     sample_time: SampleTime,
-    lanes: [Lane; C],
+    lanes: [DecimatedChannel; C],
     /// Number of input samples.
-    came: u64,
+    input_count: u64,
     /// Number of output samples.
-    given: u64,
+    output_count: u64,
 }
 
-/// The past of one channel.
+/// Past samples of one channel.
 #[derive(Debug, Clone)]
-struct Lane {
-    /// Offset of the whole sample before a new value from its old sample: 0, or the middle of M.
+struct DecimatedChannel {
+    /// Number of whole samples from old sample `k M` to the instant of the new value: 0, or the middle of the M
+    /// samples.
     lead: i64,
-    /// Position of the first weight relative to that sample, and the weights.
+    /// Position of the first weight relative to that instant, and the weights.
     offset: i64,
     weights: Vec<f64>,
-    /// Samples that the filter needs; the first is at `first` old samples, which is negative for the reflection of the
-    /// start.
+    /// Samples that the filter needs. The first one has the index `first`, which is negative within the reflection of
+    /// the start.
     past: VecDeque<f64>,
     first: i64,
     /// The last valid value.
     last: f64,
     /// True if there has been a valid value.
     seen: bool,
-    /// Indices of the samples from the last output on that are not valid.
+    /// Indices of samples that are not finite, from the last output on.
     bad: VecDeque<u64>,
 }
 
@@ -70,7 +72,7 @@ impl<const C: usize> Decimator<C> {
         let lane = |held: bool| {
             let lead = if held { 0.5 * (factor as f64 - 1.0) } else { 0.0 };
             let (offset, weights) = kernel.weights(lead.fract());
-            Lane {
+            DecimatedChannel {
                 lead: lead.floor() as i64,
                 offset: offset as i64,
                 weights,
@@ -86,8 +88,8 @@ impl<const C: usize> Decimator<C> {
             kernel,
             sample_time: new,
             lanes: held.map(lane),
-            came: 0,
-            given: 0,
+            input_count: 0,
+            output_count: 0,
         })
     }
 
@@ -103,8 +105,8 @@ impl<const C: usize> Decimator<C> {
 
     /// Returns the number of samples between the last output and the last input.
     pub fn lag_samples(&self) -> u64 {
-        let at = self.given.saturating_sub(1) * self.done.factor as u64;
-        self.came.saturating_sub(1).saturating_sub(at)
+        let at = self.output_count.saturating_sub(1) * self.done.factor as u64;
+        self.input_count.saturating_sub(1).saturating_sub(at)
     }
 
     /// Returns the state as numbers, for [`Decimator::restore`].
@@ -125,32 +127,32 @@ impl<const C: usize> Decimator<C> {
         !lacking && left.next().is_none()
     }
 
-    /// Takes a sample of each channel; returns one when it is due.
+    /// Takes one sample of each channel; returns a new sample of each channel when it is available.
     pub fn take(&mut self, values: [f64; C]) -> Option<[f64; C]> {
-        let (number, factor, half) = (self.came, self.done.factor as u64, self.kernel.half());
-        self.came += 1;
+        let (number, factor, half) = (self.input_count, self.done.factor as u64, self.kernel.half());
+        self.input_count += 1;
         for (lane, value) in self.lanes.iter_mut().zip(values) {
             lane.take(value, number);
         }
-        // The last sample that the next value needs.
-        if self.came <= self.given * factor + factor / 2 + half as u64 {
+        // The last sample that the next output needs has not yet arrived.
+        if self.input_count <= self.output_count * factor + factor / 2 + half as u64 {
             return None;
         }
-        if self.given == 0 {
+        if self.output_count == 0 {
             self.lanes.iter_mut().for_each(|lane| lane.reflect(half));
         }
-        let at = self.given * factor;
+        let at = self.output_count * factor;
         let found = self.lanes.each_mut().map(|lane| {
             let value = lane.value(at, factor);
             lane.forget(at + factor, half);
             value
         });
-        self.given += 1;
+        self.output_count += 1;
         Some(found)
     }
 }
 
-impl Lane {
+impl DecimatedChannel {
     fn take(&mut self, value: f64, number: u64) {
         if value.is_finite() {
             self.last = value;
@@ -165,11 +167,11 @@ impl Lane {
         self.past.push_back(self.last);
     }
 
-    /// Reflects the start in the first sample.
+    /// Extends the past by the reflection of the start in the first sample.
     fn reflect(&mut self, half: usize) {
         let begin = self.past[0];
         for k in 1..=half {
-            // The k - 1 values that were inserted before precede the k-th sample.
+            // The k - 1 values inserted so far shift sample k to position 2 k - 1.
             let value = 2.0 * begin - self.past[2 * k - 1];
             self.past.push_front(value);
         }
@@ -204,7 +206,7 @@ impl Lane {
 impl<const C: usize> State for Decimator<C> {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         let most = 2 * self.kernel.half() + 4 * self.done.factor + 4;
-        for count in [&mut self.came, &mut self.given] {
+        for count in [&mut self.input_count, &mut self.output_count] {
             let mut number = *count as f64;
             each(&mut number);
             *count = number.max(0.0) as u64;

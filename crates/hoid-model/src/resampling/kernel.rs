@@ -4,21 +4,21 @@
 //! x(t) ~ sum_n x_n h(t - n),    h(s) = c sinc(c s) w(s / L),    w(r) = I0(beta sqrt(1 - r^2)) / I0(beta),  |r| <= 1
 //! ```
 //!
-//! with s in samples, `sinc x = sin(pi x) / (pi x)` and the cut-off c as a share of the Nyquist
-//! frequency. By Kaiser's formulas (J. F. Kaiser, "Nonrecursive digital filter design using the
-//! I0-sinh window function", Proc. IEEE Int. Symp. Circuits and Systems, 1974) the ripple is A dB
-//! below 1 in the pass band and the stop band alike for `beta = 0.1102 (A - 8.7)` and a length
-//! `2 L = (A - 7.95) / (2.285 d)`, d the width in rad of the transition around c.
+//! with s in samples, `sinc x = sin(pi x) / (pi x)` and the cut-off c as a fraction of the Nyquist frequency. By
+//! Kaiser's formulas (J. F. Kaiser, "Nonrecursive digital filter design using the I0-sinh window function", Proc. IEEE
+//! Int. Symp. Circuits and Systems, 1974) the ripple is A dB below 1 in both the pass band and the stop band for
+//! `beta = 0.1102 (A - 8.7)` and a length `2 L = (A - 7.95) / (2.285 d)`, where d is the width in rad of the transition
+//! around c.
 //!
-//! At integer t this is a linear-phase FIR filter whose delay is compensated; at other t it interpolates, and both have
-//! the same frequency response. The weights of each t are divided by their sum, so that a constant is unchanged. A is
-//! [`DESIGN_DB`], for which the stated [`STOP_DB`] are satisfied with a margin.
+//! At integer t this is a linear-phase FIR filter whose delay is compensated; at other t it interpolates, with the same
+//! frequency response. The weights for each t are divided by their sum, so that a constant is unchanged. A is
+//! [`DESIGN_DB`], which satisfies the stated [`STOP_DB`] with a margin.
 
 use std::f64::consts::PI;
 
 /// Design attenuation, dB.
 const DESIGN_DB: f64 = 90.0;
-/// Stated attenuation of aliases and of the error of interpolation, dB.
+/// Stated attenuation of aliases and of the interpolation error, dB.
 pub const STOP_DB: f64 = 80.0;
 /// Half the width of the transition, relative to its upper edge.
 const HALF_TRANSITION: f64 = 0.1;
@@ -32,13 +32,13 @@ const WHOLE: f64 = 1e-9;
 #[derive(Debug, Clone, Copy)]
 pub struct Kernel {
     cutoff: f64,
-    /// Samples on each side.
+    /// Number of samples on each side.
     half: usize,
 }
 
 impl Kernel {
-    /// Returns a kernel that passes up to 0.8 of the Nyquist frequency of the record and stops from 1.2: it shifts a
-    /// band-limited signal by fractions of a sample.
+    /// Returns a kernel with a pass band up to 0.8 and a stop band from 1.2 of the Nyquist frequency of the record: it
+    /// shifts a band-limited signal by fractions of a sample.
     pub fn interpolating() -> Self {
         Self {
             cutoff: 1.0,
@@ -46,8 +46,8 @@ impl Kernel {
         }
     }
 
-    /// Returns a kernel that passes up to 0.8 `ratio` and stops from `ratio`, the new Nyquist frequency relative to the
-    /// old one; `None` if the filter would be longer than `longest` on each side.
+    /// Returns a kernel with a pass band up to 0.8 `ratio` and a stop band from `ratio`, the new Nyquist frequency
+    /// relative to the old one; `None` if the filter would be longer than `longest` on each side.
     pub fn limiting(ratio: f64, longest: usize) -> Option<Self> {
         let half = half_length(2.0 * HALF_TRANSITION * ratio);
         // Written so that NaN gives `None`.
@@ -57,10 +57,10 @@ impl Kernel {
         })
     }
 
-    /// Returns a kernel that passes up to 0.8 `ratio` and stops from 1.2 `ratio`, with 6 dB at `ratio`, the new Nyquist
-    /// frequency relative to the old one: aliases fall between 0.8 and 1 of it, where they replace the part that the
-    /// filter has removed, so that the spectrum of noise has no gap. `None` if the filter would be longer than
-    /// `longest` on each side.
+    /// Returns a kernel with a pass band up to 0.8 `ratio` and a stop band from 1.2 `ratio`, where `ratio` is the new
+    /// Nyquist frequency relative to the old one; the attenuation is 6 dB at `ratio`. Aliases fall between 0.8 and 1 of
+    /// the new Nyquist frequency, where they replace the part of the spectrum that the filter has removed, so that the
+    /// spectrum of noise has no gap. `None` if the filter would be longer than `longest` on each side.
     pub fn folding(ratio: f64, longest: usize) -> Option<Self> {
         let half = half_length(2.0 * (1.0 - PASS) * ratio);
         // Written so that NaN gives `None`.
@@ -76,7 +76,7 @@ impl Kernel {
     }
 
     /// Returns the weights of the samples `floor(t) - half + 1 ..= floor(t) + half` for `t = floor(t) + fraction`; for
-    /// an integer t the first is `floor(t) - half`, so that they are symmetric.
+    /// an integer t the first sample is `floor(t) - half`, so that the weights are symmetric.
     pub(super) fn weights(self, fraction: f64) -> (isize, Vec<f64>) {
         let half = self.half as isize;
         let first = if fraction == 0.0 { -half } else { 1 - half };
@@ -93,15 +93,15 @@ impl Kernel {
         self.cutoff * sinc(self.cutoff * s) * bessel_i0(beta * root) / bessel_i0(beta)
     }
 
-    /// Returns the values at `t_k = first + k step` for k = 0 .. n, in samples; every t is at least [`Kernel::half`]
-    /// samples inside.
+    /// Returns the values at `t_k = first + k step` for k = 0 .. n, in samples; every t must be at least
+    /// [`Kernel::half`] samples from both ends.
     pub fn values(self, samples: &[f64], first: f64, step: f64, n: usize) -> Vec<f64> {
         // For an integer step all fractions are equal, and the weights are computed once.
         let (mut known, mut offset, mut weights) = (f64::NAN, 0, Vec::new());
         (0..n)
             .map(|k| {
                 let t = first + k as f64 * step;
-                // A time at a sample up to rounding is that sample.
+                // A time that equals a sample up to rounding is treated as that sample.
                 let whole = (t - t.round()).abs() < WHOLE;
                 let at = if whole { t.round() } else { t.floor() };
                 let fraction = if whole { 0.0 } else { t - at };

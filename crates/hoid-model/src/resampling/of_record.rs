@@ -5,7 +5,8 @@ use super::kernel::Kernel;
 use crate::{Channel, ModelError, Record};
 
 impl Decimation {
-    /// Returns the record at its new rate, with the data of the decimation; `None` if it was not decimated.
+    /// Returns the record at its new rate, with the data of the decimation; these are `None` if the record was not
+    /// decimated.
     ///
     /// # Errors
     /// As [`Record::decimated`].
@@ -33,7 +34,7 @@ impl Record {
             return Err(refuse("a factor of 0".to_owned(), "1 or more".to_owned()));
         }
         let n = self.len();
-        // The reflection is no longer than the record without its end point.
+        // The reflection must be shorter than the record.
         let Some((done, kernel, new)) = Decimated::by(factor, self.sample_time(), n - 1) else {
             let half = Decimated::by(factor, self.sample_time(), usize::MAX).map(|(_, kernel, _)| kernel.half());
             return Err(refuse(

@@ -1,7 +1,7 @@
 //! Parsing and formatting of transfer functions in s.
 //!
-//! Two notations are accepted. `NUM/DEN` with commas contains the coefficients in descending powers of s: `90/1,6,0`.
-//! Any other text is an expression in s:
+//! Two notations are accepted. `NUM/DEN` with commas contains the coefficients in descending powers of s, such as
+//! `90/1,6,0`. Any other text is an expression in s:
 //!
 //! ```text
 //! sum     = product { (+ | -) product }
@@ -12,15 +12,15 @@
 //! ```
 //!
 //! so that `90/(s(s+6))`, `(2s+1)/(s^2+0.4s+1)` and `0.5(s+1)/s/(s+2)` have their expected meaning. A number precedes
-//! its factor (`s2` is a mistyped `s^2`). A factor after a divisor without an operator in between is ambiguous
-//! (`90/s(s+6)`), and is refused with both remedies. Common factors of numerator and denominator are kept: `s/s^2` has
-//! a pole that is cancelled in its response. A delay is a factor of the whole expression.
+//! its factor (`s2` is a mistyped `s^2`). A factor that follows a divisor without an operator in between is ambiguous
+//! (`90/s(s+6)`) and is refused; the message shows both ways to write it. Common factors of numerator and denominator
+//! are kept: `s/s^2` has a pole that is cancelled in its response. A delay is a factor of the whole expression.
 //!
 //! | file | contents |
 //! |---|---|
-//! | `coefficients` | the list of coefficients |
-//! | `reader` | the expression |
-//! | `ratio` | the result of both |
+//! | `coefficients` | parser of lists of coefficients |
+//! | `reader` | parser of expressions |
+//! | `ratio` | quotient of polynomials that both parsers return |
 
 mod coefficients;
 mod ratio;
@@ -47,8 +47,8 @@ impl FromStr for ContinuousTransferFunction {
     /// ```
     ///
     /// # Errors
-    /// [`ModelError::TransferFunction`] with the character at which the text is invalid, or with the problem of the
-    /// whole: a numerator of higher degree than the denominator, a negative delay.
+    /// [`ModelError::TransferFunction`] with the character at which the text is invalid, or with a problem of the
+    /// transfer function: a numerator of higher degree than the denominator, a negative delay.
     fn from_str(text: &str) -> Result<Self, ModelError> {
         let read = if text.contains(',') {
             coefficients(text)
@@ -73,7 +73,7 @@ impl FromStr for ContinuousTransferFunction {
 }
 
 impl fmt::Display for ContinuousTransferFunction {
-    /// Formats it as an expression in s that is parsed to the same transfer function.
+    /// Formats the transfer function as an expression in s that is parsed to the same transfer function.
     ///
     /// ```
     /// # use hoid_model::ContinuousTransferFunction;

@@ -1,4 +1,4 @@
-//! Ticks and ranges of the axes of panels: numbers with as many digits as their step needs.
+//! Ticks and ranges of the axes of panels. Tick labels have as many digits as the tick spacing requires.
 
 use std::sync::Arc;
 
@@ -6,11 +6,11 @@ use kuva::prelude::{Layout, TickFormat};
 
 use super::style;
 
-/// Smallest distance between the ticks of an ordinate, and smallest height of a decade with labels
-/// at 2 and 5.
+/// Smallest distance between the ticks of an ordinate; `HIGH_DECADE` is the smallest height of a decade with labels at
+/// 2 and 5.
 const TICK_HEIGHT: f64 = 16.0;
 const HIGH_DECADE: f64 = 48.0;
-/// Steps of phase ticks, deg.
+/// Spacings of phase ticks, deg.
 const PHASE_STEPS: [f64; 6] = [15.0, 30.0, 45.0, 90.0, 180.0, 360.0];
 /// Smallest width of a decade with labels at 2 and 5 on a logarithmic abscissa.
 const WIDE_DECADE: f64 = 95.0;
@@ -19,7 +19,7 @@ const TICK_WIDTH: f64 = 34.0;
 /// Smallest number that the library draws on a logarithmic axis.
 const LEAST: f64 = 1e-10;
 
-/// Step of 1, 2 or 5 times a power of ten that gives at most `most` ticks.
+/// Tick spacing of 1, 2 or 5 times a power of ten that gives at most `most` intervals.
 pub fn tick_step(span: f64, most: f64) -> f64 {
     let least = span / most;
     let power = 10f64.powf(least.log10().floor());
@@ -30,7 +30,7 @@ pub fn tick_step(span: f64, most: f64) -> f64 {
     step.filter(|s| s.is_finite() && *s > 0.0).unwrap_or(span)
 }
 
-/// Label of a tick with the digits that its step needs.
+/// Label of a tick with as many digits as the tick spacing `step` requires.
 pub fn tick(value: f64, step: f64) -> String {
     let place = step.log10().floor();
     let value = (value / step).round() * step;
@@ -45,7 +45,8 @@ pub fn tick(value: f64, step: f64) -> String {
     format!("{value:.digits$e}")
 }
 
-/// A layout with the ticks of an ordinate of this height in `unit`; with numbers if `labelled`.
+/// Returns the layout with the ticks of an ordinate of this height in `unit`; the ticks have numbers if `labelled` is
+/// true.
 pub fn with_ordinate(
     layout: Layout,
     (low, high): (f64, f64),
@@ -77,15 +78,15 @@ pub fn with_ordinate(
         .with_y_tick_format(TickFormat::Custom(Arc::new(format)))
 }
 
-/// An ordinate that is linear up to a limit and logarithmic beyond it, on both sides of zero: for
-/// numbers of either sign that differ by orders of magnitude.
+/// An ordinate that is linear up to a limit and logarithmic beyond it, on both sides of zero, for positive and negative
+/// numbers that differ by orders of magnitude.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bent {
-    /// Limit of the linear part, whose height equals one decade.
+pub struct SymmetricLogAxis {
+    /// Limit of the linear part; the linear part has the height of one decade on either side of zero.
     pub linear_within: f64,
 }
 
-impl Bent {
+impl SymmetricLogAxis {
     /// Height of a value, in decades.
     pub fn height(self, value: f64) -> f64 {
         let share = value / self.linear_within;
@@ -103,7 +104,7 @@ impl Bent {
         }
     }
 
-    /// A layout with ticks at the integer heights of a range, over `height` units.
+    /// Returns the layout with ticks at the integer heights of a range on axes that are `height` units high.
     pub fn with_ordinate(self, layout: Layout, (low, high): (f64, f64), height: f64) -> Layout {
         let step = ((high - low) * TICK_HEIGHT / height).ceil().max(1.0);
         let range = (self.linear_within, self.value(low.abs().max(high.abs())));
@@ -118,7 +119,7 @@ impl Bent {
     }
 }
 
-/// A layout with the ticks of an abscissa of this width.
+/// Returns the layout with the ticks of an abscissa of this width.
 pub fn with_abscissa(layout: Layout, (low, high): (f64, f64), logarithmic: bool, width: f64) -> Layout {
     if logarithmic {
         let decades = (high / low).log10();
@@ -138,8 +139,8 @@ pub fn with_abscissa(layout: Layout, (low, high): (f64, f64), logarithmic: bool,
         .with_x_tick_format(TickFormat::Custom(Arc::new(format)))
 }
 
-/// Range of a logarithmic axis that contains these values, with ends at 1, 2 or 5 times a power of
-/// ten; from 0.1 to 1 if none is positive.
+/// Range of a logarithmic axis that contains these values, with ends at 1, 2 or 5 times a power of ten. The range is
+/// 0.1 to 1 if no value can be drawn.
 pub fn log_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let drawable = values.into_iter().filter(|v| style::is_drawable(*v) && *v >= LEAST);
     let start = (f64::INFINITY, 0.0_f64);
@@ -155,7 +156,8 @@ pub fn log_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     }
 }
 
-/// Label of a tick of a logarithmic axis with this range: all labels of an axis are decimals, or all are powers of ten.
+/// Label of a tick on a logarithmic axis with this range. All labels of an axis are decimal numbers, or all are powers
+/// of ten.
 pub fn log_tick(value: f64, (low, high): (f64, f64)) -> String {
     if low > 0.999e-3 && high < 1e6 {
         return crate::numbers::plain(value);
@@ -168,7 +170,7 @@ pub fn is_power_of_ten(value: f64) -> bool {
     (exponent - exponent.round()).abs() < 1e-6
 }
 
-/// The next value of 1, 2, 5 times a power of ten, downwards or upwards.
+/// The nearest 1, 2 or 5 times a power of ten that is at least (`up`) or at most this value.
 pub fn one_two_five(value: f64, up: bool) -> f64 {
     const MARKS: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
     let power = 10f64.powf(value.log10().floor());
@@ -201,7 +203,7 @@ mod tests {
 
     #[test]
     fn a_bent_ordinate_is_smooth_enough_and_has_its_ticks_at_decades() {
-        let bent = Bent { linear_within: 10.0 };
+        let bent = SymmetricLogAxis { linear_within: 10.0 };
         assert_eq!(
             [-1000.0, -10.0, -5.0, 0.0, 10.0, 100.0].map(|v| bent.height(v)),
             [-3.0, -1.0, -0.5, 0.0, 1.0, 2.0]

@@ -1,10 +1,9 @@
-//! Bode diagrams: magnitude and phase of models with their 95 % bands, and of the true operator if
-//! known.
+//! Bode diagrams: magnitude and phase of models with their 95 % bands, and of the true operator if it is known.
 //!
-//! The estimators see the operator after the zero-order hold of their sampling, `B q^-nk/(A F)`;
-//! the true response is drawn with the same hold, so that the curves coincide if the parameters
-//! agree. The phase is unwrapped after removing the delay `nk Ts omega`, which contributes most,
-//! and the delay is added again.
+//! The estimators identify the operator including the zero-order hold of the sampling, `B q^-nk/(A F)`. The true
+//! response is drawn with the same hold, so that the curves coincide if the parameters agree. Before the phase is
+//! unwrapped, the phase of the delay, `nk Ts omega`, is removed because it is the largest part; it is added back
+//! afterwards.
 
 use std::f64::consts::TAU;
 
@@ -31,46 +30,47 @@ const PHASE_STEPS: [f64; 6] = [15.0, 30.0, 45.0, 90.0, 180.0, 360.0];
 
 /// Number of frequencies of a curve.
 const POINTS: usize = 240;
-/// Frequency range of manual control, rad/s; from 0.1 to 50 the axis has ticks at 1, 2 and 5 of
-/// each decade.
+/// Frequency range of manual control, rad/s; on an axis from 0.1 to 50 rad/s there are ticks at 1, 2 and 5 in each
+/// decade.
 const LOWEST_RAD_S: f64 = 0.1;
 const HIGHEST_RAD_S: f64 = 50.0;
-/// Range of the phase, deg: below it, the phase of a dead time decreases without bound and is
-/// irrelevant to the loop.
+/// Displayed range of the phase, deg. Below this range the phase of a dead time decreases without bound and is not
+/// relevant to the closed loop.
 const PHASE_SHOWN_DEG: (f64, f64) = (-540.0, 270.0);
 
-/// A model of the figure.
+/// A model that is drawn in a Bode diagram.
 #[derive(Debug, Clone, Copy)]
 pub struct BodeModel<'a> {
-    /// Its name in the legend.
+    /// Name of the model in the legend.
     pub name: &'a str,
-    /// The model.
+    /// The fitted model.
     pub fit: &'a Fit,
-    /// The records of the fit; the longest determines the lowest frequency.
+    /// The records of the fit; the longest record determines the lowest frequency.
     pub records: &'a [Record],
 }
 
-/// The true operator of the figure.
+/// A true operator that is drawn in a Bode diagram.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrueResponse {
-    /// Its parameters.
+    /// Parameters of the operator.
     pub operator: OperatorParameters,
     /// Sample time of the hold.
     pub sample_time: SampleTime,
 }
 
-/// Magnitude in dB and phase in deg over frequency in rad/s, from 0.1 rad/s, or the lowest
-/// frequency that the longest record resolves, to 50 rad/s or half the sampling frequency.
+/// Draws the magnitude in dB and the phase in deg over frequency in rad/s. The lower end is 0.1 rad/s or, if that is
+/// higher, the lowest frequency that the longest record resolves; the upper end is 50 rad/s or, if that is lower, the
+/// Nyquist frequency.
 ///
-/// Bands are 1.96 standard errors to either side; a model without standard errors has none. A true
-/// response that no discrete model represents (a fractional delay) is drawn without the hold.
+/// Bands extend 1.96 standard errors to either side; a model without standard errors has no band. A true response that
+/// no discrete model represents (with a fractional delay) is drawn without the hold.
 pub fn bode(id: &str, models: &[BodeModel<'_>], truths: &[TrueResponse]) -> String {
     bode_with_points(id, models, truths, &[])
 }
 
-/// The same with points, such as a describing function of the same records, with error bars of 1.96
-/// standard errors. The axes include all points below 50 rad/s. The first set is black, further
-/// ones have colours that no model has.
+/// Draws the figure of [`bode`] with additional points, such as a describing function of the same records, with error
+/// bars of 1.96 standard errors. The axes extend to lower frequencies if points lie there. The first set of points is
+/// black; further sets have colours that no model has.
 pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueResponse], points: &[BodePoints]) -> String {
     let points: Vec<BodePoints> = points.iter().map(BodePoints::drawable).collect();
     let omega = frequencies(models, &points);
@@ -142,7 +142,7 @@ pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueRespon
                 .with_y_label("magnitude (dB)")
                 .with_force_margins_y(style::TOP, style::BOTTOM_WITHOUT_LABEL)
         };
-        // A figure with only points still has axes.
+        // A figure that contains only points still needs axes.
         if plots.is_empty() {
             plots.push(style::line([], BLACK, 1.0).into());
         }
@@ -187,7 +187,7 @@ pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueRespon
     svg::finish(id, "Frequency response with 95 % bands", scene)
 }
 
-/// A phase within the displayed range; others become gaps.
+/// Returns a phase within the displayed range; NaN, which becomes a gap, for any other phase.
 fn shown(phase_deg: f64) -> f64 {
     let (low, high) = PHASE_SHOWN_DEG;
     if (low..=high).contains(&phase_deg) {
@@ -209,14 +209,14 @@ fn frequencies(models: &[BodeModel<'_>], points: &[BodePoints]) -> Vec<f64> {
         .map(|r| r.len() as f64 * r.sample_time().s())
         .fold(0.0, f64::max);
     let low = (TAU / longest_s).max(LOWEST_RAD_S).min(high / 10.0);
-    // A point at the very edge would be cut in half.
+    // A point at the edge of the axes would be cut in half.
     let below = points.iter().flat_map(|p| &p.omega_rad_s).map(|w| w / 1.1);
     let low = below.filter(|w| *w > 1e-6 * high).fold(low, f64::min);
     let ratio = (high / low).ln() / (POINTS - 1) as f64;
     (0..POINTS).map(|i| low * (ratio * i as f64).exp()).collect()
 }
 
-/// Value and standard error over frequency.
+/// Values and standard errors of magnitude and phase over frequency.
 struct Curve {
     magnitude_db: Vec<(f64, Option<f64>)>,
     phase_deg: Vec<(f64, Option<f64>)>,
@@ -266,7 +266,7 @@ impl Curve {
     }
 }
 
-/// The first step with at most eight ticks, or a multiple of the last one.
+/// The first of `steps` that gives at most eight ticks; if there is none, a multiple of the last.
 fn tick_step(span: f64, steps: &[f64]) -> f64 {
     let largest = steps.last().copied().unwrap_or(1.0);
     let enough = |step: &&f64| span / **step <= MOST_STEPS;

@@ -1,6 +1,7 @@
-//! Bode diagrams side by side: magnitude in dB over phase in deg, several curves and the true response in each column.
+//! Bode diagrams next to each other: in each column magnitude in dB above phase in deg, with several curves and the
+//! true response.
 //!
-//! The phase is unwrapped after removing the delay, as in [`super::bode`].
+//! The delay is removed before the phase is unwrapped, as in [`super::bode`].
 
 use hoid_ident::frequency::unwrapped_deg;
 use hoid_model::{Complex64, uncertainty::Estimate};
@@ -12,37 +13,36 @@ use super::{
 };
 use crate::numbers::Z_95;
 
-/// One frequency response.
+/// A frequency response in a Bode diagram.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BodeCurve {
-    /// Name in the legend, where entries with equal name and style appear once; empty if there is none.
+    /// Name in the legend; empty for no entry. Entries with equal name and style appear only once.
     pub name: String,
-    /// Style: [`LineKind::Truth`] for the reference response.
+    /// Line style; [`LineKind::Truth`] for the reference response.
     pub kind: LineKind,
-    /// Colour.
+    /// Colour of the curve.
     pub shade: Shade,
-    /// Frequencies in rad/s, ascending.
+    /// Frequencies, rad/s, in ascending order.
     pub omega_rad_s: Vec<f64>,
-    /// Magnitude in dB at each frequency. Non-finite values are gaps.
+    /// Magnitude in dB at each frequency. Non-finite values leave gaps.
     pub magnitude_db: Vec<f64>,
-    /// Phase in deg at each frequency, on any branch.
+    /// Phase in deg at each frequency; full turns may be added or missing.
     pub phase_deg: Vec<f64>,
-    /// Lower and upper edge of the band of the magnitude, dB; empty if there are none.
+    /// Lower and upper edge of the band of the magnitude, dB; empty if there is no band.
     pub magnitude_band: Vec<(f64, f64)>,
-    /// Lower and upper edge of the band of the phase, deg, on the branch of the phase; empty for
-    /// none.
+    /// Lower and upper edge of the band of the phase, deg, on the branch of the phase; empty if there is no band.
     pub phase_band: Vec<(f64, f64)>,
-    /// Lower and upper end of the error bar of the magnitude, dB; empty if there are none.
+    /// Lower and upper end of the error bar of each magnitude, dB; empty if there are no error bars.
     pub magnitude_bars: Vec<(f64, f64)>,
-    /// Lower and upper ends of the error bars of the phase, deg, on the same branch as the phase; empty if there are
-    /// none.
+    /// Lower and upper end of the error bar of each phase, deg, on the branch of the phase; empty if there are no error
+    /// bars.
     pub phase_bars: Vec<(f64, f64)>,
-    /// Delay removed for unwrapping the phase, s; that of the model, or zero.
+    /// Delay removed while the phase is unwrapped, s: the delay of the model, or zero.
     pub delay_s: f64,
 }
 
 impl BodeCurve {
-    /// A curve without band from complex values.
+    /// Creates a curve without a band from complex values.
     pub fn of_response(
         name: &str,
         kind: LineKind,
@@ -66,7 +66,8 @@ impl BodeCurve {
         }
     }
 
-    /// Points with error bars of 1.96 standard errors, if there are standard errors.
+    /// Creates a curve that consists of points, with error bars of 1.96 standard errors where a standard error is
+    /// known.
     pub fn of_points(points: &BodePoints, shade: Shade) -> Self {
         let ends = |values: &[Estimate]| {
             let bar = |v: &Estimate| {
@@ -125,23 +126,24 @@ impl BodeCurve {
     }
 }
 
-/// Bode diagrams of one column.
+/// One column of Bode diagrams.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BodeColumn {
-    /// Title; empty if there is none. `_` or `^` is followed by one character, or several in braces.
+    /// Title; empty for no title. `_` or `^` is followed by one character, or by several in braces.
     pub title: String,
-    /// Its curves.
+    /// Curves of the column.
     pub curves: Vec<BodeCurve>,
 }
 
-/// Bode diagrams side by side, with common ordinates.
+/// Bode diagrams next to each other, with common ordinates.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BodeGrid {
-    /// The columns. A single one has the width of a text column, several have that of a page.
+    /// The columns. A figure with a single column has the width of a text column; a figure with several has the width
+    /// of a page.
     pub columns: Vec<BodeColumn>,
 }
 
-/// Magnitude over phase as one figure, with logarithmic frequency in rad/s. `title` is the text for
+/// Draws magnitude above phase, over a logarithmic frequency axis in rad/s, as one figure. `title` is the text for
 /// screen readers.
 pub fn bode_grid(id: &str, title: &str, grid: &BodeGrid) -> String {
     let row = |name: &str, unit: &str, of: fn(&BodeCurve) -> Curve| -> Vec<CurvePanel> {

@@ -1,9 +1,8 @@
-//! Points with error bars in a Bode diagram: describing functions and the models fitted to the same
+//! Points with error bars in a Bode diagram, for comparison of describing functions with the models fitted to the same
 //! records.
 //!
-//! The phase of a point is known up to full turns. It is drawn on the branch nearest to the first
-//! curve, or, without a curve, unwrapped from point to point after removing the delay of the
-//! points.
+//! The phase of a point is known up to full turns. It is drawn on the branch nearest to the first curve. If there is no
+//! curve, it is unwrapped from point to point after the delay of the points is removed.
 
 use hoid_ident::frequency::{DescribingFunction, unwrapped_deg};
 use hoid_model::uncertainty::Estimate;
@@ -13,7 +12,7 @@ use super::{draw, scale::Scale};
 use crate::numbers::Z_95;
 
 const RADIUS: f64 = 2.4;
-/// Half width of the cap of an error bar.
+/// Half of the width of an error bar's cap.
 const CAP: f64 = 2.5;
 
 /// Points of a frequency response.
@@ -21,19 +20,18 @@ const CAP: f64 = 2.5;
 pub struct BodePoints {
     /// Name in the legend.
     pub name: String,
-    /// Frequencies, rad/s, ascending.
+    /// Frequencies, rad/s, in ascending order.
     pub omega_rad_s: Vec<f64>,
-    /// Magnitude in dB at each frequency, with its standard error if there is one. Non-finite
-    /// values are omitted.
+    /// Magnitude in dB at each frequency, with its standard error if known. Non-finite values are omitted.
     pub magnitude_db: Vec<Estimate>,
-    /// Phase in deg at each frequency, on any branch, with its standard error if there is one.
+    /// Phase in deg at each frequency, with its standard error if known; full turns may be added or missing.
     pub phase_deg: Vec<Estimate>,
-    /// Delay removed for unwrapping the phase if there is no curve, s.
+    /// Delay removed while the phase is unwrapped, s; used only if there is no curve.
     pub delay_s: f64,
 }
 
 impl BodePoints {
-    /// Points of a describing function.
+    /// Creates the points of a describing function.
     pub fn of_describing_function(name: &str, h: &DescribingFunction) -> Self {
         Self {
             name: name.to_owned(),
@@ -44,7 +42,7 @@ impl BodePoints {
         }
     }
 
-    /// The points at which all numbers are finite and the frequency is positive.
+    /// The points with finite magnitude and phase and a finite, positive frequency.
     pub(super) fn drawable(&self) -> Self {
         let n = self
             .omega_rad_s
@@ -65,7 +63,7 @@ impl BodePoints {
         }
     }
 
-    /// The points on the branch of a curve: frequencies and phases in deg.
+    /// Shifts the phases by full turns to the branch nearest to a curve, given as frequencies and phases in deg.
     pub(super) fn on_branch_of(mut self, curve: Option<(&[f64], &[f64])>) -> Self {
         let pairs: Vec<(f64, f64)> = self
             .omega_rad_s
@@ -83,7 +81,7 @@ impl BodePoints {
         self
     }
 
-    /// Ends of the error bars, and the values.
+    /// The values and both ends of their error bars.
     pub(super) fn reach(values: &[Estimate]) -> impl Iterator<Item = f64> + '_ {
         values.iter().flat_map(|v| {
             let half = half_bar(v);
@@ -91,7 +89,7 @@ impl BodePoints {
         })
     }
 
-    /// Draws points and bars of 1.96 standard errors; none outside the axes.
+    /// Draws the points inside the axes and their bars of 1.96 standard errors, cut off at the axes.
     pub(super) fn draw(&self, scene: &mut Scene, scale: &Scale, values: &[Estimate], colour: &str) {
         let mut at = Vec::new();
         for (&omega, value) in self.omega_rad_s.iter().zip(values).filter(|(w, _)| scale.has_x(**w)) {
@@ -101,9 +99,9 @@ impl BodePoints {
                 continue;
             }
             if half > 0.0 {
-                let place = |v: f64| scale.place_y(scale.cut(v));
+                let place = |v: f64| scale.place_y(scale.clamp_to_axis(v));
                 scene.add(draw::line((x, place(low)), (x, place(high)), colour, 1.0, None));
-                for end in [low, high].into_iter().filter(|end| scale.cut(*end) == *end) {
+                for end in [low, high].into_iter().filter(|end| scale.clamp_to_axis(*end) == *end) {
                     scene.add(draw::line(
                         (x - CAP, place(end)),
                         (x + CAP, place(end)),
@@ -113,7 +111,7 @@ impl BodePoints {
                     ));
                 }
             }
-            if scale.cut(value.value) == value.value {
+            if scale.clamp_to_axis(value.value) == value.value {
                 at.push((x, scale.place_y(value.value)));
             }
         }
@@ -125,7 +123,7 @@ fn half_bar(value: &Estimate) -> f64 {
     value.standard_error.map_or(0.0, |s| Z_95 * s).clamp(0.0, 1e6)
 }
 
-/// Interpolates linearly between the points of a curve and returns the value at the nearest end outside it; `None` if
+/// Interpolates linearly between the points of a curve and returns the value of the nearest end outside it; `None` if
 /// the value is not finite.
 fn interpolated(omega: &[f64], y: &[f64], at: f64) -> Option<f64> {
     let n = omega.len().min(y.len());

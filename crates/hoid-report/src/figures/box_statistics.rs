@@ -1,15 +1,15 @@
 //! Statistics of a box plot.
 //!
-//! A box extends from the first to the third quartile with a line at the median; whiskers end at
-//! the last value within 1.5 interquartile ranges of the box, and values beyond are points (Tukey,
-//! *Exploratory Data Analysis*, 1977).
+//! A box extends from the first to the third quartile, with a line at the median. The whiskers end at the most extreme
+//! values within 1.5 interquartile ranges of the box; values beyond are drawn as points (Tukey, *Exploratory Data
+//! Analysis*, 1977).
 
 use hoid_numerics::statistics::{finite_sorted, quantile};
 
 use super::style;
 
 /// Maximum length of whiskers, in interquartile ranges.
-const REACH: f64 = 1.5;
+const WHISKER_LENGTH: f64 = 1.5;
 
 /// Box plot statistics of a sample.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -20,7 +20,7 @@ pub struct BoxStatistics {
     pub lower_whisker: f64,
     /// First quartile.
     pub lower_quartile: f64,
-    /// Second quartile.
+    /// Median, which is the second quartile.
     pub median: f64,
     /// Third quartile.
     pub upper_quartile: f64,
@@ -31,12 +31,12 @@ pub struct BoxStatistics {
 }
 
 impl BoxStatistics {
-    /// Statistics of the finite values; quartiles by linear interpolation between ranks.
+    /// Computes the statistics of the finite values; quartiles are interpolated linearly between ranks.
     pub fn of(values: &[f64]) -> Self {
         let values = finite_sorted(values.iter().copied());
         let quartile = |q| quantile(&values, q).unwrap_or_default();
         let (lower, upper) = (quartile(0.25), quartile(0.75));
-        let reach = REACH * (upper - lower);
+        let reach = WHISKER_LENGTH * (upper - lower);
         let within = |v: &f64| (lower - reach..=upper + reach).contains(v);
         let inside: Vec<f64> = values.iter().copied().filter(within).collect();
         Self {

@@ -1,5 +1,5 @@
-//! Box plots of the results of many runs: groups on the abscissa, and one box for each series in
-//! each group. [`BoxStatistics`] describes the boxes.
+//! Box plots of the results of many runs: the abscissa shows groups, and each group has one box for each series.
+//! [`BoxStatistics`] describes the boxes.
 
 use kuva::{
     prelude::Plot,
@@ -8,7 +8,7 @@ use kuva::{
 
 use super::{
     BoxStatistics,
-    axes::{Bent, with_ordinate},
+    axes::{SymmetricLogAxis, with_ordinate},
     draw::{self, INK},
     frame::{self, Area, Frame, Ordinates},
     labels::{marked, panel_label},
@@ -18,15 +18,16 @@ use super::{
     svg,
 };
 
-/// Height of the axes of a panel, and of a single panel.
+/// Height of the axes of a panel; `SINGLE_PANEL_HEIGHT` is the height if the figure has a single panel.
 const HEIGHT: f64 = 112.0;
-const ALONE: f64 = 150.0;
-/// Space above a panel for the number of outliers beyond its range, and for its note.
+const SINGLE_PANEL_HEIGHT: f64 = 150.0;
+/// Space above a panel for its note and the number of outliers beyond its range.
 const COUNTS: f64 = 13.0;
-/// Position of the group names below the axis, and of a second row of them.
+/// Distance of the group names below the axis; `ROW_DISTANCE` is the distance of a second row of names below the first.
 const NAMES_BELOW: f64 = 17.0;
-const SECOND: f64 = 12.0;
-/// Fraction of the width of a group for its boxes, and of the width of each box.
+const ROW_DISTANCE: f64 = 12.0;
+/// Fraction of the width of a group that its boxes occupy; `BOX` is the width of a box as a fraction of its place, and
+/// `WIDEST` the largest width.
 const GROUP: f64 = 0.86;
 const BOX: f64 = 0.8;
 const WIDEST: f64 = 26.0;
@@ -34,11 +35,11 @@ const WIDEST: f64 = 26.0;
 /// Range of the ordinate of box plots.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum BoxRange {
-    /// All boxes, whiskers and outliers.
+    /// The range includes all boxes, whiskers and outliers.
     #[default]
     Full,
-    /// Boxes and whiskers; outliers beyond are counted above the panel, and a triangle at its edge
-    /// marks their group.
+    /// The range includes boxes and whiskers. Outliers beyond it are counted above the panel, and a triangle at the
+    /// edge of the panel marks their box.
     Whiskers,
 }
 
@@ -47,36 +48,34 @@ pub enum BoxRange {
 pub struct BoxSeries {
     /// Name in the legend.
     pub name: String,
-    /// Colour.
+    /// Colour of the boxes.
     pub shade: Shade,
 }
 
 /// One panel of box plots.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BoxPanel {
-    /// Name of the quantity, such as `B_r(b_0)`; `_` or `^` is followed by one character, or
-    /// several in braces.
+    /// Name of the quantity, such as `B_r(b_0)`; `_` or `^` is followed by one character, or by several in braces.
     pub name: String,
-    /// Its unit; empty if there is none.
+    /// Unit of the quantity; empty if it has none.
     pub unit: String,
-    /// The boxes by group and series; a missing box is one without values.
+    /// The boxes by group and series; statistics without values represent a missing box.
     pub boxes: Vec<Vec<BoxStatistics>>,
-    /// Limit up to which the ordinate is linear, and logarithmic beyond; `None` for a linear
-    /// ordinate.
+    /// Limit up to which the ordinate is linear; it is logarithmic beyond. `None` for a linear ordinate.
     pub linear_within: Option<f64>,
-    /// Text above the panel, such as the largest of its numbers; empty if there is none.
+    /// Text above the panel, such as its largest number; empty for no text.
     pub note: String,
 }
 
 /// Panels of box plots with common groups and series.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BoxGrid {
-    /// The panels by rows.
+    /// The panels, row by row.
     pub panels: Vec<BoxPanel>,
-    /// Panels per row; zero counts as one. A single column has the width of a text column, several
-    /// have that of a page.
+    /// Panels per row; zero counts as one. A figure with a single column has the width of a text column; a figure with
+    /// several has the width of a page.
     pub columns: usize,
-    /// Title of each column, or of each panel; empty if there are none.
+    /// Titles of the columns, or of all panels; empty for no titles.
     pub titles: Vec<String>,
     /// Name of the grouping variable, such as `n_k^*`.
     pub abscissa: String,
@@ -88,13 +87,13 @@ pub struct BoxGrid {
     pub range: BoxRange,
     /// True if the panels of a row share an ordinate.
     pub shared_ordinates: bool,
-    /// True if every range includes zero, with a line.
+    /// True if every range includes zero, which is marked by a line.
     pub with_zero: bool,
-    /// Smallest half width of every range, so that rounding does not appear as spread; zero for none.
+    /// Smallest half width of every range, so that rounding errors do not look like scatter; zero for no limit.
     pub least_reach: f64,
 }
 
-/// Box plots as one figure. `title` is the text for screen readers.
+/// Draws box plots as one figure. `title` is the text for screen readers.
 pub fn box_plots(id: &str, title: &str, grid: &BoxGrid) -> String {
     let columns = grid.columns.max(1);
     let n = grid.panels.len();
@@ -108,14 +107,14 @@ pub fn box_plots(id: &str, title: &str, grid: &BoxGrid) -> String {
         columns,
         grid.shared_ordinates,
     );
-    let height = if n == 1 { ALONE } else { HEIGHT };
+    let height = if n == 1 { SINGLE_PANEL_HEIGHT } else { HEIGHT };
     let with_text = grid.range == BoxRange::Whiskers || grid.panels.iter().any(|p| !p.note.is_empty());
     let above = if with_text { COUNTS } else { 0.0 };
     let frame = Frame::with_space(n, columns, height, ordinates, grid.titles.len(), (above, 0.0));
     let groups = (0.5, grid.groups.len() as f64 + 0.5);
     let cell = |(i, panel): (usize, &BoxPanel)| {
         let layout = style::layout(groups, ranges[i], height);
-        let layout = match panel.bent() {
+        let layout = match panel.symmetric_log_axis() {
             Some(bent) => bent.with_ordinate(layout, ranges[i], height),
             None => with_ordinate(layout, ranges[i], &panel.unit, false, height, frame.has_ticks(i)),
         };
@@ -139,13 +138,13 @@ pub fn box_plots(id: &str, title: &str, grid: &BoxGrid) -> String {
 }
 
 impl BoxPanel {
-    fn bent(&self) -> Option<Bent> {
-        self.linear_within.map(|linear_within| Bent { linear_within })
+    fn symmetric_log_axis(&self) -> Option<SymmetricLogAxis> {
+        self.linear_within.map(|linear_within| SymmetricLogAxis { linear_within })
     }
 
-    /// Height of a value on the ordinate, in its transformed units.
+    /// Position of a value on the ordinate: the value itself on a linear ordinate, otherwise in decades.
     fn height(&self, value: f64) -> f64 {
-        self.bent().map_or(value, |bent| bent.height(value))
+        self.symmetric_log_axis().map_or(value, |bent| bent.height(value))
     }
 }
 
@@ -172,13 +171,13 @@ impl BoxGrid {
     fn add_names(&self, scene: &mut Scene, area: Area) {
         let names: Vec<String> = self.groups.iter().map(|g| marked(g)).collect();
         let pitch = area.width / names.len() as f64;
-        let widest = names.iter().map(|n| draw::text_room(n, TEXT)).fold(0.0, f64::max);
+        let widest = names.iter().map(|n| draw::text_space(n, TEXT)).fold(0.0, f64::max);
         let staggered = widest > pitch;
         for (k, name) in names.iter().enumerate() {
             let x = area.left + pitch * (k as f64 + 0.5);
             let y = area.bottom()
                 + if staggered && k % 2 == 1 {
-                    NAMES_BELOW + SECOND
+                    NAMES_BELOW + ROW_DISTANCE
                 } else {
                     NAMES_BELOW
                 };
@@ -186,7 +185,7 @@ impl BoxGrid {
         }
     }
 
-    /// Draws the boxes of a panel; true if one is missing.
+    /// Draws the boxes of a panel. Returns true if a box is missing.
     fn draw(&self, scene: &mut Scene, panel: &BoxPanel, area: Area, (low, high): (f64, f64)) -> bool {
         let share = |v: f64| (panel.height(v).clamp(low, high) - low) / (high - low);
         let y_of = |v: f64| area.bottom() - share(v) * area.height;
@@ -270,7 +269,7 @@ impl BoxGrid {
         if missing {
             entries.push(Entry::new("no value", INK, Sample::Cross));
         }
-        // Levels of one method are in one row.
+        // The levels of one method stay in one row.
         let levels = self.series.first().map_or(1, |s| s.shade.levels);
         add_legend_by(scene, &entries, levels);
     }
@@ -291,7 +290,7 @@ fn draw_box(
     }
     let size = (2.0 * half, lower - upper);
     scene.add(draw::rectangle((x - half, upper), size, colour, Some((INK, 0.6))));
-    // A box without height consists of its median line.
+    // Only the median line of a very flat box is visible.
     let on_box = if size.1 < 2.0 || !is_dark(colour) {
         BLACK
     } else {
@@ -341,10 +340,10 @@ mod tests {
             outliers: vec![10.0],
         };
         let svg = box_plots("b", "t", &grid(vec![vec![one]]));
-        let y = |v: f64| 8.0 + ALONE * (10.5 - v) / 11.0;
+        let y = |v: f64| 8.0 + SINGLE_PANEL_HEIGHT * (10.5 - v) / 11.0;
         let middle = style::LEFT + 0.5 * (style::WIDTH - style::LEFT - style::RIGHT);
         let side = middle - 0.5 * WIDEST;
-        let height = ALONE * 6.0 / 11.0;
+        let height = SINGLE_PANEL_HEIGHT * 6.0 / 11.0;
         let rect = [("x", side), ("y", y(8.0)), ("width", WIDEST), ("height", height)];
         assert!(has(&svg, "rect", &rect), "{svg}");
         let line = |from: (f64, f64), to: (f64, f64)| {

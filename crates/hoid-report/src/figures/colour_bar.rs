@@ -1,8 +1,7 @@
-//! Colour map of values, and its colour bar.
+//! Colour map for values, and its colour bar.
 //!
-//! The colours are viridis (Smith and van der Walt, 2015), evenly spaced in lightness, or for
-//! differences those from red over white at zero to blue of Harrower and Brewer (2003), whose ends
-//! are equally dark.
+//! The default colours are viridis (Smith and van der Walt, 2015), with evenly spaced lightness. Differences have the
+//! diverging colours of Harrower and Brewer (2003), from red over white at zero to blue, whose ends are equally dark.
 
 use kuva::{
     prelude::ColorMap,
@@ -16,24 +15,25 @@ use super::{
     style::{BLACK, TEXT},
 };
 
-/// Space for the bar at the right, its width, and the number of its steps.
-pub const BESIDE: f64 = 72.0;
+/// Space for the colour bar at the right of the panels; `BAR` is the width of the bar and `STEPS` the number of its
+/// colour steps.
+pub const SPACE_FOR_BAR: f64 = 72.0;
 const BAR: f64 = 12.0;
 const STEPS: usize = 64;
-/// Distance between its ticks.
+/// Smallest distance between the ticks of the colour bar.
 const TICK_HEIGHT: f64 = 30.0;
 
-/// Colours of the cells.
+/// Colour map of the cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum MapColours {
     /// From dark for the smallest value to light for the largest.
     #[default]
     Sequential,
-    /// White at zero, with equal range on both sides.
+    /// White at zero; the range has the same length on both sides.
     Diverging,
 }
 
-/// Colour map of values.
+/// Colour map with the range of its values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ColourScale {
     pub low: f64,
@@ -42,7 +42,7 @@ pub struct ColourScale {
 }
 
 impl ColourScale {
-    /// The colour `#rrggbb` of a value; values outside the range have the colour of the end.
+    /// The colour `#rrggbb` of a value; values outside the range have the colour of the nearest end.
     pub fn colour(&self, value: f64) -> String {
         let share = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
         let map = match self.colours {
@@ -53,7 +53,8 @@ impl ColourScale {
         format!("#{r:02X}{g:02X}{b:02X}")
     }
 
-    /// Ticks of a bar of this height, at least three: the first in steps, their number, the step.
+    /// Ticks of a colour bar of this height, at least three if possible: the first tick in units of the spacing, the
+    /// number of ticks, and the spacing.
     fn ticks(&self, height: f64) -> (f64, usize, f64) {
         let mut most = (height / TICK_HEIGHT).max(2.0);
         loop {
@@ -68,9 +69,9 @@ impl ColourScale {
         }
     }
 
-    /// Draws a colour bar with ticks and the name of the value, at the right end of the figure.
+    /// Draws a colour bar with ticks and the name of the quantity at the right edge of the figure.
     pub fn add_bar(&self, scene: &mut Scene, top: f64, bottom: f64, name: &str) {
-        let left = scene.width - BESIDE + 2.0;
+        let left = scene.width - SPACE_FOR_BAR + 2.0;
         let height = bottom - top;
         let step = height / STEPS as f64;
         for k in 0..STEPS {
@@ -96,7 +97,7 @@ impl ColourScale {
                 None,
             ));
         }
-        // A subscript of a vertical name extends further to the right.
+        // The name is vertical, so that a subscript extends further to the right.
         let x = scene.width - 9.0;
         scene.add(draw::centred(x, top + 0.5 * height, marked(name), Some(-90.0)));
     }

@@ -12,7 +12,7 @@ use super::{
 
 const HEIGHT: f64 = 220.0;
 
-/// Autocorrelation of the residuals over positive lags with its 99 % bounds. Values outside are
+/// Draws the autocorrelation of the residuals over positive lags with its 99 % bounds. Values outside the bounds are
 /// vermillion.
 pub fn autocorrelation(id: &str, correlation: &Correlation, sample_time: SampleTime) -> String {
     stems(
@@ -24,8 +24,8 @@ pub fn autocorrelation(id: &str, correlation: &Correlation, sample_time: SampleT
     )
 }
 
-/// Cross-correlation of residuals and input over negative and positive lags with its 99 % bounds.
-/// Values outside are vermillion.
+/// Draws the cross-correlation of residuals and input over negative and positive lags with its 99 % bounds. Values
+/// outside the bounds are vermillion.
 pub fn cross_correlation(id: &str, correlation: &Correlation, sample_time: SampleTime) -> String {
     stems(
         id,

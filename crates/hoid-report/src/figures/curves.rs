@@ -1,5 +1,4 @@
-//! Curves in a grid of panels: with bands, markers, error bars and stems, on linear and logarithmic
-//! axes.
+//! Curves in a grid of panels, with bands, markers, error bars and stems, on linear or logarithmic axes.
 
 use kuva::{
     prelude::{BandPlot, Plot},
@@ -19,79 +18,79 @@ use super::{
     svg,
 };
 
-/// Height of the axes of a panel, and of a single panel.
+/// Height of the axes of a panel; `SINGLE_PANEL_HEIGHT` is the height if the figure has a single panel.
 const HEIGHT: f64 = 112.0;
-const ALONE: f64 = 150.0;
+const SINGLE_PANEL_HEIGHT: f64 = 150.0;
 const LINE: f64 = 1.4;
 const RADIUS: f64 = 2.2;
-/// Half width of the cap of an error bar.
+/// Half of the width of an error bar's cap.
 const CAP: f64 = 2.5;
-/// Margin next to the first and the last stem or marker, as a fraction of the abscissa.
-const ROOM: f64 = 0.03;
+/// Margin outside the first and the last stem or marker, as a fraction of the abscissa.
+const ABSCISSA_MARGIN: f64 = 0.03;
 
 /// Style of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LineKind {
-    /// Solid, in its colour.
+    /// Solid line in the colour of the curve.
     #[default]
     Line,
-    /// Dashed, in its colour: for a curve that may coincide with another, which remains visible.
+    /// Dashed line in the colour of the curve; a curve that coincides with it stays visible.
     Dashed,
-    /// Dotted, in its colour.
+    /// Dotted line in the colour of the curve.
     Dotted,
-    /// Dashed and black: the true or specified value.
+    /// Dashed black line for the true or specified value.
     Truth,
-    /// Solid with a marker at each value, whose shape represents the level.
+    /// Solid line with a marker at each value; the shape of the marker represents the level.
     Marked,
-    /// A marker at each value, without line.
+    /// A marker at each value, without a line.
     Points,
-    /// A line from the abscissa to each value, with a marker: a line spectrum.
+    /// A vertical line from the abscissa to each value, with a marker, for line spectra.
     Stems,
 }
 
 /// One curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// Name in the legend, where entries with equal name and style appear once; empty if there is none.
+    /// Name in the legend; empty for no entry. Entries with equal name and style appear only once.
     pub name: String,
-    /// Style.
+    /// Line style.
     pub kind: LineKind,
-    /// Colour.
+    /// Colour of the curve.
     pub shade: Shade,
-    /// Abscissas, ascending.
+    /// Abscissas in ascending order.
     pub x: Vec<f64>,
-    /// Ordinates. A value that is not finite, or not positive on a logarithmic axis, is a gap.
+    /// Ordinates. A value that is not finite leaves a gap; so does a value that is not positive on a logarithmic axis.
     pub y: Vec<f64>,
-    /// Lower and upper edge of the band at each abscissa; empty if there are none.
+    /// Lower and upper edge of the band at each abscissa; empty if there is no band.
     pub band: Vec<(f64, f64)>,
-    /// Lower and upper end of the error bar at each abscissa; empty if there are none.
+    /// Lower and upper end of the error bar at each abscissa; empty if there are no error bars.
     pub bars: Vec<(f64, f64)>,
 }
 
 /// One panel of curves.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CurvePanel {
-    /// Name of the ordinate; `_` or `^` is followed by one character, or several in braces.
+    /// Name of the ordinate; `_` or `^` is followed by one character, or by several in braces.
     pub name: String,
-    /// Its unit; empty if there is none. An ordinate in `deg` has ticks at fractions of a full turn.
+    /// Unit of the ordinate; empty if it has none. An ordinate in `deg` has ticks at fractions of a full turn.
     pub unit: String,
     /// True for a logarithmic ordinate.
     pub logarithmic: bool,
-    /// Range of the ordinate; that of the curves with their bands and bars if it is `None`.
+    /// Range of the ordinate; if `None`, it covers the curves with their bands and error bars.
     pub within: Option<(f64, f64)>,
-    /// The curves, drawn in this order over all bands.
+    /// The curves, drawn over all bands in this order.
     pub curves: Vec<Curve>,
 }
 
 /// Panels with a common abscissa.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CurveGrid {
-    /// The panels by rows.
+    /// The panels, row by row.
     pub panels: Vec<CurvePanel>,
-    /// Panels per row; zero counts as one. A single column has the width of a text column, several
-    /// have that of a page.
+    /// Panels per row; zero counts as one. A figure with a single column has the width of a text column; a figure with
+    /// several has the width of a page.
     pub columns: usize,
-    /// Title of each column, or of each panel; empty if there are none.
+    /// Titles of the columns, or of all panels; empty for no titles.
     pub titles: Vec<String>,
     /// Name and unit of the abscissa, such as `time (s)`.
     pub abscissa: String,
@@ -101,7 +100,7 @@ pub struct CurveGrid {
     pub shared_ordinates: bool,
 }
 
-/// Curves as one figure. `title` is the text for screen readers.
+/// Draws panels of curves as one figure. `title` is the text for screen readers.
 pub fn curves(id: &str, title: &str, grid: &CurveGrid) -> String {
     let columns = grid.columns.max(1);
     let n = grid.panels.len();
@@ -110,7 +109,7 @@ pub fn curves(id: &str, title: &str, grid: &CurveGrid) -> String {
     }
     let labels = grid.panels.iter().map(|p| (p.name.as_str(), p.unit.as_str()));
     let ordinates = Ordinates::of(labels, columns, grid.shared_ordinates);
-    let height = if n == 1 { ALONE } else { HEIGHT };
+    let height = if n == 1 { SINGLE_PANEL_HEIGHT } else { HEIGHT };
     let x_range = grid.abscissa_range();
     let ranges = frame::of_rows(
         grid.panels.iter().map(CurvePanel::range).collect(),
@@ -155,7 +154,7 @@ impl CurveGrid {
         let all = || self.panels.iter().flat_map(|p| &p.curves);
         let values = || all().flat_map(|c| c.x.iter().copied());
         let room = all().any(|c| matches!(c.kind, LineKind::Marked | LineKind::Points | LineKind::Stems));
-        let room = if room { ROOM } else { 0.0 };
+        let room = if room { ABSCISSA_MARGIN } else { 0.0 };
         let drawable = |v: &f64| style::is_drawable(*v) && (*v > 0.0 || !self.logarithmic_abscissa);
         let ends = values().filter(drawable);
         let start = (f64::INFINITY, f64::NEG_INFINITY);
@@ -170,7 +169,7 @@ impl CurveGrid {
             let factor = (high / low).powf(room);
             return (low / factor, high * factor);
         }
-        // A tick at the very end must not be lost by rounding.
+        // Rounding must not remove a tick at the very end of the axis.
         let room = room.max(1e-9);
         (low - room * (high - low), high + room * (high - low))
     }
@@ -191,12 +190,12 @@ impl CurveGrid {
                 entries.push(entry);
             }
         }
-        // The truth is last, so that the levels of a method stay in one row.
+        // The truth comes last, so that the levels of a method stay in one row.
         entries.sort_by_key(|entry| entry.sample == Sample::Dashed && entry.colour == BLACK);
         entries
     }
 
-    /// Largest number of levels of a method.
+    /// Largest number of levels of any method.
     fn levels(&self) -> usize {
         let curves = self.panels.iter().flat_map(|p| &p.curves);
         curves.map(|c| c.shade.levels).max().unwrap_or(1)
@@ -208,7 +207,8 @@ impl CurvePanel {
         let edges = |c: &Curve| -> Vec<f64> { c.band.iter().chain(&c.bars).flat_map(|b| [b.0, b.1]).collect() };
         let mut values: Vec<f64> = self.curves.iter().flat_map(|c| c.y.iter().copied()).collect();
         if self.logarithmic {
-            // An edge at or below zero is that of a wide band, and not a value to be shown.
+            // On a logarithmic axis the lower edge of a wide band may be zero or negative; such an edge does not
+            // determine the range.
             let least = values
                 .iter()
                 .copied()
@@ -230,11 +230,11 @@ impl CurvePanel {
         style::padded_range(values)
     }
 
-    /// Bands first, then lines.
+    /// Bands and lines of the panel; the bands come first, so that the lines are drawn over them.
     fn plots(&self, scale: &Scale) -> Vec<Plot> {
         let mut plots: Vec<Plot> = self.curves.iter().flat_map(|c| c.bands(scale)).collect();
         plots.extend(self.curves.iter().flat_map(|c| c.lines(scale)));
-        // A panel without a curve still has its axes.
+        // A panel without curves still needs axes.
         if plots.is_empty() {
             plots.push(style::line([], BLACK, 1.0).into());
         }
@@ -256,8 +256,8 @@ impl Curve {
         let band = |run: std::ops::Range<usize>| -> Plot {
             BandPlot::new(
                 run.clone().map(|k| self.x[k]),
-                run.clone().map(|k| scale.cut(self.band[k].0)),
-                run.map(|k| scale.cut(self.band[k].1)),
+                run.clone().map(|k| scale.clamp_to_axis(self.band[k].0)),
+                run.map(|k| scale.clamp_to_axis(self.band[k].1)),
             )
             .with_color(self.colour())
             .with_opacity(BAND_OPACITY)
@@ -286,7 +286,7 @@ impl Curve {
         runs(n, known).into_iter().filter(|r| r.len() > 1).map(line).collect()
     }
 
-    /// Draws stems, error bars, markers and isolated values; none outside the axes.
+    /// Draws stems, error bars, markers and isolated values inside the axes.
     fn draw_marks(&self, scene: &mut Scene, scale: &Scale) {
         let colour = self.colour();
         let n = self.y.len().min(self.x.len());
@@ -297,11 +297,11 @@ impl Curve {
                 continue;
             }
             let x = scale.place_x(self.x[k]);
-            let (from, to) = (scale.place_y(scale.cut(low)), scale.place_y(scale.cut(high)));
+            let (from, to) = (scale.place_y(scale.clamp_to_axis(low)), scale.place_y(scale.clamp_to_axis(high)));
             scene.add(draw::line((x, from), (x, to), &colour, 1.0, None));
             for (end, y) in [(low, from), (high, to)] {
-                // An end beyond the axes has no cap.
-                if scale.cut(end) == end {
+                // An end of a bar that lies beyond the axes has no cap.
+                if scale.clamp_to_axis(end) == end {
                     scene.add(draw::line((x - CAP, y), (x + CAP, y), &colour, 1.0, None));
                 }
             }
@@ -310,12 +310,12 @@ impl Curve {
         let mut at = Vec::new();
         for run in runs(n, known) {
             for k in run.clone().filter(|_| has_marker || run.len() == 1) {
-                let (x, y) = (scale.place_x(self.x[k]), scale.place_y(scale.cut(self.y[k])));
+                let (x, y) = (scale.place_x(self.x[k]), scale.place_y(scale.clamp_to_axis(self.y[k])));
                 if self.kind == LineKind::Stems {
-                    let foot = scale.place_y(scale.cut(0.0));
+                    let foot = scale.place_y(scale.clamp_to_axis(0.0));
                     scene.add(draw::line((x, foot), (x, y), &colour, 1.2, None));
                 }
-                if scale.cut(self.y[k]) == self.y[k] {
+                if scale.clamp_to_axis(self.y[k]) == self.y[k] {
                     at.push((x, y));
                 }
             }
@@ -368,7 +368,7 @@ mod tests {
         let width = style::WIDTH - style::LEFT - style::RIGHT;
         // The abscissa extends 3 % of two decades beyond both ends; the ordinate ranges from 0.5 to 1000.
         let x = |v: f64| left + width * (v.log10() + 0.06) / 2.12;
-        let y = |v: f64| 8.0 + ALONE * (1000.0 / v).log10() / 2000.0_f64.log10();
+        let y = |v: f64| 8.0 + SINGLE_PANEL_HEIGHT * (1000.0 / v).log10() / 2000.0_f64.log10();
         let upright = |at: f64, from: f64, to: f64| {
             has(
                 &svg,

@@ -1,5 +1,5 @@
-//! A describing function with its errors, over frequency: magnitude, phase and coherence, with the
-//! curves of models.
+//! A describing function with its errors over frequency: magnitude, phase and coherence, together with the curves of
+//! models.
 //!
 //! The phase of a model is drawn on the branch nearest to the points.
 
@@ -16,9 +16,9 @@ use super::{
 };
 use crate::numbers::Z_95;
 
-/// Name in the legend; equal names appear once.
+/// Name in the legend.
 const NAME: &str = "describing function, bars 95 %";
-/// Name if a bar is truncated.
+/// Name in the legend if an error bar is truncated.
 const NAME_OF_CUT: &str = "describing function, bars 95 %, cut at 180 deg";
 /// Number of frequencies of a model curve.
 const POINTS: usize = 240;
@@ -28,18 +28,19 @@ const POINTS: usize = 240;
 pub struct ModelCurve {
     /// Name in the legend.
     pub name: String,
-    /// Frequencies, rad/s, ascending.
+    /// Frequencies, rad/s, in ascending order.
     pub omega_rad_s: Vec<f64>,
     /// Response at each frequency.
     pub response: Vec<Complex64>,
-    /// Standard errors of magnitude in dB and phase in deg at each frequency, for a band; empty if there are none.
+    /// Standard errors of magnitude (dB) and phase (deg) at each frequency, for the band; empty for no band.
     pub standard_errors: Vec<[f64; 2]>,
-    /// Delay removed for unwrapping the phase, s.
+    /// Delay removed while the phase is unwrapped, s.
     pub delay_s: f64,
 }
 
 impl ModelCurve {
-    /// A response over the frequency range of a description with a small margin.
+    /// Creates the curve of a response over the frequency range of a description, with a small margin and at least up
+    /// to `reach_rad_s`.
     pub fn over(
         found: &Description,
         reach_rad_s: f64,
@@ -57,7 +58,7 @@ impl ModelCurve {
         }
     }
 
-    /// A response with its standard errors over the same frequencies.
+    /// Creates the curve of a response with its standard errors over the frequencies of [`Self::over`].
     pub fn with_band(
         found: &Description,
         reach_rad_s: f64,
@@ -82,18 +83,19 @@ impl ModelCurve {
         }
     }
 
-    /// The band of 1.96 standard errors around magnitude (0) or phase (1); empty if there is none.
+    /// Edges of the band of 1.96 standard errors around the magnitude (`part` 0) or the phase (`part` 1); empty without
+    /// standard errors.
     fn band(&self, part: usize, around: &[f64]) -> Vec<(f64, f64)> {
         let ends = |(value, errors): (&f64, &[f64; 2])| {
             let whole = Z_95 * errors[part];
-            // Not `min`, which ignores NaN.
+            // `f64::min` would ignore NaN.
             let half = if whole > LONGEST_BAR { LONGEST_BAR } else { whole };
             (value - half, value + half)
         };
         around.iter().zip(&self.standard_errors).map(ends).collect()
     }
 
-    /// Phase in deg, on the branch nearest to the points of frequency and phase.
+    /// Phase in deg on the branch nearest to the points, given as pairs of frequency and phase.
     fn phase_deg(&self, points: &[(f64, f64)]) -> Vec<f64> {
         let principal = self.response.iter().map(|h| h.arg().to_degrees());
         let pairs: Vec<(f64, f64)> = self.omega_rad_s.iter().copied().zip(principal).collect();
@@ -113,7 +115,7 @@ impl ModelCurve {
     }
 }
 
-/// The frequency range of a description with a small margin, rad/s.
+/// Frequencies in rad/s over the range of a description, with a small margin and at least up to `reach_rad_s`.
 fn frequencies(found: &Description, reach_rad_s: f64) -> Vec<f64> {
     let lines = &found.function.lines;
     let ends = lines.first().zip(lines.last());
@@ -123,8 +125,8 @@ fn frequencies(found: &Description, reach_rad_s: f64) -> Vec<f64> {
     (0..POINTS).map(|k| low * (step * k as f64).exp()).collect()
 }
 
-/// The describing function as points with error bars of 1.96 standard errors, and models as lines.
-/// `title` is the text for screen readers.
+/// Draws the describing function as points with error bars of 1.96 standard errors, and models as lines. `title` is the
+/// text for screen readers.
 pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCurve]) -> String {
     let lines = &found.function.lines;
     let omega: Vec<f64> = lines.iter().map(|line| line.omega_rad_s).collect();
@@ -158,7 +160,7 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
     };
     let known: Vec<(f64, f64)> = omega.iter().copied().zip(phases.iter().map(|p| p.value)).collect();
     let gain_of = |model: &ModelCurve| model.response.iter().map(|h| 20.0 * h.norm().log10()).collect();
-    // Models first: the points are drawn over them.
+    // The models come first, so that the points are drawn over them.
     let mut magnitude: Vec<Curve> = models.iter().enumerate().map(|m| line(m, 0, gain_of(m.1))).collect();
     magnitude.push(points(&magnitudes, name));
     let mut phase: Vec<Curve> = models
@@ -169,7 +171,8 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
     phase.push(points(&phases, name));
     let mut panels = vec![panel("magnitude", "dB", magnitude), panel("phase", "deg", phase)];
     let coherences: Vec<Estimate> = lines.iter().filter_map(|l| l.coherence).map(Estimate::fixed).collect();
-    // Without the excitation it is the coherence of u with e, which carries little information in a closed loop.
+    // If the excitation is not recorded, the coherence is between u and e and carries little information in a closed
+    // loop.
     let shown = found.channel.is_some() && coherences.len() == omega.len();
     if let Some(chance) = chance_coherence(found.function.runs.len()).filter(|_| shown) {
         let ends = models.iter().flat_map(|m| m.omega_rad_s.iter()).chain(&omega);
@@ -198,7 +201,8 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
     curves(id, title, &grid)
 }
 
-/// The first model is a solid line, further ones are broken: all remain visible where they agree.
+/// The first model has a solid line, further models have dashed and dotted lines, so that curves that coincide stay
+/// visible.
 fn kind_of(model: usize) -> LineKind {
     match model {
         0 => LineKind::Line,
@@ -207,16 +211,16 @@ fn kind_of(model: usize) -> LineKind {
     }
 }
 
-/// Largest half length of an error bar, dB or deg: a phase with an error of half a turn is unknown,
-/// and a longer bar would compress the scale of all others.
+/// Largest half length of an error bar, dB or deg. A phase with an error of half a turn is unknown, and a longer bar
+/// would compress the scale for all other points.
 const LONGEST_BAR: f64 = 180.0;
 
-/// Half length of an error bar, NaN if there is no error.
+/// Half length of an error bar; NaN if the standard error is unknown.
 fn half_bar(v: &Estimate) -> f64 {
     v.standard_error.map_or(f64::NAN, |s| Z_95 * s)
 }
 
-/// Ends of an error bar as drawn.
+/// Ends of an error bar, truncated to the largest length.
 fn bar(v: &Estimate) -> (f64, f64) {
     let whole = half_bar(v);
     let half = if whole > LONGEST_BAR { LONGEST_BAR } else { whole };

@@ -1,4 +1,4 @@
-//! Marks drawn at positions of the figure, over the axes, in its coordinates.
+//! Marks drawn over the axes at positions given in the coordinates of the figure.
 
 use kuva::render::{
     color::Color,
@@ -18,7 +18,7 @@ const SMALL: u32 = 10;
 /// Opacity of bands around lines.
 pub const BAND_OPACITY: f64 = 0.2;
 
-/// Distance between the lines of a hatching.
+/// Distance between the lines of the hatching.
 const HATCH: f64 = 5.0;
 
 pub fn line(from: (f64, f64), to: (f64, f64), colour: &str, width: f64, dashes: Option<&str>) -> Primitive {
@@ -71,7 +71,7 @@ pub fn cross(scene: &mut Scene, (x, y): (f64, f64), half: f64, colour: &str, wid
     scene.add(line((x - half, y + half), (x + half, y - half), colour, width, None));
 }
 
-/// Draws a mark of this shape at a position: all cover about the same area.
+/// Draws a mark of this shape at a position. Marks of all shapes cover about the same area.
 pub fn mark(scene: &mut Scene, at: (f64, f64), radius: f64, form: Mark, colour: &str) {
     let (x, y) = at;
     let (side, tall, wide) = (0.9 * radius, 1.35 * radius, 1.3 * radius);
@@ -126,12 +126,12 @@ pub fn text(x: f64, y: f64, content: String, size: u32, anchor: TextAnchor, rota
     }
 }
 
-/// Text centred at a position, in the font size of labels.
+/// Text centred at a position, with the font size of labels.
 pub fn centred(x: f64, y: f64, content: String, rotate: Option<f64>) -> Primitive {
     text(x, y, content, TEXT, TextAnchor::Middle, rotate)
 }
 
-/// The same, smaller if it is longer than the available space.
+/// Text centred at a position, with a smaller font if it is longer than the available space.
 pub fn fitted(x: f64, y: f64, content: String, room: f64, rotate: Option<f64>) -> Primitive {
     let size = match text_width(&content, TEXT) > room {
         true => SMALL,
@@ -140,13 +140,13 @@ pub fn fitted(x: f64, y: f64, content: String, room: f64, rotate: Option<f64>) -
     text(x, y, content, size, TextAnchor::Middle, rotate)
 }
 
-/// Space for a text in the reader's font: without Helvetica or Arial it is often DejaVu Sans, which is wider by an
-/// eighth.
-pub fn text_room(text: &str, size: u32) -> f64 {
+/// Space for a text in the reader's font, which without Helvetica or Arial is often DejaVu Sans and about an eighth
+/// wider.
+pub fn text_space(text: &str, size: u32) -> f64 {
     1.14 * text_width(text, size)
 }
 
-/// Approximate width of text in Helvetica, slightly more on average.
+/// Approximate width of a text in Helvetica, on average slightly too large.
 pub fn text_width(text: &str, size: u32) -> f64 {
     let of = |sign: char| match sign {
         ' ' | '.' | ',' | ':' | ';' | 'i' | 'j' | 'l' | '|' | '\'' | 'I' => 0.28,

@@ -1,28 +1,28 @@
-//! A figure as a file: its width on paper, and the format given by the file name.
+//! Figures as files: the width on paper, and the file format given by the extension.
 //!
-//! Every figure is drawn as SVG. PDF, with vector lines and text, and PNG, with a resolution of
-//! [`DPI`], are made from it with the fonts of the system (feature `pdf-png`).
+//! Every figure is drawn as SVG. PDF, with vector lines and text, and PNG, with a resolution of [`DPI`], are made from
+//! the SVG with the fonts of the system (feature `pdf-png`).
 
 use std::path::Path;
 
 use crate::ReportError;
 
-/// Resolution of a PNG in dots per inch, as journals require for colour line art. 85 mm are 1004 dots.
+/// Resolution of a PNG in dots per inch, as journals require for colour line art. A width of 85 mm gives 1004 dots.
 pub const DPI: f64 = 300.0;
 
 /// Formats in which a figure can be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FigureFormat {
-    /// Vector graphics, as drawn.
+    /// Vector graphics, the format in which figures are drawn.
     Svg,
-    /// One page of the size of the figure.
+    /// A single page with the size of the figure.
     Pdf,
-    /// Pixels on white.
+    /// Pixels on a white background.
     Png,
 }
 
 impl FigureFormat {
-    /// The format given by the extension of a name; `None` for another extension.
+    /// The format given by the extension of a file name; `None` for any other extension.
     pub fn of(path: &Path) -> Option<Self> {
         let ending = path.extension()?.to_str()?.to_ascii_lowercase();
         match ending.as_str() {
@@ -33,15 +33,15 @@ impl FigureFormat {
         }
     }
 
-    /// True if this build can write the format: PDF and PNG need the feature `pdf-png`.
+    /// True if this build of hoid can write the format: PDF and PNG need the feature `pdf-png`.
     pub const fn is_built(self) -> bool {
         matches!(self, Self::Svg) || cfg!(feature = "pdf-png")
     }
 
-    /// Returns the bytes of the file.
+    /// Returns the contents of the file.
     ///
     /// # Errors
-    /// [`ReportError::Figure`] if the format is not built, or the system has no font.
+    /// [`ReportError::Figure`] if this build cannot write the format, or the system has no font.
     pub fn bytes(self, svg: &str) -> Result<Vec<u8>, ReportError> {
         match self {
             Self::Svg => Ok(svg.as_bytes().to_vec()),
@@ -57,8 +57,7 @@ impl FigureFormat {
     }
 }
 
-/// Scales the figure to a width in mm, with the corresponding height. The text is scaled too; it
-/// has 7.5 pt at 85 mm.
+/// Scales the figure to a width in mm and the height in proportion. The text is scaled too; it has 7.5 pt at 85 mm.
 pub fn with_width_mm(svg: &str, width_mm: f64) -> String {
     let size = |name: &str| -> Option<f64> {
         let (_, rest) = svg.split_once(&format!(" {name}=\""))?;
@@ -78,7 +77,7 @@ pub fn with_width_mm(svg: &str, width_mm: f64) -> String {
 
 #[cfg(feature = "pdf-png")]
 mod converted {
-    //! Conversion by svg2pdf and resvg, which use the same tree of the same SVG.
+    //! Conversion by svg2pdf and resvg from the same parsed SVG tree.
 
     use resvg::{
         tiny_skia::{Pixmap, Transform},
@@ -89,9 +88,9 @@ mod converted {
     use super::DPI;
     use crate::ReportError;
 
-    /// Pixels per inch of an SVG without a unit (CSS).
+    /// Pixels per inch of an SVG without units (CSS).
     const PIXELS_AN_INCH: f64 = 96.0;
-    /// Font families of the figures, and their replacements on Linux.
+    /// Font families of the figures, with their replacements on Linux.
     const SANS_SERIF: [&str; 5] = ["Helvetica", "Arial", "Liberation Sans", "DejaVu Sans", "Noto Sans"];
 
     pub fn pdf(svg: &str) -> Result<Vec<u8>, ReportError> {
@@ -116,14 +115,14 @@ mod converted {
         let fonts = options.fontdb_mut();
         fonts.load_system_fonts();
         let family = sans_serif(fonts).ok_or_else(|| {
-            failed(&"the system has no font; install one, such as DejaVu (fonts-dejavu), or write it as .svg")
+            failed(&"the system has no font; install one, such as DejaVu (fonts-dejavu), or write the figure as .svg")
         })?;
         fonts.set_sans_serif_family(family.clone());
         options.font_family = family;
         Tree::from_str(svg, &options).map_err(|e| failed(&e))
     }
 
-    /// A font family of the system: one of [`SANS_SERIF`], otherwise any.
+    /// A font family of the system: the first of [`SANS_SERIF`] that exists, otherwise any.
     fn sans_serif(fonts: &Database) -> Option<String> {
         let has = |name: &&str| {
             fonts

@@ -1,8 +1,8 @@
-//! The grid of figures with several panels: widths, heights and margins of its cells, labels of
-//! rows, titles of columns or panels.
+//! The grid of figures with several panels: widths, heights and margins of the cells, labels of the rows, and titles of
+//! columns or panels.
 //!
-//! A single column has the width of a text column, several have that of a page. Axes have the same
-//! width in all columns. Only the lowest panel of a column has the ticks and the name of the
+//! A figure with a single column has the width of a text column; a figure with several has the width of a page. The
+//! axes have the same width in all columns. Only the lowest panel of a column has tick labels and the name of the
 //! abscissa.
 
 use std::sync::Arc;
@@ -19,35 +19,35 @@ use super::{
     svg,
 };
 
-/// Space above the axes of a panel, and below if there is no abscissa.
+/// Space above the axes of a panel, and below the axes if there is no abscissa.
 const SPACE: f64 = 8.0;
-/// Space before a panel that shares the ordinate of its neighbour.
+/// Space to the left of a panel that shares the ordinate of its neighbour.
 const GAP: f64 = 16.0;
-/// Space before a panel with its own ticks, but no label.
+/// Space to the left of a panel that has ticks of its own but no label.
 const TICKS: f64 = 50.0;
-/// Space after such a panel, except for the last: less than half of a tick label, which extends
-/// into the space of the next.
+/// Space to the right of a panel whose neighbour has ticks but no label. It is less than half of a tick label, which
+/// extends into the space of the neighbour.
 const NARROW: f64 = 5.0;
 const TITLE: f64 = 18.0;
-/// Centre of the label of the ordinate.
+/// Position of the centre of the ordinate label.
 const LABEL_AT: f64 = 13.0;
-/// Position of the name of the abscissa below its axis, and below two rows of category names.
+/// Distance of the name of the abscissa below the axis, with room for two rows of category names.
 const NAME_BELOW: f64 = 44.0;
 
-/// Panels of a row with ticks and the label of the ordinate.
+/// Which panels of a row have ticks and the label of the ordinate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ordinates {
-    /// Each panel has both.
+    /// Each panel has ticks and a label.
     Each,
-    /// Each panel has ticks, the first has the label.
+    /// Each panel has ticks; only the first has the label.
     Ticks,
-    /// The first panel has both: all have the same range.
+    /// Only the first panel has ticks and the label, because all panels of a row have the same range.
     Shared,
 }
 
 impl Ordinates {
-    /// Choice for panels with these names and units by rows: one label suffices for a row with a
-    /// single quantity.
+    /// Chooses the ordinates for panels with these names and units, given row by row. One label suffices if all panels
+    /// of a row show the same quantity.
     pub fn of<'a>(labels: impl Iterator<Item = (&'a str, &'a str)>, columns: usize, shared: bool) -> Self {
         let labels: Vec<(&str, &str)> = labels.collect();
         let one = |row: &[(&str, &str)]| row.iter().all(|l| *l == row[0]);
@@ -69,7 +69,7 @@ pub struct Area {
 }
 
 impl Area {
-    /// Number of columns to which a line between these axes is reduced: one for each unit.
+    /// Number of columns to which a line between these axes is reduced: one for each unit of width.
     pub fn parts(&self) -> usize {
         self.width.max(1.0) as usize
     }
@@ -83,7 +83,7 @@ impl Area {
     }
 }
 
-/// Sizes of a grid of `n` panels by rows; the last row may be short.
+/// Sizes of a grid of `n` panels, counted row by row; the last row may have fewer panels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
     n: usize,
@@ -97,13 +97,13 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Creates a frame of panels with axes of this height, the first `titles` of them with a title:
-    /// all, those of the first row, or none.
+    /// Creates a frame of panels whose axes have this height. The first `titles` panels have a title: all panels, the
+    /// panels of the first row, or none.
     pub fn new(n: usize, columns: usize, axes_height: f64, ordinates: Ordinates, titles: usize) -> Self {
         Self::with_space(n, columns, axes_height, ordinates, titles, (0.0, 0.0))
     }
 
-    /// Creates a frame that leaves space above each panel and at its right.
+    /// Creates a frame with additional space above each panel and at the right of the figure.
     pub fn with_space(
         n: usize,
         columns: usize,
@@ -163,17 +163,17 @@ impl Frame {
         }
     }
 
-    /// True for the lowest panel of a column.
+    /// True if the panel is the lowest of its column.
     pub fn is_lowest(&self, i: usize) -> bool {
         i + self.columns >= self.n
     }
 
-    /// True for a panel with ticks on its ordinate.
+    /// True if the panel has ticks on its ordinate.
     pub fn has_ticks(&self, i: usize) -> bool {
         i.is_multiple_of(self.columns) || self.ordinates != Ordinates::Shared
     }
 
-    /// True for a panel with a label of its ordinate.
+    /// True if the panel has a label on its ordinate.
     pub fn has_label(&self, i: usize) -> bool {
         i.is_multiple_of(self.columns) || self.ordinates == Ordinates::Each
     }
@@ -190,8 +190,8 @@ impl Frame {
         }
     }
 
-    /// A layout with the size and margins of a panel, without ticks of the abscissa unless it is
-    /// the lowest.
+    /// Returns the layout with the size and margins of a panel; only the lowest panel of a column has tick labels on
+    /// the abscissa.
     pub fn fitted(&self, i: usize, layout: Layout) -> Layout {
         let (row, column) = (i / self.columns, i % self.columns);
         let layout = layout
@@ -205,7 +205,7 @@ impl Frame {
         layout.with_x_tick_format(TickFormat::Custom(Arc::new(|_| String::new())))
     }
 
-    /// Draws the panels with the name of the abscissa, the labels of their ordinates and the titles.
+    /// Draws the panels with the name of the abscissa, the labels of the ordinates and the titles.
     pub fn drawn(
         &self,
         cells: Vec<(Vec<Plot>, Layout)>,
@@ -230,7 +230,7 @@ impl Frame {
             let (middle, y) = (area.left + 0.5 * area.width, area.top - SPACE - self.above);
             scene.add(draw::fitted(middle, y, marked(title), area.width + SPACE, None));
         }
-        // The widths of the cells add up to it, up to rounding.
+        // The widths of the cells add up to the width of the figure, up to rounding errors.
         scene.width = (scene.width + beside).round();
         scene
     }
@@ -241,7 +241,7 @@ pub fn empty(id: &str, title: &str) -> String {
     svg::finish(id, title, Scene::new(WIDTH, 1.0))
 }
 
-/// The range of each panel; if shared, the widest of its row.
+/// The range of each panel; if `shared`, the smallest range that covers all panels of its row.
 pub fn of_rows(own: Vec<(f64, f64)>, columns: usize, shared: bool) -> Vec<(f64, f64)> {
     if !shared {
         return own;

@@ -1,22 +1,20 @@
-//! Text of labels: names of parameters as symbols, subscripts and superscripts.
+//! Text of labels: symbols of parameters, subscripts and superscripts.
 //!
-//! The drawing library has no subscripts. They are marked by characters of the private use area of
-//! Unicode, which become tags in the finished SVG ([`tagged`]). SVG readers agree on little: they
-//! add up or replace the shifts of nested tags, drop tags without text, trim spaces at the edges of
-//! a tag, and position each tag separately in centred text. So the tags follow one after the other,
-//! each with text and with the whole step from the one before, and spaces at their edges are
-//! non-breaking. The start of a text with tags is given by `svg`.
+//! The drawing library has no subscripts. They are marked by characters of the private use area of Unicode, which
+//! become tags in the finished SVG ([`tagged`]). SVG readers differ: some add the shifts of nested tags, others replace
+//! them; some drop tags without text, trim spaces at the edges of a tag, or position each tag of a centred text
+//! separately. The tags are therefore not nested; each contains text and the full shift from the previous tag, and
+//! leading spaces are non-breaking. `svg` sets the start position of a text with tags.
 
-/// Markers in the text of labels for the start and end of a subscript and of a superscript; they
-/// become tags.
+/// Markers in a label for the start and end of a subscript and of a superscript; they become tags.
 const SUB: char = '\u{e000}';
-const BACK: char = '\u{e001}';
+const END_SUB: char = '\u{e001}';
 const SUPER: char = '\u{e003}';
-const DOWN: char = '\u{e004}';
-const SIGNS: [char; 4] = [SUB, BACK, SUPER, DOWN];
+const END_SUPER: char = '\u{e004}';
+const SIGNS: [char; 4] = [SUB, END_SUB, SUPER, END_SUPER];
 const NO_BREAK_SPACE: char = '\u{a0}';
 
-/// Position of a part of a label.
+/// Vertical position of a part of a label.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Level {
     Line,
@@ -34,28 +32,28 @@ impl Level {
         }
     }
 
-    /// Font size relative to that of the line.
+    /// Font size relative to the line.
     pub fn size(self) -> f64 {
         if self == Self::Line { 1.0 } else { SMALLER }
     }
 }
 
-/// Font size of subscripts in units of the figure, and relative to that of the line.
+/// Font size of subscripts in units of the figure; `SMALLER` is the size relative to the line.
 const SUBSCRIPT: &str = "12.2";
 const SMALLER: f64 = 12.2 / 13.0;
 
-/// Text of the user: a dollar sign would start a formula.
+/// Escapes dollar signs in a text, because a dollar sign would start a formula.
 fn literal(text: &str) -> String {
     text.replace('$', "\\$")
 }
 
-/// Name and unit of an axis.
+/// Label of an axis: name and unit.
 pub fn axis_label(name: &str, unit: &str) -> String {
     let unit = if unit.is_empty() { "-" } else { unit };
     literal(&plain(&format!("{name} ({unit})")))
 }
 
-/// Name and unit of a panel; several names are separated by commas.
+/// Label of a panel: name and unit; several names are separated by commas.
 pub fn panel_label(name: &str, unit: &str) -> String {
     let names: Vec<String> = name.split(", ").map(symbol).collect();
     let unit = match unit {
@@ -65,9 +63,8 @@ pub fn panel_label(name: &str, unit: &str) -> String {
     literal(&format!("{}{unit}", names.join(", ")))
 }
 
-/// Text of a label with its subscripts and superscripts: `n_k^*`, `B_r(b_0^{d,0})`. `_` or `^` is
-/// followed by one character or several in braces; words such as `my_model` and `run_2` are
-/// unchanged.
+/// Marks the subscripts and superscripts of a label, such as `n_k^*` or `B_r(b_0^{d,0})`. `_` or `^` is followed by one
+/// character, or by several in braces; words such as `my_model` and `run_2` are unchanged.
 pub fn marked(text: &str) -> String {
     literal(&marks(text))
 }
@@ -78,8 +75,8 @@ fn marks(text: &str) -> String {
     let mut at = 0;
     while at < signs.len() {
         let (open, close) = match signs[at] {
-            '_' => (SUB, BACK),
-            '^' => (SUPER, DOWN),
+            '_' => (SUB, END_SUB),
+            '^' => (SUPER, END_SUPER),
             _ => ('\0', '\0'),
         };
         let rest = &signs[at + 1..];
@@ -104,7 +101,7 @@ fn marks(text: &str) -> String {
     result
 }
 
-/// The non-empty parts of a label and their positions.
+/// The non-empty parts of a label and their vertical positions.
 pub fn parts(text: &str) -> Vec<(Level, String)> {
     let mut parts: Vec<(Level, String)> = Vec::new();
     let mut level = Level::Line;
@@ -112,7 +109,7 @@ pub fn parts(text: &str) -> Vec<(Level, String)> {
         match (sign, parts.last_mut()) {
             (SUB, _) => level = Level::Subscript,
             (SUPER, _) => level = Level::Superscript,
-            (BACK | DOWN, _) => level = Level::Line,
+            (END_SUB | END_SUPER, _) => level = Level::Line,
             (sign, Some((last, part))) if *last == level => part.push(sign),
             (sign, _) => parts.push((level, sign.to_string())),
         }
@@ -120,7 +117,7 @@ pub fn parts(text: &str) -> Vec<(Level, String)> {
     parts
 }
 
-/// A figure with the tags of its subscripts.
+/// Returns the figure with tags in place of the markers of subscripts and superscripts.
 pub fn tagged(svg: &str) -> String {
     let mut result = String::with_capacity(svg.len());
     let mut rest = svg;
@@ -158,17 +155,17 @@ fn with_tags(text: &str) -> String {
     result
 }
 
-/// True for a text with subscripts or superscripts.
+/// True if the text has subscripts or superscripts.
 pub fn has_tags(text: &str) -> bool {
     text.contains(SIGNS)
 }
 
-/// Text without the characters that become tags.
+/// Removes the characters that become tags.
 pub fn plain(text: &str) -> String {
     text.replace(SIGNS, "")
 }
 
-/// A parameter with its subscript; other text unchanged.
+/// Symbol of a parameter with its subscript; other text is unchanged.
 fn symbol(name: &str) -> String {
     let (letter, sub) = match name {
         "K_e" => ("K", "e"),
@@ -182,7 +179,7 @@ fn symbol(name: &str) -> String {
             _ => return marks(other),
         },
     };
-    format!("{letter}{SUB}{sub}{BACK}")
+    format!("{letter}{SUB}{sub}{END_SUB}")
 }
 
 #[cfg(test)]

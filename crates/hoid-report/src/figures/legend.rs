@@ -36,7 +36,7 @@ pub enum Sample {
     Hatched,
 }
 
-/// One entry.
+/// One entry of a legend.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
     /// Text of the entry; see [`marked`] for subscripts.
@@ -57,14 +57,14 @@ impl Entry {
     }
 }
 
-/// Adds the legend below the figure, which becomes higher: in one row if the width suffices,
-/// otherwise in columns or, with long names, in rows of as many entries as fit.
+/// Adds a legend below the figure and increases the height of the figure accordingly. The entries form one row if the
+/// width suffices, otherwise columns or, if names are long, rows with as many entries as fit.
 pub fn add_legend(scene: &mut Scene, entries: &[Entry]) {
     add_legend_by(scene, entries, 1);
 }
 
-/// The same with a multiple of `multiple` columns if there are several rows, so that entries of one
-/// kind stay together.
+/// Adds a legend as [`add_legend`] does. If it needs several rows, the number of columns is a multiple of `multiple`
+/// where possible, so that related entries stay together.
 pub fn add_legend_by(scene: &mut Scene, entries: &[Entry], multiple: usize) {
     if entries.is_empty() {
         return;
@@ -72,7 +72,7 @@ pub fn add_legend_by(scene: &mut Scene, entries: &[Entry], multiple: usize) {
     let names: Vec<String> = entries.iter().map(|e| marked(&shortened(&e.name, LONGEST))).collect();
     let widths: Vec<f64> = names
         .iter()
-        .map(|n| SAMPLE + GAP + draw::text_room(n, TEXT) + BETWEEN)
+        .map(|n| SAMPLE + GAP + draw::text_space(n, TEXT) + BETWEEN)
         .collect();
     let last = scene.width - 4.0 + BETWEEN;
     let whole: f64 = widths.iter().sum();

@@ -1,4 +1,4 @@
-//! Maps of a function of two variables as coloured cells, with the values printed where they fit.
+//! Maps of a function of two variables as coloured cells; the values are printed in the cells where they fit.
 
 use kuva::{
     prelude::Plot,
@@ -7,7 +7,7 @@ use kuva::{
 
 use super::{
     MapColours,
-    colour_bar::{BESIDE, ColourScale},
+    colour_bar::{SPACE_FOR_BAR, ColourScale},
     draw,
     frame::{self, Area, Frame, Ordinates},
     labels::marked,
@@ -17,68 +17,66 @@ use super::{
     svg,
 };
 
-/// Height of a cell, and the smallest height of a panel.
+/// Height of a cell; `LEAST_HEIGHT` is the smallest height of a panel.
 const CELL: f64 = 26.0;
 const LEAST_HEIGHT: f64 = 78.0;
-/// Position of the name of the ordinate.
+/// Distance between the axis and the name of the ordinate.
 const NAME_AT: f64 = 26.0;
-/// Space between category names.
-const APART: f64 = 5.0;
+/// Smallest space between category names.
+const LABEL_SPACING: f64 = 5.0;
 
-/// One map.
+/// One map of a figure.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MapPanel {
-    /// Name that distinguishes the rows of panels, such as `P_n = 0.1`; that of the first of a row
-    /// is shown.
+    /// Name that distinguishes the rows of panels, such as `P_n = 0.1`; only the name of the first panel of a row is
+    /// shown.
     pub name: String,
-    /// Values by ordinate, the lowest first, and by abscissa. Non-finite or missing values are
-    /// hatched.
+    /// Values by ordinate, from the lowest, and by abscissa. Cells with a non-finite or missing value are hatched.
     pub values: Vec<Vec<f64>>,
-    /// Indices of abscissa and ordinate, from zero, of the cell with the cross.
+    /// Indices of abscissa and ordinate, from zero, of the cell marked by a cross.
     pub marked: Option<(usize, usize)>,
 }
 
 /// Maps with common axes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MapGrid {
-    /// The panels by rows.
+    /// The panels, row by row.
     pub panels: Vec<MapPanel>,
-    /// Panels per row; zero counts as one. A single column has the width of a text column, several
-    /// have that of a page.
+    /// Panels per row; zero counts as one. A figure with a single column has the width of a text column; a figure with
+    /// several has the width of a page.
     pub columns: usize,
-    /// Title of each column, or of each panel; empty if there are none.
+    /// Titles of the columns, or of all panels; empty for no titles.
     pub titles: Vec<String>,
-    /// Name of the abscissa, such as `n_k^*`; `_` or `^` is followed by one character, or several
-    /// in braces.
+    /// Name of the abscissa, such as `n_k^*`; `_` or `^` is followed by one character, or by several in braces.
     pub abscissa: String,
     /// Category names of the abscissa.
-    pub x_places: Vec<String>,
+    pub x_categories: Vec<String>,
     /// Name of the ordinate.
     pub ordinate: String,
     /// Category names of the ordinate, from the lowest.
-    pub y_places: Vec<String>,
-    /// Name and unit of the value, such as `VAF (%)`.
+    pub y_categories: Vec<String>,
+    /// Name and unit of the mapped quantity, such as `VAF (%)`.
     pub value: String,
     /// Colours of the cells.
     pub colours: MapColours,
-    /// Values at the ends of the colour map; those of the data if it is `None`.
+    /// Values at the ends of the colour map; if `None`, the extreme values of the data.
     pub limits: Option<(f64, f64)>,
-    /// True if each row has its own colours and bar.
+    /// True if each row has its own colour map and colour bar.
     pub bar_per_row: bool,
-    /// Meaning of the cross, for the legend; empty if there is none.
+    /// Meaning of the cross, for the legend; empty for no entry.
     pub mark: String,
 }
 
-/// Maps as one figure. `title` is the text for screen readers.
+/// Draws maps as one figure. `title` is the text for screen readers.
 pub fn maps(id: &str, title: &str, grid: &MapGrid) -> String {
     let columns = grid.columns.max(1);
     let n = grid.panels.len();
-    let (nx, ny) = (grid.x_places.len(), grid.y_places.len());
+    let (nx, ny) = (grid.x_categories.len(), grid.y_categories.len());
     if n == 0 || nx == 0 || ny == 0 {
         return frame::empty(id, title);
     }
     let height = (CELL * ny as f64).max(LEAST_HEIGHT);
-    let frame = Frame::with_space(n, columns, height, Ordinates::Shared, grid.titles.len(), (0.0, BESIDE));
+    let frame = Frame::with_space(n, columns, height, Ordinates::Shared, grid.titles.len(), (0.0, SPACE_FOR_BAR));
     let (x_range, y_range) = ((0.5, nx as f64 + 0.5), (0.5, ny as f64 + 0.5));
     let x_names = grid.x_names(frame.area(0).width);
     let cell = |i: usize| {
@@ -94,7 +92,7 @@ pub fn maps(id: &str, title: &str, grid: &MapGrid) -> String {
     };
     let cells = (0..n).map(cell).collect();
     let label = |i: usize| marked(&grid.panels[i].name);
-    let mut scene = frame.drawn(cells, &grid.abscissa, label, &grid.titles, BESIDE);
+    let mut scene = frame.drawn(cells, &grid.abscissa, label, &grid.titles, SPACE_FOR_BAR);
 
     let whole = grid.scale(&grid.panels);
     let mut missing = false;
@@ -151,19 +149,19 @@ impl MapGrid {
         }
     }
 
-    /// Category names of an abscissa of this width: as many as fit.
+    /// Category names of an abscissa of this width; only every second, third or further name is shown if not all fit.
     fn x_names(&self, width: f64) -> Vec<String> {
-        let names: Vec<String> = self.x_places.iter().map(|p| marked(p)).collect();
-        let widest = names.iter().map(|n| draw::text_room(n, TEXT)).fold(0.0, f64::max);
-        let every = ((widest + APART) * names.len() as f64 / width).ceil().max(1.0) as usize;
+        let names: Vec<String> = self.x_categories.iter().map(|p| marked(p)).collect();
+        let widest = names.iter().map(|n| draw::text_space(n, TEXT)).fold(0.0, f64::max);
+        let every = ((widest + LABEL_SPACING) * names.len() as f64 / width).ceil().max(1.0) as usize;
         let shown = |(i, name): (usize, String)| if i.is_multiple_of(every) { name } else { String::new() };
         names.into_iter().enumerate().map(shown).collect()
     }
 
     /// Draws the name and the category names of the ordinate.
     fn add_ordinate(&self, scene: &mut Scene, area: Area) {
-        let ny = self.y_places.len() as f64;
-        for (k, place) in self.y_places.iter().enumerate() {
+        let ny = self.y_categories.len() as f64;
+        for (k, place) in self.y_categories.iter().enumerate() {
             let y = area.bottom() - area.height * (k as f64 + 0.5) / ny;
             scene.add(draw::line((area.left - 5.0, y), (area.left, y), BLACK, 1.0, None));
             scene.add(draw::text(
@@ -180,9 +178,9 @@ impl MapGrid {
         scene.add(draw::centred(x, middle, marked(&self.ordinate), Some(-90.0)));
     }
 
-    /// Draws the cells of a panel; true if one is missing.
+    /// Draws the cells of a panel. Returns true if a value is missing.
     fn draw(&self, scene: &mut Scene, panel: &MapPanel, area: Area, scale: &ColourScale) -> bool {
-        let (nx, ny) = (self.x_places.len(), self.y_places.len());
+        let (nx, ny) = (self.x_categories.len(), self.y_categories.len());
         let (width, height) = (area.width / nx as f64, area.height / ny as f64);
         let decimals = self.decimals(width);
         let mut missing = false;
@@ -218,7 +216,7 @@ impl MapGrid {
                     scene.add(text);
                 }
                 if is_marked {
-                    // Next to the number, or in the middle if there is none.
+                    // The cross is next to the number, or in the middle of a cell without a number.
                     let (at, half) = match decimals {
                         Some(_) => ((corner.0 + width - 4.6, corner.1 + 4.6), 2.2),
                         None => ((corner.0 + 0.5 * width, corner.1 + 0.5 * height), 5.0),
@@ -236,8 +234,8 @@ impl MapGrid {
         missing
     }
 
-    /// Number of decimals, at most two, with which the longest number fits into a cell: three
-    /// digits suffice.
+    /// Largest number of decimals, up to three significant digits, with which the longest number fits into a cell;
+    /// `None` if no number of decimals fits.
     fn decimals(&self, width: f64) -> Option<usize> {
         let values = || self.panels.iter().flat_map(|p| p.values.iter().flatten());
         let finite = || values().copied().filter(|v| style::is_drawable(*v));
@@ -249,7 +247,7 @@ impl MapGrid {
             _ => 3,
         };
         let fits = |decimals: &usize| {
-            let widths = finite().map(|v| draw::text_room(&printed(v, *decimals), TEXT));
+            let widths = finite().map(|v| draw::text_space(&printed(v, *decimals), TEXT));
             widths.fold(0.0, f64::max) <= width - 1.5
         };
         let least = usize::from(largest < 10.0);
@@ -277,9 +275,9 @@ mod tests {
                 marked: Some((1, 0)),
             }],
             abscissa: "n_k^*".to_owned(),
-            x_places: vec!["25".to_owned(), "26".to_owned()],
+            x_categories: vec!["25".to_owned(), "26".to_owned()],
             ordinate: "m^*".to_owned(),
-            y_places: vec!["1".to_owned(), "2".to_owned()],
+            y_categories: vec!["1".to_owned(), "2".to_owned()],
             value: "VAF (%)".to_owned(),
             mark: "true order".to_owned(),
             ..MapGrid::default()
@@ -289,7 +287,7 @@ mod tests {
     #[test]
     fn cells_stand_at_their_places_with_their_colours() {
         let svg = maps("m", "t", &grid(vec![vec![1.0, 2.0], vec![3.0, f64::NAN]])).to_lowercase();
-        let width = 0.5 * (style::WIDTH - BESIDE - style::LEFT - style::RIGHT);
+        let width = 0.5 * (style::WIDTH - SPACE_FOR_BAR - style::LEFT - style::RIGHT);
         let top = 8.0;
         let cell = |x: f64, y: f64, colour: &str| {
             let place = [

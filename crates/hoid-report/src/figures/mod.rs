@@ -1,26 +1,25 @@
-//! The figures of reports and studies, each as an SVG text.
+//! The figures of reports and studies, each as SVG text.
 //!
 //! | function | figure |
 //! |---|---|
 //! | [`bode`] | frequency response of fitted models with 95 % bands |
 //! | [`autocorrelation`], [`cross_correlation`] | tests of the residuals |
 //! | [`time_response`] | measured, predicted and simulated output |
-//! | [`trace_panels`] | estimates over time, by method and level: recursions, batch fits, truth |
-//! | [`box_plots`] | the spread of the results of many runs, in groups and series |
-//! | [`maps`] | a value over two orders as coloured cells |
-//! | [`bode_grid`] | several responses in each of several Bode pairs |
-//! | [`describing`] | a describing function with its errors and coherence, models through it |
-//! | [`people_by_condition`] | estimates of people by condition, with the mean and its interval |
+//! | [`trace_panels`] | estimates over time, by method and level: recursive estimates, batch fits, truth |
+//! | [`box_plots`] | scatter of the results of many runs, in groups and series |
+//! | [`maps`] | a quantity over two variables as coloured cells |
+//! | [`bode_grid`] | several Bode diagrams next to each other, each with several responses |
+//! | [`describing`] | a describing function with its errors and coherence, and the curves of models |
+//! | [`people_by_condition`] | estimates for people by condition, with the mean and its interval |
 //! | [`curves`] | any other curves, with bands, error bars, markers and stems |
-//! | [`FigureFormat`], [`with_width_mm`] | such a text as SVG, PDF or PNG, in its width on paper |
+//! | [`FigureFormat`], [`with_width_mm`] | conversion of the SVG text to SVG, PDF or PNG, and its width on paper |
 //!
-//! Figures are 420 units wide, or 840 with several columns of panels, with 13-unit text: 7.5 pt in
-//! a column of 85 mm and on a page of 170 mm, subscripts 7.0 pt. Dashed black lines are true
-//! values, dots are batch fits. Colours are those of Okabe and Ito (*Color Universal Design*,
-//! 2008), on white: the hue represents the method, its shade the level, black the truth; see
-//! [`Shade`]. In names and titles, `_` and `^` before a character or braces make subscripts and
-//! superscripts. Non-finite values are gaps. The same data give the same bytes. `id` must be
-//! different for figures on the same page: it is the prefix of all ids inside the SVG.
+//! Figures are 420 units wide, or 840 with several columns of panels. The text is 13 units high, which is 7.5 pt in a
+//! column of 85 mm and on a page of 170 mm; subscripts have 7.0 pt. Dashed black lines are true values; dotted lines
+//! are batch fits. The colours are those of Okabe and Ito (*Color Universal Design*, 2008) on white: the hue represents
+//! the method, the shade the level, and black the truth; see [`Shade`]. In names and titles, `_` and `^` before a
+//! character or braces mark subscripts and superscripts. Non-finite values leave gaps. Equal data give identical bytes.
+//! Figures on the same page must have different values of `id`, which is the prefix of all ids inside the SVG.
 
 mod axes;
 mod bode;
@@ -61,7 +60,7 @@ pub use file::{DPI, FigureFormat, with_width_mm};
 pub use maps::{MapGrid, MapPanel, maps};
 pub use palette::{Shade, shade};
 pub use panel::{Beyond, CurveKind, Ordinate, TraceCurve, TracePanel};
-pub use people::{PeopleGrid, PeoplePanel, PersonAt, people_by_condition};
+pub use people::{PeopleGrid, PeoplePanel, CategoryEstimate, people_by_condition};
 pub(crate) use time_response::has_close_up;
 pub use time_response::time_response;
 pub use trace::{TraceGrid, trace_panels};

@@ -1,18 +1,17 @@
-//! The colours of all figures: the hue represents the method, its shade the level (noise, sample
-//! time, memory), black the truth.
+//! The colours of all figures: the hue represents the method, the shade its level (noise, sample time, memory length),
+//! and black the truth.
 //!
-//! Hues are those of Okabe and Ito (*Color Universal Design*, 2008). Shades of one hue are spaced
-//! evenly in lightness `L*` (CIE 1976), light for the lowest level and dark for the highest, so
-//! that their order is preserved in greyscale. Where points are marked, each level has its own
-//! mark.
+//! The hues are those of Okabe and Ito (*Color Universal Design*, 2008). The shades of one hue are evenly spaced in
+//! lightness `L*` (CIE 1976), light for the lowest level and dark for the highest, so that their order is preserved in
+//! greyscale. Where points have markers, each level has its own marker.
 
 use super::style::MODEL_COLOURS;
 
-/// Lightness of the lowest and the highest of several levels.
+/// Lightness of the lowest of several levels; `DARKEST` is that of the highest.
 const LIGHTEST: f64 = 76.0;
 const DARKEST: f64 = 22.0;
 
-/// Shape of the marks of a curve.
+/// Shape of the markers of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mark {
     Circle,
@@ -22,19 +21,19 @@ pub enum Mark {
     Down,
 }
 
-/// Method and level that determine the colour of a curve or box.
+/// Method and level, which determine the colour of a curve or box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shade {
     /// Index of the method, which determines the hue: 0 (ARX) is blue, 1 (BJ) vermillion.
     pub method: usize,
-    /// Index of the level from the lowest, which determines the lightness.
+    /// Index of the level, counted from the lowest, which determines the lightness.
     pub level: usize,
-    /// Number of levels; with one or none the colour is the hue itself.
+    /// Number of levels; with fewer than two, the colour is the hue itself.
     pub levels: usize,
 }
 
 impl Shade {
-    /// The hue of a method.
+    /// The hue of a method without levels.
     pub fn of_method(method: usize) -> Self {
         Self {
             method,
@@ -43,19 +42,19 @@ impl Shade {
         }
     }
 
-    /// The mark of the level.
+    /// The marker of the level.
     pub(super) fn mark(self) -> Mark {
         const MARKS: [Mark; 5] = [Mark::Circle, Mark::Square, Mark::Up, Mark::Diamond, Mark::Down];
         MARKS[self.level % MARKS.len()]
     }
 
-    /// Its colour as `#rrggbb`.
+    /// The colour as `#rrggbb`.
     pub fn colour(self) -> String {
         shade(self.method, self.level, self.levels)
     }
 }
 
-/// The colour `#rrggbb` of a level of a method; levels beyond the last have its colour.
+/// The colour `#rrggbb` of a level of a method; a level beyond the last has the colour of the last.
 pub fn shade(method: usize, level: usize, levels: usize) -> String {
     let hue = MODEL_COLOURS[method % MODEL_COLOURS.len()];
     if levels < 2 {
@@ -66,7 +65,7 @@ pub fn shade(method: usize, level: usize, levels: usize) -> String {
     let hue = channels(hue);
     let end = if wanted > lightness(hue) { 255.0 } else { 0.0 };
     let mixed = |part: f64| hue.map(|c| c + part * (end - c));
-    // Lightness is monotonic in the fraction of white or black.
+    // Lightness is monotonic in the fraction of white or black that is mixed in.
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
@@ -81,13 +80,13 @@ pub fn shade(method: usize, level: usize, levels: usize) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")
 }
 
-/// True if white has more contrast than black on a colour `#rrggbb`: by contrast of luminance,
-/// below `L*` of 50.
+/// True if white text has more contrast than black text on a background `#rrggbb`. The two contrasts are equal at about
+/// `L*` = 50.
 pub fn is_dark(colour: &str) -> bool {
     lightness(channels(colour)) < 50.0
 }
 
-/// The channels of `#rrggbb`; zero for a part that is not a number.
+/// The red, green and blue channels of `#rrggbb`; zero for a channel that is not a hexadecimal number.
 fn channels(colour: &str) -> [f64; 3] {
     let part = |i: usize| {
         let digits = colour.get(1 + 2 * i..3 + 2 * i).unwrap_or("00");

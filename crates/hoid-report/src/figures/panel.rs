@@ -1,71 +1,69 @@
 //! One quantity over time, and the range of its ordinate.
 //!
-//! An estimate that leaves its normal range for a moment (T_L where K_e nearly vanishes) must not
-//! compress the scale of the rest. The ordinate therefore covers the truth, the batch fits and the
-//! estimates between their 10 and 90 % quantiles, and beyond that the quantiles of 1 and 99 % and
-//! the middle of the bands, up to one and a half such ranges to either side. If a true value is
-//! known and at least one method is near it, one that is far off does not determine the scale
-//! either: the ordinate ends at most two spans from the truth, a span being the range of the truth
-//! or a quarter of its size, and methods and batch fits beyond are ignored. Values outside are cut
-//! off at the axes, and [`TracePanel::beyond`] counts them.
+//! An estimate that leaves its normal range for a moment (such as T_L where K_e nearly vanishes) must not compress the
+//! scale for all other values. The ordinate therefore covers the truth, the batch fits and the estimates between their
+//! 10 and 90 % quantiles. It extends further, by at most one and a half times that range on either side, to include the
+//! 1 and 99 % quantiles and the middle part of the bands. If a true value is known and at least one method is near it,
+//! methods that are far off do not determine the scale either: the ordinate ends at most two spans from the truth,
+//! where a span is the range of the truth or a quarter of its magnitude, and methods and batch fits beyond are ignored.
+//! Values outside the ordinate are cut off at the axes, and [`TracePanel::beyond`] counts them.
 
 use hoid_numerics::statistics::{finite_sorted, quantile, quantile_of};
 
 use super::{axes::one_two_five, style};
 
-/// Largest extension of an ordinate beyond its middle part, in ranges of that part.
-const MORE: f64 = 1.5;
+/// Largest extension of an ordinate beyond its middle part, as a multiple of the range of that part.
+const LARGEST_EXTENSION: f64 = 1.5;
 
 /// Style of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CurveKind {
-    /// Estimate: a line in the colour of its method, with its band.
+    /// Estimate: a line in the colour of its method, with a band.
     Estimate,
     /// True value: a thin dashed black line.
     Truth,
-    /// Batch fit over a span: dashed, in the colour of its method.
+    /// Batch fit over a span: a dotted line in the colour of its method.
     Batch,
-    /// A count that is constant until the next row, in the colour of its method.
+    /// A count that is constant until the next row, as steps in the colour of its method.
     Steps,
-    /// Bound of the expected range: a thin black line, not in the legend.
+    /// Bound of the expected range: a thin black line without an entry in the legend.
     Bound,
 }
 
 /// One curve of a panel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceCurve {
-    /// Style.
+    /// Line style.
     pub kind: CurveKind,
-    /// Index of its method, which determines the colour.
+    /// Index of the method, which determines the colour.
     pub method: usize,
-    /// Index of its level among those of the grid, which determines the shade; unused if the grid
-    /// has none.
+    /// Index of the level in the grid, which determines the shade; unused if the grid has no levels.
     pub level: usize,
-    /// Times in s, ascending.
+    /// Times, s, in ascending order.
     pub times_s: Vec<f64>,
-    /// One value for each time. Non-finite values are gaps.
+    /// One value for each time. Non-finite values leave gaps.
     pub values: Vec<f64>,
-    /// Lower and upper edge of the band at each time; empty if there are none.
+    /// Lower and upper edge of the band at each time; empty if there is no band.
     pub band: Vec<(f64, f64)>,
 }
 
 /// Range of the ordinate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Ordinate {
-    /// From quantiles, as described in the module.
+    /// From quantiles, as described in the documentation of this module.
     Robust,
-    /// A given range.
+    /// A given range with a small margin.
     Within(f64, f64),
-    /// Logarithmic, between the quantiles of 1 and 99 %.
+    /// Logarithmic, from the 1 % to the 99 % quantile.
     Logarithmic,
 }
 
-/// Rows of a method that lie beyond the axes of a panel.
+/// Number of rows of a method that lie beyond the axes of a panel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Beyond {
     /// Index of the method.
     pub method: usize,
-    /// Number of rows with an estimate outside.
+    /// Number of rows with an estimate beyond the axes.
     pub outside: usize,
     /// Number of rows with an estimate.
     pub rows: usize,
@@ -74,12 +72,12 @@ pub struct Beyond {
 /// One quantity over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TracePanel {
-    /// Name: `K_e` and the other parameters of the operator, `b0` and other coefficients are
-    /// written with subscripts, others unchanged.
+    /// Name. Parameters of the operator, such as `K_e`, and coefficients, such as `b0`, are written with subscripts;
+    /// other names are unchanged.
     pub name: String,
-    /// Unit, empty if there is none.
+    /// Unit; empty if there is none.
     pub unit: String,
-    /// The curves, drawn in this order over all bands.
+    /// The curves, drawn over all bands in this order.
     pub curves: Vec<TraceCurve>,
     /// Range of the ordinate.
     pub ordinate: Ordinate,
@@ -125,13 +123,14 @@ impl TracePanel {
             wanted.extend(quantile(&finite_sorted(curve.band.iter().map(|b| b.1)), 0.75));
         }
         let (low, high) = style::padded_range(core.into_iter().map(within));
-        let more = MORE * (high - low);
+        let more = LARGEST_EXTENSION * (high - low);
         let reach = wanted.into_iter().map(|v| within(v).clamp(low - more, high + more));
         let (low, high) = reach.fold((low, high), |(l, h), v| (l.min(v), h.max(v)));
         style::padded_range([low, high])
     }
 
-    /// Two spans to either side of the truth, if the middle of an estimate lies there.
+    /// Limits of the ordinate, two spans to either side of the truth; `None` if the median of no estimate lies between
+    /// them.
     fn limit(&self) -> Option<(f64, f64)> {
         let of = |kind| self.curves.iter().filter(move |c| c.kind == kind);
         let truth = finite_sorted(of(CurveKind::Truth).flat_map(|c| c.values.iter().copied()));
@@ -142,7 +141,7 @@ impl TracePanel {
         of(CurveKind::Estimate).any(near).then_some((low, high))
     }
 
-    /// The methods with rows beyond the axes of this panel by itself.
+    /// The methods with rows beyond the axes, if the panel does not share its ordinate with others.
     pub fn beyond(&self) -> Vec<Beyond> {
         let (low, high) = self.range();
         let estimates = self.curves.iter().filter(|c| c.kind == CurveKind::Estimate);

@@ -1,5 +1,5 @@
-//! Persons by condition: each person a thin line through their estimates with their standard errors, and the mean over
-//! persons with its 95 % interval.
+//! Figure of people by condition: for each person a thin line through their estimates with standard errors, and the
+//! mean over people with its 95 % interval.
 
 use kuva::{prelude::Plot, render::render::Scene};
 
@@ -16,48 +16,52 @@ use super::{
 };
 
 const HEIGHT: f64 = 150.0;
-/// Position of the category names below the axis, and of a second row of them.
+/// Distance of the category names below the axis; `ROW_DISTANCE` is the distance of a second row of names below the
+/// first.
 const NAMES_BELOW: f64 = 17.0;
-const SECOND: f64 = 12.0;
-/// Horizontal positions within a column: first and last person, and the mean.
+const ROW_DISTANCE: f64 = 12.0;
+/// Horizontal positions of the first and the last person within a category, as fractions of its width; `MEAN` is the
+/// position of the mean.
 const PEOPLE: (f64, f64) = (0.18, 0.6);
 const MEAN: f64 = 0.78;
-/// A larger number of persons is drawn in grey, without a legend.
+/// Maximum number of people with individual colours; larger groups are drawn in grey, with one legend entry for all
+/// people.
 const COLOURED: usize = 6;
 
-/// Estimate of a person in a category, with its standard error.
-pub type PersonAt = Option<(f64, Option<f64>)>;
+/// Estimate for a person in a category, with its standard error if known; `None` if there is no estimate.
+pub type CategoryEstimate = Option<(f64, Option<f64>)>;
 
-/// One quantity.
+/// One panel with the estimates of a quantity.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PeoplePanel {
     /// Name of the quantity, such as `omega_c`.
     pub name: String,
-    /// Its unit; empty if there is none.
+    /// Unit of the quantity; empty if it has none.
     pub unit: String,
     /// The estimates by person and category.
-    pub people: Vec<Vec<PersonAt>>,
-    /// The means over persons in each category, with the ends of their intervals.
+    pub people: Vec<Vec<CategoryEstimate>>,
+    /// The mean over people in each category, with the ends of its interval.
     pub means: Vec<Option<(f64, (f64, f64))>>,
 }
 
-/// Panels of persons with common categories.
+/// Panels of people with common categories.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PeopleGrid {
-    /// The panels.
+    /// The panels, one for each quantity.
     pub panels: Vec<PeoplePanel>,
-    /// Names of the persons.
+    /// Names of the people.
     pub people: Vec<String>,
     /// Names of the categories, such as conditions.
-    pub places: Vec<String>,
+    pub categories: Vec<String>,
     /// Name of the category axis.
     pub abscissa: String,
 }
 
-/// Persons by condition as one figure, two panels per row if there are several. `title` is the text for screen readers.
+/// Draws people by condition as one figure, with two panels per row if there are several panels. `title` is the text
+/// for screen readers.
 pub fn people_by_condition(id: &str, title: &str, grid: &PeopleGrid) -> String {
     let n = grid.panels.len();
-    if n == 0 || grid.places.is_empty() {
+    if n == 0 || grid.categories.is_empty() {
         return frame::empty(id, title);
     }
     let columns = if n == 1 { 1 } else { 2 };
@@ -65,13 +69,13 @@ pub fn people_by_condition(id: &str, title: &str, grid: &PeopleGrid) -> String {
     let ordinates = Ordinates::of(labels, columns, false);
     let ranges: Vec<(f64, f64)> = grid.panels.iter().map(PeoplePanel::range).collect();
     let frame = Frame::new(n, columns, HEIGHT, ordinates, 0);
-    let places = (0.5, grid.places.len() as f64 + 0.5);
+    let places = (0.5, grid.categories.len() as f64 + 0.5);
     let cell = |(i, panel): (usize, &PeoplePanel)| {
         let layout = style::layout(places, ranges[i], HEIGHT);
         let layout = with_ordinate(layout, ranges[i], &panel.unit, false, HEIGHT, frame.has_ticks(i));
         let layout = frame
             .fitted(i, layout)
-            .with_x_categories(vec![String::new(); grid.places.len()]);
+            .with_x_categories(vec![String::new(); grid.categories.len()]);
         (vec![Plot::from(style::line([], BLACK, 1.0))], layout)
     };
     let cells = grid.panels.iter().enumerate().map(cell).collect();
@@ -120,11 +124,11 @@ impl PeoplePanel {
 
 impl PeopleGrid {
     fn add_names(&self, scene: &mut Scene, area: Area) {
-        let names: Vec<String> = self.places.iter().map(|name| marked(name)).collect();
+        let names: Vec<String> = self.categories.iter().map(|name| marked(name)).collect();
         let pitch = area.width / names.len() as f64;
-        let staggered = names.iter().any(|name| draw::text_room(name, TEXT) > pitch);
+        let staggered = names.iter().any(|name| draw::text_space(name, TEXT) > pitch);
         for (k, name) in names.into_iter().enumerate() {
-            let below = if staggered && k % 2 == 1 { SECOND } else { 0.0 };
+            let below = if staggered && k % 2 == 1 { ROW_DISTANCE } else { 0.0 };
             let x = area.left + pitch * (k as f64 + 0.5);
             scene.add(draw::centred(x, area.bottom() + NAMES_BELOW + below, name, None));
         }
@@ -132,14 +136,14 @@ impl PeopleGrid {
 
     fn draw(&self, scene: &mut Scene, panel: &PeoplePanel, area: Area, (low, high): (f64, f64)) {
         let y_of = |v: f64| area.bottom() - (v.clamp(low, high) - low) / (high - low) * area.height;
-        let pitch = area.width / self.places.len() as f64;
+        let pitch = area.width / self.categories.len() as f64;
         let x_of = |place: usize, part: f64| area.left + pitch * (place as f64 + part);
         let n = self.people.len();
         for (i, places) in panel.people.iter().enumerate() {
             let share = if n > 1 { i as f64 / (n - 1) as f64 } else { 0.5 };
             let part = PEOPLE.0 + share * (PEOPLE.1 - PEOPLE.0);
             let colour = colour(i, n);
-            let drawable = |at: &PersonAt| at.filter(|(v, _)| style::is_drawable(*v));
+            let drawable = |at: &CategoryEstimate| at.filter(|(v, _)| style::is_drawable(*v));
             let mut last: Option<(f64, f64)> = None;
             for (place, at) in places.iter().enumerate() {
                 let Some((value, error)) = drawable(at) else {
@@ -188,7 +192,7 @@ mod tests {
                 means: vec![Some((2.0, (0.0, 4.0))), None],
             }],
             people: vec!["P".to_owned(), "Q".to_owned()],
-            places: vec!["fo".to_owned(), "so".to_owned()],
+            categories: vec!["fo".to_owned(), "so".to_owned()],
             abscissa: "condition".to_owned(),
         }
     }

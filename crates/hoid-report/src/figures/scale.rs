@@ -1,8 +1,8 @@
-//! Positions of numbers between the axes of a panel, linear or logarithmic.
+//! Conversion of values to positions between the axes of a panel, linear or logarithmic.
 
 use super::{frame::Area, style};
 
-/// Positions of numbers between the axes of a panel.
+/// Conversion of values to positions between the axes of a panel.
 pub struct Scale {
     pub area: Area,
     pub x: (f64, f64),
@@ -12,21 +12,22 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// True for a number within the range of the abscissa.
+    /// True if the value lies within the range of the abscissa.
     pub fn has_x(&self, x: f64) -> bool {
         (self.x.0..=self.x.1).contains(&x)
     }
 
-    /// True for a number that has a position on the ordinate or beyond its ends.
+    /// True if the value has a position on the ordinate or beyond its ends.
     pub fn has_y(&self, y: f64) -> bool {
         style::is_drawable(y) && (y > 0.0 || !self.log_y)
     }
 
-    pub fn cut(&self, y: f64) -> f64 {
+    pub fn clamp_to_axis(&self, y: f64) -> f64 {
         y.clamp(self.y.0, self.y.1)
     }
 
-    /// Limits a value beyond the axes, where the path is clipped; otherwise numbers of 1e300 would be in the file.
+    /// Limits a value far beyond the axes. The path is clipped at the axes, but without the limit values such as 1e300
+    /// would be written to the file.
     pub fn bounded(&self, y: f64) -> f64 {
         let (low, high) = self.y;
         let span = high - low;
@@ -74,7 +75,7 @@ mod tests {
         assert_eq!(scale.place_x(1.0), 35.0);
         assert!((scale.place_y(10.0) - 45.0).abs() < 1e-12);
         assert_eq!(
-            (scale.cut(1e3), scale.bounded(1e9), scale.bounded(0.5)),
+            (scale.clamp_to_axis(1e3), scale.bounded(1e9), scale.bounded(0.5)),
             (100.0, 1e3, 0.5)
         );
         assert!(scale.has_x(4.0) && !scale.has_x(f64::NAN) && !scale.has_x(-1.0));

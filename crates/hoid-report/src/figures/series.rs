@@ -1,21 +1,20 @@
-//! Reduction of long series to few points: peaks and gaps are preserved.
+//! Reduction of long series to a few points, with peaks and gaps preserved.
 
 use std::ops::Range;
 
-/// Number of columns to which a line is reduced in a figure with one column: one for each unit between its axes.
+/// Number of columns to which a line is reduced in a single-column figure: one for each unit between its axes.
 pub const COLUMNS: usize = 340;
 
-/// With more runs than this, those separated by gaps narrower than a column are joined.
+/// Maximum number of runs; if there are more, runs separated by gaps narrower than a column are joined.
 const MOST_RUNS: usize = 200;
 
-/// Indices of the smallest and the largest value of each column, in order; all indices of a short
-/// series.
+/// Indices of the smallest and the largest value in each column, in ascending order; all indices of a short series.
 pub fn thinned(values: &[f64]) -> Vec<usize> {
     thinned_run(values, 0..values.len(), COLUMNS)
 }
 
-/// As [`thinned`], for a part of a series that has `parts` columns in all. Non-finite values are
-/// skipped.
+/// As [`thinned`], for a run of indices of a series that is divided into `parts` columns. Non-finite values are
+/// omitted.
 pub fn thinned_run(values: &[f64], run: Range<usize>, parts: usize) -> Vec<usize> {
     let finite = |k: &usize| values[*k].is_finite();
     if values.len() <= 2 * parts {
@@ -36,8 +35,8 @@ pub fn thinned_run(values: &[f64], run: Range<usize>, parts: usize) -> Vec<usize
     kept
 }
 
-/// Indices of a run with the smallest lower and the largest upper edge of a band around each:
-/// first, middle of each column, last.
+/// Points of a band in a run of indices: the first index, the middle index of each column with the smallest lower and
+/// the largest upper edge in that column, and the last index.
 pub fn thinned_band(lower: &[f64], upper: &[f64], run: Range<usize>, parts: usize) -> Vec<(usize, f64, f64)> {
     let point = |k: usize| (k, lower[k], upper[k]);
     if lower.len() <= 2 * parts {
@@ -54,7 +53,7 @@ pub fn thinned_band(lower: &[f64], upper: &[f64], run: Range<usize>, parts: usiz
     kept
 }
 
-/// The parts of a run that lie in each column of a series of `n`.
+/// The parts of a run in the columns of a series of `n` values.
 fn columns(n: usize, run: &Range<usize>, parts: usize) -> impl Iterator<Item = Range<usize>> {
     let run = run.clone();
     let (first, last) = (run.start * parts / n, run.end * parts / n);
@@ -66,7 +65,8 @@ fn columns(n: usize, run: &Range<usize>, parts: usize) -> impl Iterator<Item = R
         .filter(|c| !c.is_empty())
 }
 
-/// The indices whose value differs from a neighbour, and both ends: a constant level needs no more.
+/// Returns both ends and the indices whose value differs from that of a neighbour, since a constant level needs no
+/// other points.
 pub fn without_level<T: PartialEq>(kept: &[usize], value: impl Fn(usize) -> T) -> Vec<usize> {
     let level = |i: usize| {
         let same = |a: usize| value(kept[a]) == value(kept[i]);
@@ -76,8 +76,8 @@ pub fn without_level<T: PartialEq>(kept: &[usize], value: impl Fn(usize) -> T) -
     needed.map(|(_, &k)| k).collect()
 }
 
-/// Runs of indices with known values. If there are too many, those separated by less than a column
-/// are joined.
+/// Runs of consecutive indices with known values. If there are too many runs, those separated by less than a column are
+/// joined.
 pub fn runs(n: usize, known: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     let mut found: Vec<Range<usize>> = Vec::new();
     for k in (0..n).filter(|k| known(*k)) {

@@ -1,4 +1,4 @@
-//! Common parts of all figures: size, colours and fonts.
+//! Properties common to all figures: size, colours and fonts.
 
 use std::sync::Arc;
 
@@ -7,10 +7,9 @@ use kuva::{
     render::render::Scene,
 };
 
-/// Width of every figure in units of the SVG.
+/// Width of a figure with a single column, in units of the SVG.
 pub const WIDTH: f64 = 420.0;
-/// Space for tick labels and the label of the ordinate, the same in all figures so that panels are
-/// aligned.
+/// Space for the tick labels and the label of the ordinate, equal in all figures so that panels are aligned.
 pub const LEFT: f64 = 76.0;
 pub const RIGHT: f64 = 14.0;
 /// Space above the axes.
@@ -26,10 +25,10 @@ pub const GREY: &str = "#999999";
 pub const BLUE: &str = "#0072B2";
 pub const VERMILLION: &str = "#D55E00";
 
-/// Colours of models in the order of the report: blue, vermillion, green, purple, orange, sky blue.
+/// Colours of the models, in the order of the report: blue, vermillion, green, purple, orange, sky blue.
 pub const MODEL_COLOURS: [&str; 6] = [BLUE, VERMILLION, "#009E73", "#CC79A7", "#E69F00", "#56B4E9"];
 
-/// Layout over a fixed range of both axes.
+/// Layout with fixed ranges of both axes.
 pub fn layout((x_low, x_high): (f64, f64), (y_low, y_high): (f64, f64), height: f64) -> Layout {
     Layout::new((x_low, x_high), (y_low, y_high))
         .with_x_axis_min(x_low)
@@ -52,7 +51,7 @@ pub fn layout((x_low, x_high): (f64, f64), (y_low, y_high): (f64, f64), height: 
         .with_tick_format(TickFormat::Custom(Arc::new(tick)))
 }
 
-/// Label of a tick as the shortest decimal, without the rounding error of `0.1 + 0.2`.
+/// Label of a tick as the shortest decimal number, without rounding errors such as that of `0.1 + 0.2`.
 fn tick(value: f64) -> String {
     let text = format!("{value:.6}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
@@ -62,7 +61,7 @@ fn tick(value: f64) -> String {
     }
 }
 
-/// Line through points; non-finite ones are omitted.
+/// Line through points; non-finite points are omitted.
 pub fn line(points: impl IntoIterator<Item = (f64, f64)>, colour: &str, width: f64) -> LinePlot {
     let finite = |(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
     LinePlot::new()
@@ -71,12 +70,12 @@ pub fn line(points: impl IntoIterator<Item = (f64, f64)>, colour: &str, width: f
         .with_stroke_width(width)
 }
 
-/// True for values that can be drawn: for larger ones the differences overflow.
+/// True if the value can be drawn: differences of larger values would overflow.
 pub fn is_drawable(value: f64) -> bool {
     value.abs() < 1e100
 }
 
-/// Range of values with a margin of 5 % on both sides; a range of zero width is extended.
+/// Range of the values with a margin of 5 % on both sides; if all values are equal, the range is widened.
 pub fn padded_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for value in values.into_iter().filter(|v| is_drawable(*v)) {
@@ -94,7 +93,7 @@ pub fn padded_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     (low - room, high + room)
 }
 
-/// Panels stacked vertically, each with its height.
+/// Stacks panels vertically, each with its own height.
 pub fn stacked(panels: Vec<(Vec<Plot>, Layout, f64)>) -> Scene {
     let mut figure = Figure::new(panels.len(), 1)
         .with_cell_size(WIDTH, WIDTH)
@@ -109,7 +108,8 @@ pub fn stacked(panels: Vec<(Vec<Plot>, Layout, f64)>) -> Scene {
     figure.with_plots(plots).with_layouts(layouts).render()
 }
 
-/// Panels by rows in columns and rows of these widths and heights; the last row may be short.
+/// Arranges panels, given row by row, in columns and rows of these widths and heights; the last row may have fewer
+/// panels.
 pub fn in_grid(panels: Vec<(Vec<Plot>, Layout)>, widths: &[f64], heights: &[f64]) -> Scene {
     let mut figure = Figure::new(heights.len(), widths.len())
         .with_cell_size(WIDTH, WIDTH)

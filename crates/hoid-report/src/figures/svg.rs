@@ -1,4 +1,4 @@
-//! Final processing of a figure as SVG text.
+//! Final processing of a figure to SVG text.
 
 use kuva::{
     prelude::SvgBackend,
@@ -10,8 +10,8 @@ use super::{
     labels::{has_tags, plain, tagged},
 };
 
-/// SVG text with a view box (it scales with the page), a title for screen readers, and ids prefixed
-/// by that of the figure.
+/// Returns the SVG text with a view box, so that it scales with the page, a title for screen readers, and the id of the
+/// figure as the prefix of all other ids.
 pub fn finish(id: &str, title: &str, scene: Scene) -> String {
     let scene = anchored(scene);
     let raw = SvgBackend::new().render_scene(&scene);
@@ -21,7 +21,7 @@ pub fn finish(id: &str, title: &str, scene: Scene) -> String {
     let font = scene.font_family.as_deref().map(escaped).unwrap_or_default();
     let (width, height) = (scene.width, scene.height);
     let (id, title) = (escaped(id), escaped(&plain(title)));
-    // The generator comment would change the bytes with its version.
+    // The generator comment contains a version, so that the bytes would depend on it.
     let body = match body.split_once("-->") {
         Some((stamp, rest)) if stamp.trim_start().starts_with("<!--") => rest,
         _ => body,
@@ -33,8 +33,8 @@ pub fn finish(id: &str, title: &str, scene: Scene) -> String {
     )
 }
 
-/// Renumbers the ids `from` + number as `to` + number, counted from 1 in the order of occurrence.
-/// The library counts them over the life of the process: the same figure drawn twice would differ.
+/// Replaces the ids `from` + number by `to` + number, counted from 1 in the order of occurrence. The library counts ids
+/// over the lifetime of the process, so that two drawings of the same figure would differ.
 fn renumbered(text: &str, from: &str, to: &str) -> String {
     let mut known: Vec<&str> = Vec::new();
     let mut parts = text.split(from);
@@ -58,8 +58,8 @@ fn escaped(text: &str) -> String {
         .replace('"', "&quot;")
 }
 
-/// Anchors texts with tags at their start, wherever they were anchored: SVG readers do not agree on
-/// the position of the tags of a centred text.
+/// Anchors texts with tags at their start, because SVG readers do not agree on the position of the tags in a centred
+/// text.
 fn anchored(mut scene: Scene) -> Scene {
     for element in &mut scene.elements {
         let Primitive::Text {

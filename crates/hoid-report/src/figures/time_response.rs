@@ -1,4 +1,4 @@
-//! Measured output with the simulated and the one-step-ahead predicted output of a model.
+//! Measured output, with the simulated and the one-step-ahead predicted output of a model.
 
 use hoid_ident::validation::Validation;
 use hoid_model::Record;
@@ -12,19 +12,19 @@ use super::{
     svg,
 };
 
-/// The close-up shows this fraction of a record, if that has enough samples.
+/// Length of a record divided by the length of its close-up; a close-up has at least `SMALLEST_CLOSE_UP` samples.
 const CLOSE_UP: usize = 8;
 const SMALLEST_CLOSE_UP: usize = 50;
 
 const UPPER: f64 = 150.0;
 const LOWER: f64 = 190.0;
 
-/// Measured (grey), predicted (vermillion) and simulated (blue) output over time: the whole record
-/// above, its middle eighth below, where the prediction can be distinguished from the measurement.
+/// Draws the measured (grey), predicted (vermillion) and simulated (blue) output over time: the whole record above, and
+/// below it the middle eighth, where the prediction can be distinguished from the measurement.
 ///
-/// The ordinate covers the measured output plus half its range on either side; values beyond (of an
-/// unstable model) are cut off. Long records are drawn by the smallest and largest sample of each
-/// column, so that peaks are preserved.
+/// The ordinate covers all outputs, but extends beyond the measured output by at most half its range on either side;
+/// values beyond (from an unstable model) are cut off. Long records are drawn with the smallest and the largest sample
+/// in each column, so that peaks are preserved.
 pub fn time_response(id: &str, record: &Record, validation: &Validation) -> String {
     let measured = record.output();
     let (low, high) = style::padded_range(measured.iter().copied());
@@ -32,7 +32,7 @@ pub fn time_response(id: &str, record: &Record, validation: &Validation) -> Stri
     let models = validation.simulated.iter().chain(&validation.predicted);
     let (wanted_low, wanted_high) = style::padded_range(measured.iter().chain(models).copied());
     let range = (wanted_low.max(low - half), wanted_high.min(high + half));
-    // Beyond the axes the path is clipped; otherwise numbers of 1e300 would be in the file.
+    // The path is clipped at the axes; without this limit, values such as 1e300 would be written to the file.
     let bounded = |v: f64| v.clamp(range.0 - half, range.1 + half);
 
     let panel = |from: usize, to: usize| -> (Vec<Plot>, (f64, f64)) {
@@ -50,7 +50,7 @@ pub fn time_response(id: &str, record: &Record, validation: &Validation) -> Stri
             trace(validation.first, &validation.predicted, VERMILLION, 0.9),
             trace(validation.first, &validation.simulated, BLUE, 1.2),
         ];
-        // A single sample still needs an axis.
+        // A panel with a single sample still needs an axis.
         (plots, (record.time_s(from), record.time_s((to - 1).max(from + 1))))
     };
     let channel = record.output_channel();

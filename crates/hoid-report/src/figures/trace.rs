@@ -1,5 +1,5 @@
-//! Quantities over time in a grid of panels with one time axis: recursive estimates, their bands
-//! and errors, innovations.
+//! Quantities over time in a grid of panels with a common time axis: recursive estimates with bands, their standard
+//! errors, and innovations.
 
 use std::ops::Range;
 
@@ -31,29 +31,29 @@ const CHANGES_NAMED: usize = 6;
 /// Panels with a common time axis.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TraceGrid {
-    /// The panels by rows.
+    /// The panels, row by row.
     pub panels: Vec<TracePanel>,
-    /// Panels per row; zero counts as one. A single column has the width of a text column, several
-    /// have that of a page.
+    /// Panels per row; zero counts as one. A figure with a single column has the width of a text column; a figure with
+    /// several has the width of a page.
     pub columns: usize,
-    /// Title of each column, or of each panel; empty if there are none.
+    /// Titles of the columns, or of all panels; empty for no titles.
     pub titles: Vec<String>,
-    /// Names of the methods for the legend, which contains those that are drawn; empty if there are none.
+    /// Names of the methods for the legend, which lists only methods that are drawn; empty if there are no names.
     pub methods: Vec<String>,
-    /// Names of the levels of each method, such as noise levels, from the lowest; empty if there are none.
-    /// They are shades of the colour of the method.
+    /// Names of the levels of each method, such as noise levels, from the lowest; empty if there are none. The levels
+    /// are shades of the colour of the method.
     pub levels: Vec<String>,
-    /// Shaded spans, s.
+    /// Time spans that are shaded, s.
     pub shaded_s: Vec<(f64, f64)>,
-    /// Times with a dotted line, s.
+    /// Times marked by a dotted line, s.
     pub marks_s: Vec<f64>,
-    /// Declared changes: time, s, and text. Each has a dashed line, with its number in the first panel.
+    /// Declared changes as time in s and description. Each has a dashed line, which is numbered in the first panel.
     pub changes: Vec<(f64, String)>,
-    /// True if the panels of a row share an ordinate, which is labelled once.
+    /// True if the panels of a row share an ordinate, which has ticks and a label only in the first panel.
     pub shared_ordinates: bool,
 }
 
-/// The panels of a grid as one figure. `title` is the text for screen readers.
+/// Draws the panels of a grid as one figure. `title` is the text for screen readers.
 pub fn trace_panels(id: &str, title: &str, grid: &TraceGrid) -> String {
     let columns = grid.columns.max(1);
     let n = grid.panels.len();
@@ -168,11 +168,11 @@ impl TraceGrid {
 }
 
 impl TracePanel {
-    /// The curves within a range: bands first, then lines.
+    /// Bands and lines of the panel within a range; the bands come first, so that the lines are drawn over them.
     fn plots(&self, (low, high): (f64, f64), levels: usize, parts: usize) -> Vec<Plot> {
         let logarithmic = self.ordinate == Ordinate::Logarithmic;
         let half = 0.5 * (high - low);
-        // Beyond the axes the path is clipped; otherwise numbers of 1e300 would be in the file.
+        // The path is clipped at the axes; without this limit, values such as 1e300 would be written to the file.
         let bounded = |v: f64| match logarithmic {
             true => v.clamp(low / 10.0, high * 10.0),
             false => v.clamp(low - half, high + half),
@@ -197,7 +197,7 @@ impl TracePanel {
                 plots.push(line.into());
             }
         }
-        // A panel without a curve still has its axes.
+        // A panel without curves still needs axes.
         if plots.is_empty() {
             plots.push(style::line([], BLACK, 1.0).into());
         }
@@ -210,8 +210,8 @@ impl TraceCurve {
         shade(self.method, self.level, levels)
     }
 
-    /// The drawn rows of a run: none with the value of both neighbours. A single row extends over
-    /// its sample.
+    /// The points to draw for a run of rows, without rows whose value equals that of both neighbours. A single row is
+    /// drawn over one sample time.
     fn points(&self, run: Range<usize>, parts: usize, bounded: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
         let at = |k: usize| (self.times_s[k], bounded(self.values[k]));
         if run.len() == 1 {

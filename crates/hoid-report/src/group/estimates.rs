@@ -1,4 +1,4 @@
-//! Averages of the fits, chosen delays, and failed estimates.
+//! Averages of the fits, selected delays, and failed estimates.
 
 use minijinja::{Value, context};
 
@@ -8,9 +8,9 @@ use super::{
 };
 use crate::numbers;
 
-/// Columns of the table of averages: parameter and heading; quantities that scale with u/e have no
-/// unit, as in the table of people.
-const AVERAGED: [(&str, &str); 10] = [
+/// Columns of the table of averages: parameter and heading. Quantities that scale with u/e have no unit, as in the
+/// table of people.
+const AVERAGE_COLUMNS: [(&str, &str); 10] = [
     ("K_over_T_I", "K/T_I"),
     ("K", "K"),
     ("K_e", "K_e"),
@@ -25,12 +25,12 @@ const AVERAGED: [(&str, &str); 10] = [
 
 /// Headings of the table of averages.
 pub(super) fn headings() -> Vec<&'static str> {
-    AVERAGED.iter().map(|(_, heading)| *heading).collect()
+    AVERAGE_COLUMNS.iter().map(|(_, heading)| *heading).collect()
 }
 
 impl GroupReport<'_> {
-    /// A row for each subject, condition and estimator: the median over runs of each parameter of
-    /// the whole run.
+    /// Returns one row for each subject, condition and estimator: for each parameter, the median over the runs of the
+    /// estimates from whole runs.
     pub(super) fn averages(&self) -> Vec<Value> {
         let table = self.tables.averages;
         let [subject, condition, window, estimator, parameter] =
@@ -38,7 +38,7 @@ impl GroupReport<'_> {
         let (median, runs) = (reals(table, "median"), reals(table, "runs"));
         let mut rows: Vec<(String, String, String, Vec<String>, f64)> = Vec::new();
         for i in 0..median.len() {
-            let at = AVERAGED.iter().position(|(name, _)| *name == parameter[i]);
+            let at = AVERAGE_COLUMNS.iter().position(|(name, _)| *name == parameter[i]);
             let Some(at) = at.filter(|_| window[i] == "whole" && self.shows(&subject[i])) else {
                 continue;
             };
@@ -50,7 +50,7 @@ impl GroupReport<'_> {
                     subject[i].clone(),
                     condition[i].clone(),
                     estimator[i].clone(),
-                    vec!["\u{2013}".to_owned(); AVERAGED.len()],
+                    vec!["\u{2013}".to_owned(); AVERAGE_COLUMNS.len()],
                     0.0,
                 ));
                 rows.len() - 1
@@ -76,7 +76,8 @@ impl GroupReport<'_> {
             .collect()
     }
 
-    /// Quantities that could not be estimated, and their numbers.
+    /// Failed estimates: the number of quantities that could not be estimated, by subject, condition, estimator and
+    /// status, with the first reason.
     pub(super) fn failures(&self) -> Vec<Value> {
         let table = self.tables.estimates;
         let [subject, condition, estimator, status, reason] =

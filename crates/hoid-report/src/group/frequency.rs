@@ -1,4 +1,4 @@
-//! Describing functions with the fits, and their agreement.
+//! Describing functions with the fits, and the agreement between them.
 
 use hoid_model::uncertainty::Estimate;
 use hoid_study::group::Person;
@@ -13,7 +13,8 @@ use crate::{
     numbers,
 };
 
-/// Estimators whose fits are drawn: as everywhere, ARX blue and Box-Jenkins vermillion.
+/// Estimators whose fits are drawn, with the index of their colour: as in all figures, ARX is blue and Box-Jenkins
+/// vermillion.
 const FITS: [(&str, usize); 5] = [
     ("family, all runs", 2),
     ("ARX", 0),
@@ -23,7 +24,7 @@ const FITS: [(&str, usize); 5] = [
 ];
 
 impl GroupReport<'_> {
-    /// Results of the describing functions, with standard errors, one row for each subject and
+    /// Measures of the loop from the describing functions, with standard errors; one row for each subject and
     /// condition.
     pub(super) fn margins(&self) -> Vec<Value> {
         let Some(table) = self.tables.frequencies.map(|f| f.margins) else {
@@ -62,8 +63,7 @@ impl GroupReport<'_> {
             .collect()
     }
 
-    /// Bode points of the describing functions, one figure for each condition with a column for
-    /// each of its subjects.
+    /// Bode diagrams of the describing functions, one figure for each condition with a column for each subject.
     pub(super) fn describing_functions(&self) -> Vec<Value> {
         let figures = self.describing_figures(false).into_iter();
         figures
@@ -71,7 +71,8 @@ impl GroupReport<'_> {
             .collect()
     }
 
-    /// The same as pairs of condition and SVG text; narrow ones have a single column, of one subject.
+    /// Bode diagrams of the describing functions as pairs of name and SVG text. If `narrow` is true, each figure has a
+    /// single column with one subject.
     pub(super) fn describing_figures(&self, narrow: bool) -> Vec<(String, String)> {
         let Some(lines) = self.tables.frequencies.map(|f| f.lines) else {
             return Vec::new();
@@ -134,7 +135,7 @@ impl GroupReport<'_> {
         figures
     }
 
-    /// Delay of a person, s, for unwrapping the phase between two lines; 0 if unknown.
+    /// Delay of a person, s, for unwrapping the phase from line to line; 0 if unknown.
     fn delay_s(&self, subject: &str, condition: &str) -> f64 {
         let of = |p: &&Person| p.subject == subject && p.condition == condition;
         let person = self.summary.people.iter().find(of);
@@ -142,14 +143,13 @@ impl GroupReport<'_> {
         delay.unwrap_or(0.0)
     }
 
-    /// Median responses of the fits over the runs between two frequencies, with the quartiles as
-    /// bands.
+    /// Medians of the fitted responses over the runs in a frequency range, with the quartiles as bands.
     fn fits(&self, subject: &str, condition: &str, (low, high): (f64, f64)) -> Vec<BodeCurve> {
         let table = self.tables.responses;
         let (estimators, omega) = (texts(table, "estimator"), reals(table, "omega_rad_s"));
         let rows = rows_of(table, subject, condition);
         let curve = |(estimator, method): (&str, usize)| {
-            // One more point on either side, so that the curve covers the lines.
+            // The frequency range is 10 % wider on both sides, so that the curves cover the lines.
             let inside = |i: &&usize| estimators[**i] == estimator && (0.9 * low..=1.1 * high).contains(&omega[**i]);
             let at: Vec<usize> = rows.iter().filter(inside).copied().collect();
             let pick = |name: &str| at.iter().map(|i| reals(table, name)[*i]).collect::<Vec<f64>>();
@@ -175,7 +175,7 @@ impl GroupReport<'_> {
         FITS.into_iter().filter_map(curve).collect()
     }
 
-    /// Agreement of fits and describing function, one row for each subject, condition and estimator.
+    /// Agreement between fits and describing function, one row for each subject, condition and estimator.
     pub(super) fn agreement(&self) -> Vec<Value> {
         let Some(table) = self.tables.frequencies.map(|f| f.agreement) else {
             return Vec::new();

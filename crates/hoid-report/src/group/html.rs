@@ -1,4 +1,4 @@
-//! The page as HTML text.
+//! Rendering of the page as HTML text.
 
 use minijinja::context;
 
@@ -6,11 +6,10 @@ use super::{estimates, over_time, report::GroupReport};
 use crate::{ReportError, page};
 
 impl GroupReport<'_> {
-    /// The page as HTML text, with all styles and figures inside it. The same data give the same
-    /// bytes.
+    /// Returns the page as HTML text, which contains all styles and figures. Equal data give identical bytes.
     ///
     /// # Errors
-    /// [`ReportError::Template`] for a defect of this crate.
+    /// [`ReportError::Template`] if a template cannot be rendered, which is a defect of this crate.
     pub fn to_html(&self) -> Result<String, ReportError> {
         let title = match self.subject {
             Some(subject) => format!("{}: subject {subject}", self.manifest.name),
@@ -23,7 +22,7 @@ impl GroupReport<'_> {
                 settings => page::facts(&self.settings),
                 notes => self.notes(),
                 verdict => self.verdict(),
-                unread => self.unread(),
+                unreadable_runs => self.unreadable_runs(),
                 people_headings => self.people_headings(),
                 people => self.people(),
                 headings => estimates::headings(),

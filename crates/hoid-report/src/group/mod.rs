@@ -3,12 +3,12 @@
 //! | module | contents |
 //! |---|---|
 //! | `report`, `tables` | components of a page |
-//! | `people` | the verdict, what was not read, the operator of each person |
-//! | `estimates` | averages of the fits, chosen delays, what could not be estimated |
-//! | `frequency` | describing functions with the fits over them, and where they agree |
-//! | `over_time` | recursive estimates by condition and subject, and how fast they follow a change |
-//! | `html` | the page of these sections |
-//! | `pages` | the pages of a directory of tables, one for the group and one a subject |
+//! | `people` | the verdict, the runs that could not be read, the operator of each person |
+//! | `estimates` | averages of the fits, selected delays, failed estimates |
+//! | `frequency` | describing functions with the fits, and the agreement between them |
+//! | `over_time` | recursive estimates by condition and subject, and their settling times after a change |
+//! | `html` | rendering of the page from these sections |
+//! | `pages` | the pages made from a directory of tables: one for the group and one for each subject |
 
 mod estimates;
 mod frequency;

@@ -11,11 +11,11 @@ use crate::{
     numbers,
 };
 
-/// Recursions in the order of the colours: as everywhere, RLS blue and RPEM vermillion.
+/// Recursions in the order of the colours: as in all figures, RLS is blue and RPEM vermillion.
 const METHODS: [(&str, &str); 3] = [("RLS", "ARX (RLS)"), ("RPEM", "BJ (RPEM)"), ("PHYSICAL", "physical")];
 
-/// A figure: panels by name and unit, and the columns of RLS and of the others. The runs of a group do not have units
-/// of e and u, so that gains have none.
+/// One row of panels: name and unit, the column of the table for RLS, and the column for the other recursions. Gains
+/// have no unit, because the runs of a group have no units of e and u.
 type Row = (&'static str, &'static str, &'static str, &'static str);
 
 const OPERATOR: [Row; 5] = [
@@ -32,14 +32,14 @@ const DISCRETE: [Row; 4] = [
     ("b1", "", "b1", "b1"),
 ];
 
-/// Signals drawn over time.
+/// Statistics drawn over time.
 #[derive(Clone, Copy, PartialEq)]
 enum Shown {
-    /// Median and quartiles over the runs of all recursions.
+    /// Medians and quartiles over the runs, for all recursions.
     Estimates,
-    /// Variances of RPEM.
+    /// Variances of the RPEM estimates.
     Variances,
-    /// Correlations of RPEM.
+    /// Correlations of the RPEM estimates.
     Correlations,
 }
 
@@ -75,7 +75,7 @@ fn with_unit(name: &str, unit: &str) -> String {
     }
 }
 
-/// Formats the level of a recursion, with three digits.
+/// Formats a number with three significant digits.
 fn short(value: f64) -> String {
     numbers::significant(value, 3)
 }
@@ -103,7 +103,7 @@ impl GroupReport<'_> {
             .collect()
     }
 
-    /// The columns of the averages of traces with this prefix, without the statistic at their end.
+    /// Names of the columns of the trace averages that start with this prefix, without the suffix for the statistic.
     fn columns(&self, prefix: &str) -> Vec<&str> {
         let names = self.tables.traces.columns.iter().map(|column| column.name.as_str());
         names
@@ -138,8 +138,8 @@ impl GroupReport<'_> {
         columns.map(row).collect()
     }
 
-    /// Settling times and noise of the recursions after a change: one row for each subject,
-    /// condition and parameter, three cells for each recursion.
+    /// Settling times and noise of the recursions after a change: one row for each subject, condition and parameter,
+    /// with three cells for each recursion.
     pub(super) fn settling(&self) -> Vec<Value> {
         let table = self.tables.settling;
         let [subject, condition, estimator, parameter] =
@@ -187,7 +187,8 @@ impl GroupReport<'_> {
         rows
     }
 
-    /// Time of the task change in a condition, s: from the manifest, or at the seam of joined runs.
+    /// Time of the task change in a condition, s, from the manifest or, if joined runs were used, from the table of
+    /// settling times.
     fn change_s(&self, condition: &str) -> Option<f64> {
         let known = self.manifest.conditions.get(condition).and_then(|facts| facts.change_s);
         let table = self.tables.settling;
@@ -198,7 +199,7 @@ impl GroupReport<'_> {
         known.or_else(seam)
     }
 
-    /// A column of panels for each subject.
+    /// Draws one figure with a column of panels for each subject.
     fn figure(&self, id: &str, condition: &str, rows: &[PanelRow], shown: Shown) -> String {
         let (subjects, _) = self.names();
         let methods = if shown == Shown::Estimates {
@@ -246,7 +247,7 @@ impl GroupReport<'_> {
         trace_panels(id, &format!("Estimates over time, condition {condition}"), &grid)
     }
 
-    /// One recursion of a subject and condition; `None` if it has no values.
+    /// Curve of one recursion for a subject and condition; `None` if there are no values.
     fn curve(
         &self,
         (subject, condition, method): (&str, &str, &str),

@@ -1,4 +1,4 @@
-//! The pages of a finished group, made from the tables in its directory and written to it.
+//! The pages of a finished group, made from the tables in its directory and written to the same directory.
 
 use std::{
     collections::BTreeSet,
@@ -25,7 +25,7 @@ struct Tables {
     traces: OutputTable,
     settling: OutputTable,
     responses: OutputTable,
-    /// Lines, margins and agreement, if there is a periodic excitation.
+    /// Lines, margins and agreement; `None` without a periodic excitation.
     frequencies: Option<[OutputTable; 3]>,
 }
 
@@ -71,15 +71,15 @@ impl Tables {
     }
 }
 
-/// Least width of a figure of several columns, mm: their text has 6 pt then, as journals require.
+/// Smallest width of a figure with several columns, mm; the text then has 6 pt, as journals require.
 const PAGE_MM: f64 = 137.0;
 
-/// The describing functions of a finished group with the fitted operators, one figure for each
-/// condition: its name and the SVG text. None if no condition has a periodic excitation. For a width of one text column
-/// there is a figure for each subject, whose text stays legible.
+/// Draws the describing functions of a finished group with the fitted operators, one figure for each condition, and
+/// returns pairs of name and SVG text; empty if no condition has a periodic excitation. If `width_mm` is too narrow for
+/// several columns, there is a figure for each subject, so that the text stays legible.
 ///
 /// # Errors
-/// As [`write_group_pages`].
+/// The errors of [`write_group_pages`].
 pub fn group_figures(
     manifest: &Manifest,
     out: &Path,
@@ -96,12 +96,12 @@ pub fn group_figures(
     Ok(report.describing_figures(width_mm.is_some_and(|width| width < PAGE_MM)))
 }
 
-/// Writes the page of the group and one for each subject to the directory of its tables; `path` is
-/// that of the manifest.
+/// Writes the page of the group and one page for each subject to the directory of the tables; `path` is the path of the
+/// manifest.
 ///
 /// # Errors
-/// [`ReportError::Io`], [`ReportError::Study`] for missing tables and pages that cannot be written;
-/// [`ReportError::Template`] for a defect of this crate.
+/// [`ReportError::Io`] or [`ReportError::Study`] if tables are missing or a page cannot be written;
+/// [`ReportError::Template`] if a template cannot be rendered, which is a defect of this crate.
 pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let read = Tables::read(out)?;
     let tables = read.all();
@@ -152,12 +152,12 @@ pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result
     Ok(pages)
 }
 
-/// Maximum number of characters of a subject in the name of a page: with a number after them, the
-/// name is valid on every file system.
+/// Maximum number of characters of a subject in the file name of a page; with a number appended, the name is valid on
+/// every file system.
 const LONGEST_NAME: usize = 80;
 
-/// The name of the page of each subject: letters and digits, with a number if another subject has
-/// the same name, also on file systems that ignore case.
+/// The file name of the page of each subject. It contains letters and digits, and a number if another subject has the
+/// same name or one that differs only in case, which some file systems ignore.
 fn page_names(subjects: &[&str]) -> Vec<String> {
     let mut taken = BTreeSet::new();
     let name_of = |subject: &&str| {
@@ -175,8 +175,7 @@ fn page_names(subjects: &[&str]) -> Vec<String> {
     subjects.iter().map(name_of).collect()
 }
 
-/// Preparation of the runs and problems of their sampling: one row for all files with the same
-/// text.
+/// Preparation of the runs and problems of their sampling; all files with the same text are combined in one row.
 fn account(preparation: &OutputTable, trouble: &OutputTable) -> Vec<(String, String)> {
     let mut rows: Vec<(String, String)> = Vec::new();
     for (table, what) in [(preparation, "preparation"), (trouble, "sampling trouble")] {
@@ -203,13 +202,13 @@ fn account(preparation: &OutputTable, trouble: &OutputTable) -> Vec<(String, Str
             (format!("{what} of {of}"), words)
         }));
     }
-    // Long lists are in the tables.
+    // The complete lists are in the tables of the directory.
     let more = rows.len().saturating_sub(MOST_LISTED);
     rows.truncate(MOST_LISTED);
     if more > 0 {
         rows.push((
             "more runs".to_owned(),
-            format!("{more}; all of them are in preparation.csv and trouble.csv"),
+            format!("{more}; preparation.csv and trouble.csv list all of them"),
         ));
     }
     rows

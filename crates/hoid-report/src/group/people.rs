@@ -1,8 +1,8 @@
-//! The verdict on a group, the unreadable runs, and the operator of each person in each condition
-//! with its errors.
+//! The verdict on a group, the runs that could not be read, and the operator of each person in each condition with its
+//! errors.
 //!
-//! A determined parameter is given with its standard error. Others are in parentheses; if the interval has no upper
-//! limit, `> x` gives its lower end.
+//! A parameter that the data determine is given with its standard error; any other value is in parentheses. If the
+//! interval has no upper limit, `> x` gives its lower end.
 
 use hoid_ident::family::Parameter;
 use hoid_model::{VerdictLevel, uncertainty::Estimate};
@@ -12,8 +12,8 @@ use minijinja::{Value, context};
 use super::report::GroupReport;
 use crate::numbers;
 
-/// Names and headings of the parameters, in the order of the table. The runs of a group do not have units of e and u,
-/// so that quantities that scale with u/e have none.
+/// Names and headings of the parameters, in the order of the table. Quantities that scale with u/e have no unit,
+/// because the runs of a group have no units of e and u.
 const COLUMNS: [(&str, &str); 13] = [
     ("K_over_T_I", "K/T_I"),
     ("K_I", "K_I"),
@@ -30,18 +30,19 @@ const COLUMNS: [(&str, &str); 13] = [
     ("zeta_nm", "zeta_nm"),
 ];
 
-/// The main table as text: one row for each person and condition.
+/// The main table of a group as text: one row for each person and condition.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PeopleTable {
-    /// Headings of its columns.
+    /// Headings of the columns.
     pub headings: Vec<String>,
-    /// Cells of its rows.
+    /// Cells of the rows.
     pub rows: Vec<Vec<String>>,
-    /// Index of the first column of parameters; the last column is the verdict.
+    /// Index of the first column of parameters. The columns of parameters end before the last column, which contains
+    /// the verdict.
     pub parameters: usize,
 }
 
-/// The people with results, with columns for their parameters.
+/// Creates the table of the people with results; only parameters that at least one person has get a column.
 pub fn people_table<'a>(people: impl Iterator<Item = &'a Person>) -> PeopleTable {
     let people: Vec<&Person> = people.filter(|p| p.verdict.is_some()).collect();
     let columns: Vec<(&str, &str)> = COLUMNS
@@ -98,7 +99,7 @@ fn estimate(e: &Estimate) -> String {
     }
 }
 
-/// Value, standard error, and the interval in brackets.
+/// Value and standard error, followed by the interval in brackets.
 fn estimate_within(e: &Estimate, interval: Option<(f64, f64)>) -> String {
     let ends = interval.map(|(low, high)| {
         format!(
@@ -124,14 +125,14 @@ fn parameter(p: &Parameter) -> String {
 }
 
 impl GroupReport<'_> {
-    /// The people of the page.
+    /// The people shown on the page.
     fn shown(&self) -> impl Iterator<Item = &Person> {
         let GroupSummary { people, .. } = self.summary;
         people.iter().filter(|p| self.shows(&p.subject))
     }
 
-    /// The verdict on the group: level, reasons, notes; for a single subject the reasons are listed
-    /// with the operators.
+    /// The verdict on the group: level, reasons, notes. It is undefined on the page of a single subject, where the
+    /// operators list the reasons.
     pub(super) fn verdict(&self) -> Value {
         if self.subject.is_some() {
             return Value::UNDEFINED;
@@ -144,7 +145,7 @@ impl GroupReport<'_> {
         }
     }
 
-    pub(super) fn unread(&self) -> Vec<Value> {
+    pub(super) fn unreadable_runs(&self) -> Vec<Value> {
         let failures = self.summary.failures.iter().filter(|f| self.shows(&f.subject));
         failures
             .map(|f| context! { subject => &f.subject, condition => &f.condition, run => &f.run, reason => &f.reason })

@@ -1,10 +1,10 @@
-//! The page about a group: manifest, tables, and all subjects or one.
+//! The page about a group: the manifest, the tables, and the selected subjects.
 
 use hoid_study::group::{GroupSummary, Manifest};
 
 use super::tables::GroupTables;
 
-/// The page.
+/// Contents of the page about a group.
 #[derive(Debug)]
 pub struct GroupReport<'a> {
     /// Manifest of the group.
@@ -13,19 +13,19 @@ pub struct GroupReport<'a> {
     pub summary: &'a GroupSummary,
     /// Tables of results.
     pub tables: GroupTables<'a>,
-    /// Inputs and processing, as name and value.
+    /// Inputs and processing, as pairs of name and value.
     pub settings: Vec<(String, String)>,
-    /// A single subject; `None` for all.
+    /// The only subject of the page; `None` for all subjects.
     pub subject: Option<&'a str>,
 }
 
 impl GroupReport<'_> {
-    /// True for a subject of the page.
+    /// True if the page shows this subject.
     pub(super) fn shows(&self, subject: &str) -> bool {
         self.subject.is_none_or(|only| only == subject)
     }
 
-    /// Subjects, and conditions, in the order of the manifest.
+    /// The subjects and the conditions, in the order of the manifest.
     pub(super) fn names(&self) -> (Vec<&str>, Vec<&str>) {
         let (mut subjects, mut conditions): (Vec<&str>, Vec<&str>) = (Vec::new(), Vec::new());
         for run in self
@@ -45,7 +45,7 @@ impl GroupReport<'_> {
     }
 }
 
-/// A name as a part of an id.
+/// Creates an id from a prefix and a name.
 pub(super) fn id_of(what: &str, name: &str) -> String {
     format!("{what}-{}", name.replace(|c: char| !c.is_ascii_alphanumeric(), "-"))
 }

@@ -5,34 +5,34 @@ use hoid_io::{ColumnValues, OutputTable};
 /// The tables of a finished group.
 #[derive(Debug, Clone, Copy)]
 pub struct GroupTables<'a> {
-    /// All estimates in long form.
+    /// All estimates in long format.
     pub estimates: &'a OutputTable,
-    /// Averages over runs.
+    /// Averages of the estimates over runs.
     pub averages: &'a OutputTable,
-    /// Delays and T_n chosen in advance, one row per subject and condition.
+    /// Delays and T_n selected before the fits, one row per subject and condition.
     pub delays: &'a OutputTable,
-    /// Averages of traces.
+    /// Averages of the traces over runs.
     pub traces: &'a OutputTable,
-    /// Settling times and noise of the recursions, if a condition has a change.
+    /// Settling times and noise of the recursions; empty if no condition has a change.
     pub settling: &'a OutputTable,
     /// Averages of the frequency responses of the fits.
     pub responses: &'a OutputTable,
-    /// Describing functions, if the manifest gives an excitation.
+    /// Tables of the describing functions; `None` if the manifest gives no excitation.
     pub frequencies: Option<FrequencyTables<'a>>,
 }
 
 /// The tables of the describing functions.
 #[derive(Debug, Clone, Copy)]
 pub struct FrequencyTables<'a> {
-    /// One row per line.
+    /// The describing functions, one row per line.
     pub lines: &'a OutputTable,
     /// Crossover, margins, noise and verdict, one row per subject and condition.
     pub margins: &'a OutputTable,
-    /// Distance of each estimator.
+    /// Distance of each estimator from the describing function.
     pub agreement: &'a OutputTable,
 }
 
-/// A column of texts; empty if there is none.
+/// A column of texts; empty if the table has no such column.
 pub(super) fn texts<'a>(table: &'a OutputTable, name: &str) -> &'a [String] {
     match table.column(name) {
         Some(ColumnValues::Text(values)) => values,
@@ -40,7 +40,7 @@ pub(super) fn texts<'a>(table: &'a OutputTable, name: &str) -> &'a [String] {
     }
 }
 
-/// A column of numbers; empty if there is none.
+/// A column of numbers; empty if the table has no such column.
 pub(super) fn reals<'a>(table: &'a OutputTable, name: &str) -> &'a [f64] {
     match table.column(name) {
         Some(ColumnValues::Real(values)) => values,
@@ -48,7 +48,7 @@ pub(super) fn reals<'a>(table: &'a OutputTable, name: &str) -> &'a [f64] {
     }
 }
 
-/// The rows of a table for a subject and condition.
+/// Indices of the rows of a table that belong to a subject and condition.
 pub(super) fn rows_of(table: &OutputTable, subject: &str, condition: &str) -> Vec<usize> {
     let (s, c) = (texts(table, "subject"), texts(table, "condition"));
     (0..s.len())

@@ -5,11 +5,10 @@ use hoid_model::{Orders, Record};
 use hoid_numerics::statistics::upper_median;
 use hoid_track::{StartAt, Trace};
 
-/// A batch fit and its span, s.
+/// The span of a batch fit, s, and the fit.
 pub type BatchFit = ((f64, f64), Fit);
 
-/// The orders of a trace; if it tracks the delay, with the median of its estimated delay in a span,
-/// s.
+/// The orders of a trace. If the trace tracks the delay, nk is set to the median of the estimated delay in a span, s.
 fn orders_within(trace: &Trace, (from, to): (f64, f64)) -> Orders {
     let orders = trace.options().orders;
     if trace.options().method.track_delay_s().is_none() {
@@ -32,8 +31,8 @@ fn orders_within(trace: &Trace, (from, to): (f64, f64)) -> Orders {
     }
 }
 
-/// A fit of a span of a record with the structure and the orders of a trace; if the trace tracks the delay, with the
-/// estimated delay in that span.
+/// Fits a span of a record with the structure and the orders of a trace. If the trace tracks the delay, the fit uses
+/// the median of the estimated delay in that span.
 ///
 /// # Errors
 /// The errors of the fit.
@@ -46,8 +45,8 @@ pub fn batch_fit(trace: &Trace, record: &Record, (from, to): (f64, f64)) -> Resu
     Ok(((from, to), estimator.fit(&[record.span(from, to)?])?))
 }
 
-/// The default batch fits for comparison with a trace: the start fit, and a fit to the last third of the record unless
-/// the method starts by itself; with the error if the latter fails.
+/// The default batch fits for comparison with a trace: the start fit, and, unless the method needs no start fit, a fit
+/// to the last third of the record. The second element is the error if the latter fails.
 pub fn default_batch_fits(trace: &Trace, record: &Record) -> (Vec<BatchFit>, Option<IdentError>) {
     let mut all = Vec::new();
     if let (Some(start), StartAt::Span(Some((from, to)))) = (trace.start(), &trace.options().start)
@@ -56,7 +55,8 @@ pub fn default_batch_fits(trace: &Trace, record: &Record) -> (Vec<BatchFit>, Opt
         all.push(((span.time_s(0), span.time_s(span.len())), start.clone()));
     }
     if trace.options().method.starts_itself() {
-        // It has no orders for a batch fit: its noise model is long and it tracks its own delay.
+        // A method without a start fit has no orders for a batch fit, because its noise model is long and it tracks its
+        // own delay.
         return (all, None);
     }
     let last_third = (

@@ -1,20 +1,20 @@
-//! Coefficients by name, across structures: the poles of the operator are in A of an ARX model and
-//! in F of a Box-Jenkins model.
+//! Coefficients by name, for all model structures: the poles of the operator are in A of an ARX model and in F of a
+//! Box-Jenkins model.
 
 use hoid_ident::Fit;
 use hoid_track::Trace;
 
-/// A coefficient such as b0.
+/// A coefficient of a polynomial, such as b0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Coefficient {
-    /// Its polynomial.
+    /// Letter of the polynomial in lower case.
     pub letter: char,
-    /// Its index.
+    /// Index of the coefficient in its polynomial.
     pub index: usize,
 }
 
 impl Coefficient {
-    /// Parses its name.
+    /// Parses the name of a coefficient.
     pub fn parse(name: &str) -> Option<Self> {
         let mut letters = name.chars();
         let letter = letters.next()?;
@@ -22,7 +22,7 @@ impl Coefficient {
         Some(Self { letter, index })
     }
 
-    /// The coefficient whose panel it shares: if `joined`, f1 shares that of a1.
+    /// The coefficient in whose panel this coefficient is drawn: if `joined` is true, f1 is drawn in the panel of a1.
     pub fn home(self, joined: bool) -> Self {
         match self.letter {
             'f' if joined => Self { letter: 'a', ..self },
@@ -30,7 +30,7 @@ impl Coefficient {
         }
     }
 
-    /// Name of its panel.
+    /// Name of the panel of the coefficient.
     pub fn panel_name(self, joined: bool) -> String {
         let index = self.index;
         match self.letter {
@@ -49,8 +49,7 @@ pub fn of_trace(trace: &Trace) -> Vec<Coefficient> {
         .collect()
 }
 
-/// The coefficients of a fit, in the order of theta; `None` for a grey-box model, whose parameters are not
-/// coefficients.
+/// The coefficients of a fit, in the order of theta; empty for a grey-box model, whose parameters are not coefficients.
 pub fn of_fit(fit: &Fit) -> Vec<Coefficient> {
     if fit.is_grey_box() {
         return Vec::new();
@@ -61,7 +60,7 @@ pub fn of_fit(fit: &Fit) -> Vec<Coefficient> {
         .collect()
 }
 
-/// True if some traces have their poles in A and others in F: then a1 and f1 are the same.
+/// True if some traces have their poles in A and others in F, so that a1 and f1 are the same quantity.
 pub fn joined(traces: &[&Trace]) -> bool {
     let orders = |t: &&&Trace| t.options().orders;
     traces.iter().any(|t| orders(&t).na > 0 && orders(&t).nf == 0)

@@ -1,4 +1,4 @@
-//! A trace with the operator of each of its rows, and the operator's parameters by name.
+//! A trace with the operator in each of its rows, and the operator's parameters by name.
 
 use hoid_model::{
     NotConvertible,
@@ -8,7 +8,7 @@ use hoid_track::OPERATOR_COLUMNS;
 
 use super::section::TraceSection;
 
-/// A trace with the operator of each row.
+/// A trace with the operator in each row.
 pub struct Evaluated<'a> {
     pub section: &'a TraceSection<'a>,
     pub operators: Vec<Result<OperatorEstimate, NotConvertible>>,
@@ -24,12 +24,12 @@ impl<'a> Evaluated<'a> {
     }
 }
 
-/// The estimate of an operator's parameter.
+/// The estimate of the operator's parameter with this name.
 pub fn of_name(operator: &OperatorEstimate, name: &str) -> Option<Estimate> {
     operator.rows().into_iter().find(|r| r.0 == name).map(|r| r.2)
 }
 
-/// Names of the displayed parameters; tau_e only if a method tracks it.
+/// Names of the displayed parameters; tau_e is included only if a method tracks it.
 pub fn operator_names(traces: &[Evaluated<'_>]) -> Vec<&'static str> {
     let mut names = OPERATOR_COLUMNS.to_vec();
     if traces

@@ -1,4 +1,4 @@
-//! The figures of the page, from traces.
+//! The figures of the page about recursive estimates, drawn from traces.
 
 use std::collections::BTreeMap;
 
@@ -19,14 +19,14 @@ use crate::{
     numbers::Z_95,
 };
 
-/// Number of an estimate to draw.
+/// Which number of an estimate is drawn: its value or its standard error.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Shown {
     Value,
     Error,
 }
 
-/// A curve of estimates with band, or of their standard errors.
+/// Curve of estimates with their band, or of their standard errors.
 fn curve(method: usize, times_s: &[f64], estimates: &[Option<Estimate>], shown: Shown) -> TraceCurve {
     let error = |e: &Option<Estimate>| e.and_then(|e| e.standard_error).unwrap_or(f64::NAN);
     let value = |e: &Option<Estimate>| e.map_or(f64::NAN, |e| e.value);
@@ -74,7 +74,7 @@ fn truth_curve(record: &Record, values: Vec<f64>) -> TraceCurve {
     }
 }
 
-/// The name of the change with its subscript.
+/// Symbol, for the legend, of a quantity that changed, with its subscript.
 fn in_legend(name: &str) -> &str {
     match name {
         "K_e_dot" => "K_\u{117}",
@@ -85,7 +85,8 @@ fn in_legend(name: &str) -> &str {
     }
 }
 
-/// The panels with legend, shaded start spans and the times from which the estimates move.
+/// Combines the panels with the legend, the shaded spans of the start fits and the times from which the estimates are
+/// updated.
 fn grid(traces: &[Evaluated<'_>], record: &Record, panels: Vec<TracePanel>) -> TraceGrid {
     let mut shaded_s: Vec<(f64, f64)> = Vec::new();
     let mut marks_s: Vec<f64> = Vec::new();
@@ -122,8 +123,9 @@ fn grid(traces: &[Evaluated<'_>], record: &Record, panels: Vec<TracePanel>) -> T
     }
 }
 
-/// Quantities of the loop: gain and phase at the frequencies of the traces, crossover and phase margin with the
-/// controlled element, and the level of the remnant; `None` if neither was requested.
+/// Panels of the response and the loop: gain and phase at the frequencies of the traces, crossover and phase margin
+/// with the controlled element, and the level of the remnant. `None` if neither frequencies nor a controlled element
+/// were given.
 pub fn response_grid(traces: &[Evaluated<'_>], record: &Record) -> Option<TraceGrid> {
     let mut panels = Vec::new();
     let mut add = |name: String, unit: &str, of: &dyn Fn(&Trace, usize) -> Option<Estimate>| {
@@ -177,7 +179,7 @@ pub fn response_grid(traces: &[Evaluated<'_>], record: &Record) -> Option<TraceG
     Some(grid(traces, record, panels))
 }
 
-/// Tracked standard deviation of the innovations.
+/// Panel of the tracked standard deviation of the innovations.
 fn remnant_panel(traces: &[Evaluated<'_>], record: &Record) -> TracePanel {
     let level = |(method, t): (usize, &Evaluated<'_>)| TraceCurve {
         kind: CurveKind::Estimate,
@@ -195,13 +197,13 @@ fn remnant_panel(traces: &[Evaluated<'_>], record: &Record) -> TracePanel {
     }
 }
 
-/// Standard deviation of the innovations of each row.
+/// Standard deviation of the innovation in each row.
 fn sigmas(t: &Evaluated<'_>) -> Vec<f64> {
     let variances = t.section.trace.innovation_variance().iter();
     variances.map(|v| if *v >= 0.0 { v.sqrt() } else { f64::NAN }).collect()
 }
 
-/// The parameters of the operator, one panel each.
+/// The parameters of the operator over time, one panel for each.
 pub fn operator_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
     grid(traces, record, operator_panels(traces, record, Shown::Value))
 }
@@ -241,14 +243,14 @@ fn ordinate(shown: Shown) -> Ordinate {
     }
 }
 
-/// The coefficients, one panel each; if some methods have the poles in A and others in F, they
-/// share a panel.
+/// The coefficients over time, one panel for each. If some methods have the poles in A and others in F, the
+/// coefficients of the poles share panels.
 pub fn coefficient_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
     grid(traces, record, coefficient_panels(traces, record, Shown::Value))
 }
 
-/// Standard errors over time, of the parameters of the operator if all methods estimate these,
-/// otherwise of the coefficients.
+/// Standard errors over time: of the parameters of the operator if all methods estimate these, otherwise of the
+/// coefficients.
 pub fn error_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
     let panels = if of_operator(traces) {
         operator_panels(traces, record, Shown::Error)
@@ -277,7 +279,7 @@ fn coefficient_panels(traces: &[Evaluated<'_>], record: &Record, shown: Shown) -
         }
         for line in &t.section.batch {
             for (coefficient, (_, estimate)) in of_fit(line.fit).into_iter().zip(line.fit.parameters()) {
-                // A coefficient that no trace has gets no panel.
+                // A coefficient that occurs in no trace has no panel.
                 if let Some([_, batch, _]) = curves.get_mut(&coefficient.home(joined)) {
                     batch.extend(batch_curve(method, (line.from_s, line.to_s), estimate, shown));
                 }
@@ -302,7 +304,7 @@ fn coefficient_panels(traces: &[Evaluated<'_>], record: &Record, shown: Shown) -
     curves.into_iter().map(panel).collect()
 }
 
-/// Innovations with twice their standard deviation on either side, one panel for each method.
+/// Innovations over time, with bounds of two standard deviations on either side; one panel for each method.
 pub fn innovation_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
     let panel = |(method, t): (usize, &Evaluated<'_>)| {
         let trace = t.section.trace;
@@ -333,7 +335,7 @@ pub fn innovation_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
     grid(traces, record, panels)
 }
 
-/// Number of shortened steps over time; `None` if there are none.
+/// Number of shortened steps over time; `None` if no step was shortened.
 pub fn shortened_grid(traces: &[Evaluated<'_>], record: &Record) -> Option<TraceGrid> {
     let most = traces.iter().map(|t| t.section.trace.counts().shortened).max()?;
     if most == 0 {

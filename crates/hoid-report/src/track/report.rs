@@ -1,4 +1,4 @@
-//! The page of recursive estimates, from its sections.
+//! The page about recursive estimates, composed of its sections.
 
 use hoid_analysis::Tracked;
 use hoid_model::{GainUnit, Record, Verdict};
@@ -17,20 +17,20 @@ use crate::{
     fit_summary, page, tables as of_fits,
 };
 
-/// Maximum number of traces of a page: more curves cannot be distinguished.
+/// Maximum number of traces on a page: more curves cannot be distinguished.
 const MOST_TRACES: usize = 4;
 
-/// Content of the page.
+/// Contents of the page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackReport<'a> {
     /// Heading of the page.
     pub title: String,
-    /// Inputs and processing, as name and value: command, versions, record, seed.
+    /// Inputs and processing, as pairs of name and value: command, versions, record, seed.
     pub settings: Vec<(String, String)>,
-    /// The tracked record. Columns with the names of the parameters of the operator (`K_e`, `T_L`,
-    /// `K_e_dot`, `omega_nm`, `zeta_nm`, `tau_e`) are the true values, as in every simulation.
+    /// The tracked record. Columns with the names of operator parameters (`K_e`, `T_L`, `K_e_dot`, `omega_nm`,
+    /// `zeta_nm`, `tau_e`) contain the true values, as in every simulated record.
     pub record: &'a Record,
-    /// One to four estimates of that record, drawn together.
+    /// One to four recursive estimates over the record, drawn together.
     pub traces: Vec<TraceSection<'a>>,
     /// Verdict on the traces, at the top of the page.
     pub verdict: Option<Verdict>,
@@ -39,7 +39,7 @@ pub struct TrackReport<'a> {
 }
 
 impl<'a> TrackReport<'a> {
-    /// The page about a tracked recording, with batch fits for comparison.
+    /// Creates the page about a tracked recording, with batch fits for comparison.
     pub fn of_tracked(tracked: &'a Tracked, batch: &'a [BatchFit]) -> Self {
         let options = tracked.trace.options();
         let line = |((from_s, to_s), fit): &'a BatchFit| BatchLine {
@@ -63,12 +63,11 @@ impl<'a> TrackReport<'a> {
 }
 
 impl TrackReport<'_> {
-    /// The page as HTML text, with all styles and figures inside it. The same data give the same
-    /// bytes.
+    /// Returns the page as HTML text, which contains all styles and figures. Equal data give identical bytes.
     ///
     /// # Errors
     /// [`ReportError::NoTraces`], [`ReportError::TooManyTraces`], [`ReportError::EmptyTrace`];
-    /// [`ReportError::Template`] for a defect of this crate.
+    /// [`ReportError::Template`] if a template cannot be rendered, which is a defect of this crate.
     pub fn to_html(&self) -> Result<String, ReportError> {
         self.check()?;
         let traces: Vec<Evaluated<'_>> = self.traces.iter().map(Evaluated::new).collect();
@@ -110,8 +109,7 @@ impl TrackReport<'_> {
         page::render("track.html", values)
     }
 
-    /// The parameters of the operator over time, one panel each, for custom figures with
-    /// [`figures::trace_panels`].
+    /// The parameters of the operator over time, one panel for each, for custom figures with [`figures::trace_panels`].
     ///
     /// # Errors
     /// [`ReportError::NoTraces`], [`ReportError::TooManyTraces`], [`ReportError::EmptyTrace`].
@@ -121,21 +119,21 @@ impl TrackReport<'_> {
         Ok(panels::operator_grid(&traces, self.record))
     }
 
-    /// Gain and phase, crossover and margin over time, as [`TrackReport::operator_grid`]; `None` if the traces have
-    /// none of them.
+    /// Gain, phase, crossover and margin over time, as in [`TrackReport::operator_grid`]; `None` if the traces contain
+    /// none of these quantities.
     ///
     /// # Errors
-    /// As there.
+    /// The errors of [`TrackReport::operator_grid`].
     pub fn response_grid(&self) -> Result<Option<TraceGrid>, ReportError> {
         self.check()?;
         let traces: Vec<Evaluated<'_>> = self.traces.iter().map(Evaluated::new).collect();
         Ok(panels::response_grid(&traces, self.record))
     }
 
-    /// The coefficients over time, as [`TrackReport::operator_grid`].
+    /// The coefficients over time, as in [`TrackReport::operator_grid`].
     ///
     /// # Errors
-    /// As there.
+    /// The errors of [`TrackReport::operator_grid`].
     pub fn coefficient_grid(&self) -> Result<TraceGrid, ReportError> {
         self.check()?;
         let traces: Vec<Evaluated<'_>> = self.traces.iter().map(Evaluated::new).collect();
@@ -143,10 +141,10 @@ impl TrackReport<'_> {
     }
 
     fn check(&self) -> Result<(), ReportError> {
-        let most = MOST_TRACES;
+        let maximum = MOST_TRACES;
         match self.traces.len() {
-            0 => return Err(ReportError::NoTraces { most }),
-            found if found > most => return Err(ReportError::TooManyTraces { found, most }),
+            0 => return Err(ReportError::NoTraces { maximum }),
+            found if found > maximum => return Err(ReportError::TooManyTraces { found, maximum }),
             _ => {}
         }
         match self.traces.iter().find(|t| t.trace.is_empty()) {
@@ -178,7 +176,7 @@ impl TrackReport<'_> {
     }
 }
 
-/// For a caption: rows of each panel and method beyond the axes.
+/// Number of rows of each method beyond the axes of each panel, for a caption.
 fn beyond(grid: &TraceGrid) -> Vec<Value> {
     let of = |panel: &figures::TracePanel| -> Vec<Value> {
         let label = tables::symbol_of(&panel.name);

@@ -1,26 +1,26 @@
-//! One recursive estimate of a page and its batch fits.
+//! One recursive estimate on a page, with its batch fits.
 
 use hoid_ident::Fit;
 use hoid_track::Trace;
 
-/// One recursive estimate of the page.
+/// One recursive estimate on the page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceSection<'a> {
     /// Heading and legend text, such as `RPEM`.
     pub name: String,
-    /// The estimate.
+    /// The trace of the estimate.
     pub trace: &'a Trace,
     /// Batch fits for comparison.
     pub batch: Vec<BatchLine<'a>>,
 }
 
-/// A batch fit of a span, drawn as a dashed line over that span.
+/// A batch fit to a span of the record, drawn as a dotted line over that span.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BatchLine<'a> {
     /// Start of the span, s.
     pub from_s: f64,
     /// End of the span, s.
     pub to_s: f64,
-    /// The fit.
+    /// The batch fit.
     pub fit: &'a Fit,
 }

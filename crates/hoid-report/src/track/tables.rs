@@ -1,4 +1,4 @@
-//! The tables of a page of recursive estimates as values for the template.
+//! The tables on a page about recursive estimates, as template values.
 
 use std::mem::{Discriminant, discriminant};
 
@@ -18,7 +18,7 @@ use crate::{
     numbers::{DASH, fixed, plain},
 };
 
-/// Time from which errors are evaluated, s: the start-up of a recursion is excluded.
+/// Time from which errors are evaluated, s; it excludes the initial transient of a recursion.
 const ERRORS_FROM_S: f64 = 10.0;
 
 /// One row per method: description, forgetting, start.
@@ -50,8 +50,8 @@ pub fn methods(traces: &[Evaluated<'_>], record: &Record) -> Vec<Value> {
     traces.iter().map(row).collect()
 }
 
-/// One row per method: numbers of used, omitted and shortened samples, and rows that cannot be
-/// converted.
+/// One row per method: numbers of samples used, skipped and shortened, and of rows that cannot be converted to an
+/// operator.
 pub fn counts(traces: &[Evaluated<'_>]) -> Vec<Value> {
     let row = |t: &Evaluated<'_>| {
         let trace = t.section.trace;
@@ -91,15 +91,15 @@ pub fn changes(trace: &Evaluated<'_>) -> Vec<Value> {
     trace.section.trace.changes().iter().map(row).collect()
 }
 
-/// A reason why rows cannot be converted.
+/// A reason why rows cannot be converted to an operator.
 struct Reason {
     rows: usize,
     first_s: f64,
     text: String,
 }
 
-/// The reasons, the most frequent first. Those that differ only in their numbers are combined, with
-/// the text of the first.
+/// The reasons, with the most frequent first. Reasons that differ only in their numbers are combined under the text of
+/// the first.
 fn reasons(trace: &Evaluated<'_>) -> Vec<Reason> {
     // Rows before the first estimate have the kind `None`.
     let mut found: Vec<(Option<Discriminant<NotConvertible>>, Reason)> = Vec::new();
@@ -116,13 +116,12 @@ fn reasons(trace: &Evaluated<'_>) -> Vec<Reason> {
         }
     }
     let mut reasons: Vec<Reason> = found.into_iter().map(|f| f.1).collect();
-    // Stable sort: equal counts stay in the order of time.
+    // The sort is stable: reasons with equal counts stay in the order of time.
     reasons.sort_by_key(|r| std::cmp::Reverse(r.rows));
     reasons
 }
 
-/// Share of innovations larger than twice their standard deviation, from the first update of the
-/// estimate on.
+/// Share of the innovations larger than twice their standard deviation, counted from the first update of the estimate.
 fn outside(trace: &Evaluated<'_>) -> Option<f64> {
     let trace = trace.section.trace;
     let rows = trace
@@ -137,8 +136,8 @@ fn outside(trace: &Evaluated<'_>) -> Option<f64> {
     (!moving.is_empty()).then(|| moving.iter().filter(|m| **m).count() as f64 / moving.len() as f64)
 }
 
-/// One row per parameter of the operator, one column per method: RMS relative error in %. `None`
-/// without true values.
+/// RMS relative errors in %, one row per parameter of the operator and one column per method; `None` without true
+/// values.
 pub fn errors(traces: &[Evaluated<'_>], record: &Record) -> Option<Value> {
     let last_s = record.time_s(record.len() - 1);
     let from_s = if last_s > ERRORS_FROM_S {
@@ -194,8 +193,7 @@ fn percent(share: f64) -> String {
     }
 }
 
-/// The batch fits of one method: at the end of each span the recursive estimate, the fit and the
-/// true value.
+/// The batch fits of one method: the recursive estimate at the end of each span, the fit, and the true value.
 pub fn batch(trace: &Evaluated<'_>, record: &Record) -> Vec<Value> {
     trace
         .section
@@ -207,7 +205,7 @@ pub fn batch(trace: &Evaluated<'_>, record: &Record) -> Vec<Value> {
 
 fn span(trace: &Evaluated<'_>, record: &Record, line: &BatchLine<'_>) -> Value {
     let times = trace.section.trace.times_s();
-    // The span ends before its last time, up to rounding.
+    // The last sample of a span lies before the end of the span, up to rounding errors.
     let end = line.to_s - 0.5 * record.sample_time().s();
     let span = format!("[{}, {}] s", plain(line.from_s), plain(line.to_s));
     let Some(row) = times.partition_point(|t| *t < end).checked_sub(1) else {
@@ -251,7 +249,7 @@ fn span(trace: &Evaluated<'_>, record: &Record, line: &BatchLine<'_>) -> Value {
     context! { span, at => format!("{} s", fixed(at_s, 2)), rows, remarks, has_truth => record.channel("K_e").is_some() }
 }
 
-/// Symbol of a parameter, a coefficient, or several of them, for the page.
+/// HTML symbol of a parameter or coefficient, or of several separated by commas.
 pub fn symbol_of(name: &str) -> Value {
     let one = |name: &str| match Coefficient::parse(name) {
         Some(c) => format!("<i>{}</i><sub>{}</sub>", c.letter, c.index),

@@ -1,11 +1,11 @@
-//! The true values of the estimates, if the record contains them: the columns of a simulation.
+//! The true values of the estimated quantities, from the columns of a simulated record.
 
 use hoid_model::{OperatorParameters, Record};
 use hoid_track::Trace;
 
 use super::coefficients::{Coefficient, of_trace};
 
-/// The parameters of the operator at a sample, if the record has all of them.
+/// The true parameters of the operator at sample `k`; `None` unless the record contains all of them.
 fn operator(record: &Record, k: usize) -> Option<OperatorParameters> {
     let at = |name| record.channel(name).map(|values| values[k]);
     Some(OperatorParameters {
@@ -17,21 +17,21 @@ fn operator(record: &Record, k: usize) -> Option<OperatorParameters> {
     })
 }
 
-/// Index of the sample at a time.
+/// Index of the sample at a time; `None` outside the record.
 pub fn sample(record: &Record, time_s: f64) -> Option<usize> {
     let k = ((time_s - record.time_s(0)) / record.sample_time().s()).round();
     (k >= 0.0 && k < record.len() as f64).then_some(k as usize)
 }
 
-/// A true parameter of the operator at a time.
+/// The true value of an operator parameter at a time.
 pub fn parameter(record: &Record, name: &str, time_s: f64) -> Option<f64> {
     let values = record.channel(name)?;
     sample(record, time_s).map(|k| values[k])
 }
 
-/// The true coefficients of B and of the poles at every sample, by the exact hold with the
-/// parameters of that sample. Empty without true values, and for a model without the structure of
-/// the operator; B only is omitted if the delay differs.
+/// The true coefficients of B and of the poles at every sample, computed by the exact hold with the parameters of that
+/// sample. Empty without true values and for a model without the structure of the operator; only B is omitted if the
+/// delay differs from that of the model.
 pub fn coefficients(record: &Record, trace: &Trace) -> Vec<(Coefficient, Vec<f64>)> {
     let orders = trace.options().orders;
     let is_operator = orders.nb == 2 && (orders.na, orders.nf) != (2, 2) && (orders.na == 2 || orders.nf == 2);

@@ -1,14 +1,14 @@
-//! The gain of each part of the remnant that gives it its share of the variance of u.
+//! Gains with which each part of the remnant has its share of the variance of u.
 //!
-//! Part i with gain 1 contributes `V_i = sum over k of h_i(k)^2` to the variance of u, with h_i the response of u,
+//! Part i with gain 1 contributes `V_i = sum over k of h_i(k)^2` to the variance of u, where h_i is the response of u,
 //! through the closed loop, to one unit of w at sample 0. The sinusoids of target and disturbance contribute
-//! `V_0 = sum of A^2/2 |u/f|^2` at their frequencies, with the responses of the sampled loop: for a target to which the
+//! `V_0 = sum of A^2/2 |u/f|^2` at their frequencies, with the responses of the sampled loop. For a target to which the
 //! person responds with F, `e/f = (1 - P F)/(1 + B P)` and `u/f = (B + F)/(1 + B P)`. All parts are independent, so
-//! that with shares p_i
+//! with shares p_i
 //!
 //! `var u = (V_0 + sum of K_j^2 V_j of given gains) / (1 - sum of p_i)`, `K_i^2 = p_i var u / V_i`.
 //!
-//! The response also shows whether the loop is stable: it then decays to zero.
+//! The response also shows whether the loop is stable, since it then decays to zero.
 
 use hoid_model::{
     Complex64, ModelError,
@@ -22,23 +22,23 @@ use super::{
     noise::{Shaped, Shaping},
 };
 
-/// The first horizon, in samples.
+/// Initial horizon in samples.
 const FIRST: usize = 512;
-/// Horizon in samples by which the response of a stable loop has decayed.
+/// Horizon in samples within which the response of a stable loop must decay.
 const LONGEST: usize = 1 << 20;
-/// Share of the energy in the second half of the horizon at which a response has decayed: the share after the horizon
-/// is its square.
-const LEFT: f64 = 1e-7;
+/// Fraction of the energy in the second half of the horizon below which a response has decayed. The fraction beyond the
+/// horizon is then about its square.
+const DECAYED_ENERGY: f64 = 1e-7;
 
-/// Mean squares of u, of its steps and of e.
+/// Mean squares of u, of its steps from sample to sample, and of e.
 type MeanSquares = [f64; 3];
 
-/// Strength of the remnant for one state.
+/// Strength of the remnant for one state of the scenario.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Calibration {
-    /// K of each part.
+    /// Gain K of each part.
     pub gains: Vec<f64>,
-    /// Mean square of u, of its step from one sample to the next, and of e.
+    /// Mean squares of u, of its step from one sample to the next, and of e.
     pub mean_squares: MeanSquares,
 }
 
@@ -49,7 +49,7 @@ impl Calibration {
         shapings: &[Shaping],
         is_last: bool,
     ) -> Result<Self, ModelError> {
-        // Stability is checked with and without a remnant.
+        // Stability is also checked if there is no remnant.
         energy(held, &Shaping::White)?;
         let mut sum = line_power(held, scenario)?;
         let mut energies = Vec::with_capacity(shapings.len());
@@ -67,7 +67,7 @@ impl Calibration {
         }
         if sum[0] == 0.0 && shares > 0.0 {
             return Err(ModelError::OutOfRange {
-                quantity: "variance of u without the parts of the remnant that are a share of it",
+                quantity: "variance of u without the parts of the remnant that are defined as a share of this variance",
                 found: 0.0,
                 expected: "more than zero: give a target, a disturbance or the gain of a part",
             });
@@ -103,7 +103,7 @@ fn scaled(a: MeanSquares, by: f64) -> MeanSquares {
     a.map(|x| by * x)
 }
 
-/// Sums of squares of the responses of u, of its steps and of e to one unit of w.
+/// Returns the sums of the squared responses of u, of its steps and of e to one unit of w.
 fn energy(held: &HeldLoop, shaping: &Shaping) -> Result<MeanSquares, ModelError> {
     let mut state = LoopState::at_rest(held, held.delay());
     let mut shaped = Shaped::at_rest(shaping);
@@ -131,7 +131,7 @@ fn energy(held: &HeldLoop, shaping: &Shaping) -> Result<MeanSquares, ModelError>
         if !total[0].is_finite() {
             return Err(unstable("the response of u to a unit of remnant grows without bound"));
         }
-        if horizon > FIRST && block[0] <= LEFT * total[0] {
+        if horizon > FIRST && block[0] <= DECAYED_ENERGY * total[0] {
             return Ok(total);
         }
         if horizon >= LONGEST {
@@ -141,13 +141,13 @@ fn energy(held: &HeldLoop, shaping: &Shaping) -> Result<MeanSquares, ModelError>
     }
 }
 
-/// Response of a held operator, `backward` the delay of one sample.
+/// Returns the frequency response of a held operator; `backward` is the delay operator of one sample.
 fn held_response(held: &HeldFamily, backward: Complex64) -> Complex64 {
     let denominator = 1.0 + backward * polynomial::value(&held.f, backward);
     polynomial::value(&held.b, backward) * backward.powu(held.nk as u32) / denominator
 }
 
-/// Mean squares due to target and disturbance.
+/// Returns the mean squares due to target and disturbance.
 fn line_power(held: &HeldLoop, scenario: &FamilyScenario) -> Result<MeanSquares, ModelError> {
     let seen = scenario.feedforward.as_ref();
     let seen = seen.map(|seen| seen.operator.zoh(scenario.sample_time)).transpose()?;
@@ -158,13 +158,13 @@ fn line_power(held: &HeldLoop, scenario: &FamilyScenario) -> Result<MeanSquares,
             let [y, p] = held.responses(omega).ok_or(ModelError::OutOfRange {
                 quantity: "frequency of a sinusoid in rad/s",
                 found: omega,
-                expected: "one that is not a pole of the operator or of the controlled element",
+                expected: "a frequency that is not a pole of the operator or of the controlled element",
             })?;
             let closed = 1.0 + y * p;
             let backward = Complex64::from_polar(1.0, -omega * scenario.sample_time.s());
             let (of_e, of_u) = match (is_target, &seen) {
                 (true, Some(seen)) => {
-                    // The preview changes only the phase of F relative to f, on which e depends.
+                    // The preview changes only the phase of F relative to f, which affects e.
                     let shown_s = scenario.feedforward.as_ref().map_or(0.0, |seen| seen.preview_s);
                     let f = held_response(seen, backward) * Complex64::from_polar(1.0, omega * shown_s);
                     ((1.0 - p * f) / closed, (y + f) / closed)

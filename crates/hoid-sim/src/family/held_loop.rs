@@ -1,15 +1,15 @@
-//! One sample of the loop.
+//! Simulation of the loop over one sample.
 //!
 //! At sample k, with the parameters at that time,
 //!
 //! `u = r(k - l) + n`, `y = C x_p + D (u + d)`, `e = f - y`,
 //!
-//! where r is the response of the operator after the fractional part of the delay `tau = l Ts + delta`, x_p the state
-//! of the controlled element. Operator and element are then advanced by one sample exactly, for held inputs
-//! ([`hoid_model::held_system`]). An operator without a neuromuscular part may pass e on without lag: with the held
-//! error this would be one sample or the next, so the direct part is computed from the error interpolated about
-//! `t - delta - Ts/2`, as in [`FamilyOperator::zoh`](hoid_model::FamilyOperator::zoh). If that part and D form a loop
-//! within a sample, both equations are solved together.
+//! where r is the response of the operator after the fractional part of the delay `tau = l Ts + delta`, and x_p the
+//! state of the controlled element. Operator and element are then advanced exactly by one sample, for held inputs
+//! ([`hoid_model::held_system`]). An operator without a neuromuscular part may have a direct response to e. With a held
+//! error this response would appear at one sample or at the next, so it is computed from the error interpolated about
+//! `t - delta - Ts/2`, as in [`FamilyOperator::zoh`](hoid_model::FamilyOperator::zoh). If the direct response and D
+//! form a loop within a sample, both equations are solved together.
 
 use hoid_model::{
     ModelError, SampleTime, family_scenario::FamilyState, held_system::HeldSystem, scenario::Realisation,
@@ -17,14 +17,14 @@ use hoid_model::{
 
 use hoid_model::Complex64;
 
-/// Smallest size of `1 + D Y` within a sample.
+/// Smallest magnitude of `1 + D Y` within a sample.
 const SMALLEST: f64 = 1e-9;
 
-/// The loop with its parameters at one instant.
+/// Closed loop with its parameters at one instant.
 #[derive(Debug, Clone)]
 pub(super) struct HeldLoop {
     operator: HeldSystem,
-    /// Additional weights of e(k), e(k-1), e(k-2).
+    /// Weights of e(k), e(k-1), e(k-2) in the direct response.
     taps: [f64; 3],
     delay: usize,
     element: HeldSystem,
@@ -33,7 +33,7 @@ pub(super) struct HeldLoop {
     sample_time: SampleTime,
 }
 
-/// Inputs of a sample: target, disturbance, remnant.
+/// Inputs of the loop at a sample: target, disturbance, remnant.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Inputs {
     pub target: f64,
@@ -41,7 +41,7 @@ pub(super) struct Inputs {
     pub remnant: f64,
 }
 
-/// Result of a sample: error, control, output of the element.
+/// Signals of the loop at a sample: error, control, output of the element.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Outputs {
     pub e: f64,
@@ -61,26 +61,26 @@ pub(super) struct LoopState {
 pub(super) struct OperatorState {
     state: Vec<f64>,
     next: Vec<f64>,
-    /// e(k-1), e(k-2).
+    /// Errors e(k-1) and e(k-2).
     errors: [f64; 2],
-    /// Responses, that of sample k at index k of a ring.
+    /// Ring of responses, with the response of sample k at index k.
     ring: Vec<f64>,
     k: usize,
 }
 
-/// Output of the operator at a sample before its error is known.
+/// Output of the operator at a sample before the error of that sample is known.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OperatorOutput {
-    /// The response without the error of the sample, before the delay of whole samples.
+    /// Response without the contribution of the current error, before the delay of whole samples.
     past: f64,
-    /// The same after the delay: its contribution to u.
+    /// Known part of u: the response after the delay of whole samples, without the contribution of the current error.
     pub known: f64,
-    /// Direct response of u to the error of the sample.
+    /// Weight of the current error in u.
     tap: f64,
 }
 
 impl HeldLoop {
-    /// Builds the loop with a delay of whole samples and a fraction of one.
+    /// Builds the loop with a delay of whole samples plus a fraction of a sample.
     pub fn new(
         state: &FamilyState,
         (delay, late): (usize, f64),
@@ -95,7 +95,7 @@ impl HeldLoop {
         taps[whole as usize] = operator.direct() * (1.0 - part);
         taps[whole as usize + 1] = operator.direct() * part;
         let p = &state.controlled_element;
-        // The leading gain is separate: a step of it may or may not make y jump.
+        // The leading gain is separate, since a step of this gain may or may not make y jump.
         let gain = p.num()[0];
         let num: Vec<f64> = p
             .num()
@@ -115,7 +115,7 @@ impl HeldLoop {
             element_output,
             sample_time,
         };
-        if held.at_once().abs() < SMALLEST {
+        if held.return_difference().abs() < SMALLEST {
             return Err(ModelError::UnstableLoop {
                 reason: "the direct parts of operator and controlled element cancel within a sample".to_owned(),
             });
@@ -123,7 +123,7 @@ impl HeldLoop {
         Ok(held)
     }
 
-    /// Returns the delay in whole samples.
+    /// Returns the number of whole samples of the delay.
     pub fn delay(&self) -> usize {
         self.delay
     }
@@ -132,19 +132,19 @@ impl HeldLoop {
         self.element_input * self.element_output * self.element.direct()
     }
 
-    /// Returns `1 + D Y` of the direct paths within a sample.
-    fn at_once(&self) -> f64 {
+    /// Returns `1 + D Y` for the direct responses within a sample.
+    fn return_difference(&self) -> f64 {
         1.0 + self.element_direct() * if self.delay == 0 { self.taps[0] } else { 0.0 }
     }
 
     /// True if u depends on the error of the same sample.
-    pub fn answers_at_once(&self) -> bool {
+    pub fn has_direct_response(&self) -> bool {
         self.delay == 0 && self.taps[0] != 0.0
     }
 
     /// Returns the output of the operator at the next sample.
     #[inline]
-    pub fn answer(&self, state: &OperatorState) -> OperatorOutput {
+    pub fn output(&self, state: &OperatorState) -> OperatorOutput {
         let [e1, e2] = state.errors;
         let past = self.operator.output(&state.state) + self.taps[1] * e1 + self.taps[2] * e2;
         let (known, tap) = if self.delay == 0 {
@@ -156,11 +156,11 @@ impl HeldLoop {
         OperatorOutput { past, known, tap }
     }
 
-    /// Takes the error of that sample and advances the operator by one sample.
+    /// Takes the error of this sample and advances the operator by one sample.
     #[inline]
-    pub fn respond(&self, state: &mut OperatorState, answer: OperatorOutput, e: f64) {
+    pub fn advance_operator(&self, state: &mut OperatorState, output: OperatorOutput, e: f64) {
         let mask = state.ring.len() - 1;
-        state.ring[state.k & mask] = answer.past + self.taps[0] * e;
+        state.ring[state.k & mask] = output.past + self.taps[0] * e;
         state.k += 1;
         let [e1, _] = state.errors;
         self.operator.step(&state.state, e, e1, &mut state.next);
@@ -171,14 +171,14 @@ impl HeldLoop {
     /// Advances the loop by one sample.
     #[inline]
     pub fn step(&self, state: &mut LoopState, inputs: Inputs) -> Outputs {
-        let answer = self.answer(&state.operator);
-        let OperatorOutput { known, tap, .. } = answer;
+        let output = self.output(&state.operator);
+        let OperatorOutput { known, tap, .. } = output;
         let direct = self.element_direct();
         let of_state = self.element_output * self.element.output(&state.element);
         let rest = inputs.target - of_state - direct * (known + inputs.remnant + inputs.disturbance);
         let e = if tap == 0.0 { rest } else { rest / (1.0 + direct * tap) };
         let u = known + tap * e + inputs.remnant;
-        self.respond(&mut state.operator, answer, e);
+        self.advance_operator(&mut state.operator, output, e);
         let driven = self.element_input * (u + inputs.disturbance);
         self.element.step(&state.element, driven, 0.0, &mut state.next);
         std::mem::swap(&mut state.element, &mut state.next);
@@ -189,7 +189,7 @@ impl HeldLoop {
         }
     }
 
-    /// Returns the responses of the operator and of the element at a frequency, for the sampled loop.
+    /// Returns the frequency responses of operator and element in the sampled loop.
     pub fn responses(&self, omega_rad_s: f64) -> Option<[Complex64; 2]> {
         let backward = Complex64::from_polar(1.0, -omega_rad_s * self.sample_time.s());
         let [a, b, c] = self.taps;
@@ -225,7 +225,7 @@ impl OperatorState {
         }
     }
 
-    /// Returns its state as numbers; the ring starts at the next sample.
+    /// Returns the state as numbers; the ring is rotated so that it starts at the next sample.
     pub fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
         let oldest = self.k & (self.ring.len() - 1);
         self.ring.rotate_left(oldest);

@@ -1,16 +1,16 @@
-//! The closed loop of any operator of the family, sample by sample.
+//! Closed loop of any operator of the family, sample by sample.
 //!
-//! The fast path for the thesis's operator is [`Simulator`](crate::Simulator); here all orders are known only at run
-//! time.
+//! [`Simulator`](crate::Simulator) is the fast path for the operator of the thesis; in this module all orders are known
+//! only at run time.
 //!
 //! | file | contents |
 //! |---|---|
-//! | `held_loop` | the loop with its parameters at one instant, and one sample of it |
-//! | `noise` | the parts of the remnant and the walk of the stick |
-//! | `remnant_run` | all of the remnant of a run, one sample after the other |
-//! | `calibration` | the gains that give each part its share of the variance of u |
-//! | `simulator` | [`FamilySimulator`]: a scenario made ready, and its runs |
-//! | `operator_run` | [`FamilyOperatorRun`]: the operator alone, a sample at a time |
+//! | `held_loop` | closed loop with its parameters at one instant, and its simulation over one sample |
+//! | `noise` | parts of the remnant |
+//! | `remnant_run` | complete remnant of a run, with the random walk of the stick, sample by sample |
+//! | `calibration` | gains with which each part has its share of the variance of u |
+//! | `simulator` | [`FamilySimulator`]: a prepared scenario and its runs |
+//! | `operator_run` | [`FamilyOperatorRun`]: the operator alone, sample by sample |
 
 mod calibration;
 mod held_loop;

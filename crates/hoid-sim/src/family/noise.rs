@@ -1,7 +1,7 @@
-//! The parts of the remnant, sample by sample.
+//! Parts of the remnant, sample by sample.
 //!
-//! `n = K G w` with the white sequence w of [`hoid_model::family_scenario`]'s remnant. Each part has its own random
-//! streams.
+//! Each part is `n = K G w` with the white sequence w of the remnant in [`hoid_model::family_scenario`], and has its
+//! own random streams.
 
 use hoid_model::{
     ModelError, SampleTime,
@@ -11,7 +11,7 @@ use hoid_model::{
 
 use crate::RunSeed;
 
-/// The shaping filter of a part.
+/// Shaping filter of a part.
 #[derive(Debug, Clone)]
 pub(super) enum Shaping {
     White,
@@ -38,7 +38,7 @@ impl Shaping {
     }
 }
 
-/// State of a filter.
+/// State of a shaping filter.
 #[derive(Debug, Clone)]
 pub(super) struct Shaped {
     state: Vec<f64>,
@@ -58,8 +58,8 @@ impl Shaped {
         }
     }
 
-    /// Returns the output of the filter in this sample; `w` is the input, which affects a held filter from the next
-    /// sample on.
+    /// Returns the output of the filter at this sample. The input `w` affects the output of a held filter only from the
+    /// next sample.
     #[inline]
     pub fn step(&mut self, shaping: &Shaping, w: f64) -> f64 {
         match shaping {
@@ -82,22 +82,22 @@ impl Shaped {
         }
     }
 
-    /// Returns its state as numbers.
+    /// Returns the state as numbers.
     pub fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
         self.state.iter_mut()
     }
 }
 
-/// Factors of w that do not depend on u: normal deviates, pulses, on and off.
+/// Returns w without its dependence on u: normal deviates with pulses and intermittence.
 pub(super) fn driving(part: &RemnantPart, run: RunSeed, index: u64, ts_s: f64, samples: usize) -> Vec<f64> {
     let mut w = if index == 0 {
-        // The deviates of a single remnant equal those of `Simulator`.
+        // The first part uses the deviates of `Simulator`, so that a single remnant equals that of `Simulator`.
         run.white_noise(samples)
     } else {
         run.white_noise_of(STREAMS + 4 * index, samples)
     };
     if let Some(pulses) = part.pulses {
-        // More pulses than samples count as one per sample.
+        // There is at most one pulse per sample.
         let chance = (pulses.rate_per_s * ts_s).min(1.0);
         let heights = run.white_noise_of(STREAMS + 4 * index + 1, samples);
         let places = run.uniform_of(STREAMS + 4 * index + 2, samples);
@@ -109,7 +109,7 @@ pub(super) fn driving(part: &RemnantPart, run: RunSeed, index: u64, ts_s: f64, s
     if let Some(times) = part.intermittence.filter(|times| times.off_s > 0.0) {
         let draws = run.uniform_of(STREAMS + 4 * index + 3, samples);
         let duty = times.on_s / (times.on_s + times.off_s);
-        // The two-state Markov chain with these mean times, observed at the samples.
+        // Two-state Markov chain with these mean times, observed at the samples.
         let settled = 1.0 - (-ts_s * (1.0 / times.on_s + 1.0 / times.off_s)).exp();
         let mut on = draws.first().is_some_and(|draw| *draw < duty);
         for (w, draw) in w.iter_mut().zip(draws) {
@@ -123,5 +123,6 @@ pub(super) fn driving(part: &RemnantPart, run: RunSeed, index: u64, ts_s: f64, s
     w
 }
 
-/// First tag of the streams of parts; part 0 has the stream of [`RunSeed::white_noise`].
+/// Tag of the random streams of part 0; the tags of the other parts follow. The deviates of part 0 come from
+/// [`RunSeed::white_noise`].
 pub(super) const STREAMS: u64 = u64::from_le_bytes(*b"\0people\0");

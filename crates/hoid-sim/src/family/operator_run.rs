@@ -1,9 +1,9 @@
-//! Only the operator of a scenario of the family, sample by sample: for a loop that is closed elsewhere.
+//! Operator of a scenario of the family alone, sample by sample, for a loop that is closed elsewhere.
 //!
-//! Simulates, as [`FamilySimulator`] does in a loop, `u = r(k - l) + n`, with the same random numbers and with the
-//! strength of the remnant in the loop of the scenario: a loop that responds to u like its controlled element gives
-//! the same run to the last bit. The offsets of the recorder in e and u (`offset_e`, `offset_u`) are not part of the
-//! operator. The control of a sample must not depend on the error of the same sample.
+//! Simulates `u = r(k - l) + n` as [`FamilySimulator`] does in a loop, with the same random numbers, and with the
+//! strength of the remnant in the loop of the scenario. A loop that responds to u like the controlled element of the
+//! scenario therefore gives a bit-identical run. The offsets of the recorder in e and u (`offset_e`, `offset_u`) are
+//! not part of the operator. The control at a sample must not depend on the error of the same sample.
 
 use super::{
     FamilySimulator,
@@ -12,28 +12,28 @@ use super::{
 };
 use crate::{RunSeed, SimError, operator_run::saved_sample};
 
-/// A running operator of the family.
+/// Running operator of the family.
 #[derive(Debug, Clone)]
 pub struct FamilyOperatorRun {
     simulator: FamilySimulator,
     operator: OperatorState,
     remnant: RemnantRun,
-    /// The next sample, and its remnant.
+    /// Index of the next sample, and remnant at that sample.
     k: usize,
     n: f64,
 }
 
 impl FamilyOperatorRun {
-    /// Starts an operator at rest before the sample at `start_s`, in s from the start of the measurement. The part of
-    /// the run-in before it is left out; its random numbers are skipped.
+    /// Starts an operator at rest before the sample at `start_s`, in s relative to the start of the measurement. The
+    /// part of the run-in before `start_s` is omitted, and its random numbers are skipped.
     ///
     /// # Errors
-    /// [`SimError::AnswersAtOnce`].
+    /// [`SimError::DirectResponse`] if the control depends on the error of the same sample.
     pub fn new(simulator: FamilySimulator, run: RunSeed, start_s: f64) -> Result<Self, SimError> {
         let scenario = simulator.scenario.scenario();
         let ts_s = scenario.sample_time.s();
-        if (0..simulator.samples()).any(|k| simulator.held(k).answers_at_once()) {
-            return Err(SimError::AnswersAtOnce {
+        if (0..simulator.samples()).any(|k| simulator.held(k).has_direct_response()) {
+            return Err(SimError::DirectResponse {
                 scenario: scenario.name.clone(),
                 tau_e_s: scenario
                     .initial
@@ -59,35 +59,35 @@ impl FamilyOperatorRun {
         self.simulator.held(self.k)
     }
 
-    /// Returns the control u of the next sample, deg.
+    /// Returns the control u of the next sample in deg.
     pub fn control(&self) -> f64 {
-        self.held().answer(&self.operator).known + self.n
+        self.held().output(&self.operator).known + self.n
     }
 
-    /// Returns the remnant n of the next sample, deg, with bias and walk of the stick.
+    /// Returns the remnant n of the next sample in deg, including the bias and the random walk of the stick.
     pub fn remnant(&self) -> f64 {
         self.n
     }
 
-    /// Takes the error e of the sample, deg, and advances by one sample.
+    /// Takes the error e of the sample in deg and advances by one sample.
     pub fn take(&mut self, e: f64) {
         let held = self.simulator.held(self.k);
-        let answer = held.answer(&self.operator);
-        held.respond(&mut self.operator, answer, e);
+        let answer = held.output(&self.operator);
+        held.advance_operator(&mut self.operator, answer, e);
         let (scenario, remnants) = (&self.simulator.scenario, &self.simulator.remnants);
         self.remnant.follow(scenario, remnants, self.k, answer.known + self.n);
         self.k += 1;
         self.n = self.remnant.next(scenario, remnants, self.k);
     }
 
-    /// Returns its state as numbers.
+    /// Returns the state as numbers.
     pub fn saved(&mut self) -> Vec<f64> {
         let beside = [self.k as f64, self.n];
         beside.into_iter().chain(self.numbers().map(|number| *number)).collect()
     }
 
-    /// Continues from a saved state of an operator of the same scenario and run ([`FamilyOperatorRun::saved`]), with
-    /// the same digits. Returns false, without any change, for numbers of another operator.
+    /// Continues from the saved state ([`FamilyOperatorRun::saved`]) of an operator with the same scenario and run,
+    /// with bit-identical results. Returns false, without any change, if the numbers belong to another operator.
     pub fn restore(&mut self, saved: &[f64]) -> bool {
         let Some((&[k, n], rest)) = saved.split_first_chunk::<2>() else {
             return false;
@@ -268,7 +268,7 @@ mod tests {
     fn an_operator_that_answers_within_a_sample_is_refused() {
         let of = |samples: f64| FamilyOperatorRun::new(FamilySimulator::new(&quick(samples)).unwrap(), SEED, 0.0);
         let refused = of(0.3).unwrap_err();
-        assert!(matches!(refused, SimError::AnswersAtOnce { .. }), "{refused}");
+        assert!(matches!(refused, SimError::DirectResponse { .. }), "{refused}");
         assert!(refused.to_string().contains("0.003 s") && refused.to_string().contains("0.005 s"));
         assert!(of(0.5).is_ok());
     }

@@ -1,8 +1,9 @@
-//! Components of u other than the response, sample by sample: the parts of the remnant, and the walk of the stick.
+//! Components of u other than the response to e, sample by sample: the parts of the remnant, and the random walk of the
+//! stick.
 //!
-//! `n(k) = walk(k) + sum of K_i(k) G_i(q) w_i(k)`, with K_i of [`calibration`](super::calibration) and w_i of
-//! [`noise`](super::noise), scaled by the signal that it depends on for a signal-dependent part. All of it is known
-//! before the control of the sample.
+//! `n(k) = walk(k) + sum of K_i(k) G_i(q) w_i(k)`, with K_i from [`calibration`](super::calibration) and w_i from
+//! [`noise`](super::noise). In a signal-dependent part, a fraction of the variance of w_i is proportional to the
+//! running mean square of the signal on which it depends. The remnant is known before the control of the same sample.
 
 use hoid_model::family_scenario::{Followed, ResolvedFamilyScenario};
 
@@ -12,9 +13,9 @@ use super::{
 };
 use crate::RunSeed;
 
-const WALK: u64 = u64::from_le_bytes(*b"stick\0\0\0");
+const STICK_STREAM: u64 = u64::from_le_bytes(*b"stick\0\0\0");
 
-/// The prepared remnant of a scenario: the filter of each part, and its strength before and after the change.
+/// Prepared remnant of a scenario: the filter of each part, and its strength before and after the change.
 #[derive(Debug, Clone)]
 pub(super) struct Remnants {
     pub shapings: Vec<Shaping>,
@@ -24,8 +25,8 @@ pub(super) struct Remnants {
 }
 
 impl Remnants {
-    /// Returns a number of the calibration at sample `k`, between its initial and final value; after the end of the
-    /// scenario it is that of the last sample.
+    /// Returns a value of the calibration at sample `k`, between its initial and final values. After the end of the
+    /// scenario it is the value at the last sample.
     #[inline]
     fn calibrated(&self, scenario: &ResolvedFamilyScenario, k: usize, of: impl Fn(&Calibration) -> f64) -> f64 {
         let [initial, last] = &self.calibrations;
@@ -41,20 +42,20 @@ fn samples_of(scenario: &ResolvedFamilyScenario) -> usize {
     scenario.run_in_samples() + scenario.measurement_samples()
 }
 
-/// The remnant of a run, and its state.
+/// Remnant of a run, with its state.
 #[derive(Debug, Clone)]
 pub(super) struct RemnantRun {
     run: RunSeed,
-    /// The input of each part, from the first sample of the run-in to the last drawn sample.
+    /// Input of each part, from the first sample of the run-in to the last sample drawn.
     driven: Vec<Vec<f64>>,
-    /// Steps of the stick, likewise.
+    /// Steps of the random walk of the stick, for the same samples.
     steps: Vec<f64>,
     shaped: Vec<Shaped>,
-    /// Each running mean square in units of its mean over the run.
+    /// Running mean square of the signal on which each part depends, relative to its mean over the run.
     followed: Vec<f64>,
     forgets: Vec<f64>,
     walk: f64,
-    /// The control of the last sample.
+    /// Control at the last sample.
     before: f64,
 }
 
@@ -80,8 +81,8 @@ impl RemnantRun {
         new
     }
 
-    /// Draws the random numbers up to a given number of samples if there are fewer; the first ones do not depend on
-    /// the number.
+    /// Draws the random numbers for at least the given number of samples. The numbers of a sample do not depend on how
+    /// many samples are drawn.
     fn draw(&mut self, scenario: &ResolvedFamilyScenario, samples: usize) {
         if samples <= self.steps.len() {
             return;
@@ -95,14 +96,14 @@ impl RemnantRun {
         self.steps = if scenario.stick.walk_per_root_s == 0.0 {
             vec![0.0; samples]
         } else {
-            self.run.white_noise_of(WALK, samples)
+            self.run.white_noise_of(STICK_STREAM, samples)
         };
     }
 
-    /// Returns the remnant of sample `k`, to be called after that of `k - 1`.
+    /// Returns the remnant at sample `k`. It must be called after the call for sample `k - 1`.
     #[inline]
     pub fn next(&mut self, scenario: &ResolvedFamilyScenario, of: &Remnants, k: usize) -> f64 {
-        // It continues after the end of the scenario.
+        // The remnant continues after the end of the scenario.
         if k >= self.steps.len() {
             self.draw(scenario, 2 * k + 1);
         }
@@ -117,10 +118,10 @@ impl RemnantRun {
         n
     }
 
-    /// Takes the control of sample `k`, after its remnant.
+    /// Takes the control at sample `k`, after the remnant of this sample was returned.
     #[inline]
     pub fn follow(&mut self, scenario: &ResolvedFamilyScenario, of: &Remnants, k: usize, u: f64) {
-        // In a restored run nothing has been drawn yet.
+        // A restored run may not have drawn any numbers yet.
         self.draw(scenario, k + 1);
         for (i, part) in scenario.scenario().remnant.iter().enumerate() {
             if let Some(own) = part.signal_dependence {
@@ -139,7 +140,7 @@ impl RemnantRun {
         self.walk += scenario.stick.walk_per_root_s * scenario.sample_time.s().sqrt() * self.steps[k];
     }
 
-    /// Returns its state as numbers.
+    /// Returns the state as numbers.
     pub fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
         let shaped = self.shaped.iter_mut().flat_map(Shaped::numbers);
         [&mut self.walk, &mut self.before]

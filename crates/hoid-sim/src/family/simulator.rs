@@ -1,9 +1,9 @@
-//! A prepared scenario of the family, and its runs.
+//! Prepared scenario of the family, and its runs.
 //!
-//! Parameters that change follow the sigmoid at each sample, with the exact hold of these values
-//! ([`held_loop`](super::held_loop)); gains of the remnant are computed for both states and follow the same sigmoid.
-//! The random numbers of a run are identified by its [`RunSeed`]: those of each part of the remnant, of the stick, and
-//! of the phases of target and disturbance have their own streams.
+//! Parameters that change follow the sigmoid at each sample, with the exact hold for these values
+//! ([`held_loop`](super::held_loop)). The gains of the remnant are computed for the initial and the final state and
+//! follow the same sigmoid. The random numbers of a run are identified by its [`RunSeed`]; each part of the remnant,
+//! the stick, and the phases of target and disturbance have separate streams.
 
 use std::f64::consts::TAU;
 
@@ -22,27 +22,27 @@ use super::{
 };
 use crate::{RunSeed, SimError};
 
-/// A prepared scenario: held models of all samples, gains of the remnant.
+/// Prepared scenario: held models for all samples, and gains of the remnant.
 #[derive(Debug, Clone)]
 pub struct FamilySimulator {
     pub(super) scenario: ResolvedFamilyScenario,
-    /// Each loop with its state.
+    /// Held loops, each with the state of the scenario to which it belongs.
     loops: Vec<(FamilyState, HeldLoop)>,
-    /// Index in `loops` of each sample; empty if there is one for all.
+    /// Index in `loops` for each sample; empty if all samples have the same loop.
     places: Vec<usize>,
     pub(super) remnants: Remnants,
 }
 
-/// The signals of one run, run-in included.
+/// Signals of one run, including the run-in.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FamilySignals {
-    /// Error e, as recorded.
+    /// Error e as recorded.
     pub e: Vec<f64>,
-    /// Control u, as recorded.
+    /// Control u as recorded.
     pub u: Vec<f64>,
     /// Output y of the controlled element.
     pub y: Vec<f64>,
-    /// Remnant n, with bias and walk of the stick.
+    /// Remnant n, including the bias and the random walk of the stick.
     pub n: Vec<f64>,
     /// Target f.
     pub f: Vec<f64>,
@@ -54,10 +54,10 @@ const TARGET_PHASES: u64 = u64::from_le_bytes(*b"target\0\0");
 const DISTURBANCE_PHASES: u64 = u64::from_le_bytes(*b"disturb\0");
 
 impl FamilySimulator {
-    /// Prepares a scenario. Its runs share the results.
+    /// Prepares a scenario. All runs share the result.
     ///
     /// # Errors
-    /// [`SimError::Model`] if the scenario is invalid or the loop of one of its states is not stable.
+    /// [`SimError::Model`] if the scenario is invalid or if the loop is unstable in one of its states.
     pub fn new(scenario: &FamilyScenario) -> Result<Self, SimError> {
         let resolved = scenario.resolve()?;
         let ts = scenario.sample_time;
@@ -101,10 +101,10 @@ impl FamilySimulator {
         })
     }
 
-    /// Returns the same scenario with another stick, which changes nothing else.
+    /// Returns the same simulator with another stick.
     ///
     /// # Errors
-    /// [`SimError::Model`] if one of its numbers is invalid.
+    /// [`SimError::Model`] if a number of the stick is invalid.
     pub fn with_stick(mut self, stick: Stick) -> Result<Self, SimError> {
         let scenario = FamilyScenario {
             stick,
@@ -119,12 +119,12 @@ impl FamilySimulator {
         &self.scenario
     }
 
-    /// Returns the number of samples of a run: run-in and measurement.
+    /// Returns the number of samples of a run, including the run-in.
     pub fn samples(&self) -> usize {
         self.scenario.run_in_samples() + self.scenario.measurement_samples()
     }
 
-    /// Returns the loop at sample `k`; after the end of the scenario it is that of the last sample.
+    /// Returns the loop at sample `k`. After the end of the scenario it is the loop at the last sample.
     #[inline]
     pub(super) fn held(&self, k: usize) -> &HeldLoop {
         let place = self.places.get(k).or(self.places.last()).copied().unwrap_or(0);
@@ -142,12 +142,12 @@ impl FamilySimulator {
         [&initial.gains, &last.gains]
     }
 
-    /// Returns the variance of u in a long run, without bias and walk of the stick, before and after the change.
+    /// Returns the variance of u in a long run, without bias and random walk of the stick, before and after the change.
     pub fn control_variance(&self) -> [f64; 2] {
         [0, 1].map(|i| self.remnants.calibrations[i].mean_squares[0])
     }
 
-    /// Returns the variance of e, likewise.
+    /// Returns the variance of e in a long run, without bias and random walk of the stick, before and after the change.
     pub fn error_variance(&self) -> [f64; 2] {
         [0, 1].map(|i| self.remnants.calibrations[i].mean_squares[2])
     }
@@ -155,7 +155,7 @@ impl FamilySimulator {
     /// Returns the signals of a run.
     ///
     /// # Errors
-    /// [`SimError::Diverged`].
+    /// [`SimError::Diverged`] if a signal is not finite.
     pub fn signals(&self, run: RunSeed) -> Result<FamilySignals, SimError> {
         let scenario = self.scenario.scenario();
         let (ts, samples) = (scenario.sample_time, self.samples());
@@ -173,7 +173,7 @@ impl FamilySimulator {
             let inputs = Inputs {
                 target: signals.f[k],
                 disturbance: signals.d[k],
-                // The response of the person to the target is independent of the loop.
+                // The response of the person to the target does not depend on the loop.
                 remnant: n + seen.get(k).copied().unwrap_or(0.0),
             };
             let now = self.held(k).step(&mut state, inputs);
@@ -195,7 +195,7 @@ impl FamilySimulator {
         Ok(signals)
     }
 
-    /// Returns the response to a visible target, from rest; empty for a target that is not visible.
+    /// Returns the response of the person to a visible target, from rest; empty if the target is not visible.
     fn response_to_target(&self, run: RunSeed) -> Result<Vec<f64>, SimError> {
         let scenario = self.scenario.scenario();
         let Some(seen) = &scenario.feedforward else {
@@ -211,11 +211,11 @@ impl FamilySimulator {
         Ok(response)
     }
 
-    /// Returns one run as a record of the measurement (or from the start of the run-in): e, u, d, y, n, and f_t if
-    /// there is a target.
+    /// Returns one run as a record, from the start of the measurement or, with `keep_run_in`, of the run-in: e, u, d,
+    /// y, n, and f_t if there is a target.
     ///
     /// # Errors
-    /// [`SimError::Diverged`].
+    /// [`SimError::Diverged`] if a signal is not finite.
     pub fn run(&self, run: RunSeed, keep_run_in: bool) -> Result<Record, SimError> {
         let signals = self.signals(run)?;
         let scenario = self.scenario.scenario();
@@ -237,7 +237,7 @@ impl FamilySimulator {
         Ok(record)
     }
 
-    /// Returns the same record with the true parameters of the operator at each sample under their names; only
+    /// As [`FamilySimulator::run`], with the true parameters of the operator at each sample, under their names. Only
     /// parameters that are finite throughout are included.
     ///
     /// # Errors
@@ -257,7 +257,7 @@ impl FamilySimulator {
     }
 }
 
-/// Returns the function with the phases of a run.
+/// Returns the forcing function with the phases of a run.
 fn phased(excitation: &Excitation, run: RunSeed, tag: u64) -> Result<ForcingFunction, SimError> {
     if !excitation.random_phases {
         return Ok(excitation.function.clone());

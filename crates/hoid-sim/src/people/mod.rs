@@ -1,8 +1,9 @@
 //! Virtual people: operators drawn from the family, and their runs.
 //!
 //! A person is an operator of the family with parameters from published ranges, a realistic remnant, and a stick that
-//! drifts; the task is that of recorded experiments: to hold a zero reference against a multi-sine disturbance at the
-//! input of `1/s`, `1/(s(s+1))` or `1/s^2`, 5 s of run-in and 40 s at 60 Hz. All true values are known.
+//! drifts. The task is that of recorded experiments: keeping a zero reference against a multi-sine disturbance at the
+//! input of `1/s`, `1/(s(s+1))` or `1/s^2`, with 5 s of run-in and 40 s of measurement at 60 Hz. All true values are
+//! known.
 //!
 //! ```
 //! use hoid_sim::people::{Person, Plant, Population, RemnantKind, Task};
@@ -18,8 +19,8 @@
 //!
 //! | file | contents |
 //! |---|---|
-//! | `population` | [`Population`]: the ranges, with their sources; [`Plant`] |
-//! | `remnants` | [`RemnantKind`]: remnants like people's |
+//! | `population` | [`Population`]: ranges of the parameters, with their sources; [`Plant`] |
+//! | `remnants` | [`RemnantKind`]: realistic remnants |
 //! | `person` | [`Person`], [`Task`], [`PersonRun`] |
 
 mod person;

@@ -1,9 +1,9 @@
-//! One virtual person, and their runs.
+//! One virtual person and their runs.
 //!
-//! Numbers from `[0, 1)` of the stream (seed, person) give the parameters, in a fixed order; a draw that
-//! [`Population`] rejects is followed by the next. In each run gain, lead,
-//! `1/T_I`, omega_nm, zeta_nm and delay are multiplied by `exp(b z)`, with z normal deviates of the run and b the
-//! spread between runs; a run whose loop is not stable is drawn again.
+//! Numbers in `[0, 1)` from the random stream (seed, person) give the parameters in a fixed order. If [`Population`]
+//! rejects a draw, the next numbers are used. In each run the gain, the lead, `1/T_I`, omega_nm, zeta_nm and the delay
+//! are multiplied by `exp(b z)`, where z are normal deviates of the run and b is the spread between runs. A run whose
+//! loop is unstable is drawn again.
 
 use hoid_model::{
     Complex64, FamilyOperator, FamilyScenario, FamilyState, Form, ModelError, Record, SampleTime,
@@ -18,16 +18,16 @@ use super::{
 };
 use crate::{RunSeed, SimError, family::FamilySimulator};
 
-/// The task of all persons.
+/// Task of every person.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Task {
-    /// Time between two samples. Default 1/60 s.
+    /// Sample time. Default: 1/60 s.
     pub sample_time: SampleTime,
-    /// Measurement, s. Default 40 s: two periods of the disturbance.
+    /// Duration of the measurement in s. Default: 40 s, two periods of the disturbance.
     pub measurement_s: f64,
-    /// Run-in, s. Default 5 s.
+    /// Duration of the run-in in s. Default: 5 s.
     pub run_in_s: f64,
-    /// Spread of the parameters between runs, 0.03 for 3 %. Default: none.
+    /// Spread of the parameters between runs, such as 0.03 for 3 %. Default: 0.
     pub between_runs: f64,
 }
 
@@ -42,42 +42,42 @@ impl Default for Task {
     }
 }
 
-/// A person with all true values.
+/// Virtual person with all true values.
 #[derive(Debug, Clone)]
 pub struct Person {
-    /// The controlled element.
+    /// Controlled element.
     pub plant: Plant,
-    /// The operator and the controlled element.
+    /// Operator and controlled element.
     pub state: FamilyState,
     /// Kind of remnant.
     pub kind: RemnantKind,
-    /// Share of the remnant in the variance of u.
+    /// Share of the variance of u that is due to the remnant.
     pub remnant_share: f64,
-    /// Its parts.
+    /// Parts of the remnant.
     pub remnant: Vec<RemnantPart>,
     /// Drift and offsets of the stick.
     pub stick: Stick,
-    /// Crossover frequency of `Y P`, rad/s.
+    /// Crossover frequency of `Y P` in rad/s.
     pub crossover_rad_s: f64,
-    /// Phase margin of `Y P`, deg.
+    /// Phase margin of `Y P` in deg.
     pub phase_margin_deg: f64,
     task: Task,
     streams: RunSeed,
     simulator: FamilySimulator,
 }
 
-/// A run of a person.
+/// Run of a person.
 #[derive(Debug, Clone)]
 pub struct PersonRun {
-    /// The operator of this run; that of the person if runs have no spread.
+    /// Operator and controlled element of this run; the same as those of the person if runs have no spread.
     pub state: FamilyState,
-    /// e, u, d, y, n from the start of the measurement.
+    /// Record of e, u, d, y and n from the start of the measurement.
     pub record: Record,
 }
 
-/// Number of draws of a person after which the ranges count as empty.
+/// Number of rejected draws after which the ranges of a population count as empty.
 const MOST_DRAWS: usize = 2000;
-/// Largest number of draws of a run.
+/// Maximum number of draws for a run.
 const MOST_RUN_DRAWS: usize = 50;
 /// Number of random values per draw.
 const NUMBERS: usize = 16;
@@ -85,11 +85,12 @@ const PERSON: u64 = u64::from_le_bytes(*b"person\0\0");
 const SPREAD: u64 = u64::from_le_bytes(*b"spread\0\0");
 
 impl Person {
-    /// Draws the person of a seed and a number. Without a given form, one that people use with this element.
+    /// Draws the person with a given seed and number. If `form` is `None`, one of the forms that people use with this
+    /// element is drawn.
     ///
     /// # Errors
-    /// [`SimError::Model`] for invalid ranges or an invalid task, and [`SimError::NobodyFound`] if the ranges contain
-    /// no acceptable loop.
+    /// [`SimError::Model`] for invalid ranges or an invalid task, and [`SimError::NoAcceptablePerson`] if the ranges
+    /// contain no acceptable loop.
     pub fn draw(
         population: &Population,
         task: &Task,
@@ -135,7 +136,7 @@ impl Person {
             scenario.remnant.clone_from(&remnant);
             scenario.measurement_s = task.measurement_s;
             scenario.run_in_s = task.run_in_s;
-            // A loop that is stable in continuous time need not be so after the holds.
+            // A loop that is stable in continuous time can be unstable with the holds.
             let simulator = match FamilySimulator::new(&scenario) {
                 Err(SimError::Model(ModelError::UnstableLoop { .. })) => continue,
                 other => other?,
@@ -162,14 +163,14 @@ impl Person {
                 state,
             });
         }
-        Err(SimError::NobodyFound {
+        Err(SimError::NoAcceptablePerson {
             form: form.map_or_else(|| "any".to_owned(), |form| form.to_string()),
             plant: plant.to_string(),
             draws: MOST_DRAWS,
         })
     }
 
-    /// Returns the scenario of a run without spread.
+    /// Returns the scenario of a run without spread between runs.
     pub fn scenario(&self) -> &FamilyScenario {
         self.simulator.scenario().scenario()
     }
@@ -182,10 +183,10 @@ impl Person {
         }
     }
 
-    /// Returns a run by its number.
+    /// Returns the run with a given number.
     ///
     /// # Errors
-    /// [`SimError::NobodyFound`] if the spread between runs leaves no stable loop.
+    /// [`SimError::NoAcceptablePerson`] if no draw of the parameters gives a stable loop.
     pub fn run(&self, run: u64) -> Result<PersonRun, SimError> {
         let seed = self.run_seed(run);
         if self.task.between_runs == 0.0 {
@@ -224,7 +225,7 @@ impl Person {
                 Err(other) => return Err(other),
             }
         }
-        Err(SimError::NobodyFound {
+        Err(SimError::NoAcceptablePerson {
             form: self.state.operator.form().to_string(),
             plant: self.plant.to_string(),
             draws: MOST_RUN_DRAWS,
@@ -232,14 +233,14 @@ impl Person {
     }
 }
 
-/// A loop that a population accepts.
+/// Loop that a population accepts.
 struct AcceptedLoop {
     state: FamilyState,
     crossover_rad_s: f64,
     phase_margin_deg: f64,
 }
 
-/// Returns the loop of one draw with its crossover and margin, if the population accepts it.
+/// Returns the loop of one draw with its crossover frequency and phase margin; `None` if the population rejects it.
 fn loop_of(population: &Population, plant: Plant, form: Form, draw: &[f64]) -> Result<Option<AcceptedLoop>, SimError> {
     let kinds = form.coordinates(true);
     let value = |kind: &Coordinate| match kind {
@@ -247,9 +248,9 @@ fn loop_of(population: &Population, plant: Plant, form: Form, draw: &[f64]) -> R
         Coordinate::Lead | Coordinate::Linear => population.lead_s.at_log(draw[0]),
         Coordinate::LagRate if draw[1] < population.integrates => 0.0,
         Coordinate::LagRate => 1.0 / population.lag_s.at_log(draw[2]),
-        // A double lead with real roots of the numerator: c_2 up to (c_1/2)^2.
+        // Double lead whose numerator has real roots: c_2 is at most (c_1/2)^2.
         Coordinate::Quadratic => (population.lead_s.at_log(draw[0]) / 2.0).powi(2) * draw[3],
-        // The droop of a lag: alpha of the order of 1/T_I.
+        // Phase droop of a lag: alpha is of the order of 1/T_I.
         Coordinate::Droop => 1.0 / population.lag_s.at_log(draw[2]),
         Coordinate::LogOmega => population.omega_nm_rad_s.at(draw[4]).ln(),
         Coordinate::LogZeta => population.zeta_nm.at_log(draw[5]).ln(),
@@ -270,15 +271,15 @@ fn loop_of(population: &Population, plant: Plant, form: Form, draw: &[f64]) -> R
         controlled_element: element,
     };
     let open_loop = state.open_loop()?;
-    // From a tenth of the crossover to ten times it.
-    let rings = (-40..=40).any(|i| {
+    // The frequencies range from a tenth of the crossover frequency to ten times this frequency.
+    let is_resonant = (-40..=40).any(|i| {
         let l = open_loop.response(crossover * 10f64.powf(f64::from(i) / 40.0));
         (Complex64::from(1.0) + l).norm() * population.largest_sensitivity < 1.0
     });
-    if rings || !closed_loop_is_stable(&open_loop) {
+    if is_resonant || !closed_loop_is_stable(&open_loop) {
         return Ok(None);
     }
-    // The gain may cross one elsewhere too: the crossover by definition is used.
+    // The gain may equal one at other frequencies too, so the crossover is found by its definition.
     let found = margins(|omega| open_loop.response(omega), MANUAL_CONTROL_RANGE_RAD_S);
     let (Some(crossover_rad_s), Some(phase_margin_deg)) = (found.crossover_rad_s, found.phase_margin_deg) else {
         return Ok(None);

@@ -1,21 +1,21 @@
-//! Distribution of the drawn people, and the controlled element.
+//! Distribution from which virtual people are drawn, and the controlled element.
 //!
-//! Each parameter is drawn uniformly over a range; time constants and damping uniformly in the logarithm. The gain
-//! follows from a crossover frequency that is drawn likewise. A loop whose phase margin lies outside its range, or that
-//! has a resonance or is not stable, is drawn again with all its parameters.
+//! Each parameter is drawn uniformly over a range; time constants and damping are drawn uniformly in the logarithm. The
+//! gain follows from a crossover frequency, which is also drawn uniformly in the logarithm. All parameters are drawn
+//! again if the phase margin of the loop is outside its range or if the loop is resonant or unstable.
 //!
 //! | parameter | range | source |
 //! |---|---|---|
 //! | T_L | 0.3 to 2 s | D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics 8 (1967) 231-249 |
-//! | T_I | 2 to 20 s, or infinite | the same: low-frequency lag of people on `K/s` |
+//! | T_I | 2 to 20 s, or infinite | McRuer and Jex: low-frequency lag of people on `K/s` |
 //! | omega_nm | 8 to 16 rad/s | R. E. Magdaleno and D. T. McRuer, NASA CR-1757 (1971); M. M. van Paassen, *Biophysics in Aircraft Control* (1994) |
-//! | zeta_nm | 0.1 to 0.6 | the same |
-//! | tau | 0.12 to 0.4 s | McRuer and Jex: 0.12 to 0.2 s with practised people on `K/s`, more on elements of higher order |
-//! | phase margin | 20 to 65 deg | the same |
+//! | zeta_nm | 0.1 to 0.6 | Magdaleno and McRuer; van Paassen |
+//! | tau | 0.12 to 0.4 s | McRuer and Jex: 0.12 to 0.2 s for practised people on `K/s`, longer for elements of higher order |
+//! | phase margin | 20 to 65 deg | McRuer and Jex |
 
 use hoid_model::{ContinuousTransferFunction, Form, ModelError, family_scenario::MultiSine};
 
-/// A range of values.
+/// Range of values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
     /// Lower limit.
@@ -30,12 +30,12 @@ impl Range {
         Self { low, high }
     }
 
-    /// Returns the value at a share of the range, 0 to 1.
+    /// Returns the value at a fraction (0 to 1) of the range.
     pub(super) fn at(&self, part: f64) -> f64 {
         self.low + (self.high - self.low) * part
     }
 
-    /// Returns the value at a share of the range on a logarithmic scale.
+    /// Returns the value at a fraction (0 to 1) of the range on a logarithmic scale.
     pub(super) fn at_log(&self, part: f64) -> f64 {
         self.low * (self.high / self.low).powf(part)
     }
@@ -53,37 +53,38 @@ impl Range {
         Err(ModelError::OutOfRange {
             quantity,
             found: if self.low >= least { self.high } else { self.low },
-            expected: "a range from a positive number (zero or more for shares) to one that is not smaller",
+            expected: "two positive numbers (zero or more for shares), the smaller number first",
         })
     }
 }
 
-/// The ranges.
+/// Ranges of the parameters of virtual people.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Population {
-    /// T_L, s.
+    /// Lead time constant T_L in s.
     pub lead_s: Range,
-    /// T_I, s, if it is finite.
+    /// Lag time constant T_I in s, if it is finite.
     pub lag_s: Range,
-    /// Probability that the lag of a person is an integration: T_I is infinite. Default 0.25.
+    /// Probability that the lag of a person is an integration, that is, T_I is infinite. Default: 0.25.
     pub integrates: f64,
-    /// omega_nm, rad/s.
+    /// Neuromuscular natural frequency omega_nm in rad/s.
     pub omega_nm_rad_s: Range,
-    /// zeta_nm.
+    /// Neuromuscular damping ratio zeta_nm.
     pub zeta_nm: Range,
-    /// tau_e, s.
+    /// Effective delay tau_e in s.
     pub tau_e_s: Range,
-    /// Crossover frequency, rad/s. Default 1 to 5.
+    /// Crossover frequency in rad/s. Default: 1 to 5.
     pub crossover_rad_s: Range,
-    /// Phase margin, deg.
+    /// Phase margin in deg.
     pub phase_margin_deg: Range,
-    /// Largest `|1/(1 + Y P)|`: beyond it a loop is too resonant. Default 4, that of a phase margin of 14 deg.
+    /// Largest `|1/(1 + Y P)|` of an accepted loop; above this limit a loop counts as resonant. Default: 4, the value
+    /// at the crossover for a phase margin of 14 deg.
     pub largest_sensitivity: f64,
-    /// Share of the remnant in the variance of u. Default 0.05 to 0.5.
+    /// Share of the variance of u that is due to the remnant. Default: 0.05 to 0.5.
     pub remnant_share: Range,
-    /// Largest offset of recorded e and u, in either direction, in their own rms. Default 0.3.
+    /// Largest offset of the recorded e and u, in either direction, relative to the rms of the signal. Default: 0.3.
     pub offset: f64,
-    /// Random walk of the stick, in rms of u per root second. Default 0.03.
+    /// Random walk of the stick, in rms of u per square root of a second. Default: 0.03.
     pub walk_per_root_s: f64,
 }
 
@@ -144,7 +145,7 @@ impl Population {
     }
 }
 
-/// The controlled element of a virtual person.
+/// Controlled element of a virtual person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Plant {
     /// `1/s`.
@@ -162,7 +163,7 @@ hoid_model::named_choice!(Plant, "controlled element", 3, {
 });
 
 impl Plant {
-    /// Returns its denominator in descending powers of s; the numerator is one.
+    /// Returns the denominator of the transfer function in descending powers of s; the numerator is one.
     pub fn denominator(self) -> &'static [f64] {
         match self {
             Self::Integrator => &[1.0, 0.0],
@@ -171,7 +172,7 @@ impl Plant {
         }
     }
 
-    /// Returns it in the notation of a manifest, `NUM/DEN`.
+    /// Returns the controlled element in the notation of a manifest, `NUM/DEN`.
     pub fn text(self) -> &'static str {
         match self {
             Self::Integrator => "1/1,0",
@@ -180,16 +181,16 @@ impl Plant {
         }
     }
 
-    /// Returns its transfer function.
+    /// Returns the transfer function of the controlled element.
     ///
     /// # Errors
-    /// None in practice: as [`ContinuousTransferFunction::new`].
+    /// As [`ContinuousTransferFunction::new`]; no error is expected in practice.
     pub fn transfer_function(self) -> Result<ContinuousTransferFunction, ModelError> {
         ContinuousTransferFunction::new(&[1.0], self.denominator())
     }
 
-    /// Returns the forms that people use with it, with equal probabilities: gain, lead and lag on `1/s`; a lead, or
-    /// two with a lag, on elements of second order.
+    /// Returns the forms that people use with this element, which are drawn with equal probabilities: gain, lead and
+    /// lag with `1/s`; a lead, or two leads with a lag, with elements of second order.
     pub fn forms(self) -> &'static [Form] {
         match self {
             Self::Integrator => &[Form::LeadLag],
@@ -197,8 +198,8 @@ impl Plant {
         }
     }
 
-    /// Returns the disturbance: primes up to 31 times 0.05 Hz on `1/s`, up to 17 on elements of second order, whose
-    /// loops are slower.
+    /// Returns the disturbance: the prime multiples of 0.05 Hz, up to 31 times with `1/s` and up to 17 times with
+    /// elements of second order, whose loops are slower.
     pub fn disturbance(self) -> MultiSine {
         MultiSine {
             largest: if self == Self::Integrator { 31 } else { 17 },

@@ -1,25 +1,26 @@
 //! Realistic remnants.
 //!
-//! All but the first have three parts: a broad band `1/(T_n s + 1)` with T_n = 0.05 to 0.3 s, 70 % of the remnant; a
-//! peak at the person's omega_nm with a damping of 0.15 to 0.4, 20 %; a drift `1/(T_n s + 1)` with T_n = 3 to 10 s, 10
-//! %. The kinds are described with their sources in [`hoid_model::family_scenario`].
+//! All kinds except the first have three parts: a broad band `1/(T_n s + 1)` with T_n = 0.05 to 0.3 s (70 % of the
+//! remnant), a peak at the omega_nm of the person with a damping ratio of 0.15 to 0.4 (20 %), and a drift
+//! `1/(T_n s + 1)` with T_n = 3 to 10 s (10 %). [`hoid_model::family_scenario`] describes the kinds and their sources.
 
 use hoid_model::family_scenario::{Followed, Intermittence, Pulses, RemnantPart, RemnantShape, SignalDependence};
 
 use super::population::Range;
 
-/// A kind of remnant.
+/// Kind of remnant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum RemnantKind {
     /// Only `1/(T_n s + 1)`, as in the thesis.
     Lag,
-    /// Broad band, peak and drift, Gaussian.
+    /// Gaussian broad band, peak and drift.
     BroadBand,
-    /// The same, with 80 % of the variance of the broad band proportional to the running rms of u (1 s).
+    /// As `BroadBand`, with 80 % of the variance of the broad band proportional to the running mean square of u (memory
+    /// 1 s).
     SignalDependent,
-    /// The same, with 80 % of the variance of the broad band in two pulses per second.
+    /// As `BroadBand`, with 80 % of the variance of the broad band in pulses, two per second on average.
     Pulsed,
-    /// The same, with the broad band on for 2 s and off for 2 s on average.
+    /// As `BroadBand`, with the broad band on for 2 s and off for 2 s on average.
     Intermittent,
 }
 
@@ -36,7 +37,7 @@ const DRIFT_S: Range = Range::new(3.0, 10.0);
 const DAMPING: Range = Range::new(0.15, 0.4);
 
 impl RemnantKind {
-    /// Returns the parts of a person, from three numbers from `[0, 1)`.
+    /// Returns the parts of the remnant of a person, from three numbers in `[0, 1)`.
     pub(super) fn parts(self, share: f64, omega_nm_rad_s: f64, numbers: [f64; 3]) -> Vec<RemnantPart> {
         let lag = |time_constant_s| RemnantShape::Lag {
             time_constant_s,

@@ -1,14 +1,15 @@
 //! Analysis of the runs of a person in a condition, jointly and one by one.
 //!
-//! All runs of a person in a condition come first. If nothing changes within them, the family of operators is fitted
-//! jointly to all of them ([`hoid_ident::family`]): the operator of the person. nk, and for Box-Jenkins nd and T_n, are
-//! also chosen once for all of them (`run_orders`). In addition there is a Box-Jenkins model of all runs with initial
-//! states of each, the delay that fits best, and the highest order of the noise model that the manifest allows. In a
-//! closed loop a noise model of too low order biases the operator, and a single run is too short for a high order.
+//! First, all runs of a person in a condition are analysed together. If the task does not change within them, the
+//! family of operators is fitted jointly to all of them ([`hoid_ident::family`]), which gives the operator of the
+//! person. The orders and delay of the polynomial models (nk, and for Box-Jenkins nd and T_n) are also chosen once for
+//! all of these runs (`run_orders`). In addition, a Box-Jenkins model is fitted to all runs, with separate initial
+//! states for each run, the best-fitting delay, and the highest order of the noise model that the manifest allows. In a
+//! closed loop, a noise model of too low an order biases the operator, and a single run is too short for a high order.
 //!
 //! With the chosen orders, ARX and Box-Jenkins models are fitted to the sub-batches of each run and to the whole run,
-//! and the recursions start from the fit of the first sub-batch; the family is fitted to the whole run with the form of
-//! the person. A row gives the estimated quantity and its window; a failure is a row with its reason.
+//! and the recursions start from the fit of the first sub-batch. The family is fitted to the whole run with the form of
+//! the person. Each row gives one estimated quantity and its window; a failure is a row with its reason.
 
 use std::path::Path;
 
@@ -35,21 +36,21 @@ use crate::statistics::median;
 
 /// Label of a run that could not be read.
 pub(super) const READ: &str = "read";
-/// Label for the recording itself.
+/// Label of quantities that describe the recording itself.
 pub(super) const RECORD: &str = "record";
 /// Name of the table of people.
 pub(super) const PEOPLE: &str = "people";
 
-/// Results of all runs of a person in a condition that the analysis of each run uses.
+/// Results from all runs of a person in a condition that the analysis of each run needs.
 pub(super) struct FromCell {
     arx: Result<Orders, String>,
     box_jenkins: Result<Orders, String>,
-    /// The form of the operator, if there is one.
+    /// Form of the operator of the person; `None` if the person has no operator.
     form: Option<Form>,
 }
 
 impl FromCell {
-    /// From the parts of the cell: its estimates and its people.
+    /// Extracts these results from two tables of the cell: its estimates and its people.
     pub fn of(estimates: &OutputTable, people: &OutputTable) -> Self {
         Self {
             arx: run_orders::chosen(estimates, Structure::Arx),
@@ -108,13 +109,13 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
     let late_samples = analysis.rows.condition.offset_samples;
     let people = match (&cell.changes, runs.is_empty()) {
         (Some(reason), _) => vec![Person::without(cell.key(), PersonStatus::Changes, reason)],
-        // For a file that cannot be read, its run reports the error.
+        // A file that cannot be read is reported by the analysis of its run.
         (None, true) => vec![Person::without(
             cell.key(),
             PersonStatus::Failed,
             "no run could be read",
         )],
-        // They differ only if u is late.
+        // The two pairings differ only if u is recorded late.
         (None, false) if late_samples != 0.0 => {
             let (entries, paired) = read(Pairing::InTheLoop);
             analysis.family_together(manifest, cell.key(), &entries, &paired)
@@ -125,7 +126,7 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
     if let Some(first) = records.first() {
         let tau_s = people[0].parameter("tau_e").map(|tau| tau.value);
         let nk = tau_s.map(|tau_s| run_orders::nk_of(tau_s, first.sample_time().s(), late_samples));
-        // Their names have been checked with the manifest.
+        // The names of the structures were checked with the manifest.
         for structure in analysis.settings.structures().unwrap_or_default() {
             if let Err(reason) = run_orders::choose(analysis.settings, &records, structure, nk, &mut analysis.rows) {
                 analysis.rows.failed(None, label_of(structure), &reason);
@@ -141,7 +142,7 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
     tables
 }
 
-/// The analysis of a run: its settings and its results so far.
+/// The analysis of a run: its settings and the rows written so far.
 struct RunAnalysis<'a> {
     settings: &'a AnalysisSettings,
     rows: RunRows<'a>,
@@ -166,7 +167,7 @@ impl<'a> RunAnalysis<'a> {
         for (name, value) in of_record.into_iter().chain(change) {
             self.rows.row(Some(windows[2]), RECORD, name, Estimate::fixed(value));
         }
-        // Names of structures and recursions have been checked with the manifest.
+        // The names of structures and recursions were checked with the manifest.
         for structure in self.settings.polynomials().unwrap_or_default() {
             let label = label_of(structure);
             let orders = match from_cell.orders(structure) {
@@ -198,12 +199,12 @@ impl<'a> RunAnalysis<'a> {
         }
     }
 
-    /// Applies a recursion to the run: one that starts by itself gets no prior information, another has the orders of
-    /// the cell and starts from a fit of the first window.
+    /// Applies a recursion to the run. A method that needs no start fit gets no prior information; any other method
+    /// gets the orders chosen for the cell and starts from a fit of the first window.
     fn track(&mut self, run: &Run, windows: &[Window; 3], method: &Method, from_cell: &FromCell) {
         let label = traces::label_of(method);
         let mut tracking = Tracking {
-            // The run is repaired and has its final rate.
+            // The run has already been repaired and reduced to its final rate.
             rate: Decimation::Off,
             every: run.samples(self.settings.trace_every as f64).round().max(1.0) as usize,
             ..Tracking::of(TrackRequest::of(method.clone()))
@@ -237,7 +238,7 @@ impl<'a> RunAnalysis<'a> {
         }
     }
 
-    /// Fits a Box-Jenkins model to all runs.
+    /// Fits one Box-Jenkins model to all runs.
     fn box_jenkins_together(&mut self, records: &[Record]) {
         const LABEL: &str = "BJ, all runs";
         let structure = Structure::BoxJenkins;
@@ -252,7 +253,7 @@ impl<'a> RunAnalysis<'a> {
         }
     }
 
-    /// Fits the family to all runs, and returns the people of the fit.
+    /// Fits the family jointly to all runs and returns the people of the fit.
     fn family_together(
         &mut self,
         manifest: &Manifest,
@@ -272,17 +273,17 @@ impl<'a> RunAnalysis<'a> {
             Ok(found) => {
                 let record = &runs[0].record;
                 let window = windows(self.settings, record)[2];
-                family_fits::rows_of_fit(&mut self.rows, window, family_fits::OF_ALL, &found.fit, record);
+                family_fits::rows_of_fit(&mut self.rows, window, family_fits::JOINT_LABEL, &found.fit, record);
                 family_fits::people_of_fit(key, entries, &found, self.rows.element())
             }
             Err(reason) => {
-                self.rows.failed(None, family_fits::OF_ALL, &reason);
+                self.rows.failed(None, family_fits::JOINT_LABEL, &reason);
                 vec![Person::without(key, PersonStatus::Failed, &reason)]
             }
         }
     }
 
-    /// Fits the family to one run, in the form of the person.
+    /// Fits the family to one run, in the form chosen for the person.
     fn family_of_run(&mut self, record: Result<Record, String>, form: Form) {
         let fit = record.and_then(|record| {
             let estimator = family_fits::estimator_of_run(self.settings, &self.rows.condition, form)?;
@@ -292,9 +293,9 @@ impl<'a> RunAnalysis<'a> {
         match fit {
             Ok((fit, record)) => {
                 let window = windows(self.settings, &record)[2];
-                family_fits::rows_of_fit(&mut self.rows, window, family_fits::OF_RUN, &fit, &record);
+                family_fits::rows_of_fit(&mut self.rows, window, family_fits::SINGLE_RUN_LABEL, &fit, &record);
             }
-            Err(reason) => self.rows.failed(None, family_fits::OF_RUN, &reason),
+            Err(reason) => self.rows.failed(None, family_fits::SINGLE_RUN_LABEL, &reason),
         }
     }
 

@@ -1,4 +1,4 @@
-//! Treatment of each run: the keys of `[analysis]`.
+//! Settings of the analysis of each run: the keys of `[analysis]`.
 
 use hoid_ident::family::FamilyEstimator;
 use hoid_model::{Form, Structure, operator_family::Coordinate};
@@ -6,11 +6,11 @@ use hoid_track::Method;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Treatment of each run.
+/// Settings of the analysis of each run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AnalysisSettings {
-    /// The two sub-batches, s. Default: the first and the last three eighths of each record.
+    /// The two sub-batches, in s. Default: the first three eighths and the last three eighths of each record.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub windows_s: Option<[(f64, f64); 2]>,
     /// Smallest and largest order of the noise model; BIC selects an order on each sub-batch, and the larger of the two
@@ -21,35 +21,34 @@ pub struct AnalysisSettings {
     /// Recursions by name, as in `hoid track`. Default: adaptive, rls, rpem.
     #[schemars(extend("items" = serde_json::json!({ "enum": method_names() })))]
     pub methods: Vec<String>,
-    /// Polynomial models that are fitted in addition to the operator, for tables and figures: arx, bj, both or none.
+    /// Polynomial models that are fitted in addition to the operator, for tables and figures: arx, bj, both or neither.
     #[schemars(extend("items" = serde_json::json!({ "enum": POLYNOMIALS.map(Structure::name) })))]
     pub polynomials: Vec<String>,
-    /// Samples from one kept point of a trace to the next.
+    /// Number of samples from one stored point of a trace to the next.
     pub trace_every: usize,
-    /// Whether the grey box is fitted too.
+    /// Whether the grey-box model is also fitted.
     pub grey_box: bool,
-    /// Form of the operator of the family: auto, or the name of a form.
+    /// Form of the operator: auto, or the name of a form.
     #[schemars(extend("enum" = serde_json::json!(form_names())))]
     pub form: String,
-    /// Prior knowledge of the operator before the data: population, none, or NAME=CENTRE:SPREAD
-    /// separated by commas.
+    /// Prior knowledge of the operator: population, none, or NAME=CENTRE:SPREAD, separated by commas.
     pub prior: String,
-    /// Parameters of the operator that each run has for itself, such as K; all others are common to
-    /// the runs of a person in a condition.
+    /// Parameters of the operator that differ between runs, such as K; all other parameters are common to the runs of a
+    /// person in a condition.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schemars(extend("items" = serde_json::json!({ "enum": Coordinate::ALL.map(Coordinate::parameter) })))]
     pub individual: Vec<String>,
-    /// Whether the operator is also fitted to each run, with the common form of all runs.
+    /// Whether the operator is also fitted to each single run, in the form common to all runs.
     pub each_run: bool,
-    /// Frequencies at which the response of the recursions is kept, rad/s.
+    /// Frequencies at which the response of the recursions is stored, rad/s.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub response_at_rad_s: Vec<f64>,
 }
 
-/// The structures that a group may fit.
+/// Polynomial structures that a group can fit.
 const POLYNOMIALS: [Structure; 2] = [Structure::Arx, Structure::BoxJenkins];
 
-/// The form that held-out runs choose.
+/// Name for the form chosen by the fit.
 const AUTO: &str = "auto";
 
 /// The names of the forms, for the schema.
@@ -84,19 +83,19 @@ impl Default for AnalysisSettings {
 }
 
 impl AnalysisSettings {
-    /// The recursions with their defaults.
+    /// Returns the recursive methods with their default options.
     ///
     /// # Errors
-    /// A name that no method has.
+    /// A name that is not the name of a recursive method.
     pub(super) fn recursions(&self) -> Result<Vec<Method>, String> {
         let of = |name: &String| hoid_survey::method(name).map_err(|error| format!("analysis.methods: {error}"));
         self.methods.iter().map(of).collect()
     }
 
-    /// The polynomial models that are fitted, in their default order.
+    /// Returns the polynomial models to fit, in default order.
     ///
     /// # Errors
-    /// A name of another structure, or of none.
+    /// A name that is neither `arx` nor `bj`.
     pub(super) fn polynomials(&self) -> Result<Vec<Structure>, String> {
         let names = POLYNOMIALS.map(Structure::name);
         if let Some(name) = self.polynomials.iter().find(|name| !names.contains(&name.as_str())) {
@@ -109,7 +108,8 @@ impl AnalysisSettings {
         Ok(POLYNOMIALS.into_iter().filter(asked).collect())
     }
 
-    /// The structures whose orders are needed: of the polynomial models, and of the recursions that start from one.
+    /// Returns the structures whose orders are needed: those of the polynomial models to fit, and those of recursions
+    /// that start from a fit.
     ///
     /// # Errors
     /// As [`Self::polynomials`] and [`Self::recursions`].
@@ -123,10 +123,10 @@ impl AnalysisSettings {
         Ok(POLYNOMIALS.into_iter().filter(needed).collect())
     }
 
-    /// Settings of the fit of the family; the form is selected by the data or given.
+    /// Returns the settings for fitting the family; the form is given, or selected from the data.
     ///
     /// # Errors
-    /// A form, a prior or a parameter that does not exist.
+    /// An unknown form, prior or parameter.
     pub(super) fn family(&self) -> Result<FamilyEstimator, String> {
         let mut estimator = FamilyEstimator::default();
         if self.form != AUTO {
@@ -144,7 +144,7 @@ impl AnalysisSettings {
         Ok(estimator)
     }
 
-    /// Reason why the settings are not valid.
+    /// Checks the settings; the error is the reason why they are invalid.
     pub(super) fn check(&self) -> Result<(), String> {
         self.structures()?;
         self.family()?;

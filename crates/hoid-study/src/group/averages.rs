@@ -1,5 +1,4 @@
-//! Averages over the runs of a subject and condition: means with their errors, chosen delays, mean
-//! traces.
+//! Averages over the runs of a subject in a condition: means with their errors, chosen delays, and mean traces.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +13,7 @@ use crate::{
 /// Subject, condition, window, estimator, parameter.
 type Key = [String; 5];
 
-/// Estimates collected over runs.
+/// Estimates of all runs, by subject, condition, window, estimator and parameter.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Averages(BTreeMap<Key, Vec<f64>>);
 
@@ -31,7 +30,7 @@ impl Averages {
         }
     }
 
-    /// Mean, spread and standard error over the runs.
+    /// Returns the table of means, standard deviations and standard errors over the runs.
     pub fn table(&self) -> OutputTable {
         let mut rows = Rows::new(&schema(
             text(&["subject", "condition", "window", "estimator", "parameter"]).chain(real(&[
@@ -53,7 +52,7 @@ impl Averages {
             {
                 rows.text(name, text);
             }
-            let figures = [s.count as f64, s.mean, s.mean_se, s.sd, s.median, s.least, s.most];
+            let figures = [s.count as f64, s.mean, s.mean_se, s.sd, s.median, s.min, s.max];
             for (name, value) in ["runs", "mean", "standard_error", "sd", "median", "least", "most"]
                 .iter()
                 .zip(figures)
@@ -65,7 +64,7 @@ impl Averages {
     }
 }
 
-/// Delays and T_n chosen in advance (Table 3): one row for each subject and condition.
+/// Chosen delays and orders, and T_n (Table 3): one row for each subject and condition.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Delays(BTreeMap<(String, String), BTreeMap<&'static str, f64>>);
 
@@ -77,7 +76,7 @@ const DELAY_COLUMNS: [(&str, &str, &str); 4] = [
 ];
 
 impl Delays {
-    /// Adds the runs of a subject in a condition.
+    /// Adds the values chosen for a subject in a condition.
     pub fn add(&mut self, estimates: &OutputTable) {
         let [subject, condition, window, estimator, parameter] =
             ["subject", "condition", "window", "estimator", "parameter"].map(|name| texts(estimates, name));
@@ -93,7 +92,7 @@ impl Delays {
         }
     }
 
-    /// The table.
+    /// Returns the table of the chosen values.
     pub fn table(&self) -> OutputTable {
         let columns = DELAY_COLUMNS.map(|(_, _, column)| column);
         let mut rows = Rows::new(&schema(text(&["subject", "condition"]).chain(real(&columns))));
@@ -112,7 +111,7 @@ impl Delays {
 /// Statistics of a parameter over the runs at each time.
 const FIGURES: [&str; 6] = ["runs", "mean", "sd", "lower_quartile", "median", "upper_quartile"];
 
-/// Traces of all runs at common times.
+/// Traces of all runs, collected by time.
 #[derive(Debug, Clone, Default)]
 pub(super) struct TraceAverages {
     names: Vec<String>,
@@ -120,7 +119,8 @@ pub(super) struct TraceAverages {
 }
 
 impl TraceAverages {
-    /// Starts the collection for these parameters; names that end in `_se` are averaged as variances.
+    /// Creates an empty collection for these columns. For names that end in `_se`, the table gives the median of the
+    /// variances.
     pub fn new(names: Vec<String>) -> Self {
         Self {
             names,
@@ -128,7 +128,7 @@ impl TraceAverages {
         }
     }
 
-    /// The columns.
+    /// Returns the columns of the table.
     pub fn schema(names: &[String]) -> TableSchema {
         let mut columns: Vec<String> = vec!["t".to_owned()];
         for name in names {
@@ -156,7 +156,7 @@ impl TraceAverages {
         }
     }
 
-    /// Times of the rows of an estimator, and the medians of a parameter over the runs.
+    /// Returns the times of the rows of an estimator, and the medians of a parameter over the runs at these times.
     pub fn medians(&self, key: &[String; 3], name: &str) -> (Vec<f64>, Vec<f64>) {
         let at = self.names.iter().position(|known| known == name);
         let (Some(times), Some(at)) = (self.values.get(key), at) else {
@@ -168,8 +168,8 @@ impl TraceAverages {
             .unzip()
     }
 
-    /// Median, quartiles, mean and standard deviation over the runs at each time; for a standard
-    /// error the median of the variances.
+    /// Returns the table of median, quartiles, mean and standard deviation over the runs at each time; for a standard
+    /// error, the median of the variances.
     pub fn table(&self) -> OutputTable {
         let mut rows = Rows::new(&Self::schema(&self.names));
         for (key, times) in &self.values {

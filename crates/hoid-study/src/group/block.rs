@@ -1,11 +1,11 @@
-//! Unit of analysis, which is one part on disk: a run, or all runs of a person in a condition.
+//! Unit of analysis, which is stored as one part on disk: a single run, or all runs of a person in a condition.
 
 use super::manifest::{Manifest, RunEntry};
 
 /// All runs of a person in a condition.
 pub(super) struct Cell<'a> {
     pub runs: Vec<&'a RunEntry>,
-    /// Reason why it has no operator: the behaviour of the person changes within the runs.
+    /// Reason why the cell has no operator: the task changes within the runs. `None` if it does not.
     pub changes: Option<String>,
 }
 
@@ -16,13 +16,13 @@ impl Cell<'_> {
     }
 }
 
-/// Unit of analysis, which is one part on disk.
+/// Unit of analysis, which is stored as one part on disk.
 pub(super) enum Block<'a> {
     Run(&'a RunEntry),
     Cell(Cell<'a>),
 }
 
-/// The runs that count, followed by their cells.
+/// Returns the runs that are analysed, followed by their cells.
 pub(super) fn blocks(manifest: &Manifest) -> Vec<Block<'_>> {
     let runs: Vec<&RunEntry> = manifest.runs.iter().filter(|run| run.counts).collect();
     let mut cells: Vec<Cell<'_>> = Vec::new();

@@ -1,18 +1,19 @@
-//! Controlled elements of conditions as one text, as `hoid group init --element` takes it:
+//! Controlled elements of conditions in text form, as for `hoid group init --element`:
 //!
 //! ```text
 //! C1-*,C3-pitch=90/(s(s+6))
 //! C3-roll=90/(s(s+6)) > 30/(s(s+.2)) @ 50 : 0.5
 //! ```
 //!
-//! Names of conditions (`*` matches anything) and the element; if the element changes, also the element after the
-//! change, the time of the change in s, and its rate G in 1/s; without G the change is sudden.
+//! The text gives the names of conditions (`*` matches anything) and the element. If the element changes, the text also
+//! gives the element after the change, the time of the change in s, and its rate G in 1/s; without G the change is
+//! sudden.
 
 use std::str::FromStr;
 
 use super::{manifest::Manifest, pattern::matches_any};
 
-/// The controlled element of some conditions.
+/// The controlled element of one or more conditions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConditionElement {
     names: Vec<String>,
@@ -66,10 +67,10 @@ impl FromStr for ConditionElement {
 }
 
 impl ConditionElement {
-    /// Writes the elements to the conditions of a manifest.
+    /// Writes the elements to the matching conditions of a manifest.
     ///
     /// # Errors
-    /// A name that no condition has, an element that cannot be parsed, or a rate that is not positive.
+    /// A name that matches no condition, an element that cannot be parsed, or a rate that is not positive.
     pub fn apply(all: &[Self], manifest: &mut Manifest) -> Result<(), String> {
         let mut conditions: Vec<String> = manifest.runs.iter().map(|run| run.condition.clone()).collect();
         conditions.sort();

@@ -10,17 +10,18 @@ use super::preparation_settings::PreparationSettings;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ConditionSettings {
-    /// Controlled element, such as `90/(s(s+6))` or `90/1,6,0` (by descending powers of s); before the change, if there
-    /// is one.
+    /// Controlled element, such as `90/(s(s+6))` or `90/1,6,0` (coefficients in descending powers of s). If the element
+    /// changes, this is the one before the change.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub controlled_element: Option<String>,
     /// Channel whose lines excite the loop: f_t or a disturbance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub excitation: Option<String>,
-    /// Period of the excitation, s. Default: the longest period of which all its lines are harmonics.
+    /// Period of the excitation, s. Default: the longest period of which all lines are harmonics.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub period_s: Option<f64>,
-    /// Samples by which u is recorded later than the e to which it responds: `e[k]` belongs to `u[k + offset]`.
+    /// Number of samples by which u is recorded later than the e to which it responds: `e[k]` belongs to
+    /// `u[k + offset]`.
     pub offset_samples: f64,
     /// Time at which the task changes, s.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -28,17 +29,17 @@ pub struct ConditionSettings {
     /// Controlled element after the change.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub changes_to: Option<String>,
-    /// Rate G of the change, 1/s: a share `1/(1 + exp(-G (t - change_s)))` of the new element at t. Default: a sudden
-    /// change.
+    /// Rate G of the change, 1/s: at time t the new element has the weight `1/(1 + exp(-G (t - change_s)))`. Default: a
+    /// sudden change.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub change_per_s: Option<f64>,
-    /// Treatment of its runs before they are analysed; keys given here override those of the group.
+    /// Preparation of the runs of this condition; its keys override those of the group.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prepare: Option<PreparationSettings>,
 }
 
 impl ConditionSettings {
-    /// The controlled element of the whole run; none where it changes.
+    /// Returns the controlled element of the whole run; `None` if the element changes or is unknown.
     pub fn lasting_element(&self) -> Option<&str> {
         match self.changes_to {
             None => self.controlled_element.as_deref(),
@@ -46,10 +47,10 @@ impl ConditionSettings {
         }
     }
 
-    /// Checks the controlled elements and the change between them.
+    /// Checks the controlled elements and the settings of the change between them.
     ///
     /// # Errors
-    /// The key, the problem, and the remedy.
+    /// The invalid key, with the problem and the remedy.
     pub(super) fn check_elements(&self) -> Result<(), String> {
         let elements = [
             ("controlled_element", &self.controlled_element),
@@ -64,12 +65,13 @@ impl ConditionSettings {
         }
         if self.changes_to.is_some() && (self.controlled_element.is_none() || self.change_s.is_none()) {
             return Err(
-                "changes_to: name controlled_element, from which it changes, and change_s, the time".to_owned(),
+                "changes_to: also give controlled_element, the element before the change, and its time, change_s"
+                    .to_owned(),
             );
         }
         match self.change_per_s {
             Some(_) if self.changes_to.is_none() => {
-                Err("change_per_s: name changes_to, the element after it".to_owned())
+                Err("change_per_s: also give changes_to, the element after the change".to_owned())
             }
             Some(rate) if !(rate.is_finite() && rate > 0.0) => Err(format!(
                 "change_per_s is {rate}, expected a rate above 0; without it the change is sudden"

@@ -1,5 +1,5 @@
-//! Fits of the family of operators to the runs of a person in a condition jointly, and to each run
-//! with their common form.
+//! Fits of the family of operators, jointly to all runs of a person in a condition, and to each run in the form chosen
+//! by the joint fit.
 
 use hoid_analysis::{Excitation, Identification, Identified};
 use hoid_ident::family::{FamilyEstimator, FamilyFit};
@@ -14,12 +14,12 @@ use super::{
     windows::Window,
 };
 
-/// Label of a fit of one run in the tables.
-pub(super) const OF_RUN: &str = "family";
-/// Label of the fit of all runs.
-pub(super) const OF_ALL: &str = "family, all runs";
+/// Label of the fit of a single run in the tables.
+pub(super) const SINGLE_RUN_LABEL: &str = "family";
+/// Label of the joint fit of all runs in the tables.
+pub(super) const JOINT_LABEL: &str = "family, all runs";
 
-/// Identification of all runs of a person in a condition, as by `hoid identify`.
+/// Returns the identification of all runs of a person in a condition, with the settings of the manifest.
 pub(super) fn identification(
     manifest: &Manifest,
     condition: &str,
@@ -37,7 +37,7 @@ pub(super) fn identification(
     })
 }
 
-/// Estimator of one run.
+/// Returns the estimator for one run.
 fn estimator(settings: &AnalysisSettings, condition: &ConditionSettings) -> Result<FamilyEstimator, String> {
     Ok(FamilyEstimator {
         excitation: condition.excitation.clone(),
@@ -46,7 +46,7 @@ fn estimator(settings: &AnalysisSettings, condition: &ConditionSettings) -> Resu
     })
 }
 
-/// Estimator of one run of a person whose form is known: there are no individual parameters in one run.
+/// Returns the estimator for one run of a person whose form is known. A single run has no individual parameters.
 pub(super) fn estimator_of_run(
     settings: &AnalysisSettings,
     condition: &ConditionSettings,
@@ -59,7 +59,7 @@ pub(super) fn estimator_of_run(
     })
 }
 
-/// The people of a fit: one, or one for each run if some parameters are individual.
+/// Returns the people of a fit: one person, or one for each run if some parameters are individual.
 pub(super) fn people_of_fit(
     key: (&str, &str),
     runs: &[&RunEntry],
@@ -77,7 +77,7 @@ pub(super) fn people_of_fit(
         .collect()
 }
 
-/// The run of a recording, with its span if the run was cut at a fault.
+/// Returns the name of the run of a recording, with its time span if the run was cut at a fault.
 fn run_of(runs: &[&RunEntry], recording: &str) -> String {
     let of = |entry: &&RunEntry| {
         let span = recording.strip_prefix(&entry.file.display().to_string())?;
@@ -86,7 +86,7 @@ fn run_of(runs: &[&RunEntry], recording: &str) -> String {
     runs.iter().find_map(of).unwrap_or_else(|| recording.to_owned())
 }
 
-/// Parameters, loop and response of a fit of aligned records.
+/// Writes parameters, loop measures and response of a fit of aligned records.
 pub(super) fn rows_of_fit(rows: &mut RunRows<'_>, window: Window, label: &str, fit: &FamilyFit, record: &Record) {
     let of = fit.operator(0);
     for parameter in of.parameters.iter().filter(|p| p.value.is_finite()) {

@@ -1,21 +1,22 @@
-//! Describing functions of a group, by Fourier coefficients at the lines of the excitation (see
+//! Describing functions of a group, from the Fourier coefficients at the lines of the excitation (see
 //! [`hoid_ident::frequency`]).
 //!
-//! For each subject and each condition with an excitation in the manifest: the describing function
-//! over the readable runs, its verdict, and crossover and margins with the controlled element, all
-//! as by `hoid describe` ([`describe_runs`]). They complement the parametric fits and do not assume their structure.
+//! For each subject and each condition whose manifest entry names an excitation, the tables give the describing
+//! function over the readable runs, its verdict, and crossover and margins with the controlled element, as in
+//! `hoid describe` ([`describe_runs`]). The describing functions complement the parametric fits, whose structure they
+//! do not assume.
 //!
-//! The distance of a fit: with `H_j` the describing function at line j, `s_j` its standard error
-//! and `F_j` the median response of the fits over the runs, the distance is
-//! `sqrt(sum |F_j - H_j|^2/s_j^2 / sum |H_j|^2/s_j^2)`, the deviation relative to H with the lines
-//! weighted by their precision, and in standard errors `sqrt(mean |F_j - H_j|^2/s_j^2)`. The error
-//! of a line is estimated from few runs; each is shrunk towards the median of all lines,
-//! `r_j^2 <- (nu r_j^2 + 4 r~^2)/(nu + 4)` with `r = s/|H|` and `nu = 2 (runs - 1)` (moderated
-//! variances, Smyth 2004), otherwise an error that is small by chance would dominate. Both come from the same runs, so
-//! that a fit without bias is closer than one error. If the controlled element is known, a fit agrees if its crossover
-//! is within 10 % and its phase margin within 5 deg of those of the describing function: about the difference between
-//! two experiments with the same person; otherwise if its distance is below 10 %. If the task changes within the run,
-//! both are different averages over the change, and no agreement is reported.
+//! Distance of a fit: let `H_j` be the describing function at line j, `s_j` its standard error, and `F_j` the median
+//! response of the fits over the runs. The relative distance is `sqrt(sum |F_j - H_j|^2/s_j^2 / sum |H_j|^2/s_j^2)`,
+//! with the lines weighted by their precision; the distance in standard errors is `sqrt(mean |F_j - H_j|^2/s_j^2)`.
+//! Since the error of a line is estimated from few runs, each error is shrunk towards the median over all lines,
+//! `r_j^2 <- (nu r_j^2 + 4 r~^2)/(nu + 4)` with `r = s/|H|` and `nu = 2 (runs - 1)` (moderated variances, Smyth 2004);
+//! otherwise an error that is small by chance would dominate. Fit and describing function come from the same runs, so
+//! an unbiased fit is closer than one standard error. If the controlled element is known, a fit agrees if its crossover
+//! is within 10 % and its phase margin within 5 deg of those of the describing function, which is about the difference
+//! between two experiments with the same person. Otherwise a fit agrees if its distance is below 10 %. If the task
+//! changes within the run, the fit and the describing function average over the change differently, and no agreement is
+//! reported.
 
 use std::path::Path;
 
@@ -33,7 +34,7 @@ use super::{
 };
 use crate::{columns::Rows, statistics::median};
 
-/// Results of the describing functions: one row per line, and one per subject and condition.
+/// Tables of the describing functions: one row per line, one row per subject and condition, and one row per fit.
 pub(super) struct Frequencies {
     pub lines: OutputTable,
     pub margins: OutputTable,
@@ -70,19 +71,19 @@ const AGREEMENT: [&str; 6] = [
     "distance_in_errors",
 ];
 
-/// Largest difference of the crossover, of the phase margin, and of a response without crossover,
-/// for agreement.
-const AGREES: (f64, f64, f64) = (10.0, 5.0, 10.0);
+/// Largest differences at which a fit agrees: of the crossover in %, of the phase margin in deg, and, if there is no
+/// crossover, of the response in %.
+const AGREEMENT_LIMITS: (f64, f64, f64) = (10.0, 5.0, 10.0);
 
-/// The tables in progress.
+/// Rows of the tables written so far.
 struct Tables {
     lines: Rows,
     margins: Rows,
     agreement: Rows,
 }
 
-/// Describing functions of all subjects and conditions with an excitation, and the distances of the
-/// fits from them; `None` if the manifest gives no excitation.
+/// Computes the describing functions of all subjects and conditions with an excitation, and the distances of the fits
+/// from them; `None` if the manifest names no excitation.
 pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAverages) -> Option<Frequencies> {
     manifest.conditions.values().find(|facts| facts.excitation.is_some())?;
     let with_errors: Vec<String> = MARGINS
@@ -125,7 +126,8 @@ pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAvera
         let runs: Vec<Run> = of_cell
             .filter_map(|r| read_run(manifest, base, r, Pairing::Recorded).ok())
             .collect();
-        // A ratio of samples does not include the hold: the shift of the input for it is reversed.
+        // A ratio of Fourier coefficients does not include the hold, so the corresponding shift of the input is
+        // reversed.
         let late_samples = runs.first().map_or(0.0, |run| {
             run.samples(facts.offset_samples) + run.input_lead_s / run.record.sample_time().s()
         });
@@ -175,7 +177,7 @@ fn of_records(
         period_s: facts.period_s,
         controlled_element: element.clone(),
         offset_samples,
-        // It is part of reading.
+        // The trend was already removed when the runs were read.
         detrend: Detrend::None,
         ..DescriptionOptions::default()
     };
@@ -237,7 +239,7 @@ fn of_records(
         let (distance, in_errors) = distance(found, &response);
         agreement.real("distance_percent", distance);
         agreement.real("distance_in_errors", in_errors);
-        let mut agrees = distance <= AGREES.2;
+        let mut agrees = distance <= AGREEMENT_LIMITS.2;
         if let Some((crossover, margin)) = margins_of_lines {
             agrees = false;
             if let Some(of_fit) = element.as_ref().and_then(|element| response.crossover(element)) {
@@ -247,7 +249,7 @@ fn of_records(
                 agreement.real("phase_margin_deg", of_fit.phase_margin_deg);
                 agreement.real("crossover_difference_percent", by);
                 agreement.real("phase_margin_difference_deg", turn);
-                agrees = by.abs() <= AGREES.0 && turn.abs() <= AGREES.1;
+                agrees = by.abs() <= AGREEMENT_LIMITS.0 && turn.abs() <= AGREEMENT_LIMITS.1;
             }
         }
         let verdict = if agrees { "yes" } else { "no" };
@@ -256,8 +258,8 @@ fn of_records(
     Ok(())
 }
 
-/// Distance between a describing function and a fit, in percent and in standard errors; for a
-/// single run, which has no errors, with equal weights and in percent only.
+/// Returns the distance between a describing function and a fit, in percent and in standard errors. A single run has no
+/// standard errors: its lines have equal weights, and the distance is in percent only.
 fn distance(found: &DescribingFunction, response: &MedianResponse) -> (f64, f64) {
     const PRIOR: f64 = 4.0;
     let relative = |line: &Line| line.standard_error.map(|s| s * s / line.response.norm_sqr());

@@ -1,7 +1,6 @@
-//! The tables of a group, from those of its runs.
+//! Joins the parts of the runs into the tables of a group.
 //!
-//! The traces of 1000 runs do not fit into memory: they are averaged for one person in one
-//! condition at a time.
+//! The traces of 1000 runs do not fit into memory, so they are averaged for one person in one condition at a time.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -26,7 +25,7 @@ use crate::{
     directory::{part, table_path},
 };
 
-/// A table in each of its formats.
+/// The writers of a table, one for each file format.
 struct Writers(Vec<TableWriter>);
 
 impl Writers {
@@ -42,11 +41,11 @@ impl Writers {
 /// A run of a person in a condition.
 struct RunOfCell {
     block: usize,
-    /// Time of the task change, s.
+    /// Time at which the task changes, s.
     change_s: Option<f64>,
 }
 
-/// Writes the tables from the parts: Parquet, and also CSV if `csv` is set.
+/// Joins the parts into the tables, as Parquet and, if `csv` is set, also as CSV.
 pub(super) fn join(
     manifest: &Manifest,
     base: &Path,
@@ -65,7 +64,7 @@ pub(super) fn join(
     let mut of_responses = ResponseAverages::default();
     let mut estimates = writers("estimates", &estimates_schema())?;
     let mut responses = writers("responses", &responses::responses_schema())?;
-    // Runs of a person in a condition.
+    // The runs of each person in each condition.
     let mut cells: BTreeMap<(&str, &str), Vec<RunOfCell>> = BTreeMap::new();
     for (block, of) in blocks.iter().enumerate() {
         let found = read(block, "estimates")?;
@@ -89,7 +88,7 @@ pub(super) fn join(
     responses.finish()?;
 
     for (table, schema) in reading::schemas() {
-        // Tables that users examine first: always CSV.
+        // These tables are the first that users examine, so they are always written as CSV too.
         let writer = |csv: bool| TableWriter::create(&table_path(directory, table, csv), &schema);
         let mut writers = Writers(vec![writer(false)?, writer(true)?]);
         for (block, _) in blocks.iter().enumerate().filter(|(_, of)| matches!(of, Block::Run(_))) {
@@ -150,7 +149,7 @@ pub(super) fn join(
     Ok(())
 }
 
-/// Time of the task change of a run, s, from its estimates.
+/// Returns the time in s at which the task of a run changes, read from the estimates of the run.
 fn change_s(estimates: &OutputTable) -> Option<f64> {
     let names = texts(estimates, "parameter");
     let row = names.iter().position(|name| name == "change_s")?;

@@ -1,4 +1,5 @@
-//! The manifest of a group, in TOML: the assignment of files to subjects, conditions and runs, and their treatment.
+//! The manifest of a group, in TOML: it assigns files to subjects, conditions and runs, and contains the settings of
+//! the analysis.
 //!
 //! ```toml
 //! name = "tracking"
@@ -58,37 +59,37 @@ pub struct Manifest {
     /// Settings for reading the files.
     #[serde(default)]
     pub read: ReadSettings,
-    /// Treatment of the runs before they are analysed.
+    /// Preparation of the runs before they are analysed.
     #[serde(default, skip_serializing_if = "PreparationSettings::is_empty")]
     pub prepare: PreparationSettings,
-    /// Treatment of each run.
+    /// Settings of the analysis of each run.
     #[serde(default)]
     pub analysis: AnalysisSettings,
     /// Known properties of the conditions, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub conditions: BTreeMap<String, ConditionSettings>,
-    /// The runs.
+    /// The runs of the group.
     pub runs: Vec<RunEntry>,
 }
 
-/// One run.
+/// A run of a group.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RunEntry {
-    /// Its file, from the directory of the manifest.
+    /// Path of the file of the run, relative to the directory of the manifest.
     pub file: PathBuf,
-    /// A second file that is joined after the first, from the next sample on: the controlled
-    /// element changes at the seam.
+    /// A second file, appended to the first at the next sample. The controlled element changes where the files are
+    /// joined.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub then: Option<PathBuf>,
-    /// Identity.
+    /// Name of the subject.
     pub subject: String,
-    /// The controlled element.
+    /// Name of the condition, such as the controlled element.
     #[serde(default)]
     pub condition: String,
     /// Number or name of the run.
     pub run: String,
-    /// Whether the run is analysed: training runs are listed but not analysed.
+    /// Whether the run is analysed. Training runs are listed but not analysed.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub counts: bool,
 }
@@ -103,11 +104,11 @@ fn is_yes(counts: &bool) -> bool {
 }
 
 impl Manifest {
-    /// The manifest of a directory, or the named one.
+    /// Returns the path of the manifest: `named` itself, or the manifest in the directory `named`.
     ///
     /// # Errors
-    /// [`StudyError::NoManifest`] if there is none.
-    pub fn place(named: &Path) -> Result<PathBuf, StudyError> {
+    /// [`StudyError::NoManifest`] if there is no manifest.
+    pub fn manifest_path(named: &Path) -> Result<PathBuf, StudyError> {
         let path = if named.is_dir() {
             named.join(MANIFEST)
         } else {
@@ -124,13 +125,13 @@ impl Manifest {
     /// Reads and checks a manifest.
     ///
     /// # Errors
-    /// [`StudyError::Plan`] with the file, the line where there is one, and the remedy;
-    /// [`StudyError::Io`].
+    /// [`StudyError::Plan`] with the file, the line if known, and the remedy; [`StudyError::Io`] if the file cannot be
+    /// read.
     pub fn read(path: &Path) -> Result<Self, StudyError> {
         Self::parse(&hoid_io::read_settings(path)?, &path.display().to_string())
     }
 
-    /// A manifest from its text; `path` is for messages.
+    /// Parses the text of a manifest; `path` is used in messages.
     ///
     /// # Errors
     /// As [`Manifest::read`].
@@ -159,7 +160,7 @@ impl Manifest {
             }
             if !known.insert((&run.subject, &run.condition, &run.run)) {
                 return Err(format!(
-                    "run {} of {} in {:?} is duplicated, the second time as {}: give each its own run",
+                    "run {} of {} in {:?} is duplicated, the second time as {}: give each file its own run",
                     run.run,
                     run.subject,
                     run.condition,
@@ -178,7 +179,7 @@ impl Manifest {
             {
                 return Err(format!(
                     "run {} of {} is joined from two files, but [conditions.{}] names an excitation or change_s: leave \
-                     them out, the change is at the seam",
+                     both out, the change is at the seam",
                     run.run, run.subject, run.condition
                 ));
             }
@@ -198,12 +199,11 @@ impl Manifest {
         self.analysis.check()
     }
 
-    /// A manifest of the files in a directory that match a pattern, in the order of their names;
-    /// and the names of those that do not.
+    /// Creates a manifest of the files in a directory whose names match a pattern, sorted by name. Also returns the
+    /// names that do not match.
     ///
     /// # Errors
-    /// [`StudyError::Io`] when the directory cannot be read, [`StudyError::NoRuns`] when nothing
-    /// matches.
+    /// [`StudyError::Io`] if the directory cannot be read, [`StudyError::NoRuns`] if no name matches.
     pub fn of_directory(directory: &Path, pattern: &Pattern) -> Result<(Self, Vec<String>), StudyError> {
         let mut names = hoid_io::file_names(directory)?;
         names.sort();
@@ -253,7 +253,7 @@ impl Manifest {
         Ok((manifest, others))
     }
 
-    /// Treatment of the runs of a condition.
+    /// Returns the preparation of the runs of a condition.
     ///
     /// # Errors
     /// The invalid key, and the reason.
@@ -262,7 +262,7 @@ impl Manifest {
         self.prepare.preparation(of_condition)
     }
 
-    /// Decimation of the runs of a condition because of a high rate.
+    /// Returns the decimation of the runs of a condition that depends on their sampling frequency.
     ///
     /// # Errors
     /// As [`Manifest::preparation`].
@@ -271,7 +271,7 @@ impl Manifest {
         self.prepare.by_rate(of_condition)
     }
 
-    /// The manifest as TOML.
+    /// Returns the manifest as TOML text.
     pub fn text(&self) -> String {
         toml::to_string_pretty(self).unwrap_or_default()
     }

@@ -2,30 +2,31 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`Manifest`] | assignment of files to subjects and runs, and how each run is processed |
-//! | [`ReadSettings`], [`PreparationSettings`], [`AnalysisSettings`], [`ConditionSettings`] | its tables: how runs are read, prepared and analysed, and the prior knowledge of a condition |
-//! | [`ConditionElement`] | controlled elements of conditions as one text |
-//! | [`inspect`], [`commented`] | a manifest completed by what the files state, with the evidence |
-//! | [`Pattern`] | subject, condition and run from names of files |
-//! | [`run_group`] | the analysis in a directory, part by part |
-//! | `reading` | runs from files, and the processing of them; one of them: [`RecordedRun`] |
-//! | `analysis` | analysis of the runs of a person in a condition (`block`) and of single runs: their `windows`, orders (`run_orders`) and rows (`run_rows`) |
+//! | [`Manifest`] | assignment of files to subjects and runs, and settings for processing the runs |
+//! | [`ReadSettings`], [`PreparationSettings`], [`AnalysisSettings`], [`ConditionSettings`] | tables of the manifest: settings for reading, preparing and analysing the runs, and known properties of a condition |
+//! | [`ConditionElement`] | controlled elements of conditions in text form |
+//! | [`inspect`], [`commented`] | manifest completed from the contents of the files, with the evidence |
+//! | [`Pattern`] | subject, condition and run from file names |
+//! | [`run_group`] | analysis of a group in a directory, part by part |
+//! | `reading` | reading and preparation of runs; a single run: [`RecordedRun`] |
+//! | `analysis` | analysis of the runs of a person in a condition (`block`) and of single runs: windows (`windows`), orders (`run_orders`) and table rows (`run_rows`) |
 //! | `family_fits`, [`Person`] | the operator of a person in a condition, and its row in the table of people |
 //! | [`RunEstimates`] | estimates of each run, read back from the tables |
-//! | [`GroupSummary`] | failures, people, and the verdict on the whole group |
-//! | `traces` | its recursive estimates as rows |
+//! | [`GroupSummary`] | failures, people, and the verdict on the group as a whole |
+//! | `traces` | recursive estimates as table rows |
 //! | `responses` | frequency responses of the fits |
-//! | [`VirtualExperiment`] | the same from simulated subjects, with the defects of recorded data ([`SamplingDefect`]) |
-//! | [`PeopleExperiment`] | the same from persons drawn over the family of operators |
-//! | `virtual_files` | the files of either |
-//! | `frequency` | describing functions by subject and condition, and how far the fits are from them |
-//! | `settling` | how fast the recursions follow a change at a known instant, and how noisy they are |
-//! | `averages` | means over the runs, chosen delays, averages of traces |
-//! | `join` | the tables of the group from those of its runs |
+//! | [`VirtualExperiment`] | a group of simulated subjects, with the defects of recorded data ([`SamplingDefect`]) |
+//! | [`PeopleExperiment`] | a group of virtual people drawn from the family of operators |
+//! | `virtual_files` | files of both kinds of virtual experiment |
+//! | `frequency` | describing functions by subject and condition, and distances of the fits from them |
+//! | `settling` | settling times of the recursions after a change at a known time, and their noise |
+//! | `averages` | means over the runs, chosen delays, averaged traces |
+//! | `join` | joining of the parts into the tables of the group |
 //!
-//! Each run is stored as a part on disk, like a block of a study, and so are the joint results of all runs of a person
-//! in a condition, which are computed first. A stopped group can therefore continue, and only the estimates and
-//! responses of a run remain in memory; traces are averaged for one person in one condition at a time.
+//! The results of each run are stored as a part on disk, like a block of a study. The joint results of all runs of a
+//! person in a condition are also stored as a part; they are computed first. The analysis of a group can therefore be
+//! stopped and continued. Only the estimates and responses of the runs remain in memory; traces are averaged for one
+//! person in one condition at a time.
 
 mod analysis;
 mod analysis_settings;

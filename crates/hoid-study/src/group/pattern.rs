@@ -1,7 +1,7 @@
 //! Patterns of file names: `{subject}_{condition}_{run}*.csv`.
 //!
-//! A name in braces matches one or more characters, as few as possible, `*` any number of them; all
-//! other characters match themselves.
+//! A name in braces matches one or more characters, as few as possible; `*` matches any number of characters; all other
+//! characters match themselves.
 
 use std::fmt;
 
@@ -19,21 +19,21 @@ enum Part {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pattern(Vec<Part>);
 
-/// Values of the placeholders in a file name.
+/// Values of the placeholders for a file name.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FileNameParts {
-    /// `{subject}`.
+    /// Value of `{subject}`; empty if the pattern has no subject.
     pub subject: String,
-    /// `{condition}`; empty if the pattern has none.
+    /// Value of `{condition}`; empty if the pattern has no condition.
     pub condition: String,
-    /// `{axis}`; empty if the pattern has none.
+    /// Value of `{axis}`; empty if the pattern has no axis.
     pub axis: String,
-    /// `{run}`.
+    /// Value of `{run}`.
     pub run: String,
 }
 
 impl FileNameParts {
-    /// The condition of the axis, such as `C3-roll`: each axis has its own controlled element and operator.
+    /// Returns the condition with its axis, such as `C3-roll`. Each axis has its own controlled element and operator.
     pub fn condition_of_axis(&self) -> String {
         match (self.condition.as_str(), self.axis.as_str()) {
             (condition, "") => condition.to_owned(),
@@ -59,8 +59,8 @@ impl Pattern {
     /// Parses a pattern.
     ///
     /// # Errors
-    /// [`StudyError::Pattern`] for unclosed braces, unknown or duplicate names, two adjacent names,
-    /// or a pattern without `{run}`.
+    /// [`StudyError::Pattern`] for unclosed braces, unknown or duplicate names, two names without a character between
+    /// them, or a pattern without `{run}`.
     pub fn new(text: &str) -> Result<Self, StudyError> {
         let bad = |reason: String| StudyError::Pattern {
             pattern: text.to_owned(),
@@ -101,14 +101,14 @@ impl Pattern {
         Ok(Self(parts))
     }
 
-    /// Values of the placeholders in a file name; `None` if it does not match.
+    /// Returns the values of the placeholders for a file name; `None` if the name does not match.
     pub fn matches(&self, name: &str) -> Option<FileNameParts> {
         let mut found = FileNameParts::default();
         found_in(&self.0, name, &mut found).then_some(found)
     }
 }
 
-/// Whether a text matches a pattern in which only `*` is a placeholder.
+/// True if a text matches a pattern in which `*` is the only placeholder.
 pub(super) fn matches_any(pattern: &str, text: &str) -> bool {
     let mut parts = Vec::new();
     for (i, fixed) in pattern.split('*').enumerate() {

@@ -1,31 +1,31 @@
-//! The operator of a person in a condition: the joint fit of the family ([`hoid_ident::family`]) to
-//! all their runs, and its row in the table `people`.
+//! The operator of a person in a condition, from the joint fit of the family ([`hoid_ident::family`]) to all their
+//! runs, and its row in the table `people`.
 //!
-//! A row has the form, for each parameter its value, standard error of these runs (`_se`) and of the person
-//! (`_se_person`), 95 % interval (`_low`, `_high`), whether the data determine it (`_determined`) and the share of the
-//! prior (`_prior_share`), crossover and phase margin with the controlled element and their errors and intervals, the
-//! evidence of each form that was tried (`criterion_FORM`, above the least, and `weight_FORM`), the statistics of the fit
-//! and its verdict. Parameters that no person has, and forms that were not tried, have no columns. If some parameters
-//! are individual, a person has one row for each run.
+//! A row contains the form; for each parameter its value, its standard errors for these runs (`_se`) and for the person
+//! (`_se_person`), its 95 % interval (`_low`, `_high`), whether the data determine it (`_determined`), and the share of
+//! the prior (`_prior_share`); crossover and phase margin with the controlled element, with errors and intervals; the
+//! evidence for each form tried (`criterion_FORM`, relative to the best form, and `weight_FORM`); the statistics of the
+//! fit and its verdict. There are no columns for parameters that no person has or for forms that were not tried. If
+//! some parameters are individual, a person has one row for each run.
 
 use hoid_ident::family::{FamilyFit, OperatorOfRecord, Parameter};
 use hoid_io::{ColumnValues, OutputTable, TableSchema};
 use hoid_model::{ContinuousTransferFunction, Form, VerdictLevel, operator_family::PARAMETERS, uncertainty::Estimate};
 
-use super::tables::{joined, numbers, parted, real, schema, text, texts};
+use super::tables::{joined, numbers, sentences, real, schema, text, texts};
 use crate::columns::Rows;
 
-/// Name of the run that represents all runs.
+/// Name of the run for results that apply to all runs.
 pub(super) const ALL: &str = "all";
 
 /// Outcome of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PersonStatus {
-    /// It has a result.
+    /// The fit gave an operator.
     Fitted,
-    /// It failed.
+    /// The fit failed.
     Failed,
-    /// There is none, since the behaviour of the person changes within the runs.
+    /// No fit was made, since the task changes within the runs.
     Changes,
 }
 
@@ -35,14 +35,14 @@ hoid_model::named_choice!(PersonStatus, "status of a person", 3, {
     Changes => "changes",
 });
 
-/// Evidence of a form in a fit.
+/// Evidence for one form in a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FormEvidence {
     /// The form.
     pub form: Form,
-    /// Its criterion above the least of all forms.
+    /// Criterion of the form minus the smallest criterion of all forms.
     pub criterion: f64,
-    /// Its weight in averages over forms.
+    /// Weight of the form in averages over forms.
     pub weight: f64,
 }
 
@@ -59,38 +59,38 @@ pub struct Person {
     pub runs: usize,
     /// Outcome of the fit.
     pub status: PersonStatus,
-    /// Reason why there is no result; empty if there is one.
+    /// Reason why there is no operator; empty if there is one.
     pub reason: String,
     /// The form of the operator.
     pub form: String,
-    /// Evidence of each form that has a criterion, in the order of the forms.
+    /// Evidence for each form that has a criterion, in the order of the forms.
     pub forms: Vec<FormEvidence>,
-    /// Its parameters.
+    /// Parameters of the operator.
     pub parameters: Vec<Parameter>,
     /// Crossover frequency with the controlled element, rad/s.
     pub crossover_rad_s: Option<Estimate>,
-    /// Its 95 % interval by Student's t, since the errors are based on few runs.
+    /// 95 % interval of the crossover frequency from Student's t distribution, since the errors are based on few runs.
     pub crossover_interval: Option<(f64, f64)>,
-    /// Phase margin, deg.
+    /// Phase margin with the controlled element, deg.
     pub phase_margin_deg: Option<Estimate>,
-    /// Its 95 % interval, likewise.
+    /// 95 % interval of the phase margin, also from Student's t distribution.
     pub phase_margin_interval: Option<(f64, f64)>,
-    /// chi^2 at the lines of the excitation, and its degrees of freedom.
+    /// chi^2 at the lines of the excitation, and the number of degrees of freedom.
     pub chi2: Option<(f64, usize)>,
     /// Ratio of clustered to model-based variances.
     pub kappa: Option<f64>,
     /// Order nd of the noise model.
     pub noise_order: Option<usize>,
-    /// Verdict on the result.
+    /// Verdict on the fit.
     pub verdict: Option<VerdictLevel>,
     /// Findings of the verdict.
     pub reasons: Vec<String>,
-    /// Additional notes.
+    /// Notes of the verdict, which do not affect its level.
     pub notes: Vec<String>,
 }
 
 impl Person {
-    /// A person without a result, and the reason.
+    /// Creates a person without an operator, with the reason.
     pub(super) fn without((subject, condition): (&str, &str), status: PersonStatus, reason: &str) -> Self {
         Self {
             subject: subject.to_owned(),
@@ -115,7 +115,7 @@ impl Person {
         }
     }
 
-    /// A person with one of the operators of a fit.
+    /// Creates a person from one of the operators of a fit.
     pub(super) fn of_fit(
         key: (&str, &str),
         run: &str,
@@ -147,7 +147,7 @@ impl Person {
         }
     }
 
-    /// True for the row of all runs; if some parameters are individual, there is one row for each run.
+    /// True for a row that covers all runs. If some parameters are individual, each run has its own row instead.
     pub fn is_of_all_runs(&self) -> bool {
         self.run == ALL
     }
@@ -157,7 +157,7 @@ impl Person {
         self.parameters.iter().find(|p| p.name == name)
     }
 
-    /// Person and condition: `P03 in fo`.
+    /// Returns the name of person and condition, such as `P03 in fo`.
     pub fn name(&self) -> String {
         let of_run = if self.is_of_all_runs() {
             String::new()
@@ -167,7 +167,7 @@ impl Person {
         format!("{}{of_run}", cell_name(&self.subject, &self.condition))
     }
 
-    /// Returns the evidence of a form, if it has any.
+    /// Returns the evidence for a form, if there is any.
     pub fn evidence(&self, form: Form) -> Option<&FormEvidence> {
         self.forms.iter().find(|of| of.form == form)
     }
@@ -274,13 +274,13 @@ impl Person {
             kappa: any("kappa"),
             noise_order: any("noise_order").map(|nd| nd as usize),
             verdict: cell("verdict").parse().ok(),
-            reasons: parted(&cell("reasons")),
-            notes: parted(&cell("notes")),
+            reasons: sentences(&cell("reasons")),
+            notes: sentences(&cell("notes")),
         })
     }
 }
 
-/// The criteria of the forms of a fit, above the least, and their weights.
+/// Returns the weights of the forms of a fit, and their criteria relative to the smallest one.
 fn evidence(fit: &FamilyFit) -> Vec<FormEvidence> {
     let least = (fit.forms.iter().filter_map(|of| of.criterion)).fold(f64::INFINITY, f64::min);
     let evidence = |form: &Form| {
@@ -294,7 +294,7 @@ fn evidence(fit: &FamilyFit) -> Vec<FormEvidence> {
     Form::ALL.iter().filter_map(evidence).collect()
 }
 
-/// Person and condition, as text.
+/// Returns the name of person and condition.
 pub(super) fn cell_name(subject: &str, condition: &str) -> String {
     if condition.is_empty() {
         subject.to_owned()
@@ -303,7 +303,7 @@ pub(super) fn cell_name(subject: &str, condition: &str) -> String {
     }
 }
 
-/// The table, with columns for the parameters of its people.
+/// Returns the table `people`, with columns for the parameters and forms that occur.
 pub(super) fn people_table(people: &[Person]) -> OutputTable {
     let used = |name: &&str| people.iter().any(|p| p.parameter(name).is_some());
     let names = PARAMETERS.map(|(name, _)| name);
@@ -343,7 +343,7 @@ fn people_schema(parameters: &[&str], forms: &[&str]) -> TableSchema {
     )
 }
 
-/// The people of a table; rows with an unknown status are skipped.
+/// Reads the people from a table; rows with an unknown status are skipped.
 pub(super) fn people_of(table: &OutputTable) -> Vec<Person> {
     let rows = match table.column("subject") {
         Some(ColumnValues::Text(values)) => values.len(),

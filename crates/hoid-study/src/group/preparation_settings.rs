@@ -1,5 +1,4 @@
-//! Preparation of the runs of a group: the keys of `[prepare]`, and those of `[conditions.NAME.prepare]`, each of which
-//! overrides the same key of `[prepare]`.
+//! Preparation of the runs of a group: the keys of `[prepare]`, which the keys of `[conditions.NAME.prepare]` override.
 //!
 //! ```toml
 //! [prepare]
@@ -13,9 +12,9 @@
 //! offset = { stick = 0 }
 //! ```
 //!
-//! If the rate is not specified, recordings at more than 200 Hz are decimated to about 100 Hz
-//! ([`hoid_model::resampling`]); `offset_samples` of a condition then counts recorded samples; if a factor or a
-//! frequency is given, it counts samples of the new rate.
+//! If no rate is specified, recordings at more than 200 Hz are decimated to about 100 Hz ([`hoid_model::resampling`]),
+//! and `offset_samples` of a condition counts recorded samples. If a factor or a frequency is given, `offset_samples`
+//! counts samples at the new rate.
 
 use std::collections::BTreeMap;
 
@@ -24,33 +23,33 @@ use hoid_model::Decimation;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Treatment of the runs before they are analysed. Steps that are not given are not applied, or are applied as given
-/// for the group.
+/// Preparation of the runs before they are analysed. A condition uses the settings of the group for steps that it does
+/// not specify; a step specified in neither is not applied.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PreparationSettings {
-    /// Factor, factor and unit, or two units by channel.
+    /// Scaling by channel: a factor, a factor and a unit, or two units.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub scale: BTreeMap<String, NumberOrText>,
-    /// Delay with which a channel was recorded, in samples, or in s as a text such as "0.0167s".
+    /// Delay by channel with which it was recorded: in samples, or in s as text such as "0.0167s".
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub offset: BTreeMap<String, NumberOrText>,
-    /// Every M-th sample after a low-pass filter; "off" or 1 keeps the rate. Default: "auto", which above 200 Hz
-    /// selects the M whose rate is nearest to 100 Hz.
+    /// Decimation factor M: every M-th sample is kept after a low-pass filter; "off" or 1 keeps the rate. Default:
+    /// "auto", which for rates above 200 Hz selects the M whose new rate is nearest to 100 Hz.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decimate: Option<NumberOrText>,
     /// New sampling frequency, Hz.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
-    /// Time from the first sample that is dropped, s.
+    /// Time at the start of the run that is dropped, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub run_in_s: Option<f64>,
-    /// Whether rows that are duplicated are dropped.
+    /// Whether duplicated rows are dropped.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drop_repeated: Option<bool>,
 }
 
-/// A number, or a text as on the command line.
+/// A number or a text, as on the command line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum NumberOrText {
@@ -70,13 +69,13 @@ impl NumberOrText {
 }
 
 impl PreparationSettings {
-    /// Whether it carries no information.
+    /// True if no step is specified.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
 
-    /// The settings of the rate. `decimate` and `rate_hz` are two keys for one quantity: a condition that gives either
-    /// replaces both values of the group.
+    /// Returns the settings of the rate, `decimate` and `rate_hz`. They are two keys for one quantity, so a condition
+    /// that gives either of them replaces both settings of the group.
     fn rate<'a>(&'a self, condition: Option<&'a Self>) -> (Option<&'a NumberOrText>, Option<f64>) {
         let of = condition.unwrap_or(self);
         let named = of.decimate.is_some() || of.rate_hz.is_some();
@@ -84,7 +83,7 @@ impl PreparationSettings {
         (of.decimate.as_ref(), of.rate_hz)
     }
 
-    /// Decimation of the runs of a condition because of a high rate: nothing if the rate is named.
+    /// Returns the decimation that depends on the sampling frequency of the recording; `Off` if the rate is specified.
     ///
     /// # Errors
     /// The invalid key, and the reason.
@@ -96,8 +95,8 @@ impl PreparationSettings {
         })
     }
 
-    /// Treatment of the runs of a condition: the settings of the condition, and those of the group for keys that the
-    /// condition does not give.
+    /// Returns the preparation of the runs of a condition: the settings of the condition, and the settings of the group
+    /// for keys that the condition does not give.
     ///
     /// # Errors
     /// The invalid key, and the reason.
@@ -128,7 +127,7 @@ impl PreparationSettings {
     }
 }
 
-/// A factor, or the words for it; auto where nothing is specified.
+/// Parses a decimation factor, "auto" or "off"; `Auto` if nothing is specified.
 fn decimation(typed: Option<&NumberOrText>) -> Result<Decimation, String> {
     let Some(typed) = typed else {
         return Ok(Decimation::Auto);
@@ -138,7 +137,7 @@ fn decimation(typed: Option<&NumberOrText>) -> Result<Decimation, String> {
         .map_err(|_| format!("decimate is {text}, expected \"auto\", \"off\", or an integer factor of 1 or more"))
 }
 
-/// The settings by channel; those of the second list override those of the first.
+/// Parses the settings by channel; those of the condition override those of the group.
 fn parsed<T>(
     group: &BTreeMap<String, NumberOrText>,
     condition: &BTreeMap<String, NumberOrText>,

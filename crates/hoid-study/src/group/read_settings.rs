@@ -11,41 +11,42 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ReadSettings {
-    /// Column of the input, or a difference such as `r-y`.
+    /// Column of the input, or a difference of columns such as `r-y`.
     pub input: String,
     /// Column of the output.
     pub output: String,
-    /// Column of the time and its unit, such as `clock:ms`. Default: t, or a common name of a time.
+    /// Column of the time, with its unit, such as `clock:ms`. Default: t, or another common name for time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
-    /// The trial of each file that is read, such as `trial=3`.
+    /// Trial to read from each file, such as `trial=3`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trial: Option<String>,
-    /// Sampling frequency, Hz. Default: that of the column t.
+    /// Sampling frequency, Hz. Default: from the time column.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sampling_hz: Option<f64>,
-    /// Start of the span that counts, s.
+    /// Start of the span that is read, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub from_s: Option<f64>,
-    /// End of the span that counts, s.
+    /// End of the span that is read, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub to_s: Option<f64>,
-    /// Interpolate an uneven t.
+    /// Whether unevenly spaced samples are interpolated.
     pub resample: bool,
-    /// Bridge missing values.
+    /// Whether missing values are bridged.
     pub fill: bool,
-    /// Columns logged at their own instants, such as `{ u = "hold" }`: hold, linear or drop.
+    /// Columns logged at their own times, such as `{ u = "hold" }`: hold, linear or drop.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub sparse: BTreeMap<String, String>,
     /// Trend removed from e and u: none, mean or linear.
     pub detrend: Detrending,
-    /// Faults of the recordings: bridge, report or keep. If a fault is too long to be bridged, the operator of a person
-    /// is fitted to all parts without it, and single runs are analysed on the longest part.
+    /// Treatment of faults of the recordings: bridge, report or keep. If a fault is too long to be bridged, the
+    /// operator of a person is fitted to all parts without the fault, and single runs are analysed on the longest such
+    /// part.
     pub faults: FaultTreatment,
 }
 
 impl ReadSettings {
-    /// The columns that are sparse.
+    /// Returns the columns logged at their own times, with their treatment.
     pub(super) fn sparse(&self) -> Result<BTreeMap<String, Sparse>, String> {
         let of = |(name, how): (&String, &String)| match how.parse() {
             Ok(how) => Ok((name.clone(), how)),
@@ -59,17 +60,17 @@ impl ReadSettings {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum FaultTreatment {
-    /// Short faults are bridged; of a run with long faults, the longest part without them is used.
+    /// Short faults are bridged; a run with long faults is reduced to its longest part without them.
     #[default]
     Bridge,
-    /// Faults are reported.
+    /// Faults are reported but not repaired.
     Report,
     /// Faults are not searched for.
     Keep,
 }
 
 impl FaultTreatment {
-    /// The same as an option of the repair.
+    /// Returns the corresponding option of the repair.
     pub(super) fn handling(self) -> FaultHandling {
         match self {
             Self::Bridge => FaultHandling::Bridge,
@@ -83,7 +84,7 @@ impl FaultTreatment {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Detrending {
-    /// Nothing.
+    /// No trend is removed.
     #[default]
     None,
     /// The mean.

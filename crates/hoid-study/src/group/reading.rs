@@ -1,4 +1,4 @@
-//! Reading and preparation of the runs of a group according to the manifest.
+//! Reading and preparation of the runs of a group as specified in the manifest.
 
 use std::path::Path;
 
@@ -15,16 +15,16 @@ use super::{
 };
 use crate::{StudyError, columns::Rows};
 
-/// Alignment of the output with the input.
+/// Alignment of u with e.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Pairing {
-    /// As recorded, with the offsets of `[prepare]`.
+    /// Alignment as recorded, corrected by the offsets of `[prepare]`.
     Recorded,
-    /// Also with `offset_samples` of the condition reversed: u aligned with the e to which it responds.
+    /// As `Recorded`, and corrected by `offset_samples` of the condition: u is aligned with the e to which it responds.
     InTheLoop,
 }
 
-/// Reads and prepares a record; the condition may have its own preparation.
+/// Reads and prepares a file, with the preparation of its condition.
 fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing) -> Result<CheckedRecord, String> {
     let reading = &manifest.read;
     let text = |error: hoid_io::IoError| error.to_string();
@@ -86,7 +86,7 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
         record: longest.unwrap_or_else(|| read.record.clone()),
         ..read
     };
-    // Faults are detected in the recorded samples.
+    // The rate is reduced only now, since faults are detected in the recorded samples.
     let (record, done) = manifest
         .by_rate(condition)?
         .of(read.record)
@@ -101,17 +101,17 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
     })
 }
 
-/// A record that was read and repaired, with its faults.
+/// A record that has been read and repaired, with its faults.
 pub(super) struct CheckedRecord {
     read: ReadRecord,
     faults: Vec<Fault>,
-    /// Factor by which its rate was reduced after the steps that count recorded samples.
+    /// Factor by which the rate was reduced, after the steps that count recorded samples.
     factor: usize,
     recorded: Recorded,
 }
 
-/// The tables of the account: preparation steps of the runs, one per row, and problems of their
-/// sampling, one per row.
+/// Returns the columns of two tables: preparation steps of the runs, one per row, and problems of their sampling, one
+/// per row.
 pub(super) fn schemas() -> [(&'static str, TableSchema); 2] {
     let schema = |names: &[&str]| {
         let column = |name: &&str| ColumnSchema {
@@ -150,10 +150,10 @@ pub(super) fn schemas() -> [(&'static str, TableSchema); 2] {
     ]
 }
 
-/// A file by its name in the manifest, and the result of reading it.
+/// A file, given by its name in the manifest, and the result of reading it.
 pub(super) type ReadFile<'a> = (&'a Path, Result<CheckedRecord, String>);
 
-/// The file of a run, and the one joined after it.
+/// Reads the file of a run and, if there is one, the file joined after it.
 pub(super) fn read_files<'a>(
     manifest: &Manifest,
     base: &Path,
@@ -172,26 +172,27 @@ pub(super) fn read_files<'a>(
 /// A run, read and prepared according to the manifest.
 pub(super) struct Run {
     pub record: Record,
-    /// Time of the seam, s, for a run joined from two files.
+    /// Time at which the second of two joined files starts, s.
     pub seam_s: Option<f64>,
-    /// Factor by which its rate was reduced: the number of recorded samples per sample.
+    /// Factor by which the rate was reduced: the number of recorded samples per sample of the run.
     pub factor: usize,
-    /// Time by which a sample of the input is later than that of the output in the same row, s.
+    /// Time by which a sample of the input is later than the sample of the output in the same row, s.
     pub input_lead_s: f64,
-    /// Recorded run for an identification; `None` for a run joined from two files, whose task changes at the seam.
+    /// The recording before repair, for an identification; `None` for a run joined from two files, within which the
+    /// task changes.
     pub recorded: Option<Recorded>,
 }
 
-/// A recorded and prepared run, with its faults and its rate.
+/// A recorded run after preparation, but with its faults and at its recorded rate.
 #[derive(Clone)]
 pub(super) struct Recorded {
     pub record: Record,
-    /// Steps applied to it.
+    /// Preparation steps and quality issues of the run.
     pub account: Account,
 }
 
 impl Run {
-    /// Converts a number of recorded samples to samples of the run.
+    /// Converts a number of recorded samples to a number of samples of the run.
     pub fn samples(&self, recorded: f64) -> f64 {
         recorded / self.factor as f64
     }
@@ -202,17 +203,18 @@ pub(super) fn read_run(manifest: &Manifest, base: &Path, entry: &RunEntry, pairi
     run_of(read_files(manifest, base, entry, pairing))
 }
 
-/// A run as a group analyses it, for other analyses.
+/// A run as prepared for the analysis of its group, for use by other analyses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedRun {
     /// The prepared record.
     pub record: Record,
-    /// Time at which the task changes: by the manifest, or the seam of two joined files.
+    /// Time at which the task changes, s: from the manifest, or the time at which two files are joined.
     pub change_s: Option<f64>,
 }
 
 impl RecordedRun {
-    /// Reads and prepares a run of a manifest; file names are relative to `base`. Rows of e and u are aligned.
+    /// Reads and prepares a run of a manifest. File names are relative to `base`. Each row contains an e and the u that
+    /// responds to it.
     ///
     /// # Errors
     /// [`StudyError::Recording`] with file, reason and remedy.
@@ -227,7 +229,7 @@ impl RecordedRun {
     }
 }
 
-/// The run of one file, or joined from two.
+/// Returns the run of one file, or of two files joined.
 pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
     let mut run: Option<Run> = None;
     for (_, read) in files {
@@ -259,8 +261,8 @@ pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
     run.ok_or_else(|| "no file is named".to_owned())
 }
 
-/// Steps applied to the files of a run, and their problems; nothing for a file that cannot be read,
-/// which its estimates report.
+/// Returns the tables of the steps applied to the files of a run and of their problems. A file that cannot be read has
+/// no rows here; the table of estimates reports it.
 pub(super) fn account(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static str, OutputTable); 2] {
     let [(steps_name, steps), (trouble_name, trouble)] = schemas();
     let (mut steps, mut trouble) = (Rows::new(&steps), Rows::new(&trouble));

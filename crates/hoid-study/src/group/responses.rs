@@ -1,11 +1,9 @@
-//! Frequency responses of the fits of whole runs, on one grid of frequencies, and their medians
-//! over the runs.
+//! Frequency responses of the fits to whole runs on one frequency grid, and their medians over the runs.
 //!
-//! The grid is `omega = 10^(k/32)` rad/s from 0.1 to 40, up to the limit of the sampling: 32 points
-//! per decade, so that linear interpolation is within 0.01 rad of the phase of a delay of half a
-//! second at 10 rad/s. A response is that from e to u with the alignment of the manifest,
-//! `H e^{j omega Ts offset}`, like that of the describing function. Phases are unwrapped from the
-//! lowest frequency.
+//! The grid is `omega = 10^(k/32)` rad/s from 0.1 to 40 rad/s, up to half the sampling frequency. With 32 points per
+//! decade, linear interpolation of the phase of a 0.5 s delay is within 0.01 rad at 10 rad/s. A response is from e to u
+//! with the alignment of the manifest, `H e^{j omega Ts offset}`, as for the describing function. Phases are unwrapped
+//! from the lowest frequency.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +19,7 @@ pub(super) type Key = [String; 3];
 
 const KEYS: [&str; 3] = ["subject", "condition", "estimator"];
 
-/// The frequencies below half the sampling frequency, rad/s.
+/// Returns the grid frequencies below half the sampling frequency, rad/s.
 pub(super) fn grid(sample_time_s: f64) -> Vec<f64> {
     (-32..=51)
         .map(|k| 10f64.powf(f64::from(k) / 32.0))
@@ -38,7 +36,7 @@ pub(super) fn responses_schema() -> TableSchema {
     ])))
 }
 
-/// Unwrapped phases in deg, each on the branch nearest to the previous one.
+/// Returns the phases in deg, each on the branch nearest to the phase at the previous frequency.
 pub(super) fn followed_phases_deg(response: &[Complex64]) -> Vec<f64> {
     let mut turn = 0.0;
     let mut last: Option<Complex64> = None;
@@ -52,7 +50,7 @@ pub(super) fn followed_phases_deg(response: &[Complex64]) -> Vec<f64> {
         .collect()
 }
 
-/// Responses collected over runs.
+/// Responses of all runs, by subject, condition and estimator.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ResponseAverages(BTreeMap<Key, BTreeMap<u64, [Vec<f64>; 2]>>);
 
@@ -65,13 +63,13 @@ pub(super) struct MedianResponse {
 }
 
 impl MedianResponse {
-    /// Interpolates the response linearly over log omega; none beyond the grid.
+    /// Interpolates gain in dB and phase linearly over log omega; `None` outside the grid.
     pub fn at(&self, omega_rad_s: f64) -> Option<Complex64> {
         let [decibel, degrees] = self.decibel_and_degrees(omega_rad_s)?;
         Some(Complex64::from_polar(10f64.powf(decibel / 20.0), degrees.to_radians()))
     }
 
-    /// The response as gain in dB and phase in deg.
+    /// Returns the interpolated gain in dB and phase in deg; `None` outside the grid.
     pub fn decibel_and_degrees(&self, omega_rad_s: f64) -> Option<[f64; 2]> {
         let k = self.omega_rad_s.partition_point(|omega| *omega <= omega_rad_s);
         let (low, high) = (k.checked_sub(1)?, k);
@@ -83,7 +81,7 @@ impl MedianResponse {
 }
 
 impl MedianResponse {
-    /// Lowest crossover with a controlled element.
+    /// Returns the lowest crossover with a controlled element.
     pub fn crossover(&self, element: &ContinuousTransferFunction) -> Option<Crossover> {
         let open_loop: Vec<Complex64> = self
             .omega_rad_s
@@ -110,7 +108,7 @@ impl ResponseAverages {
         }
     }
 
-    /// The estimators of a subject and condition with their median responses.
+    /// Returns the estimators of a subject and condition with their median responses.
     pub fn medians(&self, subject: &str, condition: &str) -> Vec<(&str, MedianResponse)> {
         let of_cell = self
             .0
@@ -129,7 +127,7 @@ impl ResponseAverages {
             .collect()
     }
 
-    /// Median and quartiles over the runs at each frequency.
+    /// Returns the table of the medians and quartiles over the runs at each frequency.
     pub fn table(&self) -> OutputTable {
         const FIGURES: [&str; 3] = ["lower_quartile", "median", "upper_quartile"];
         let columns: Vec<String> = ["magnitude_db", "phase_deg"]

@@ -1,5 +1,5 @@
-//! Analysis of a group in a directory: blocks over threads, parts on disk, and finally the tables
-//! of the group.
+//! Analysis of a group in a directory: blocks are distributed over threads, stored as parts on disk, and finally joined
+//! into the tables of the group.
 
 use std::{
     path::{Path, PathBuf},
@@ -23,7 +23,7 @@ use crate::{
     seal::{OnDisk, notes_on, on_disk, write_block},
 };
 
-/// Analyses the runs that count. File names are relative to `base`.
+/// Analyses the runs that the manifest marks with `counts`. File names are relative to `base`.
 ///
 /// # Errors
 /// As [`crate::run`](fn@crate::run).
@@ -33,7 +33,7 @@ pub fn run_group(
     directory: &Path,
     options: &RunOptions,
     progress: &(dyn Fn(Progress) + Sync),
-    go_on: &(dyn Fn() -> bool + Sync),
+    should_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Outcome, StudyError> {
     let blocks = blocks(manifest);
     let record = RunRecord {
@@ -70,14 +70,15 @@ pub fn run_group(
             true
         }
     });
-    // The joint choices for all runs of a person in a condition come before each of them.
+    // The joint analysis of all runs of a person in a condition comes first, since the analysis of each run uses its
+    // results.
     let is_cell = |i: &usize| matches!(blocks[*i], Block::Cell(_));
     let (cells, runs): (Vec<usize>, Vec<usize>) = open.partition(is_cell);
     let notes: Vec<String> = found.note_on_seals().into_iter().chain(notes_on(&damaged)).collect();
     let known = total - (cells.len() + runs.len()) as u64;
     let done = AtomicU64::new(known);
     let one = |&i: &usize| -> Result<bool, StudyError> {
-        if !go_on() {
+        if !should_continue() {
             return Ok(false);
         }
         let found = match &blocks[i] {
@@ -127,12 +128,12 @@ pub fn run_group(
     })
 }
 
-/// True if a group was analysed into the directory, even if not to the end.
+/// True if the directory holds results of a group, even incomplete ones.
 pub fn has_results(directory: &Path) -> bool {
     !matches!(RunRecord::read(directory), Ok(None))
 }
 
-/// Checks that no recording lies where the tables and parts are written.
+/// Checks that no recording would be overwritten by the tables or parts.
 fn check_directory(manifest: &Manifest, base: &Path, directory: &Path) -> Result<(), StudyError> {
     let files = manifest
         .runs
@@ -146,7 +147,8 @@ fn check_directory(manifest: &Manifest, base: &Path, directory: &Path) -> Result
     Ok(())
 }
 
-/// SHA-256 of the manifest and of the files that count; an unreadable file is reported by its run.
+/// Returns the SHA-256 of the manifest and of the recordings that are analysed. The analysis of a run reports a file
+/// that cannot be read.
 fn hash(manifest: &Manifest, base: &Path) -> String {
     let mut hasher = Sha256::new();
     hasher.update(manifest.text().as_bytes());
@@ -158,7 +160,7 @@ fn hash(manifest: &Manifest, base: &Path) -> String {
     hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Prepares the directory, or reads what it holds.
+/// Prepares an empty directory, or reads the record of the results that it holds.
 fn prepare(manifest: &Manifest, directory: &Path, record: &RunRecord, resume: bool) -> Result<RunRecord, StudyError> {
     let shown = || directory.display().to_string();
     if let Some(found) = RunRecord::read(directory)? {

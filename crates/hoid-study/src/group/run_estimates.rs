@@ -1,5 +1,5 @@
-//! Results of a finished group for each run, read from its tables: the operator in the form of the person, RMS values,
-//! and responses.
+//! Results of a finished group for each run, read from its tables: the operator in the form chosen for the person, RMS
+//! values, and responses.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -8,7 +8,7 @@ use hoid_model::uncertainty::Estimate;
 
 use super::{
     analysis::RECORD,
-    family_fits::{OF_ALL, OF_RUN},
+    family_fits::{JOINT_LABEL, SINGLE_RUN_LABEL},
     person::ALL,
     responses::MedianResponse,
     tables::{numbers, texts},
@@ -31,7 +31,7 @@ impl RunEstimates {
     /// Reads the tables in the directory of a finished group.
     ///
     /// # Errors
-    /// [`StudyError::Io`] for missing tables.
+    /// [`StudyError::Io`] if a table cannot be read.
     pub fn read(directory: &Path) -> Result<Self, StudyError> {
         let table = |name: &str| read_table(&table_path(directory, name, false));
         Ok(Self::of(&table("estimates")?, &table("responses")?))
@@ -45,7 +45,7 @@ impl RunEstimates {
         let [estimator, parameter, status] = ["estimator", "parameter", "status"].map(|name| texts(estimates, name));
         let [value, error] = ["value", "standard_error"].map(|name| numbers(estimates, name));
         for row in 0..status.len() {
-            if status[row] != "ok" || !(estimator[row] == OF_RUN || estimator[row] == RECORD) {
+            if status[row] != "ok" || !(estimator[row] == SINGLE_RUN_LABEL || estimator[row] == RECORD) {
                 continue;
             }
             let key = key(estimates, row);
@@ -64,7 +64,7 @@ impl RunEstimates {
         let estimator = texts(responses, "estimator");
         let columns = ["omega_rad_s", "magnitude_db", "phase_deg"].map(|name| numbers(responses, name));
         for row in 0..estimator.len() {
-            if estimator[row] == OF_RUN || estimator[row] == OF_ALL {
+            if estimator[row] == SINGLE_RUN_LABEL || estimator[row] == JOINT_LABEL {
                 let of_run = all.responses.entry(key(responses, row)).or_default();
                 of_run.omega_rad_s.push(columns[0][row]);
                 of_run.magnitude_db.push(columns[1][row]);
@@ -74,19 +74,21 @@ impl RunEstimates {
         all
     }
 
-    /// The runs of a person in a condition, in the order of the manifest.
+    /// Returns the runs of a person in a condition, in the order of the manifest.
     pub fn runs(&self, subject: &str, condition: &str) -> &[String] {
         let key = [subject, condition].map(str::to_owned);
         self.runs.get(&key).map_or(&[], Vec::as_slice)
     }
 
-    /// Returns a parameter, `crossover_rad_s`, `phase_margin_deg`, `rms_e` or `rms_u` of a run.
+    /// Returns a quantity of a run: a parameter of the operator, `crossover_rad_s`, `phase_margin_deg`, `rms_e` or
+    /// `rms_u`.
     pub fn parameter(&self, [subject, condition, run]: [&str; 3], name: &str) -> Option<Estimate> {
         let key = [subject, condition, run].map(str::to_owned);
         self.parameters.get(&key)?.get(name).copied()
     }
 
-    /// Gain in dB and phase in deg of the operator of a run, or of all runs (`None`); none outside 0.1 to 40 rad/s.
+    /// Returns gain in dB and phase in deg of the operator of a run, or of the joint fit (`run = None`); `None` outside
+    /// 0.1 to 40 rad/s.
     pub fn response(&self, [subject, condition]: [&str; 2], run: Option<&str>, omega_rad_s: f64) -> Option<[f64; 2]> {
         let key = [subject, condition, run.unwrap_or(ALL)].map(str::to_owned);
         self.responses.get(&key)?.decibel_and_degrees(omega_rad_s)

@@ -1,11 +1,11 @@
-//! Orders and delay of the ARX and Box-Jenkins models, chosen in advance.
+//! Orders and delay of the ARX and Box-Jenkins models, chosen before the runs are fitted.
 //!
 //! A single run determines the delay of a person poorly: the loss of a second-order model is flat over nk, often
-//! decreases towards the end of the range, and has several minima, between which the selection changes with a single
-//! sample. The delay is therefore common to all runs of a person in a condition, that of their operator in the family:
-//! `nk = round(tau_e/Ts) + 1`, plus the samples by which u is recorded late. If there is no such operator, every nk in
-//! the range is fitted jointly to all runs on each of two sub-batches, and nk is the rounded mean of the two best. nd
-//! is the larger of the orders that BIC selects on the sub-batches of all runs.
+//! decreases towards the end of the range, and has several minima, and a single sample can change which of them is
+//! selected. The delay is therefore common to all runs of a person in a condition. It is the delay of their operator in
+//! the family: `nk = round(tau_e/Ts) + 1`, plus the number of samples by which u is recorded late. If there is no such
+//! operator, every nk in the range is fitted jointly to all runs on each of two sub-batches, and nk is the rounded mean
+//! of the two best values. nd is the larger of the orders that BIC selects on the two sub-batches of all runs.
 
 use hoid_ident::{Estimator, OrderRanges, choose_orders, order_selection::Criterion};
 use hoid_io::OutputTable;
@@ -24,13 +24,13 @@ pub(super) fn label_of(structure: Structure) -> &'static str {
     if structure == Structure::Arx { "ARX" } else { "BJ" }
 }
 
-/// nk of a delay in s, if u is recorded late by `late_samples`.
+/// Returns nk for a delay in s if u is recorded `late_samples` late.
 pub(super) fn nk_of(delay_s: f64, sample_time_s: f64, late_samples: f64) -> usize {
     (delay_s / sample_time_s + late_samples).round().max(0.0) as usize + 1
 }
 
-/// Orders of a structure for all runs, with a known or estimated delay; if it is estimated, there is a row for the
-/// delay of each sub-batch.
+/// Chooses the orders of a structure for all runs, with a known or estimated delay. If the delay is estimated, a row is
+/// written for the delay of each sub-batch.
 pub(super) fn choose(
     settings: &AnalysisSettings,
     records: &[Record],
@@ -83,7 +83,7 @@ pub(super) fn choose(
     Ok(())
 }
 
-/// Orders of the operator with the delays of the manifest.
+/// Returns the orders of a second-order operator, with nk in the range of delays of the manifest.
 pub(super) fn ranges(settings: &AnalysisSettings, record: &Record, structure: Structure) -> OrderRanges {
     let (least, most) = settings.delay_s;
     let samples = |delay_s: f64| (delay_s / record.sample_time().s()).round() as usize + 1;
@@ -92,7 +92,8 @@ pub(super) fn ranges(settings: &AnalysisSettings, record: &Record, structure: St
     ranges
 }
 
-/// The chosen orders, from the estimates of a person in a condition; or the reason why there are none.
+/// Returns the chosen orders, read from the estimates of a person in a condition, or the reason why no orders were
+/// chosen.
 pub(super) fn chosen(estimates: &OutputTable, structure: Structure) -> Result<Orders, String> {
     let [window, estimator, parameter, reason] =
         ["window", "estimator", "parameter", "reason"].map(|name| texts(estimates, name));

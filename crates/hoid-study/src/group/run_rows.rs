@@ -1,5 +1,4 @@
-//! The estimates of one run as rows: coefficients, operator, responses, and failures with their
-//! reasons.
+//! The estimates of one run as table rows: coefficients, operator, responses, and failures with their reasons.
 
 use hoid_ident::{Fit, frequency::Crossover};
 use hoid_io::{OutputTable, TableSchema};
@@ -25,12 +24,12 @@ pub(super) struct RunTables {
     pub estimates: OutputTable,
     pub responses: OutputTable,
     pub traces: OutputTable,
-    /// Tables by name: for a run, the steps applied to its files and the problems of their
-    /// sampling; for all runs jointly, the person.
+    /// Additional tables by name: for a run, the steps applied to its files and the problems of their sampling; for a
+    /// cell, the people.
     pub account: Vec<(&'static str, OutputTable)>,
 }
 
-/// One estimate per row, in long form.
+/// Returns the columns of the table of estimates, in long form: one estimate per row.
 pub(super) fn estimates_schema() -> TableSchema {
     schema(
         text(&["subject", "condition", "run", "window"])
@@ -41,13 +40,13 @@ pub(super) fn estimates_schema() -> TableSchema {
     )
 }
 
-/// The tables of a run in progress.
+/// Rows of the tables of a run, written during its analysis.
 pub(super) struct RunRows<'a> {
     entry: &'a RunEntry,
-    /// Known properties of its condition.
+    /// Known properties of the condition of the run.
     pub condition: ConditionSettings,
-    /// Time by which a sample of the input is later than that of the output in the same row, s: a ratio of samples
-    /// contains it as a phase, which is removed.
+    /// Time by which a sample of the input is later than the sample of the output in the same row, s. The phase that
+    /// this lead adds to a frequency response is removed.
     pub input_lead_s: f64,
     element: Option<ContinuousTransferFunction>,
     columns: TraceColumns,
@@ -72,7 +71,7 @@ impl<'a> RunRows<'a> {
         }
     }
 
-    /// Converts options that count recorded samples to samples of a run.
+    /// Converts settings that count recorded samples to samples of a run.
     pub fn at_the_rate_of(&mut self, run: &Run) {
         self.condition.offset_samples = run.samples(self.condition.offset_samples);
         self.input_lead_s = run.input_lead_s;
@@ -87,7 +86,7 @@ impl<'a> RunRows<'a> {
         }
     }
 
-    /// Coefficients, quality, responses and operator of a fit.
+    /// Writes coefficients, innovation variance, VAF, response and operator of a fit.
     pub fn fit_rows(&mut self, window: Window, label: &str, fit: &Fit, record: &Record) {
         for (name, estimate) in fit.parameters() {
             self.row(Some(window), label, &name, estimate);
@@ -108,7 +107,7 @@ impl<'a> RunRows<'a> {
         self.operator_rows(window, label, fit.operator());
     }
 
-    /// The operator of a fit, or the reason why it has none.
+    /// Writes the operator of a fit, or the reason why the fit has no operator.
     pub fn operator_rows(&mut self, window: Window, label: &str, operator: Result<OperatorEstimate, NotConvertible>) {
         match operator {
             Ok(operator) => {
@@ -120,8 +119,8 @@ impl<'a> RunRows<'a> {
         }
     }
 
-    /// Frequency response of the fit of the whole run, and crossover and phase margin with the
-    /// controlled element, if known.
+    /// Writes the frequency response of a fit of the whole run and, if the controlled element is known, crossover and
+    /// phase margin.
     pub fn response_rows(&mut self, window: Window, label: &str, fit: &Fit, sample_time_s: f64) {
         if window.name != WHOLE {
             return;
@@ -150,7 +149,8 @@ impl<'a> RunRows<'a> {
         }
     }
 
-    /// Response on the grid of a model whose u is late by `advance_s`.
+    /// Writes the response of a model on the frequency grid, advanced by the time `advance_s` by which u is late;
+    /// returns frequencies and response.
     pub fn responses_of(
         &mut self,
         label: &str,
@@ -177,12 +177,12 @@ impl<'a> RunRows<'a> {
         (omega, response)
     }
 
-    /// The controlled element, if known.
+    /// Returns the controlled element, if it is known and does not change.
     pub fn element(&self) -> Option<&ContinuousTransferFunction> {
         self.element.as_ref()
     }
 
-    /// The moving rows of a trace.
+    /// Writes the rows of a trace from its first update on.
     pub fn trace_rows(&mut self, trace: &Trace) {
         traces::write(&mut self.traces, &self.columns, self.entry, trace);
     }
@@ -201,7 +201,7 @@ impl<'a> RunRows<'a> {
         }
     }
 
-    /// A number estimated in a window, or for the whole run.
+    /// Writes a quantity estimated in a window, or without a window for the run as a whole.
     pub fn row(&mut self, window: Option<Window>, estimator: &str, parameter: &str, estimate: Estimate) {
         self.begin(window, estimator);
         self.estimates.text("parameter", parameter);
@@ -218,7 +218,7 @@ impl<'a> RunRows<'a> {
         self.estimates.text("reason", reason);
     }
 
-    /// Findings of a recursion over the whole run; none if it is trustworthy.
+    /// Writes the verdict on a recursion with its reasons, unless the recursion is trustworthy.
     pub fn judged(&mut self, estimator: &str, verdict: &Verdict) {
         if verdict.level == VerdictLevel::Trustworthy {
             return;
@@ -229,7 +229,7 @@ impl<'a> RunRows<'a> {
         self.estimates.text("reason", &reasons.join("; "));
     }
 
-    /// Quantities that could not be estimated, and the reason.
+    /// Writes that an estimator failed, and the reason.
     pub fn failed(&mut self, window: Option<Window>, estimator: &str, reason: &str) {
         self.begin(window, estimator);
         self.estimates.text("status", "failed");

@@ -7,11 +7,11 @@ use hoid_numerics::statistics::root_mean_square;
 /// A sampling defect that occurs in recorded data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SamplingDefect {
-    /// Times with jitter of a fifth of a sample.
+    /// Sample times with a jitter of one fifth of a sample.
     Jitter,
-    /// One row of two hundred is missing.
+    /// One row in two hundred is missing.
     Missing,
-    /// One row of two hundred is duplicated.
+    /// One row in two hundred is duplicated.
     Repeated,
     /// A clock that is slow by 0.2 %.
     SlowClock,
@@ -19,7 +19,7 @@ pub enum SamplingDefect {
     Saturated,
     /// A stick quantised to 8 bits over its range.
     Quantised,
-    /// A recorder that once writes the same values for half a second.
+    /// A recorder that repeats the same values for half a second, once per run.
     Stalled,
 }
 
@@ -35,12 +35,12 @@ impl SamplingDefect {
         Self::Stalled,
     ];
 
-    /// True if the times of the rows become uneven.
+    /// True if the rows are no longer evenly spaced in time.
     pub(super) fn is_uneven(self) -> bool {
         matches!(self, Self::Jitter | Self::Missing | Self::Repeated)
     }
 
-    /// Its name.
+    /// Returns the name of the defect.
     pub fn name(self) -> &'static str {
         match self {
             Self::Jitter => "jitter",
@@ -54,8 +54,8 @@ impl SamplingDefect {
     }
 }
 
-/// t and the given columns of a run as recorded with these defects. `noise` are normal deviates,
-/// one per sample.
+/// Returns t and the given columns of a run as recorded with these defects. `noise` contains one normal deviate per
+/// sample.
 pub(super) fn recorded(record: &Record, names: &[&str], defects: &[SamplingDefect], noise: &[f64]) -> OutputTable {
     let has = |defect: SamplingDefect| defects.contains(&defect);
     let n = record.len();
@@ -65,7 +65,7 @@ pub(super) fn recorded(record: &Record, names: &[&str], defects: &[SamplingDefec
         t.iter_mut().for_each(|t| *t *= 0.998);
     }
     if has(SamplingDefect::Jitter) {
-        // Less than half a sample, so that the order is kept.
+        // The jitter is less than half a sample, so the order of the samples is kept.
         t.iter_mut()
             .zip(noise)
             .for_each(|(t, z)| *t += (0.2 * z).clamp(-0.45, 0.45) * ts);
@@ -79,7 +79,7 @@ pub(super) fn recorded(record: &Record, names: &[&str], defects: &[SamplingDefec
         let step = 8.0 * sd / 256.0;
         u.iter_mut().for_each(|u| *u = (*u / step).round() * step);
     }
-    // Source of the values of each row; the times continue.
+    // Returns the row from which the values of row k are taken; the times are not repeated.
     let held = |k: usize| {
         let stall = n / 3..n / 3 + (0.5 / ts) as usize;
         if has(SamplingDefect::Stalled) && stall.contains(&k) {
@@ -89,7 +89,7 @@ pub(super) fn recorded(record: &Record, names: &[&str], defects: &[SamplingDefec
         }
     };
     let mut rows: Vec<usize> = (0..n).collect();
-    // One in two hundred, by a deviate that is always drawn.
+    // Selects about one row in two hundred. The deviate is the same with or without the defect.
     let rare = |k: usize| (noise[k] * 1e6).abs() as u64 % 200;
     if has(SamplingDefect::Missing) {
         rows.retain(|k| *k == 0 || rare(*k) != 0);

@@ -1,13 +1,12 @@
-//! Settling times of the recursions after a change at a known instant, and their noise, by subject,
-//! condition and parameter.
+//! Settling times and noise of the recursions after a change at a known time, by subject, condition and parameter.
 //!
-//! For a recorded person the true values are not known: the levels before and after the change are
-//! those of the recursion itself, namely the medians, over the second half of the rows before the change and over the
-//! second half of those after it, of the median over the runs. The settling times are those at which the median first
-//! covers 50 and 90 % of the step, as in the studies; the noise is the deviation of one run around its own level after
-//! the change, `1.4826` times the median absolute deviation, and its median over the runs. There is no settling time if
-//! the step is smaller than the noise, and none if the share was already covered at the change: in the latter case the
-//! estimate changed for another reason.
+//! For a recorded person the true values are not known, so the levels before and after the change are taken from the
+//! recursion itself. Each level is a median over time of the median over the runs: over the second half of the rows
+//! before the change, and over the second half of the rows after it. The settling times are the times at which the
+//! median over the runs first covers 50 and 90 % of the step, as in the studies. The noise of a run is its deviation
+//! around its own level after the change, `1.4826` times the median absolute deviation; the table gives the median over
+//! the runs. There is no settling time if the step is smaller than the noise, or if the estimate had already covered
+//! the share when the task changed, since it then changed for another reason.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +18,7 @@ use super::{
 };
 use crate::{columns::Rows, statistics::median};
 
-/// Factor from the median absolute deviation to the standard deviation of a normal distribution.
+/// Ratio of the standard deviation to the median absolute deviation for a normal distribution.
 const MAD: f64 = 1.4826;
 
 const KEYS: [&str; 4] = ["subject", "condition", "estimator", "parameter"];
@@ -33,18 +32,18 @@ const FIGURES: [&str; 7] = [
     "noise",
 ];
 
-/// Results of single runs: times of the change, and the noise of each parameter.
+/// Results of single runs: times of the change, and noise of each parameter.
 #[derive(Debug, Clone, Default)]
 struct OfRuns {
     change_s: Vec<f64>,
     noise: BTreeMap<String, Vec<f64>>,
 }
 
-/// Results of the runs with a change.
+/// Results of the runs with a change, by subject, condition and estimator.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Settling(BTreeMap<[String; 3], OfRuns>);
 
-/// Rows in the second half of an interval.
+/// Returns the rows in the second half of a time interval.
 fn second_half(times: &[f64], from_s: f64, to_s: f64) -> Vec<usize> {
     let inside: Vec<usize> = (0..times.len())
         .filter(|i| times[*i] > from_s && times[*i] <= to_s)
@@ -79,12 +78,12 @@ impl Settling {
         }
     }
 
-    /// The columns.
+    /// Returns the columns of the table.
     pub fn schema() -> TableSchema {
         schema(text(&KEYS).chain(real(&FIGURES)))
     }
 
-    /// A row for each parameter that moves.
+    /// Returns the table with a row for each estimator and parameter.
     pub fn table(&self, traces: &TraceAverages) -> OutputTable {
         let mut rows = Rows::new(&Self::schema());
         for (key, of_runs) in &self.0 {
@@ -139,7 +138,8 @@ impl Step {
         }
     }
 
-    /// Time from the change until a share of the step is covered; `None` if it was covered before.
+    /// Returns the time from the change until the given share of the step is covered; `None` if it was covered before
+    /// the change or is never covered.
     fn settled_s(&self, times: &[f64], values: &[f64], change_s: f64, share: f64) -> Option<f64> {
         let covered = |v: f64| (v - self.before) / (self.after - self.before) >= share;
         let (before, after): (Vec<_>, Vec<_>) = times.iter().zip(values).partition(|(t, _)| **t <= change_s);

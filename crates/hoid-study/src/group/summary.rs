@@ -1,17 +1,17 @@
 //! Summary of a finished group: failures, people, and an overall verdict.
 //!
-//! | finding | weight | when |
+//! | finding | level | condition |
 //! |---|---|---|
 //! | `nothing-read` | undetermined | no run could be read |
-//! | `nothing-determined` | undetermined | operators were requested, and of no person there is one that the data determine |
+//! | `nothing-determined` | undetermined | operators were requested, but the data determine none of them |
 //! | `run-failed` | doubt | a run could not be read |
 //! | `condition-failed` | doubt | no operator could be fitted to a person in a condition |
-//! | `person-not-determined`, `person-doubtful` | doubt | the verdict on a person |
-//! | `fits-failed` | note | other fits, which are rows with their reasons |
-//! | `condition-changes` | note | a condition that changes within its runs has no operator |
+//! | `person-not-determined`, `person-doubtful` | doubt | the operator of a person is not determined, or is doubtful |
+//! | `fits-failed` | note | other fits failed; the table of estimates gives the reasons |
+//! | `condition-changes` | note | there is no operator, because the task changes within the runs |
 //!
-//! One person whose data carry no information makes the group doubtful, not undetermined: the results of the others
-//! remain valid.
+//! If the data of one person carry no information, the group is doubtful, not undetermined: the results of the other
+//! people remain valid.
 
 use std::path::Path;
 
@@ -42,13 +42,13 @@ pub struct RunFailure {
 /// Summary of a finished group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupSummary {
-    /// Number of runs that count.
+    /// Number of runs that are analysed.
     pub runs: usize,
     /// The runs that could not be read.
     pub failures: Vec<RunFailure>,
     /// The people, in the order of their first runs in the manifest.
     pub people: Vec<Person>,
-    /// Overall verdict.
+    /// Verdict on the group as a whole.
     pub verdict: Verdict,
 }
 
@@ -56,7 +56,7 @@ impl GroupSummary {
     /// Reads the tables in the directory of a finished group.
     ///
     /// # Errors
-    /// [`StudyError::Io`] for missing tables.
+    /// [`StudyError::Io`] if a table cannot be read.
     pub fn read(manifest: &Manifest, directory: &Path) -> Result<Self, StudyError> {
         let table = |name: &str| read_table(&table_path(directory, name, false));
         let (people, estimates) = (people_of(&table(PEOPLE)?), table("estimates")?);
@@ -72,7 +72,7 @@ impl GroupSummary {
     }
 }
 
-/// The unreadable runs, and the number of other failed estimates.
+/// Returns the runs that could not be read, and the number of other failed estimates.
 fn failures(estimates: &OutputTable) -> (Vec<RunFailure>, usize) {
     let [subject, condition, run, estimator, status, reason] =
         ["subject", "condition", "run", "estimator", "status", "reason"].map(|name| texts(estimates, name));
@@ -135,7 +135,7 @@ fn findings(runs: usize, failures: &[RunFailure], people: &[Person], other: usiz
     if other > 0 {
         all.push(Finding::note(
             "fits-failed",
-            format!("{other} other fits failed; the table estimates has their reasons"),
+            format!("{other} other fits failed; the table estimates lists their reasons"),
         ));
     }
     all

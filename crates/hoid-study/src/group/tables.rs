@@ -2,17 +2,17 @@
 
 use hoid_io::{ColumnKind, ColumnSchema, ColumnValues, OutputTable, TableSchema};
 
-/// Columns of texts.
+/// Returns text columns with these names.
 pub(super) fn text<S: AsRef<str>>(names: &[S]) -> impl Iterator<Item = (&str, ColumnKind)> {
     names.iter().map(|name| (name.as_ref(), ColumnKind::Text))
 }
 
-/// Columns of numbers.
+/// Returns columns of real numbers with these names.
 pub(super) fn real<S: AsRef<str>>(names: &[S]) -> impl Iterator<Item = (&str, ColumnKind)> {
     names.iter().map(|name| (name.as_ref(), ColumnKind::Real))
 }
 
-/// A table with these columns.
+/// Returns the schema of a table with these columns.
 pub(super) fn schema<'a>(columns: impl Iterator<Item = (&'a str, ColumnKind)>) -> TableSchema {
     TableSchema {
         comments: Vec::new(),
@@ -25,7 +25,7 @@ pub(super) fn schema<'a>(columns: impl Iterator<Item = (&'a str, ColumnKind)>) -
     }
 }
 
-/// Reads a column of texts; empty if there is none.
+/// Reads a text column; empty if there is no such column.
 pub(super) fn texts<'a>(table: &'a OutputTable, name: &str) -> &'a [String] {
     match table.column(name) {
         Some(ColumnValues::Text(values)) => values,
@@ -33,7 +33,7 @@ pub(super) fn texts<'a>(table: &'a OutputTable, name: &str) -> &'a [String] {
     }
 }
 
-/// Reads a column of numbers; empty if there is none.
+/// Reads a numeric column; empty if there is no such column.
 pub(super) fn numbers<'a>(table: &'a OutputTable, name: &str) -> &'a [f64] {
     match table.column(name) {
         Some(ColumnValues::Real(values)) => values,
@@ -41,16 +41,16 @@ pub(super) fn numbers<'a>(table: &'a OutputTable, name: &str) -> &'a [f64] {
     }
 }
 
-/// Separator between sentences in a cell.
+/// Separator between sentences in one cell.
 const BETWEEN: &str = " | ";
 
-/// Sentences in one cell.
+/// Joins sentences into the text of one cell.
 pub(super) fn joined<'a>(sentences: impl Iterator<Item = &'a str>) -> String {
     sentences.collect::<Vec<_>>().join(BETWEEN)
 }
 
-/// Splits a cell into its sentences.
-pub(super) fn parted(cell: &str) -> Vec<String> {
+/// Splits the text of a cell into its sentences.
+pub(super) fn sentences(cell: &str) -> Vec<String> {
     cell.split(BETWEEN)
         .filter(|sentence| !sentence.is_empty())
         .map(str::to_owned)

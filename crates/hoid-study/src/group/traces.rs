@@ -1,9 +1,9 @@
-//! Recursive estimates of one run as rows: coefficients and operator with their standard errors,
-//! correlations of the coefficients, and the frequency response at the frequencies of the manifest.
+//! Recursive estimates of one run as table rows: coefficients and operator with their standard errors, correlations of
+//! the coefficients, and the frequency response at the frequencies given in the manifest.
 //!
-//! The covariance of the errors of two coefficients is their correlation times both standard
-//! errors; pages show it for RPEM. The response at a frequency between the lines of the excitation
-//! is determined even if single parameters are not.
+//! The covariance of the errors of two coefficients is their correlation times the product of their standard errors;
+//! the report pages show it for RPEM. The response at a frequency between the lines of the excitation is determined
+//! even if single parameters are not.
 
 use hoid_io::TableSchema;
 use hoid_model::PolynomialModel;
@@ -16,24 +16,23 @@ use super::{
 };
 use crate::columns::{OPERATOR, Rows};
 
-/// Maximum number of coefficients of a polynomial in the tables.
+/// Maximum number of noise-model coefficients in the tables.
 const MOST_ND: usize = 20;
 
-/// Coefficients of RPEM whose correlations are kept.
+/// Coefficients of RPEM whose correlations are stored.
 const CORRELATED: [&str; 4] = ["f1", "f2", "b0", "b1"];
 
-/// Columns of the traces.
+/// Columns of the table of traces.
 #[derive(Debug, Clone)]
 pub(super) struct TraceColumns {
-    /// Columns with a standard error: coefficients of RLS and of Box-Jenkins models, and the
-    /// operator.
+    /// Quantities with a standard error: coefficients of RLS and of Box-Jenkins models, and parameters of the operator.
     pub parameters: Vec<String>,
-    /// Correlations, and the response at the frequencies of the manifest.
+    /// Quantities without a standard error: correlations, and the response at the frequencies given in the manifest.
     pub others: Vec<String>,
     response_at_rad_s: Vec<f64>,
 }
 
-/// Names of magnitude and phase at a frequency.
+/// Returns the names of the columns for magnitude and phase at a frequency.
 pub(super) fn response_names(omega_rad_s: f64) -> [String; 2] {
     ["magnitude_db", "phase_deg"].map(|name| format!("{name}_at_{omega_rad_s}"))
 }
@@ -51,7 +50,7 @@ impl TraceColumns {
         }
     }
 
-    /// All names: parameters, their standard errors, and the others.
+    /// Returns all column names: the quantities, their standard errors, and the quantities without a standard error.
     pub fn names(&self) -> Vec<String> {
         let errors = self.parameters.iter().map(|name| format!("{name}_se"));
         self.parameters
@@ -62,13 +61,13 @@ impl TraceColumns {
             .collect()
     }
 
-    /// Columns whose settling times are computed.
+    /// Returns the columns whose settling times are computed.
     pub fn of_settling(&self) -> Vec<String> {
         let responses = self.others.iter().filter(|name| !name.starts_with("correlation"));
         self.parameters.iter().chain(responses).cloned().collect()
     }
 
-    /// The table: one stored point of a recursion per row.
+    /// Returns the columns of the table, with one stored point of a recursion per row.
     pub fn schema(&self) -> TableSchema {
         let pairs: Vec<String> = self
             .parameters
@@ -84,7 +83,7 @@ impl TraceColumns {
     }
 }
 
-/// Positions of two different coefficients in [`CORRELATED`].
+/// Returns the positions of all pairs of different coefficients in [`CORRELATED`].
 fn pairs() -> impl Iterator<Item = (usize, usize)> {
     (0..CORRELATED.len()).flat_map(|i| (i + 1..CORRELATED.len()).map(move |j| (i, j)))
 }
@@ -94,13 +93,14 @@ pub(super) fn label_of(method: &Method) -> String {
     method.name().to_uppercase()
 }
 
-/// The rows of a trace from its first update on: before, it is the fit from which it starts.
+/// Returns the rows of a trace from the first update on. Earlier rows only repeat the fit from which the recursion
+/// starts.
 pub(super) fn moving(trace: &Trace) -> impl Iterator<Item = usize> + '_ {
     let from_s = trace.updated_from_s() - 0.5 * trace.sample_time().s();
     (0..trace.len()).filter(move |k| trace.times_s()[*k] >= from_s)
 }
 
-/// Writes the moving rows of a trace.
+/// Writes the rows of a trace from its first update on.
 pub(super) fn write(rows: &mut Rows, columns: &TraceColumns, entry: &RunEntry, trace: &Trace) {
     let label = label_of(&trace.options().method);
     let names = trace.parameter_names();
@@ -148,7 +148,7 @@ fn write_response(rows: &mut Rows, columns: &TraceColumns, trace: &Trace, k: usi
     }
 }
 
-/// The values of each coefficient and of the operator in a window, from the first update on.
+/// Returns the values of each coefficient and of each operator parameter in a window, from the first update on.
 pub(super) fn values_within(trace: &Trace, from_s: f64, to_s: f64) -> Vec<(String, Vec<f64>)> {
     let names = trace.parameter_names().into_iter().chain(OPERATOR.map(str::to_owned));
     let mut columns: Vec<(String, Vec<f64>)> = names.map(|name| (name, Vec::new())).collect();

@@ -1,5 +1,5 @@
-//! The files of a virtual experiment: one table per run, `truth.csv`, and `group.toml` last, so
-//! that a directory that contains it is complete.
+//! The files of a virtual experiment: one table per run, `truth.csv`, and `group.toml`. The last is written at the end,
+//! so a directory that contains it is complete.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{StudyError, columns::Rows};
 
-/// Writer of the files of an experiment.
+/// Writer for the files of a virtual experiment.
 pub(super) struct VirtualFiles<'a> {
     directory: &'a Path,
     /// Columns of a run, except t.
@@ -25,11 +25,11 @@ pub(super) struct VirtualFiles<'a> {
 }
 
 impl<'a> VirtualFiles<'a> {
-    /// Refuses a directory that contains an experiment.
+    /// Returns an error if the directory already contains an experiment.
     ///
     /// # Errors
-    /// [`StudyError::ExperimentThere`].
-    pub fn refuse_another(directory: &Path) -> Result<(), StudyError> {
+    /// [`StudyError::ExperimentThere`] if the directory contains an experiment.
+    pub fn check_no_experiment(directory: &Path) -> Result<(), StudyError> {
         if directory.join(MANIFEST).exists() {
             return Err(StudyError::ExperimentThere {
                 directory: directory.display().to_string(),
@@ -41,7 +41,7 @@ impl<'a> VirtualFiles<'a> {
     /// Creates the directory.
     ///
     /// # Errors
-    /// [`StudyError::Io`].
+    /// [`StudyError::Io`] if the directory cannot be created.
     pub fn new(directory: &'a Path, columns: &'a [&'a str], defects: &'a [SamplingDefect]) -> Result<Self, StudyError> {
         hoid_io::make_directory(directory)?;
         Ok(Self {
@@ -52,10 +52,10 @@ impl<'a> VirtualFiles<'a> {
         })
     }
 
-    /// Writes a run of a subject in a condition, sampled with the defects.
+    /// Writes a run of a subject in a condition, with the sampling defects applied.
     ///
     /// # Errors
-    /// [`StudyError::Io`].
+    /// [`StudyError::Io`] if the file cannot be written.
     pub fn run(
         &mut self,
         (subject, condition, run): (u64, String, u64),
@@ -76,10 +76,10 @@ impl<'a> VirtualFiles<'a> {
         Ok(())
     }
 
-    /// Writes the truth and the manifest.
+    /// Writes the true parameters and the manifest.
     ///
     /// # Errors
-    /// [`StudyError::Io`].
+    /// [`StudyError::Io`] if a file cannot be written.
     pub fn finish(
         self,
         name: &str,

@@ -1,10 +1,9 @@
-//! A virtual experiment with persons drawn from the family of operators.
+//! A virtual experiment with people drawn from the family of operators.
 //!
-//! Each subject is a person for each controlled element ([`hoid_sim::people`]): parameters from
-//! published ranges, a realistic remnant, a stick with drift. The kinds of remnant alternate over
-//! the subjects. Files have the columns t, e, u, d, y of recorded experiments; `truth.csv` has the
-//! true parameters of each run with its crossover and margin. An empty T_I of a form with a lag is
-//! infinite.
+//! Each subject is a new person for each controlled element ([`hoid_sim::people`]), with parameters from published
+//! ranges, a realistic remnant, and a stick with drift. The kinds of remnant alternate over the subjects. The files
+//! have the columns t, e, u, d, y, as in recorded experiments. `truth.csv` contains the true parameters, crossover and
+//! margin of each run. If T_I of a form with a lag is empty, it is infinite.
 
 use std::path::Path;
 
@@ -21,33 +20,33 @@ use super::{
 };
 use crate::{StudyError, columns::Rows};
 
-/// Experiment to simulate.
+/// A virtual experiment with people drawn from the family of operators.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PeopleExperiment {
     /// Number of subjects.
     pub subjects: u64,
-    /// Controlled elements, one condition each.
+    /// Controlled elements; each is a condition.
     pub plants: Vec<Plant>,
-    /// Form of their operators; `None` for the typical form for each element.
+    /// Form of the operators; `None` for the typical form for each controlled element.
     pub form: Option<Form>,
     /// Kinds of remnant, alternating over the subjects.
     pub remnants: Vec<RemnantKind>,
-    /// Number of runs of each subject and condition.
+    /// Number of runs per subject and condition.
     pub runs: u64,
-    /// Spread of the parameters between the runs of a subject.
+    /// Relative spread of the parameters between the runs of a subject.
     pub between_runs: f64,
-    /// Population from which the persons are drawn.
+    /// Population from which the people are drawn.
     pub population: Population,
-    /// Time between two samples.
+    /// Sample time of the recordings.
     pub sample_time: SampleTime,
     /// Seed of all random streams.
     pub seed: u64,
-    /// Sampling defects.
+    /// Sampling defects applied to the recordings.
     pub defects: Vec<SamplingDefect>,
 }
 
 impl Default for PeopleExperiment {
-    /// Three subjects on all elements, with all kinds of remnant, five runs each.
+    /// Three subjects, all controlled elements, all kinds of remnant, five runs each.
     fn default() -> Self {
         Self {
             subjects: 3,
@@ -66,7 +65,7 @@ impl Default for PeopleExperiment {
 
 /// Columns of a file, except t.
 const COLUMNS: [&str; 4] = ["e", "u", "d", "y"];
-/// Other true values.
+/// Other true values in `truth.csv`.
 const OTHERS: [&str; 7] = [
     "crossover_rad_s",
     "phase_margin_deg",
@@ -76,22 +75,22 @@ const OTHERS: [&str; 7] = [
     "offset_u",
     "sample_time_s",
 ];
-/// Random streams of the defects: no person has this number.
+/// Cell number of the random streams for the defects; no person has this number.
 const DEFECTS: u64 = u64::MAX / 2;
 
-/// Simulates the experiment into a directory: one file per run, `truth.csv`, `group.toml`.
+/// Simulates the experiment and writes its files to a directory: one file per run, `truth.csv`, and `group.toml`.
 ///
 /// # Errors
-/// [`StudyError::Virtual`] for an invalid experiment, [`StudyError::ExperimentThere`],
-/// [`StudyError::Io`].
+/// [`StudyError::Virtual`] for an invalid experiment, [`StudyError::ExperimentThere`] if the directory already contains
+/// one, [`StudyError::Io`] if a file cannot be written.
 pub fn simulate_people(
     experiment: &PeopleExperiment,
     directory: &Path,
     each: &dyn Fn(),
 ) -> Result<Manifest, StudyError> {
     experiment.check()?;
-    VirtualFiles::refuse_another(directory)?;
-    // All persons are drawn before any file is written.
+    VirtualFiles::check_no_experiment(directory)?;
+    // All people are drawn before any file is written.
     let mut people = Vec::new();
     for subject in 1..=experiment.subjects {
         for (place, plant) in (0..).zip(&experiment.plants) {

@@ -1,11 +1,11 @@
-//! A virtual experiment: subjects, conditions and runs of simulated subjects, with their true
-//! parameters.
+//! A virtual experiment: simulated subjects, conditions and runs, with the true parameters.
 //!
-//! The gain K_e, the lead T_L, omega_nm, zeta_nm and the noise level of subject s are those of the
-//! condition times `exp(a z)`, where z is a normal deviate of the subject and a the spread between subjects (0.15 is 15
-//! %); in each run each parameter is again multiplied by `exp(b z)`, where b is the spread between runs. The delay
-//! differs by whole samples. An unstable loop is drawn again, from the next deviates. Deviates come from the random
-//! stream (seed, subject, run), remnants from the streams that `hoid simulate` uses.
+//! The gain K_e, the lead T_L, omega_nm, zeta_nm and the noise level of a subject are those of the condition times
+//! `exp(a z)`, where z is a normal deviate of the subject and a is the spread between subjects (0.15 is 15 %). In each
+//! run each parameter is multiplied by a further factor `exp(b z)`, where b is the spread between runs. The delay
+//! varies between subjects with half their spread, rounded to whole samples, and not between runs. If the loop is
+//! unstable, new deviates are drawn. Deviates come from the random stream (seed, subject, run), remnants from the
+//! streams that `hoid simulate` uses.
 
 use std::path::Path;
 
@@ -28,46 +28,46 @@ use crate::{
     columns::{OPERATOR, Rows},
 };
 
-/// Experiment to simulate.
+/// A virtual experiment with simulated subjects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VirtualExperiment {
     /// Number of subjects.
     pub subjects: u64,
-    /// Conditions.
+    /// Conditions in which each subject is simulated.
     pub conditions: Vec<Condition>,
-    /// Number of runs of each subject and condition.
+    /// Number of runs per subject and condition.
     pub runs: u64,
-    /// Spread of the parameters between subjects.
+    /// Relative spread of the parameters between subjects.
     pub between_subjects: f64,
-    /// Spread of the parameters between the runs of a subject.
+    /// Relative spread of the parameters between the runs of a subject.
     pub between_runs: f64,
     /// Order of the remnant.
     pub remnant_order: usize,
-    /// Noise level before the spread is applied.
+    /// Noise level before the spreads are applied.
     pub noise_level: f64,
     /// Seed of all random streams.
     pub seed: u64,
-    /// Sampling defects.
+    /// Sampling defects applied to the recordings.
     pub defects: Vec<SamplingDefect>,
 }
 
-/// Random streams of the subjects: no cell of a study has this number.
+/// Cell number of the random stream of subject 0; no cell of a study has a number near it.
 const SUBJECTS: u64 = u64::MAX;
-/// Number of draws after which the spread is too large for stable loops.
+/// Maximum number of draws for a stable loop; if all fail, the spreads are too large.
 const MOST_DRAWS: usize = 100;
 
-/// Simulates the experiment into a directory: one file per run, `truth.csv`, `group.toml`.
+/// Simulates the experiment and writes its files to a directory: one file per run, `truth.csv`, and `group.toml`.
 ///
 /// # Errors
-/// [`StudyError::Virtual`] for an invalid experiment, [`StudyError::ExperimentThere`],
-/// [`StudyError::Io`].
+/// [`StudyError::Virtual`] for an invalid experiment, [`StudyError::ExperimentThere`] if the directory already contains
+/// one, [`StudyError::Io`] if a file cannot be written.
 pub fn simulate_group(
     experiment: &VirtualExperiment,
     directory: &Path,
     each: &dyn Fn(),
 ) -> Result<Manifest, StudyError> {
     experiment.check()?;
-    VirtualFiles::refuse_another(directory)?;
+    VirtualFiles::check_no_experiment(directory)?;
     let mut files = VirtualFiles::new(directory, &["f_t", "e", "u", "x"], &experiment.defects)?;
     let mut truth = Rows::new(&truth_schema());
     for subject in 1..=experiment.subjects {
@@ -107,10 +107,10 @@ pub fn simulate_group(
     )
 }
 
-/// Maximum number of runs of a virtual experiment, one file each.
+/// Maximum number of runs of a virtual experiment; each run is a file.
 const MOST_RUNS: u64 = 100_000;
 
-/// Checks the number of files of an experiment.
+/// Checks that an experiment does not have too many runs.
 pub(super) fn check_number(factors: &[u64]) -> Result<(), StudyError> {
     let runs = factors.iter().try_fold(1_u64, |all, n| all.checked_mul(*n));
     if runs.is_some_and(|runs| runs <= MOST_RUNS) {
@@ -119,8 +119,8 @@ pub(super) fn check_number(factors: &[u64]) -> Result<(), StudyError> {
     let found: Vec<String> = factors.iter().map(u64::to_string).collect();
     Err(StudyError::Virtual {
         reason: format!(
-            "subjects times runs times conditions are {}, expected at most {MOST_RUNS} runs in all: ask for fewer, or \
-             make several experiments with different seeds",
+            "subjects times runs times conditions is {}, expected at most {MOST_RUNS} runs in all: ask for fewer runs, \
+             or make several experiments with different seeds",
             found.join(" x ")
         ),
     })
@@ -150,11 +150,11 @@ impl VirtualExperiment {
         Ok(())
     }
 
-    /// The person of a run, and the run; subject and run count from 1, a cell is an index of
-    /// `conditions`.
+    /// Returns the scenario of a run, with the parameters of its subject, and the simulated record. Subject and run are
+    /// counted from 1; `cell` is an index of `conditions`.
     ///
     /// # Errors
-    /// [`StudyError::Virtual`] for a subject without a stable loop.
+    /// [`StudyError::Virtual`] if no draw gives a stable loop.
     pub fn run(
         &self,
         subject: u64,
@@ -174,8 +174,7 @@ impl VirtualExperiment {
         let of_run = deviates(1 + cell * 1_000_000 + run);
         let mut reason = String::new();
         for draw in 0..MOST_DRAWS {
-            // The subject is drawn again if none of their runs is stable, after new draws of the
-            // run.
+            // The deviates of the run are replaced in each draw, those of the subject in every tenth draw.
             let (s, r) = (&of_subject[6 * (draw / 10)..], &of_run[6 * draw..]);
             let factor = |i: usize| (self.between_subjects * s[i] + self.between_runs * r[i]).exp();
             let mut scenario = Scenario::condition(condition);
@@ -212,7 +211,7 @@ impl VirtualExperiment {
         })
     }
 
-    /// Normal deviates for the defects of a run, one per sample.
+    /// Returns normal deviates for the defects of a run, one per sample.
     fn sampling_noise(&self, subject: u64, cell: u64, run: u64, samples: usize) -> Vec<f64> {
         RunSeed {
             seed: self.seed,

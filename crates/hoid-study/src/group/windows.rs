@@ -1,13 +1,13 @@
-//! The spans of a run that are estimated separately.
+//! The windows of a run in which quantities are estimated.
 
 use hoid_model::Record;
 
 use super::analysis_settings::AnalysisSettings;
 
-/// Name of the span of the whole run.
+/// Name of the window that covers the whole run.
 pub(super) const WHOLE: &str = "whole";
 
-/// A span of the run with its name.
+/// A time span of the run, with its name.
 #[derive(Clone, Copy)]
 pub(super) struct Window {
     pub name: &'static str,
@@ -15,7 +15,7 @@ pub(super) struct Window {
     pub to_s: f64,
 }
 
-/// The two sub-batches and the whole run.
+/// Returns the two sub-batches and the whole run.
 pub(super) fn windows(settings: &AnalysisSettings, record: &Record) -> [Window; 3] {
     let (begin, end) = (
         record.time_s(0),

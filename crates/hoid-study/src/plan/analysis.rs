@@ -1,7 +1,7 @@
-//! Estimators of a plan that run as in `hoid identify`, with their verdict: the operator of a person, an operator with
-//! changing gains, instrumental variables.
+//! Estimators of a plan that run as in `hoid identify` and give a verdict: the operator of a person, an operator with
+//! changing gains, and instrumental variables.
 //!
-//! Their options are those of the registry of estimators.
+//! The options of these estimators are those in the registry of estimators.
 
 use hoid_analysis::{
     Identification, ResolvedRequest,
@@ -10,16 +10,16 @@ use hoid_analysis::{
 use hoid_ident::{IdentError, NamedOrders, family::OperatorPrior, settings::MethodSpec};
 use hoid_model::{Form, Orders, Structure};
 
-/// Words for `method`.
+/// Value of `method` for the operator of a person.
 pub(super) const OPERATOR: &str = registry::OPERATOR;
-/// Another word for `operator` with `change = "sigmoid"`.
+/// Value of `method` equivalent to `operator` with `change = "sigmoid"`.
 pub(super) const TIME_VARYING: &str = "time-varying";
-/// Another word for `operator`.
+/// Alternative name for `operator`.
 const FAMILY: &str = "family";
 
-/// Options of the registry that are not separate keys of a plan: the plan has typed keys for them, or they do not apply
-/// to single runs.
-const ELSEWHERE: [&str; 10] = [
+/// Options of the registry that are not keys of the registry in a plan: either a plan has its own typed keys for them,
+/// or they do not apply to single runs.
+const NOT_PLAN_KEYS: [&str; 10] = [
     "noise",
     "change",
     "orders",
@@ -32,7 +32,7 @@ const ELSEWHERE: [&str; 10] = [
     "max_iterations",
 ];
 
-/// The methods with their options in plans.
+/// Returns the methods with their options in plans.
 pub(super) fn methods() -> Vec<MethodSpec> {
     let in_plan = |spec: MethodSpec| {
         let name = match spec.name {
@@ -41,19 +41,20 @@ pub(super) fn methods() -> Vec<MethodSpec> {
         };
         of_method(name, false)?;
         let mut settings = spec.settings;
-        settings.retain(|setting| !ELSEWHERE.contains(&setting.name));
+        settings.retain(|setting| !NOT_PLAN_KEYS.contains(&setting.name));
         Some(MethodSpec { name, settings, ..spec })
     };
     estimators().into_iter().filter_map(in_plan).collect()
 }
 
-/// Estimator run as by `hoid identify`, with its defaults and without a prior; `None` for another method.
+/// Returns the estimator of a method that runs as in `hoid identify`, with its defaults and without a prior; `None` for
+/// any other method.
 pub(super) fn of_method(method: &str, changes: bool) -> Option<ResolvedRequest> {
     let estimator = match method {
         TIME_VARYING => CHANGE,
         OPERATOR | FAMILY if changes => CHANGE,
         OPERATOR | FAMILY => OPERATOR,
-        // These have separate tables.
+        // A plan names these estimators differently.
         registry::PEM | registry::REMNANT | CHANGE => return None,
         name => name,
     };
@@ -64,7 +65,7 @@ pub(super) fn of_method(method: &str, changes: bool) -> Option<ResolvedRequest> 
     Some(asked)
 }
 
-/// Its name as a method of plans.
+/// Returns the name of the estimator as a method of plans.
 pub(crate) fn name(asked: &ResolvedRequest) -> &'static str {
     match asked.estimator() {
         CHANGE => TIME_VARYING,
@@ -72,7 +73,7 @@ pub(crate) fn name(asked: &ResolvedRequest) -> &'static str {
     }
 }
 
-/// With the orders of its noise, or of its polynomials.
+/// Returns the estimator with the orders of its noise model or of its polynomials.
 pub(super) fn with_orders(
     asked: ResolvedRequest,
     noise: &NamedOrders,
@@ -96,7 +97,7 @@ pub(super) fn with_orders(
     })
 }
 
-/// A held or bounded parameter that the model does not have, with those that it has.
+/// Returns a fixed or bounded parameter that the model does not have, and the names of its parameters.
 pub(super) fn unknown_parameter(asked: &ResolvedRequest) -> Option<(&str, Vec<String>)> {
     let ResolvedRequest::Change(how) = asked else {
         return None;
@@ -109,7 +110,8 @@ pub(super) fn unknown_parameter(asked: &ResolvedRequest) -> Option<(&str, Vec<St
     Some((unknown, names))
 }
 
-/// Columns of its own parameters; those of polynomials follow from their orders.
+/// Returns the names of the columns for the parameters of the estimator; empty for polynomials, whose columns follow
+/// from their orders.
 pub(crate) fn parameters(asked: &ResolvedRequest) -> Vec<String> {
     match asked {
         ResolvedRequest::Operator(how) => {
@@ -118,7 +120,7 @@ pub(crate) fn parameters(asked: &ResolvedRequest) -> Vec<String> {
         }
         ResolvedRequest::Change(how) => {
             let mut names = how.estimator.most_names();
-            // Not a parameter of the fit, but a product of parameters that change.
+            // K and K_e_dot are not parameters of the fit, but products of parameters that change.
             let all = how.estimator.form.parameters(how.estimator.neuromuscular).into_iter();
             let products = all.filter(|name| matches!(*name, "K" | "K_e_dot"));
             names.extend(products.flat_map(|name| [1, 2].map(|end| format!("{name}{end}"))));

@@ -1,4 +1,4 @@
-//! A plan as a whole: read, expanded into cells and estimators, and checked.
+//! A plan as a whole: reading, expansion into cells and estimators, and checks.
 
 use std::{collections::BTreeSet, path::Path};
 
@@ -30,19 +30,19 @@ pub struct Plan {
     pub name: String,
     /// Description in one line.
     pub title: String,
-    /// Its content or notes on it.
+    /// Content of the study, or notes on it.
     pub description: String,
-    /// Seed of its random streams.
+    /// Seed of the random streams.
     pub seed: u64,
-    /// Replications of each cell.
+    /// Number of replications of each cell.
     pub replications: u64,
-    /// Replications that are run and stored together.
+    /// Number of replications that are run and stored together.
     pub block: u64,
-    /// Samples from one stored point of a trace to the next; `None` if traces are not stored.
+    /// Number of samples from one stored point of a trace to the next; `None` if traces are not stored.
     pub trace_every: Option<usize>,
-    /// Whether the points of traces are kept, not only their summary.
+    /// Whether the points of traces are stored, not only their summary.
     pub trace_points: bool,
-    /// Whether standard errors are kept.
+    /// Whether standard errors are stored.
     pub standard_errors: bool,
     /// Whether bias, bands and declared changes of recursions are measured.
     pub changes: bool,
@@ -56,17 +56,17 @@ pub struct Plan {
 /// One scenario of the grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cell {
-    /// Its number in the study, from 0.
+    /// Number of the cell in the study, counted from 0.
     pub index: u64,
-    /// Name of its table in the plan.
+    /// Name of the scenario.
     pub scenario: String,
-    /// The condition from which it started, empty if there is none.
+    /// Name of the condition on which the scenario is based; empty if there is none.
     pub condition: String,
-    /// Axes that replace the lists of its table.
+    /// For each list in the scenario's table, the selected entry.
     pub axes: Vec<Axis>,
     /// The scenario, ready to be simulated.
     pub resolved: ResolvedScenario,
-    /// Replications: those of the plan, or one without remnant.
+    /// Number of replications: that of the plan, or one if there is no remnant.
     pub replications: u64,
 }
 
@@ -83,24 +83,23 @@ const MOST_REPLICATIONS: u64 = 100_000_000;
 /// Largest number of estimates of a study.
 const MOST_ESTIMATES: u128 = 10_000_000_000;
 
-/// Largest number of blocks of a study: a few files each.
+/// Largest number of blocks of a study; each block is a few files.
 const MOST_BLOCKS: u128 = 1_000_000;
 
 impl Plan {
     /// Reads and checks a plan.
     ///
     /// # Errors
-    /// [`StudyError::Plan`] with the file, the line and the remedy; [`StudyError::Io`] for a file
-    /// that cannot be read.
+    /// [`StudyError::Plan`] with the file, the line and the remedy; [`StudyError::Io`] if the file cannot be read.
     pub fn read(path: &Path) -> Result<Self, StudyError> {
         let text = hoid_io::read_settings(path)?;
         Self::parse(&text, &path.display().to_string())
     }
 
-    /// Parses a plan; `path` is for messages.
+    /// Parses the text of a plan; `path` is used in messages.
     ///
     /// # Errors
-    /// [`StudyError::Plan`].
+    /// [`StudyError::Plan`] if the plan is invalid.
     pub fn parse(text: &str, path: &str) -> Result<Self, StudyError> {
         Self::of_text(text).map_err(|problem| StudyError::Plan {
             path: path.to_owned(),
@@ -216,7 +215,7 @@ impl Plan {
     /// Sets the number of replications.
     ///
     /// # Errors
-    /// [`StudyError::Plan`] if it is zero.
+    /// [`StudyError::Plan`] if the number is zero.
     pub fn with_replications(mut self, replications: u64) -> Result<Self, StudyError> {
         if !(1..=MOST_REPLICATIONS).contains(&replications) {
             return Err(StudyError::Plan {
@@ -241,7 +240,7 @@ impl Plan {
         Ok(self)
     }
 
-    /// Checks the size of the study.
+    /// Checks that the study does not have too many estimates or blocks.
     fn check_size(&self) -> Result<(), String> {
         let estimates = |cell: &Cell| u128::from(cell.replications) * self.estimators_of(cell).count() as u128;
         let estimates: u128 = self.cells.iter().map(estimates).sum();
@@ -260,12 +259,12 @@ impl Plan {
         Ok(())
     }
 
-    /// Returns the text of the plan as read.
+    /// Returns the text of the plan as it was read.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// SHA-256 of everything that determines the results: the text of the plan and the
+    /// Returns the SHA-256 of everything that determines the results: the text of the plan and the number of
     /// replications.
     pub fn hash(&self) -> String {
         let mut hasher = Sha256::new();
@@ -274,7 +273,7 @@ impl Plan {
         hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    /// The estimators that are applied to the records of a cell, with their indices.
+    /// Returns the estimators that are applied to the records of a cell, with their indices.
     pub fn estimators_of<'a>(&'a self, cell: &'a Cell) -> impl Iterator<Item = (usize, &'a EstimatorCell)> {
         self.estimators
             .iter()
@@ -282,7 +281,7 @@ impl Plan {
             .filter(|(_, estimator)| estimator.takes(&cell.scenario))
     }
 
-    /// Number of estimates of the whole study: one per replication and estimator.
+    /// Returns the number of estimates of the whole study: one per replication and estimator.
     pub fn estimates(&self) -> u64 {
         let of = |cell: &Cell| cell.replications * self.estimators_of(cell).count() as u64;
         self.cells.iter().map(of).sum()
@@ -311,13 +310,13 @@ fn check_head(head: &Head, at: &impl Fn(&str) -> Option<usize>) -> Result<(), Pl
     if head.keep.trace_every == Some(0) {
         return bad(
             "keep.trace_every",
-            "0, expected 1 or more, or nothing to keep no traces".to_owned(),
+            "0, expected 1 or more, or no value to keep no traces".to_owned(),
         );
     }
     Ok(())
 }
 
-/// The tables of an array.
+/// Returns the tables `[[key]]` of a plan.
 fn tables_of<'a>(
     document: &Spanned<DeTable<'a>>,
     key: &str,
@@ -345,7 +344,7 @@ fn tables_of<'a>(
         .collect()
 }
 
-/// Reads a table without axes.
+/// Reads a table in which lists are not allowed.
 fn single(table: &Spanned<DeTable<'_>>, text: &str, whole: &[&str]) -> Result<Variant, PlanProblem> {
     let mut all = variants(table, text, whole)?;
     match (all.pop(), all.is_empty()) {
@@ -381,7 +380,7 @@ fn is_noise_free(resolved: &ResolvedScenario) -> bool {
     }
 }
 
-/// Converts an error of a scenario, with the line of the plan.
+/// Converts an error of a scenario to a problem at a line of the plan.
 fn of_scenario(error: ScenarioFileError, variant: &Variant) -> PlanProblem {
     match error {
         ScenarioFileError::Syntax { line, reason, .. } => PlanProblem {

@@ -8,9 +8,9 @@
 //! orders = { nd = [1, 2], nk = "true" }
 //! ```
 //!
-//! The keys are the options of the command line, with units where these have none. `"true"` as an order takes the value
-//! of the scenario: nk from its delay, nd from its remnant; `nk = "ramp"` is one less. Orders that are not given are
-//! those of the operator's structure, with `nk = "true"`.
+//! The keys are the options of the command line, with the unit in the name if the value has none. If an order is
+//! `"true"`, it is taken from the scenario: nk from its delay, nd from its remnant. `nk = "ramp"` is one less than
+//! `nk = "true"`. Orders that are not given are those of the operator's structure, with `nk = "true"`.
 
 use std::collections::BTreeMap;
 
@@ -22,56 +22,56 @@ use hoid_track::{Method, StartAt, TrackOptions};
 use super::{
     analysis,
     estimator_table::{
-        EstimatorTable, FIT, GREY_BOX, OfScenario, Order, OrdersTable, RECORD, StartValue, what_is_done,
+        EstimatorTable, FIT, GREY_BOX, OfScenario, Order, OrdersTable, RECORD, StartValue, method_names,
     },
     grid::{Axis, Variant},
     problem::PlanProblem,
 };
 
-/// One estimator of a study: the treatment of each record.
+/// One estimator of a study, which is applied to each record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EstimatorCell {
-    /// Its name in the plan.
+    /// Name of the estimator in the plan.
     pub name: String,
-    /// The name, and the axes that replace the lists of its table.
+    /// Name of the estimator, followed by the selected entries of the lists in its table.
     pub label: String,
-    /// Axes that replace the lists.
+    /// For each list in the estimator's table, the selected entry.
     pub axes: Vec<Axis>,
-    /// The estimator whose VAF is subtracted from that of this one.
+    /// Name of the estimator whose VAF is subtracted from the VAF of this one.
     pub versus: Option<String>,
-    /// Names of the scenarios that it takes; `None` for all.
+    /// Names of the scenarios to which the estimator is applied; `None` for all scenarios.
     pub scenarios: Option<Vec<String>>,
-    /// Span of the record that it takes, s; `None` for all.
+    /// Span of the record that is used, s; `None` for the whole record.
     pub span_s: Option<(f64, f64)>,
-    /// Every n-th sample is taken.
+    /// Number n if only every n-th sample is used.
     pub decimate: usize,
     /// Trend removed from e and u before the estimate.
     pub detrend: Detrend,
-    /// Its task.
+    /// Method with its options.
     pub task: Task,
-    /// Label of its start, empty for its own.
+    /// Label of the start values; empty if the method finds its own.
     pub start: String,
     pub(crate) orders: OrdersTable,
     pub(crate) start_values: BTreeMap<String, f64>,
 }
 
-/// Treatment of a record.
+/// Method of an estimator, with its options.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Task {
-    /// The record itself is described: levels and noise level.
+    /// Describes the record itself: RMS values and noise levels.
     Describe,
-    /// A polynomial model is fitted.
+    /// Fits a polynomial model.
     Fit(Box<Estimator>),
-    /// The operator's parameters are fitted.
+    /// Fits the operator's parameters.
     GreyBox(Box<GreyBox>),
-    /// Analysis as by `hoid identify`, verdict included.
+    /// Analyses the record as `hoid identify` does, and gives a verdict.
     Analysis(Box<ResolvedRequest>),
-    /// The operator is tracked.
+    /// Tracks the operator.
     Track(Box<TrackOptions>),
 }
 
 impl Task {
-    /// Analysis as by `hoid identify`; `None` for the other estimators.
+    /// Returns the request of an estimator that runs as in `hoid identify`; `None` for any other estimator.
     pub(crate) fn analysis(&self) -> Option<&ResolvedRequest> {
         match self {
             Self::Analysis(asked) => Some(asked),
@@ -87,7 +87,7 @@ impl EstimatorCell {
             line: variant.line_of_key(key).or_else(|| variant.lines.first().copied()),
             reason: format!("{key} {reason}"),
         };
-        let asked = table.asked(&at)?;
+        let asked = table.identify_request(&at)?;
         let method = match table.method.as_str() {
             FIT | GREY_BOX | RECORD => None,
             _ if asked.is_some() => None,
@@ -160,14 +160,14 @@ impl EstimatorCell {
         Ok(cell)
     }
 
-    /// Whether it takes the records of a scenario.
+    /// True if the estimator is applied to the records of a scenario.
     pub fn takes(&self, scenario: &str) -> bool {
         self.scenarios
             .as_ref()
             .is_none_or(|names| names.iter().any(|n| n == scenario))
     }
 
-    /// The polynomial structure; `None` for an operator, and if the record itself is described.
+    /// Returns the polynomial structure; `None` if an operator is fitted or the record itself is described.
     pub fn structure(&self) -> Option<Structure> {
         match &self.task {
             Task::Describe => None,
@@ -178,7 +178,7 @@ impl EstimatorCell {
         }
     }
 
-    /// Method as in the plan.
+    /// Returns the method as named in the plan.
     pub fn method(&self) -> &'static str {
         match &self.task {
             Task::Describe => RECORD,
@@ -189,14 +189,14 @@ impl EstimatorCell {
         }
     }
 
-    /// Orders for a scenario.
+    /// Returns the orders for a scenario.
     pub fn orders(&self, scenario: &ResolvedScenario) -> Orders {
         let Some(structure) = self.structure() else {
             return Orders::default();
         };
         let (ts, table) = (scenario.scenario().sample_time.s() * self.decimate as f64, &self.orders);
-        // The delay in whole samples, except for the rounding of the quotient: b0 and the following coefficients
-        // represent the remaining fraction.
+        // The delay in whole samples. The small number compensates the rounding of the quotient; b0 and the following
+        // coefficients represent the remaining fraction of a sample.
         let delay = (scenario.scenario().initial.operator.tau_e_s / ts + 1e-9).floor() as usize;
         let of = |order: Option<Order>, default: usize, simulated: usize| match order {
             None | Some(Order::Range(_)) => default,
@@ -219,12 +219,13 @@ impl EstimatorCell {
         }
     }
 
-    /// Start of a coefficient, where the plan gives one.
+    /// Returns the start value of a coefficient, if the plan gives one.
     pub fn start_value(&self, name: &str) -> Option<f64> {
         self.start_values.get(name).copied()
     }
 
-    /// Start of theta for these orders, where the plan gives one; coefficients that are not given are zero.
+    /// Returns the start value of theta for these orders, with zero for coefficients that are not given; `None` if the
+    /// plan gives no start.
     pub(crate) fn theta(&self, orders: &Orders) -> Option<Vec<f64>> {
         if self.start.is_empty() {
             return None;
@@ -233,7 +234,7 @@ impl EstimatorCell {
         Some(orders.parameter_names().iter().map(of).collect())
     }
 
-    /// The task with the orders and the start of a scenario.
+    /// Returns the method with its options, including the orders and the start for a scenario.
     pub fn task_for(&self, scenario: &ResolvedScenario) -> Task {
         let orders = self.orders(scenario);
         let mut task = self.task.clone();
@@ -245,7 +246,7 @@ impl EstimatorCell {
             }
             Task::GreyBox(grey) => grey.order = orders.nd..=orders.nd,
             Task::Analysis(asked) => {
-                // Checked with the plan.
+                // The orders were checked when the plan was read.
                 if let Ok(of_scenario) = self.with_orders(asked, scenario) {
                     **asked = of_scenario;
                 }
@@ -265,7 +266,7 @@ impl EstimatorCell {
         analysis::with_orders(asked.clone(), &noise, &self.orders(scenario))
     }
 
-    /// Checks orders, start and options against a scenario: returns the key and its problems.
+    /// Checks orders, start and options against a scenario. The error is the key and its problem.
     pub(crate) fn check(&self, scenario: &ResolvedScenario) -> Result<(), (&'static str, String)> {
         let orders = self.orders(scenario);
         if let Some(structure) = self.structure() {
@@ -331,5 +332,5 @@ impl EstimatorCell {
 }
 
 fn unknown_method(name: &str) -> String {
-    format!("is {name:?}, expected one of {}", what_is_done().join(", "))
+    format!("is {name:?}, expected one of {}", method_names().join(", "))
 }

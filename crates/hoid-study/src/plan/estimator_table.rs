@@ -1,4 +1,4 @@
-//! The table `[[estimators]]` as it is in a plan: keys, defaults, and the keys of each method.
+//! The table `[[estimators]]` as written in a plan: keys, defaults, and the keys of each method.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use serde::{Deserialize, Deserializer, de::Error as _};
 
 use super::{analysis, problem::PlanProblem};
 
-/// Keys whose value is a list or a table, which is not an axis.
+/// Returns the keys whose value is itself a list or a table, so that a list is not an axis.
 pub fn whole_keys() -> Vec<String> {
     let fixed = ["scenarios", "span_s", "start_span_s", "delay_s", "delay_range_s"].map(str::to_owned);
     let settings = methods().into_iter().flat_map(|spec| spec.settings);
@@ -24,12 +24,12 @@ pub fn whole_keys() -> Vec<String> {
     fixed.into_iter().chain(spans).collect()
 }
 
-/// The recursive methods, and the estimators that run as in `hoid identify`, with their options.
+/// Returns the recursive methods, and the estimators that run as in `hoid identify`, with their options.
 pub(super) fn methods() -> Vec<MethodSpec> {
     [hoid_survey::registry(), analysis::methods()].concat()
 }
 
-/// A whole number, or `"true"` for that of the scenario.
+/// A whole number, or `"true"` for the value that corresponds to the scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(
     untagged,
@@ -37,15 +37,15 @@ pub(super) fn methods() -> Vec<MethodSpec> {
                  (nc, nd of operator)"
 )]
 pub(crate) enum Order {
-    /// This number.
+    /// The number itself.
     Number(usize),
-    /// The value for the scenario.
+    /// A value derived from the scenario.
     Scenario(OfScenario),
-    /// A number of the range LO..HI.
+    /// A number selected from the range LO..HI.
     Range(#[schemars(with = "String")] OrderRange),
 }
 
-/// Orders from the first to the last.
+/// First and last order of a range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(try_from = "String")]
 pub(crate) struct OrderRange(usize, usize);
@@ -66,31 +66,30 @@ impl TryFrom<String> for OrderRange {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum OfScenario {
-    /// nk of the delay and sample time; nd of the order of the remnant.
+    /// nk from the delay and the sample time of the scenario; nd from the order of the remnant.
     True,
-    /// nk for an input that is a ramp between two samples, one less: a decimated signal is not
-    /// held.
+    /// nk one less than for "true", for an input that is a ramp between two samples: a decimated signal is not held.
     Ramp,
 }
 
-/// Orders. Default: those of the operator's structure.
+/// Orders of a model. Default: those of the operator's structure.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct OrdersTable {
     pub na: Option<usize>,
     pub nb: Option<usize>,
-    /// Order of C; for operator also a range.
+    /// Order of C; for operator also a range, such as 0..8.
     pub nc: Option<Order>,
-    /// Order of D, or "true" for the order of the simulated remnant; for operator also a range.
+    /// Order of D, or "true" for the order of the simulated remnant; for operator also a range, such as 0..8.
     pub nd: Option<Order>,
     pub nf: Option<usize>,
-    /// Delay in samples, or "true" for that of the simulated operator (its default), or "ramp" for
-    /// one less.
+    /// Delay in samples, or "true" for the delay of the simulated operator (the default), or "ramp" for one sample
+    /// less.
     pub nk: Option<Order>,
 }
 
 impl OrdersTable {
-    /// True if an order is a range.
+    /// True if at least one order is a range.
     fn has_range(&self) -> bool {
         [self.nc, self.nd, self.nk]
             .into_iter()
@@ -98,7 +97,7 @@ impl OrdersTable {
             .any(|order| matches!(order, Order::Range(_)))
     }
 
-    /// All given orders, for an estimator that has only orders of its noise model.
+    /// Returns all given orders, for an estimator that has orders only of its noise model.
     pub(super) fn of_noise(&self, remnant_order: usize) -> NamedOrders {
         let numbers = [("na", self.na), ("nb", self.nb), ("nf", self.nf)];
         let numbers = numbers.map(|(name, n)| (name, n.map(Order::Number)));
@@ -116,7 +115,7 @@ impl OrdersTable {
     }
 }
 
-/// Whether the estimated quantities change.
+/// How the estimated gains change within the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Change {
@@ -124,26 +123,26 @@ pub(super) enum Change {
     Sigmoid,
 }
 
-/// Estimator of each record. Each value may be a list, which makes it an axis of the grid.
+/// Table of an estimator, which is applied to each record. Any value may be a list, which makes it an axis of the grid.
 #[derive(Debug, Deserialize, JsonSchema)]
 pub(crate) struct EstimatorTable {
-    /// Name in the results.
+    /// Name of the estimator in the results.
     pub(super) name: String,
-    /// Names of the scenarios that it takes. Default: all.
+    /// Names of the scenarios to which the estimator is applied. Default: all.
     pub(super) scenarios: Option<Vec<String>>,
-    /// The action taken.
-    #[schemars(extend("enum" = what_is_done()))]
+    /// Method applied to each record.
+    #[schemars(extend("enum" = method_names()))]
     pub(super) method: String,
-    /// Name of an estimator above, whose VAF with the same nk on the same run is subtracted from that of this one:
-    /// delta_vaf.
+    /// Name of an estimator above; delta_vaf is the VAF of this estimator minus the VAF of that one with the same nk on
+    /// the same run.
     pub(super) versus: Option<String>,
     /// Structure of the polynomial model. Default: arx for rls, otherwise bj.
     #[schemars(extend("enum" = structure_names()))]
     pub(super) structure: Option<String>,
-    /// Orders.
+    /// Orders of the model.
     #[serde(default)]
     pub(super) orders: OrdersTable,
-    /// Span of the record, s. Default: all of it.
+    /// Span of the record that is used, s. Default: the whole record.
     pub(super) span_s: Option<(f64, f64)>,
     /// Every N-th sample of e and u is used, without a filter. Default 1.
     pub(super) decimate: Option<usize>,
@@ -155,22 +154,23 @@ pub(crate) struct EstimatorTable {
     #[serde(default, deserialize_with = "choice_or_auto")]
     #[schemars(with = "Option<String>", extend("enum" = names::<InitialState>(&["auto"])))]
     pub(super) initial_state: Option<InitialState>,
-    /// Start of a search or a recursion: coefficients by name; those not given are zero. `name` labels it.
+    /// Start of a search or a recursion: coefficients by name; coefficients that are not given are zero. `name` is a
+    /// label for the start.
     pub(super) start: Option<BTreeMap<String, StartValue>>,
-    /// Number of own starts from which a search runs to completion. Default 2.
+    /// Number of the method's own starts from which a search is completed. Default 2.
     pub(super) starts: Option<usize>,
     /// Largest number of iterations of a search. Default 100.
     pub(super) max_iterations: Option<usize>,
-    /// Shortest and longest delay tau_e of an operator, s. Default 0.05 to 0.6, for operator 0.02 to 0.8.
+    /// Shortest and longest delay tau_e of an operator, s. Default: 0.02 to 0.8 for operator, otherwise 0.05 to 0.6.
     #[serde(alias = "delay_range_s")]
     pub(super) delay_s: Option<(f64, f64)>,
     /// Kind of change of an operator's gains. Default: none.
     pub(super) change: Option<Change>,
     /// Span of the start fit of a recursion, s. Default: the first third.
     pub(super) start_span_s: Option<(f64, f64)>,
-    /// Time from which a recursion updates its estimate, s.
+    /// Time after which a recursion updates its estimate, s.
     pub(super) update_from_s: Option<f64>,
-    /// Options of the method, as in the registries of methods and estimators.
+    /// Options of the method, as in the registries of recursive methods and of estimators.
     #[serde(flatten)]
     #[schemars(skip)]
     pub(super) settings: BTreeMap<String, toml::Value>,
@@ -187,7 +187,7 @@ pub(super) enum StartValue {
 }
 
 impl EstimatorTable {
-    /// Refuses keys that the method does not use, since a setting without effect would mislead the user.
+    /// Rejects keys that the method does not use, since a setting without effect would mislead the user.
     pub(super) fn check_placement(
         &self,
         method: Option<&Method>,
@@ -197,7 +197,7 @@ impl EstimatorTable {
         let (fits, grey_box) = (self.method == FIT, self.method == GREY_BOX);
         let operator = asked.is_some_and(|asked| asked.structure().is_none());
         let tracks = method.is_some();
-        // A window is not a recursion that starts from coefficients or waits.
+        // A method that repeats a batch fit has no start coefficients and no time of the first update.
         let moves = method.is_some_and(|method| !method.fits_anew());
         let both = "fit and grey-box";
         let recursive = "the recursive methods";
@@ -305,9 +305,9 @@ impl EstimatorTable {
         })
     }
 
-    /// Estimator that runs as in `hoid identify`, with the options of the table except its orders; `None` for another
-    /// method.
-    pub(super) fn asked(
+    /// Returns the request of an estimator that runs as in `hoid identify`, with the options of the table except its
+    /// orders; `None` for any other method.
+    pub(super) fn identify_request(
         &self,
         at: &impl Fn(&str, String) -> PlanProblem,
     ) -> Result<Option<ResolvedRequest>, PlanProblem> {
@@ -365,14 +365,14 @@ impl EstimatorTable {
         Ok(Some(asked))
     }
 
-    /// The method with the options of the table.
+    /// Returns a recursive method with the options of the table.
     pub(super) fn track(
         &self,
         mut method: Method,
         structure: Structure,
         at: &impl Fn(&str, String) -> PlanProblem,
     ) -> Result<TrackOptions, PlanProblem> {
-        // In the order of the registry: the options of a rule of forgetting follow the rule.
+        // Options are set in the order of the registry, in which the rule of forgetting precedes its own options.
         let known = hoid_survey::registry().into_iter().flat_map(|spec| spec.settings);
         let mut left: BTreeMap<&str, &toml::Value> = self.settings.iter().map(|(k, v)| (k.as_str(), v)).collect();
         for setting in known {
@@ -401,13 +401,13 @@ impl EstimatorTable {
     }
 }
 
-/// Words for `method` in addition to those of the recursive methods.
+/// Values of `method` in addition to the names of the recursive methods.
 pub(super) const FIT: &str = "fit";
 pub(super) const GREY_BOX: &str = "grey-box";
 pub(super) const RECORD: &str = "record";
 
-/// All words for `method`, the default of `hoid identify` first.
-pub(super) fn what_is_done() -> Vec<&'static str> {
+/// Returns all values of `method`; the default of `hoid identify` is first.
+pub(super) fn method_names() -> Vec<&'static str> {
     let analysed = analysis::methods().into_iter().map(|spec| spec.name);
     let (first, others): (Vec<_>, Vec<_>) = analysed.partition(|name| *name == analysis::OPERATOR);
     let recursive = hoid_survey::registry().into_iter().map(|spec| spec.name);
@@ -419,7 +419,7 @@ fn structure_names() -> Vec<&'static str> {
     Structure::ALL.iter().map(|structure| structure.name()).collect()
 }
 
-/// Key of an option: its name, followed by its unit if the value is given without one.
+/// Returns the key of an option: its name, with `_s` appended if the value is a number of seconds.
 pub(super) fn plan_key(setting: &Setting) -> String {
     match (setting.kind, setting.unit) {
         (Kind::Span | Kind::NumberOrSpan | Kind::Number, "s") => format!("{}_s", setting.name),
@@ -427,12 +427,13 @@ pub(super) fn plan_key(setting: &Setting) -> String {
     }
 }
 
-/// A value of a plan in the form of the command line.
+/// Converts a value of a plan to the form used on the command line.
 fn text_of(value: &toml::Value, kind: Kind) -> Result<String, String> {
     let wrong = || format!("is {value}, expected {}", as_text(kind));
     Ok(match (value, kind) {
         (toml::Value::String(text), Kind::Prior) if hoid_io::is_fit_file(text) => {
-            let reason = "is a file, and a plan holds all that it needs; name the parameters, as \"omega_nm=9:0.2\"";
+            let reason = "is a file, but a plan contains all that it needs; give the parameters, such as \
+                          \"omega_nm=9:0.2\"";
             return Err(reason.to_owned());
         }
         (toml::Value::String(text), _) => text.clone(),
@@ -446,7 +447,7 @@ fn text_of(value: &toml::Value, kind: Kind) -> Result<String, String> {
             }
         }
         (toml::Value::Table(values), Kind::Named(of)) => {
-            // `name` labels the table.
+            // `name` is the label of the table.
             let named = values.iter().filter(|(name, _)| *name != "name");
             let each: Vec<String> = named
                 .map(|(name, value)| Ok(format!("{name}={}", text_of(value, *of)?)))
@@ -463,7 +464,7 @@ fn as_text(kind: Kind) -> &'static str {
         Kind::Count => "a whole number",
         Kind::Number => "a number",
         Kind::NumberOrDefault(_) => "a number, or true",
-        Kind::Counts => "a whole number, or two",
+        Kind::Counts => "one or two whole numbers",
         Kind::NumberOrSpan => "a number, or two",
         Kind::Delay => "a whole number of samples, or a text such as \"0.28s\"",
         Kind::Memory => "a number of samples, or a text such as \"2.56s\" or \"inf\"",
@@ -474,7 +475,7 @@ fn as_text(kind: Kind) -> &'static str {
     }
 }
 
-/// Problems with a value, after its key.
+/// Returns the problem with a value, as text that follows its key.
 fn in_plan(error: &IdentError) -> String {
     match error {
         IdentError::BadOption { found, expected, .. } => format!("is {found}, expected {expected}"),
@@ -482,17 +483,17 @@ fn in_plan(error: &IdentError) -> String {
     }
 }
 
-/// The methods that have an option of this key.
+/// Returns the methods that have an option with this key.
 fn methods_with(key: &str) -> Vec<&'static str> {
     let all = methods().into_iter();
     let with = all.filter(|spec| spec.settings.iter().any(|setting| plan_key(setting) == key));
     with.map(|spec| spec.name).collect()
 }
 
-/// Problems with a key that the method does not have.
+/// Returns the problem with a key that the method does not have.
 fn misplaced(key: &str) -> String {
     match methods_with(key).as_slice() {
-        [] => "is unknown; the keys of an estimator are on the page Monte Carlo studies of the book".to_owned(),
+        [] => "is unknown; the keys of an estimator are listed on the page Monte Carlo studies of the book".to_owned(),
         of => format!("has no effect here: it applies to {}", of.join(", ")),
     }
 }
@@ -502,19 +503,19 @@ fn unknown_key(method: &Method) -> String {
     format!("is unknown; {method} has {}", keys.join(", "))
 }
 
-/// Appends the names of a choice to others.
+/// Appends the names of the values of a choice to other names.
 fn names<T: NamedChoice>(others: &[&'static str]) -> Vec<&'static str> {
     let own = T::CHOICES.iter().map(|choice| choice.choice_name());
     others.iter().copied().chain(own).collect()
 }
 
-/// A choice by its name.
+/// Deserialises a value of a choice from its name.
 fn choice<'de, T: NamedChoice, D: Deserializer<'de>>(from: D) -> Result<Option<T>, D::Error> {
     let name = String::deserialize(from)?;
     T::of_name(&name).map(Some).map_err(D::Error::custom)
 }
 
-/// A choice by its name; `None` for `auto`.
+/// Deserialises a value of a choice from its name; `None` for `auto`.
 fn choice_or_auto<'de, T: NamedChoice, D: Deserializer<'de>>(from: D) -> Result<Option<T>, D::Error> {
     let name = String::deserialize(from)?;
     match name.as_str() {

@@ -1,9 +1,9 @@
-//! Grids in TOML: a list in the place of a value gives each of its entries in turn.
+//! Grids in TOML: where a list replaces a single value, each of its entries is used in turn.
 //!
-//! A table of a plan is split into its leaves, `remnant.order = [1, 2]` and so on. A leaf with a list is an axis,
-//! unless the value of the key is itself a list. All combinations are formed; the first axis of the file varies
-//! slowest. Each combination is written as a table without lists, one key per line, and the line of the plan from which
-//! each line came is stored, so that messages can refer to the line that the user wrote.
+//! A table of a plan is split into its leaves, such as `remnant.order = [1, 2]`. A leaf with a list is an axis, unless
+//! the value of the key is itself a list. All combinations are formed; the first axis in the file varies slowest. Each
+//! combination is written as a table without lists, one key per line. For each of these lines, the corresponding line
+//! of the plan is stored, so that messages can refer to the line that the user wrote.
 
 use toml::{
     Spanned,
@@ -12,46 +12,46 @@ use toml::{
 
 use super::problem::PlanProblem;
 
-/// Largest number of combinations of one table, so that a typing error does not exhaust the memory.
-const MOST: usize = 1_000_000;
+/// Largest number of combinations of one table; it prevents a typing error from exhausting the memory.
+const MAX_COMBINATIONS: usize = 1_000_000;
 
-/// One combination of the axes of a table.
+/// One combination of the entries of the lists in a table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Variant {
     /// The table without lists.
     pub text: String,
-    /// Line of the plan, from 1, of each line of `text`.
+    /// For each line of `text`, the corresponding line of the plan, counted from 1.
     pub lines: Vec<usize>,
-    /// Axes that replace the lists, in the order of the file.
+    /// The selected entry of each list, in the order of the file.
     pub axes: Vec<Axis>,
 }
 
-/// A key with a list, and the selected entry.
+/// A key with a list, and the entry selected from it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Axis {
-    /// The key from the top of the table, joined by `_`.
+    /// Path of the key from the top of the table, joined by `_`.
     pub key: String,
-    /// The entry: text without quotes, a number as it was written, the `name` of a table.
+    /// The entry: text without quotes, a number as written in the plan, or the `name` of a table.
     pub value: String,
 }
 
 struct Leaf {
     path: Vec<String>,
-    /// Each entry as it was written, and as it is shown.
+    /// Each entry as written in the plan, and as displayed.
     entries: Vec<(String, String)>,
     is_axis: bool,
-    /// Its position in the plan.
+    /// Position of the key in the plan.
     start: usize,
 }
 
 impl Variant {
-    /// The line of the plan from which a line of the text came; the first where it has none.
+    /// Returns the line of the plan that corresponds to a line of `text`; 1 if there is none.
     pub fn line(&self, of_text: usize) -> usize {
         let at = of_text.saturating_sub(1).min(self.lines.len().saturating_sub(1));
         self.lines.get(at).copied().unwrap_or(1)
     }
 
-    /// The first line of the plan with a key, given as in the text, or with a key below it.
+    /// Returns the first line of the plan that contains a key, given as in `text`, or a key below it.
     pub fn line_of_key(&self, key: &str) -> Option<usize> {
         let at = self.text.lines().position(|line| {
             line.strip_prefix(key)
@@ -60,7 +60,7 @@ impl Variant {
         self.lines.get(at).copied()
     }
 
-    /// Reads the text; a problem is reported with the line of the plan.
+    /// Deserialises the table; a problem is reported with the line of the plan.
     pub fn read<T: serde::de::DeserializeOwned>(&self) -> Result<T, PlanProblem> {
         toml::from_str(&self.text).map_err(|error| {
             let line = error.span().map_or(1, |span| line_at(&self.text, span.start));
@@ -72,7 +72,7 @@ impl Variant {
     }
 }
 
-/// Line of a byte of a text, from 1.
+/// Returns the line of the byte at position `byte` of a text, counted from 1.
 pub fn line_at(text: &str, byte: usize) -> usize {
     1 + text.as_bytes()[..byte.min(text.len())]
         .iter()
@@ -80,8 +80,8 @@ pub fn line_at(text: &str, byte: usize) -> usize {
         .count()
 }
 
-/// All combinations of the values in the lists of a table. The lists or tables of the keys in `whole`, joined by dots,
-/// are kept unchanged.
+/// Returns all combinations of the entries of the lists in a table. Lists and tables of the keys in `whole` (full
+/// names, joined by dots) are kept unchanged.
 pub fn variants(table: &Spanned<DeTable<'_>>, source: &str, whole: &[&str]) -> Result<Vec<Variant>, PlanProblem> {
     let mut leaves = Vec::new();
     collect(table.get_ref(), source, whole, &mut Vec::new(), &mut leaves)?;
@@ -89,11 +89,11 @@ pub fn variants(table: &Spanned<DeTable<'_>>, source: &str, whole: &[&str]) -> R
     let mut count = 1usize;
     for leaf in &leaves {
         count = count.saturating_mul(leaf.entries.len());
-        if count > MOST {
+        if count > MAX_COMBINATIONS {
             return Err(PlanProblem {
                 line: Some(line_at(source, leaf.start)),
                 reason: format!(
-                    "the lists of this table give more than {MOST} combinations; expected fewer: shorten a list or divide the study"
+                    "the lists of this table give more than {MAX_COMBINATIONS} combinations; expected fewer: shorten a list or divide the study"
                 ),
             });
         }
@@ -124,8 +124,8 @@ fn combination(index: usize, count: usize, leaves: &[Leaf], source: &str, first_
         let key: Vec<String> = leaf.path.iter().map(|part| quoted(part)).collect();
         let line = format!("{} = {written}\n", key.join("."));
         let at = line_at(source, leaf.start);
-        // An entry over several lines is short of some where the list started later; the first line
-        // is what a reader looks for.
+        // All lines of an entry refer to the line of its key. If a list spans several lines, the lines of its later
+        // entries are not known, and a user looks for the first line.
         variant.lines.extend(line.lines().map(|_| at));
         variant.text.push_str(&line);
     }
@@ -177,7 +177,7 @@ fn collect(
     Ok(())
 }
 
-/// An entry as it can be written again, and as it is shown.
+/// Returns an entry as TOML, and as displayed.
 fn entry_of(entry: &Spanned<DeValue<'_>>, source: &str) -> (String, String) {
     let written = written(entry, source);
     let shown = match entry.get_ref() {
@@ -192,7 +192,8 @@ fn entry_of(entry: &Spanned<DeValue<'_>>, source: &str) -> (String, String) {
     (written, shown)
 }
 
-/// A value on one line. A table under a separate heading has no contiguous text, which is therefore assembled.
+/// Writes a value on one line. A table under a separate heading has no contiguous text in the plan, so its text is
+/// assembled.
 fn written(value: &Spanned<DeValue<'_>>, source: &str) -> String {
     match value.get_ref() {
         DeValue::Table(table) => {

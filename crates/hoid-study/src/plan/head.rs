@@ -1,9 +1,9 @@
-//! The keys of a plan outside its tables, and `[keep]`.
+//! The keys of a plan above its tables, and the table `[keep]`.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// The head of a plan.
+/// The keys of a plan above its tables.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Head {
@@ -12,19 +12,19 @@ pub(crate) struct Head {
     /// Description in one line.
     #[serde(default)]
     pub title: String,
-    /// Its content or notes on it.
+    /// Content of the study, or notes on it.
     #[serde(default)]
     pub description: String,
     /// Seed of the random streams. Default 1.
     #[serde(default = "one")]
     pub seed: u64,
-    /// Replications of each cell.
+    /// Number of replications of each cell.
     pub replications: u64,
-    /// Replications that are run and stored together, which a stopped study loses at most. Default
-    /// 50.
+    /// Number of replications that are run and stored together. A stopped study loses at most this many per thread.
+    /// Default 50.
     #[serde(default = "default_block")]
     pub block: u64,
-    /// The stored data.
+    /// Data to store.
     #[serde(default)]
     pub keep: Keep,
 }
@@ -32,12 +32,11 @@ pub(crate) struct Head {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct Keep {
-    /// Samples from one kept point of a trace to the next. Default: no traces are kept.
+    /// Number of samples from one stored point of a trace to the next. Default: no traces are stored.
     pub trace_every: Option<usize>,
-    /// Whether the points of each trace are kept, or only the summary over replications. Default
-    /// true.
+    /// Whether the points of each trace are stored, or only the summary over replications. Default true.
     pub trace_points: bool,
-    /// Whether standard errors are kept. Default true.
+    /// Whether standard errors are stored. Default true.
     pub standard_errors: bool,
     /// Whether bias before and after a change, coverage of the bands and declared changes of
     /// recursions are measured. Default false.

@@ -20,9 +20,9 @@
 //! structure = "arx"
 //! ```
 //!
-//! A *cell* is one scenario of the grid; cells are numbered in the order of the file; the first axis varies slowest.
-//! The remnant of replication r in cell c is the random stream (seed, c, r), the same for all estimators. A cell
-//! without remnant is run once: all its replications are the same.
+//! A *cell* is one scenario of the grid. Cells are numbered in the order of the file; the first axis varies slowest.
+//! The remnant of replication r in cell c is the random stream (seed, c, r), which is the same for all estimators. A
+//! cell without remnant is run only once, since all its replications would be the same.
 
 pub(crate) mod analysis;
 mod document;

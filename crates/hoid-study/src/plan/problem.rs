@@ -1,6 +1,6 @@
-//! Problems in a plan, and their positions.
+//! Problems in a plan, with their position.
 
-/// Problems in a plan, and their positions.
+/// A problem in a plan, and the line where it occurs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct PlanProblem {
     pub line: Option<usize>,

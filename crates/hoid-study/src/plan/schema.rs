@@ -1,7 +1,7 @@
-//! JSON schema of a plan, with which editors complete and check it.
+//! JSON schema of a plan, which editors use to complete and check plans.
 //!
-//! It is generated from the types that read plans and from the schema of a scenario file, in which each single value
-//! may also be a list.
+//! The schema is generated from the types that read plans and from the schema of a scenario file, extended so that each
+//! single value may also be a list.
 
 use hoid_ident::settings::{Kind, MethodSpec};
 use schemars::{SchemaGenerator, generate::SchemaSettings};
@@ -12,12 +12,12 @@ use super::{
     head::Head,
 };
 
-/// The schema (draft 2020-12) as text.
+/// Returns the schema (draft 2020-12) as text.
 pub fn plan_schema() -> String {
     plan_schema_of(&methods())
 }
 
-/// The schema with the options of these methods.
+/// Returns the schema with the options of these methods.
 pub fn plan_schema_of(methods: &[MethodSpec]) -> String {
     let settings = || SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
     let of = |generator: SchemaGenerator, which: u8| match which {
@@ -48,7 +48,7 @@ pub fn plan_schema_of(methods: &[MethodSpec]) -> String {
     format!("{plan:#}\n")
 }
 
-/// The options of the methods, as in the registries.
+/// Adds the options of the methods, as listed in the registries.
 fn add_settings(estimator: &mut Value, methods: &[MethodSpec]) {
     let Some(table) = estimator.as_object_mut() else { return };
     table.insert("additionalProperties".to_owned(), false.into());
@@ -74,7 +74,7 @@ fn add_settings(estimator: &mut Value, methods: &[MethodSpec]) {
     }
 }
 
-/// The schema of a type of values.
+/// Returns the schema for a kind of value.
 fn of_kind(kind: Kind) -> Value {
     match kind {
         Kind::Flag => json!({ "type": "boolean" }),
@@ -91,13 +91,13 @@ fn of_kind(kind: Kind) -> Value {
         }
         Kind::Choice(words) => json!({ "enum": words }),
         Kind::Named(of) => {
-            // `name` labels a table among others.
+            // `name` labels one table of a list of tables.
             json!({ "type": "object", "additionalProperties": of_kind(*of), "properties": { "name": { "type": "string" } } })
         }
     }
 }
 
-/// Parts that only a separate schema has.
+/// Removes the keys that belong only at the top level of a schema.
 fn strip(schema: &mut Value) {
     if let Some(object) = schema.as_object_mut() {
         object.remove("$schema");
@@ -105,7 +105,7 @@ fn strip(schema: &mut Value) {
     }
 }
 
-/// Lets each value that is not a table be a list of such values too.
+/// Extends the schema of each value that is not a table, so that a list of such values is also valid.
 fn with_lists(table: &mut Value, whole: &[&str]) {
     let Some(properties) = table.get_mut("properties").and_then(Value::as_object_mut) else {
         return;

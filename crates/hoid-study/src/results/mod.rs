@@ -1,7 +1,7 @@
-//! Reading of a finished study: rows of its summary, values of its replications, traces.
+//! Reading of a finished study: rows of its summary, values of its replications, and traces.
 //!
-//! The description of a cell and an estimator comes from the plan in the directory, numbers come from the tables. Rows
-//! are found by their description:
+//! The properties of a cell and an estimator come from the plan in the directory, the numbers from the tables. Rows are
+//! selected by these properties:
 //!
 //! ```no_run
 //! use hoid_study::{Query, Results};

@@ -14,13 +14,12 @@ use crate::{
 };
 
 impl Results {
-    /// Reads the directory of a finished study; tables as Parquet or CSV.
+    /// Reads the directory of a finished study, with tables in Parquet or CSV format.
     ///
     /// # Errors
-    /// [`StudyError::NoStudy`] and [`StudyError::Unfinished`] for a directory without a study or
-    /// with an incomplete one, [`StudyError::OtherStudy`] if its plan has been changed,
-    /// [`StudyError::Table`] for a table that lacks a column or does not fit the plan,
-    /// [`StudyError::Io`] for one that cannot be read.
+    /// [`StudyError::NoStudy`] if the directory holds no study, [`StudyError::Unfinished`] if the study is incomplete,
+    /// [`StudyError::OtherStudy`] if its plan has been changed, [`StudyError::Table`] if a table lacks a column or does
+    /// not match the plan, [`StudyError::Io`] if a file cannot be read.
     pub fn read(directory: &Path) -> Result<Self, StudyError> {
         let shown = || directory.display().to_string();
         let manifest = RunRecord::read(directory)?.ok_or_else(|| StudyError::NoStudy { directory: shown() })?;
@@ -31,7 +30,7 @@ impl Results {
         if plan.hash() != manifest.plan_sha256 {
             return Err(StudyError::OtherStudy {
                 directory: shown(),
-                reason: format!("its {PLAN} is not the one that was run"),
+                reason: format!("its {PLAN} is not the plan that was run"),
             });
         }
         let mut results = Self::without_tables(plan);
@@ -76,14 +75,14 @@ impl Results {
                 mean_se: mean_se[i],
                 sd: sd[i],
                 sd_se: sd_se[i],
-                least: least[i],
+                min: least[i],
                 lower_whisker: lower_whisker[i],
                 lower_quartile: lower_quartile[i],
                 median: median[i],
                 median_se: median_se[i],
                 upper_quartile: upper_quartile[i],
                 upper_whisker: upper_whisker[i],
-                most: most[i],
+                max: most[i],
                 outliers: Vec::new(),
             };
             let of = &mut self.pairs[pair];

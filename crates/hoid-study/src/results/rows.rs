@@ -1,4 +1,4 @@
-//! Rows of the summaries of a study.
+//! Rows of the summaries in the results of a study.
 
 use std::collections::BTreeMap;
 
@@ -9,40 +9,40 @@ use crate::Statistics;
 pub struct SummaryRow {
     /// Number of the cell.
     pub cell: u64,
-    /// The condition on which it is based; empty if there is none.
+    /// Name of the scenario.
     pub scenario: String,
-    /// The condition from which it started, empty if there is none.
+    /// Name of the condition on which the scenario is based; empty if there is none.
     pub condition: String,
     /// Order m0 of the simulated remnant.
     pub remnant_order: usize,
-    /// Specified noise level; not a number if the gain was given.
+    /// Specified noise level; NaN if the gain of the remnant was specified instead.
     pub noise_level: f64,
     /// Time constant T_n of the simulated remnant, s.
     pub t_n_s: f64,
-    /// Axes that replace the lists of scenario and estimator, by their keys joined by `_`.
+    /// Selected entries of the lists in the tables of the scenario and the estimator, by key.
     pub axes: BTreeMap<String, String>,
-    /// Label of the estimator: its name and its axes.
+    /// Label of the estimator: its name and the selected entries of its lists.
     pub estimator: String,
     /// Name of the estimator.
     pub name: String,
-    /// Its method.
+    /// Method of the estimator.
     pub method: String,
-    /// Order m* of its noise model.
+    /// Order m* of the noise model.
     pub nd: Option<usize>,
-    /// Its delay n_k*, samples.
+    /// Delay n_k* of the model, in samples.
     pub nk: Option<usize>,
-    /// Label of its start, empty for its own.
+    /// Label of the start; empty if the method finds its own start.
     pub start: String,
-    /// It took every `decimate`-th sample.
+    /// Number n if the estimator used only every n-th sample.
     pub decimate: usize,
-    /// The quantity: a column of the table of fits, `bias_<column>`, a rate or a settling time of
-    /// median traces.
+    /// Name of the quantity: a column of the table of fits, `bias_<column>`, a rate, or a settling time of median
+    /// traces.
     pub quantity: String,
-    /// Statistics over the replications, without the outliers themselves.
+    /// Statistics over the replications, without the list of outliers.
     pub statistics: Statistics,
     /// Number of values beyond the whiskers.
     pub outliers: usize,
-    /// True value; not a number if there is none.
+    /// True value of the quantity; NaN if there is none.
     pub truth: f64,
     /// Mean of the absolute values.
     pub absolute_mean: f64,
@@ -51,13 +51,13 @@ pub struct SummaryRow {
 /// Summary of the traces of an estimator in a cell.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TraceSummary {
-    /// Times, s.
+    /// Times of the points, s.
     pub times_s: Vec<f64>,
-    /// By name of a parameter.
+    /// Statistics of each parameter, by name.
     pub parameters: BTreeMap<String, TraceStatistics>,
 }
 
-/// Statistics of a trace over the replications, at each time.
+/// Statistics of one parameter over the replications, at each time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TraceStatistics {
     /// Mean.
@@ -73,7 +73,7 @@ pub struct TraceStatistics {
 }
 
 impl TraceStatistics {
-    /// Monte Carlo error of the median of a point, computed as for a normal sample with the same
+    /// Returns the Monte Carlo error of the median at a point, computed as for a normal sample with the same
     /// interquartile range.
     pub fn error_of_median(&self, point: usize, replications: u64) -> f64 {
         match replications {

@@ -1,4 +1,4 @@
-//! A finished study in memory, with selection of its rows by query.
+//! A finished study in memory; queries select its rows.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -18,7 +18,7 @@ pub struct Results {
     /// Each cell with each of its estimators, in the order of the tables.
     pub(super) pairs: Vec<CellEstimator>,
     pub(super) rows: Vec<SummaryRow>,
-    /// Numbers of the table of fits by column.
+    /// Numeric columns of the table of fits, by name.
     pub(super) fits: BTreeMap<String, Vec<f64>>,
     pub(super) traces: HashMap<(u64, String), TraceSummary>,
 }
@@ -29,9 +29,9 @@ pub(super) struct CellEstimator {
     pub(super) cell: usize,
     pub(super) estimator: usize,
     pub(super) key: RowKey,
-    /// Row of the summary for each quantity.
+    /// Index of the summary row of each quantity.
     pub(super) rows: BTreeMap<String, usize>,
-    /// Rows of the table of fits, one per replication.
+    /// Indices of the rows in the table of fits, one per replication.
     pub(super) fits: Vec<usize>,
 }
 
@@ -58,8 +58,8 @@ impl Results {
         }
     }
 
-    /// The rows of the summary that a query selects, in the order of the table. A query without a
-    /// quantity selects all quantities.
+    /// Returns the rows of the summary that a query selects, in the order of the table. A query without a quantity
+    /// selects all quantities.
     pub fn find(&self, query: &Query) -> Vec<&SummaryRow> {
         let mut found = Vec::new();
         for pair in self.pairs.iter().filter(|pair| query.matches(&pair.key)) {
@@ -75,7 +75,7 @@ impl Results {
         found.into_iter().map(|row| &self.rows[row]).collect()
     }
 
-    /// The row of the summary that a query selects; `None` if there is not exactly one.
+    /// Returns the row of the summary that a query selects; `None` unless it selects exactly one.
     pub fn one(&self, query: &Query) -> Option<&SummaryRow> {
         match self.find(query).as_slice() {
             [row] => Some(row),
@@ -83,10 +83,10 @@ impl Results {
         }
     }
 
-    /// The values of a quantity by replication, cells and estimators in the order of the table;
-    /// missing values are not a number. `bias_<column>` is computed from the column and its true
-    /// value; `failed`, `not_convertible`, `converged` and `diverged` are 0 or 1. Empty if the
-    /// query has no quantity, or one that the table of fits does not have.
+    /// Returns the values of a quantity for all replications, with cells and estimators in the order of the table;
+    /// missing values are NaN. `bias_<column>` is computed from the column and its true value; `failed`,
+    /// `not_convertible`, `converged` and `diverged` are 0 or 1. The result is empty if the query has no quantity or
+    /// the table of fits does not have this quantity.
     pub fn values(&self, query: &Query) -> Vec<f64> {
         let Some(quantity) = query.quantity() else {
             return Vec::new();
@@ -109,12 +109,12 @@ impl Results {
         values
     }
 
-    /// The summary of the traces of an estimator, by its label.
+    /// Returns the summary of the traces of an estimator, given by its label.
     pub fn traces(&self, cell: u64, estimator: &str) -> Option<&TraceSummary> {
         self.traces.get(&(cell, estimator.to_owned()))
     }
 
-    /// The cells of the rows that a query selects.
+    /// Returns the cells of the rows that a query selects.
     pub fn cells(&self, query: &Query) -> Vec<&Cell> {
         let mut found: Vec<usize> = self
             .pairs
@@ -126,12 +126,12 @@ impl Results {
         found.into_iter().map(|i| &self.plan.cells[i]).collect()
     }
 
-    /// Number of pairs of cell and estimator that a query selects, for any quantity.
+    /// Returns the number of pairs of cell and estimator that a query selects, regardless of its quantity.
     pub fn count(&self, query: &Query) -> usize {
         self.pairs.iter().filter(|pair| query.matches(&pair.key)).count()
     }
 
-    /// True if there are values of the quantity of a query.
+    /// True if the table of fits has the quantity of a query.
     pub fn has_quantity(&self, query: &Query) -> bool {
         let column = query
             .quantity()
@@ -139,7 +139,7 @@ impl Results {
         column.is_some_and(|column| self.fits.contains_key(column))
     }
 
-    /// The first estimator that a query selects.
+    /// Returns the first estimator that a query selects.
     pub fn estimator(&self, query: &Query) -> Option<&EstimatorCell> {
         let pair = self.pairs.iter().find(|pair| query.matches(&pair.key));
         pair.map(|pair| &self.plan.estimators[pair.estimator])

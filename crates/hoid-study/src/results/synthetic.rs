@@ -1,4 +1,4 @@
-//! Synthetic results without runs, for fast tests of code that reads results.
+//! Synthetic results without simulated runs, for fast tests of code that reads results.
 
 use std::collections::BTreeMap;
 
@@ -13,9 +13,9 @@ use crate::{
 };
 
 impl Results {
-    /// Results of a plan without running it. `data` gives the relative error of quantities with a
-    /// true value, otherwise the value; traces step with the true value, have the relative error of
-    /// replication 0 in whole % and quartiles at a distance of 1 % of the true value.
+    /// Creates results of a plan without running it. `data` gives the relative error of a quantity that has a true
+    /// value, otherwise the quantity itself. The traces follow the steps of the true values, with the relative error of
+    /// replication 0 rounded to whole percent and with quartiles 1 % of the true value from the median.
     pub fn synthetic(plan: Plan, data: &dyn Fn(&Cell, &EstimatorCell, &str, u64) -> f64) -> Self {
         const WITH_TRUTH: [&str; 14] = [
             "a1",

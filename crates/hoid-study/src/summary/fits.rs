@@ -18,7 +18,7 @@ use crate::{
     true_value::true_value,
 };
 
-/// Settings among the real columns.
+/// Real columns that are settings, not quantities.
 const SETTINGS: [&str; 11] = [
     "noise_level",
     "T_n_true",
@@ -33,14 +33,14 @@ const SETTINGS: [&str; 11] = [
     "to_s",
 ];
 
-/// The levels of a verdict, and their quantities.
+/// The levels of a verdict, and the names of their rates.
 const LEVELS: [(VerdictLevel, &str); 3] = [
     (VerdictLevel::Trustworthy, "trustworthy"),
     (VerdictLevel::Doubtful, "doubtful"),
     (VerdictLevel::NotDetermined, "not_determined"),
 ];
 
-/// Statistics of a row of the summary, in the order of their columns.
+/// Statistics in a row of the summary, in the order of their columns.
 const FIGURES: [&str; 14] = [
     "mean",
     "mean_se",
@@ -104,7 +104,7 @@ pub(crate) fn write_fits(
                     let truth = true_value(cell, estimator, name);
                     put(name, values, truth);
                     if truth.is_finite() && truth != 0.0 {
-                        // The lead of another form is a different quantity.
+                        // T_L of any other form is a different quantity, so it has no bias.
                         let meant = |lead: &bool| *lead || !name.starts_with("T_L");
                         let error = |v: f64| 100.0 * (v - truth) / truth;
                         let of_each = values.iter().zip(&found.leads);
@@ -160,14 +160,14 @@ fn statistics_row(rows: &mut Rows, quantity: &str, s: &Statistics, values: &[f64
         s.mean_se,
         s.sd,
         s.sd_se,
-        s.least,
+        s.min,
         s.lower_whisker,
         s.lower_quartile,
         s.median,
         s.median_se,
         s.upper_quartile,
         s.upper_whisker,
-        s.most,
+        s.max,
         absolute_mean,
         truth,
     ];
@@ -176,7 +176,7 @@ fn statistics_row(rows: &mut Rows, quantity: &str, s: &Statistics, values: &[f64
     }
 }
 
-/// The values of the replications of a cell, by estimator.
+/// The values of all replications of a cell, by estimator.
 struct Collected<'a> {
     at: BTreeMap<&'a str, usize>,
     quantities: &'a [&'a str],
@@ -186,14 +186,14 @@ struct Collected<'a> {
 #[derive(Clone, Default)]
 struct OfEstimator {
     values: Vec<Vec<f64>>,
-    /// True if the form is that of the simulated scenario, a gain with a lead, or not selected.
+    /// For each fit, true if its form is a gain with a lead, as simulated, or if no form was selected.
     leads: Vec<bool>,
     count: usize,
     failed: usize,
     not_convertible: usize,
     converged: usize,
     diverged: usize,
-    /// Number of fits of each verdict level.
+    /// Number of fits at each verdict level.
     levels: [usize; LEVELS.len()],
 }
 

@@ -1,4 +1,4 @@
-//! Common parts of both summaries: the columns of the settings, and the memory limit.
+//! Common parts of the two summaries: the columns of the settings, and the memory limit.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -10,13 +10,13 @@ use crate::{
     plan::{Cell, EstimatorCell},
 };
 
-/// Numbers in memory at a time: 256 MB.
+/// Largest number of values in memory at a time: 256 MB.
 pub(super) const BUDGET: usize = 1 << 25;
 
-/// Parts of each cell: its position and their numbers.
+/// The parts of each cell, by the position of the cell in the plan: directory and block number.
 pub(crate) type PartsOfCell<'a> = BTreeMap<usize, Vec<(&'a Path, u64)>>;
 
-/// Columns that identify the cell and the estimator of a row.
+/// Returns the columns that identify the cell and the estimator of a row.
 pub(super) fn setting_columns(plan: &Plan) -> Vec<(String, ColumnKind)> {
     use ColumnKind::{Real, Text, Whole};
     let mut columns: Vec<(String, ColumnKind)> = Vec::new();
@@ -34,7 +34,7 @@ pub(super) fn setting_columns(plan: &Plan) -> Vec<(String, ColumnKind)> {
     columns
 }
 
-/// A table of a study with these columns.
+/// Returns the schema of a table of a study with these columns.
 pub(super) fn schema(plan: &Plan, columns: Vec<(String, ColumnKind)>) -> TableSchema {
     TableSchema {
         comments: comments(plan),
@@ -45,7 +45,7 @@ pub(super) fn schema(plan: &Plan, columns: Vec<(String, ColumnKind)>) -> TableSc
     }
 }
 
-/// Starts a row with the settings of cell and estimator.
+/// Starts a row with the settings of the cell and the estimator.
 pub(super) fn begin_row(rows: &mut Rows, extra: &[String], cell: &Cell, estimator: &EstimatorCell) {
     let scenario = cell.resolved.scenario();
     rows.begin();

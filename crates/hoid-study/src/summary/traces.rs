@@ -17,7 +17,7 @@ use crate::{
 /// Settling times of median traces, by cell and estimator.
 pub(crate) type SettlingOfMedians = BTreeMap<(u64, String), Vec<(String, f64)>>;
 
-/// Writes the summary of the traces and computes the settling times of their medians.
+/// Writes the summary of the traces and returns the settling times of the median traces.
 pub(crate) fn write_traces(
     plan: &Plan,
     schemas: &Schemas,
@@ -73,7 +73,7 @@ pub(crate) fn write_traces(
     Ok(settling)
 }
 
-/// Values by time (as bits, which sort like the times) and parameter.
+/// Values by time and parameter. Times are stored as bits, which sort in the same order.
 #[derive(Clone, Default)]
 struct Series(BTreeMap<u64, Vec<Vec<f64>>>);
 
@@ -107,7 +107,7 @@ fn collect_traces(table: &OutputTable, group: &[&EstimatorCell], names: &[&str],
 }
 
 impl Series {
-    /// Writes a row for each time; returns times and medians.
+    /// Writes a row for each time; returns the times and the medians.
     fn write(&self, rows: &mut Rows, cell: &Cell, estimator: &EstimatorCell, names: &[&str]) -> Vec<(f64, Vec<f64>)> {
         let mut medians = Vec::with_capacity(self.0.len());
         for (bits, parameters) in &self.0 {
@@ -139,7 +139,8 @@ impl Series {
     }
 }
 
-/// Times at which the median traces have covered 50 and 90 % of the steps of the operator's parameters.
+/// Returns the times after the change at which the median traces have covered 50 and 90 % of the steps of the
+/// operator's parameters.
 fn settled(cell: &Cell, names: &[&str], medians: &[(f64, Vec<f64>)]) -> Vec<(String, f64)> {
     let Some(midpoint_s) = cell.resolved.scenario().schedule.change_s() else {
         return Vec::new();

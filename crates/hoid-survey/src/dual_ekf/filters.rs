@@ -9,37 +9,37 @@ use nalgebra::{DMatrix, DVector, RowDVector};
 
 use super::pade;
 
-/// Largest number of parameters: those of the operator, and the delay.
+/// Largest number of parameters: the operator parameters and the delay.
 pub(super) const LARGEST: usize = OPERATOR + 1;
 
-/// Relative step of the central differences of the held matrices.
+/// Relative step of the central differences of A and B.
 const STEP: f64 = 1e-5;
-/// Largest number of halvings of a step of the parameters.
+/// Largest number of times that a step of the parameters is halved.
 const MOST_HALVINGS: usize = 30;
 
-/// Both filters.
+/// The filter of the state and the filter of the parameters.
 #[derive(Debug, Clone)]
 pub(super) struct Filters {
     pub sample_time: SampleTime,
     pub d1: f64,
-    /// Order of the Padé approximation, 0 for none.
+    /// Order of the Padé approximation of the delay; 0 for no approximation.
     pub pade: usize,
-    /// Variances of the innovation of the remnant, and of the noise added to e.
+    /// Variance of the innovation of the remnant; `input_noise_variance` is the variance of the noise added to e.
     pub innovation_variance: f64,
-    pub beside_e: f64,
+    pub input_noise_variance: f64,
     pub x: DVector<f64>,
     pub p: DMatrix<f64>,
-    /// K_e, K_e_dot, omega_nm, zeta_nm, and tau_e with a Padé approximation.
+    /// Parameters K_e, K_e_dot, omega_nm and zeta_nm; with a Padé approximation also tau_e.
     pub w: DVector<f64>,
     pub p_w: DMatrix<f64>,
-    /// Growth of P_w per sample.
+    /// Increase of the diagonal of P_w per sample.
     pub walk: DVector<f64>,
-    /// dx/dw after the correction.
+    /// Derivative dx/dw after the correction.
     pub slope: DMatrix<f64>,
 }
 
 impl Filters {
-    /// A and B of the state for given parameters.
+    /// Returns A and B of the state equation for given parameters.
     fn held(&self, w: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
         let n = self.x.len();
         let (mut a, mut b) = (DMatrix::zeros(n, n), DVector::zeros(n));
@@ -72,11 +72,11 @@ impl Filters {
         })
     }
 
-    /// Predicts the state: x, P, dx/dw.
+    /// Predicts the state x, its covariance P and its derivative dx/dw.
     pub fn predict(&mut self, e: f64) {
         let (a, b) = self.held(&self.w);
         let mut slope = &a * &self.slope;
-        // K_e and K_e_dot are only in C.
+        // K_e and K_e_dot occur only in C.
         for i in 2..self.w.len() {
             let by = STEP * self.w[i];
             let moved = |by: f64| {
@@ -91,18 +91,18 @@ impl Filters {
         self.slope = slope;
         let n = self.x.len();
         self.x = &a * &self.x + &b * e;
-        self.p = &a * &self.p * a.transpose() + &b * b.transpose() * self.beside_e;
+        self.p = &a * &self.p * a.transpose() + &b * b.transpose() * self.input_noise_variance;
         self.p[(n - 1, n - 1)] += self.innovation_variance;
     }
 
-    /// Corrects the state, and the parameters if they move; returns the innovation and its variance.
+    /// Corrects the state, and the parameters if `moves` is true. Returns the innovation and its variance.
     pub fn correct(&mut self, u: f64, moves: bool) -> [f64; 2] {
         let c = self.output();
         let innovation = u - (&c * &self.x)[0];
-        // Slightly above zero: u has no measurement noise.
+        // The second term keeps the variance above zero, because u has no measurement noise.
         let variance = (&c * &self.p * c.transpose())[0] + 1e-9 * self.innovation_variance;
         let gain = &self.p * c.transpose() / variance;
-        let h = self.along();
+        let h = self.prediction_gradient();
         if moves {
             self.move_parameters(&h, innovation, variance);
         }
@@ -113,8 +113,8 @@ impl Filters {
         [innovation, variance]
     }
 
-    /// h, the total derivative of the prediction.
-    pub fn along(&self) -> RowDVector<f64> {
+    /// Returns h, the total derivative of the prediction with respect to the parameters.
+    pub fn prediction_gradient(&self) -> RowDVector<f64> {
         let mut h = self.output() * &self.slope;
         h[0] += self.x[0];
         h[1] += self.x[1];
@@ -126,7 +126,7 @@ impl Filters {
         let s = (h * &self.p_w * h.transpose())[0] + variance;
         let gain = &self.p_w * h.transpose() / s;
         let mut step = &gain * innovation;
-        // Poles and delay must stay positive: a linear step may be too large.
+        // omega_nm, zeta_nm and the delay must stay positive, and a full step may be too large.
         for _ in 0..MOST_HALVINGS {
             let moved = &self.w + &step;
             if moved.rows(2, moved.len() - 2).iter().all(|x| *x > 0.0) {
@@ -139,7 +139,7 @@ impl Filters {
         self.p_w = (&self.p_w + self.p_w.transpose()) * 0.5;
     }
 
-    pub fn is_sound(&self) -> bool {
+    pub fn is_valid(&self) -> bool {
         let mut all = self
             .x
             .iter()
@@ -150,7 +150,7 @@ impl Filters {
         all.all(|x| x.is_finite())
     }
 
-    /// Keeps the parameters within their bounds; true if one of them was changed.
+    /// Keeps the parameters within their bounds. Returns true if a parameter was changed.
     pub fn bound(&mut self, bounds: &[[f64; 2]; LARGEST]) -> bool {
         let before = self.w.clone();
         for (w, bounds) in self.w.iter_mut().zip(bounds) {
@@ -172,7 +172,7 @@ mod tests {
             d1: -0.8,
             pade,
             innovation_variance: 1e-4,
-            beside_e: 0.0,
+            input_noise_variance: 0.0,
             x: DVector::zeros(n),
             // The state is exactly known and has no noise: the gain of y_0 and y_1 is zero, that of n does not depend
             // on w.
@@ -206,7 +206,7 @@ mod tests {
             let mut slopes = Vec::new();
             for k in 0..200 {
                 own.predict(e(k));
-                slopes.push(own.along());
+                slopes.push(own.prediction_gradient());
                 own.correct(u(k), false);
             }
             for i in 0..w.len() {

@@ -1,26 +1,27 @@
-//! Two extended Kalman filters that take turns: one of the state with the parameters held, one of
-//! the parameters with the state held (E. A. Wan and A. T. Nelson, *Dual extended Kalman filter
-//! methods*, chapter 5 of S. Haykin (ed.), *Kalman Filtering and Neural Networks*, 2001; of
-//! operators: A. Popovici, P. M. T. Zaal and D. M. Pool, *Dual extended Kalman filter for the
-//! identification of time-varying human manual control behavior*, AIAA 2017).
+//! Two alternating extended Kalman filters: one for the state with the parameters held constant, one for the parameters
+//! with the state held constant (E. A. Wan and A. T. Nelson, *Dual extended Kalman filter methods*, chapter 5 of S.
+//! Haykin (ed.), *Kalman Filtering and Neural Networks*, 2001; for human operators: A. Popovici, P. M. T. Zaal and D.
+//! M. Pool, *Dual extended Kalman filter for the identification of time-varying human manual control behavior*, AIAA
+//! 2017).
 //!
-//! State `x = [y_0, y_1, .., n]`: neuromuscular position and rate, and the remnant as AR(1),
+//! The state `x = [y_0, y_1, .., n]` consists of the neuromuscular position and rate, and the remnant as an AR(1)
+//! process:
 //!
 //! `x(k) = A(w) x(k-1) + B(w) e(k - nk) + w_x`, `u = C(w) x`, `C = [K_e, K_e_dot, 1]`,
 //!
-//! A and B held exactly. Parameters `w = [K_e, K_e_dot, omega_nm, zeta_nm]` are a random walk. At
-//! each sample the parameters are predicted (they stay, P_w grows), the state is predicted with
-//! them, and the innovation `eps = u - C x` corrects both: the parameters along `h = d(C x)/dw`, the
-//! whole derivative, in which the state's own dependence goes along,
+//! where A and B are those of the exact hold. The parameters `w = [K_e, K_e_dot, omega_nm, zeta_nm]` are a random walk.
+//! At each sample the parameters are predicted (they stay constant, P_w grows), the state is predicted with them, and
+//! the innovation `eps = u - C x` corrects both state and parameters. The parameters are corrected along the total
+//! derivative `h = d(C x)/dw`, which includes the dependence of the state on the parameters:
 //!
-//! `D(k|k-1) = A D(k-1|k-1) + (dA/dw) x + (dB/dw) e`, `h = C D(k|k-1) + (dC/dw) x`,
-//! `D(k|k) = D(k|k-1) - g h` with the gain g of the state filter (its own dependence on w left out).
+//! `D(k|k-1) = A D(k-1|k-1) + (dA/dw) x + (dB/dw) e`, `h = C D(k|k-1) + (dC/dw) x`, `D(k|k) = D(k|k-1) - g h`, where g
+//! is the gain of the state filter, whose dependence on w is neglected.
 //!
-//! A joint filter ([`crate::joint_filter`]) keeps the covariance between state and parameters, which
-//! two filters that take turns do not have. By default the delay is whole samples, as all other
-//! methods have it. With `pade` of 1 to 3 it is a parameter too, after the approximation of that
-//! order, as the source and the discussion of the thesis have it for a delay that is not a multiple
-//! of the sample time or changes ([`super::pade`]); its states are between y_1 and n.
+//! A joint filter ([`crate::joint_filter`]) also estimates the covariance between state and parameters, which two
+//! alternating filters neglect. By default the delay is a whole number of samples, as in all other methods. If `pade`
+//! is 1 to 3, the delay is a further parameter, represented by the Padé approximation of that order ([`super::pade`]),
+//! as in the source and in the discussion of the thesis, for a delay that changes or is not a multiple of the sample
+//! time. The states of the approximation lie between y_1 and n.
 
 mod filters;
 mod pade;
@@ -49,10 +50,10 @@ use crate::known_noise::{check_first_order, lead_of};
 use filters::{Filters, LARGEST};
 
 const NAME: &str = "dual-ekf";
-/// Delays that are followed behind a Padé approximation, s.
+/// Range of the delay if it is estimated with a Padé approximation, s.
 const DELAYS_S: (f64, f64) = (0.05, 0.6);
-/// Least error of every parameter at the start where the delay is open, share of its value.
-const UNKNOWN: f64 = 0.1;
+/// Smallest initial standard error of each parameter, relative to its value, if the delay is estimated.
+const SMALLEST_RELATIVE_ERROR: f64 = 0.1;
 
 settings! {
     /// Options of the two filters.
@@ -76,7 +77,7 @@ settings! {
         pub pade: usize = 0,
     }
     groups {
-        /// Bounds.
+        /// Bounds of the parameters.
         pub bounds: BoundOptions,
     }
 }
@@ -92,7 +93,7 @@ impl RecursiveMethod for DualEkfOptions {
         }
     }
 
-    /// It follows from a random walk of the parameters.
+    /// The memory length follows from the random walk of the parameters.
     fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Infinite
     }
@@ -154,19 +155,20 @@ impl RecursiveMethod for DualEkfOptions {
     }
 }
 
-/// The recursion.
+/// The recursion of the two filters.
 struct DualEkf {
     filters: Filters,
     first: Filters,
     bounds: [[f64; 2]; LARGEST],
     delay: DelayLine<Vec<f64>>,
     reported: Reported,
-    /// Additional noise of e, as a share of its size; the mean square of e so far, where it is not given.
+    /// Noise added to e, relative to the root mean square of e. `power` is the mean square of e, either given or
+    /// computed from the samples so far.
     state_noise: f64,
     size_is_given: bool,
     power: f64,
     samples: f64,
-    /// Innovation variance as expected at the last sample.
+    /// Predicted innovation variance at the last sample.
     expected: f64,
     restarts: u64,
 }
@@ -194,8 +196,9 @@ impl DualEkf {
             errors.push(0.0);
             drifts.push(own.delay_drift);
         }
-        // The errors of the start fit are those for its delay: where that is open, so are they.
-        let least = if own.pade > 0 { UNKNOWN } else { 0.0 };
+        // The standard errors of the start fit hold for its delay; if the delay is estimated, the parameters are less
+        // certain.
+        let least = if own.pade > 0 { SMALLEST_RELATIVE_ERROR } else { 0.0 };
         let power = own.error_size.map_or(0.0, |size| size * size);
         let (n, p) = (3 + own.pade, values.len());
         let of = |value: fn(f64, f64, f64) -> f64| {
@@ -208,7 +211,7 @@ impl DualEkf {
             d1: from.values[OPERATOR],
             pade: own.pade,
             innovation_variance: from.variance,
-            beside_e: own.state_noise * own.state_noise * power,
+            input_noise_variance: own.state_noise * own.state_noise * power,
             x: DVector::zeros(n),
             p: DMatrix::identity(n, n) * power,
             w: of(|value, _, _| value),
@@ -217,7 +220,7 @@ impl DualEkf {
             slope: DMatrix::zeros(n, p),
         };
         let [k_e, k_e_dot, omega, zeta] = physical_bounds::<OPERATOR>(setup, sample_time)?;
-        // After a Padé approximation the delay is the filters' own, except for the hold.
+        // With a Padé approximation the filters contain the delay, except for that of the hold.
         let late = if own.pade == 0 { setup.orders.nk } else { 1 };
         Ok(Self {
             first: filters.clone(),
@@ -238,7 +241,7 @@ impl DualEkf {
         if !self.size_is_given {
             self.samples += 1.0;
             self.power += (e * e - self.power) / self.samples;
-            self.filters.beside_e = self.state_noise * self.state_noise * self.power;
+            self.filters.input_noise_variance = self.state_noise * self.state_noise * self.power;
         }
         let e = self.delay.step(e);
         self.filters.predict(e);
@@ -248,7 +251,7 @@ impl DualEkf {
         self.predict(sample.e);
         let [innovation, expected] = self.filters.correct(sample.u, moves);
         let mut shortened = moves && self.filters.bound(&self.bounds);
-        if self.filters.is_sound() && expected.is_finite() {
+        if self.filters.is_valid() && expected.is_finite() {
             self.expected = expected;
         } else {
             self.filters = self.first.clone();
@@ -274,7 +277,7 @@ impl State for DualEkf {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         let own = &mut self.filters;
         let parts: &mut [&mut dyn State] = &mut [
-            &mut own.beside_e,
+            &mut own.input_noise_variance,
             &mut own.x.as_mut_slice(),
             &mut own.p.as_mut_slice(),
             &mut own.w.as_mut_slice(),
@@ -288,7 +291,7 @@ impl State for DualEkf {
             &mut self.restarts,
         ];
         visit_all(parts, each);
-        // For numbers that were changed none may leave its bounds.
+        // Restored or changed numbers must also lie within the bounds.
         self.filters.bound(&self.bounds);
     }
 }

@@ -1,17 +1,16 @@
-//! A delay as a rational function (H. Padé 1892; K. Ogata, *Modern Control Engineering*).
+//! Padé approximation of a delay by a rational function (H. Padé 1892; K. Ogata, *Modern Control Engineering*).
 //!
-//! `e^(-tau s) = Q(-tau s)/Q(tau s)`, `Q(x) = sum_k c_k x^k`,
-//! `c_k = (2n - k)! n!/((2n)! k! (n - k)!)`, of order n: all-pass, with the phase of the delay up to
-//! `omega tau = 2 n`. Each order adds a state and a pole, and tau appears in the coefficients, as needed for a
-//! parameter that is estimated or changes.
+//! `e^(-tau s) ≈ Q(-tau s)/Q(tau s)`, `Q(x) = sum_k c_k x^k`, `c_k = (2n - k)! n!/((2n)! k! (n - k)!)`, for order n.
+//! The approximation is all-pass, and its phase is close to that of the delay up to about `omega tau = n`. Each order
+//! adds a state and a pole. tau appears in the coefficients, so that it can be estimated and can change.
 
 use hoid_model::SampleTime;
 use nalgebra::{DMatrix, DVector};
 
-/// Highest order.
+/// Highest order of the approximation.
 pub(super) const HIGHEST: usize = 3;
 
-/// c_0 to c_n.
+/// Returns the coefficients c_0 to c_n.
 fn coefficients(order: usize) -> Vec<f64> {
     let mut c = vec![1.0];
     for k in 1..=order {
@@ -22,11 +21,12 @@ fn coefficients(order: usize) -> Vec<f64> {
     c
 }
 
-/// The neuromuscular part with a delay, over one sample of held input: states y_0, y_1 and those of the delay.
+/// Returns the transition of the neuromuscular system with a delay over one sample of held input. The states are y_0,
+/// y_1 and those of the delay.
 ///
-/// The delay is in controllable canonical form, `p^(n) + sum a_k p^(k) = e`, its output
-/// `d e + sum b_k p^(k)` with the direct part `d = (-1)^n`; y_0 is driven by it. Both are discretised together, exactly
-/// for a held input, by the exponential of the matrix of states and input.
+/// The delay is in controllable canonical form, `p^(n) + sum a_k p^(k) = e`, with the output `d e + sum b_k p^(k)` and
+/// the feedthrough `d = (-1)^n`; this output drives y_0. The delay and the neuromuscular system are discretised
+/// together, exactly for a held input, by the exponential of the matrix of states and input.
 pub(super) fn delayed_second_order(
     omega: f64,
     zeta: f64,
@@ -36,7 +36,7 @@ pub(super) fn delayed_second_order(
 ) -> (DMatrix<f64>, DVector<f64>) {
     let c = coefficients(order);
     let direct = if order.is_multiple_of(2) { 1.0 } else { -1.0 };
-    // Divided by c_n tau^n, so that the leading coefficient of the denominator is 1.
+    // All coefficients are divided by c_n tau^n, so that the leading coefficient of the denominator is 1.
     let leading = c[order] * tau_s.powi(order as i32);
     let denominator = |k: usize| c[k] * tau_s.powi(k as i32) / leading;
     let numerator = |k: usize| {
@@ -58,7 +58,8 @@ pub(super) fn delayed_second_order(
         all[(n - 1, 2 + k)] = -denominator(k);
     }
     all[(n - 1, n)] = 1.0;
-    // Powers of p times 1/tau differ by orders of magnitude: scaled by tau the exponential keeps its digits.
+    // The derivatives of p differ by orders of magnitude (powers of 1/tau); scaling by powers of tau keeps the
+    // exponential accurate.
     let scale = |i: usize| {
         if (2..n).contains(&i) {
             tau_s.powi((i - 2) as i32)

@@ -1,33 +1,33 @@
-//! The state with the parameters, and the model of one sample.
+//! The state augmented by the parameters, and the model for one sample.
 
 use hoid_core::divided_differences::DividedDifferences;
 
-/// Length of X.
+/// Length of the augmented state X.
 pub(super) const N: usize = 6;
 /// Index of the first parameter in X.
 pub(super) const ETA: usize = 2;
-/// Covariance of X by rows.
+/// Covariance of X, stored by rows.
 pub(super) type Matrix = [[f64; N]; N];
 
 /// Estimate and covariance of X.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Belief {
+pub(super) struct AugmentedState {
     pub x: [f64; N],
     pub p: Matrix,
 }
 
-hoid_core::state!([] Belief { x, p });
+hoid_core::state!([] AugmentedState { x, p });
 
-/// The model.
+/// Model of one sample: sample time and noise variances.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Model {
     pub ts: f64,
-    /// Variance of the noise added to each element of X in a sample, and of n.
+    /// Variance of the noise added to each element of X per sample; `noise` is the variance of n.
     pub drift: [f64; N],
     pub noise: f64,
 }
 
-/// Phi and its derivatives: the entries from which all others follow, with derivatives with respect to omega and zeta.
+/// The four coefficients of the transition of p and v, with their derivatives with respect to omega and zeta.
 struct Hold {
     /// `1 - A`, `R/omega^2`, R, `1 - A - 2 zeta R/omega`.
     values: [f64; 4],

@@ -1,16 +1,15 @@
-//! The extended Kalman filter: with F the Jacobian of the transition and h the gradient of the
-//! output,
+//! The extended Kalman filter, where F is the Jacobian of the transition and h the gradient of the output:
 //!
 //! `P <- F P F' + Q`, `g = P h/(h' P h + R)`, `X <- X + g eps`,
 //! `P <- (I - g h') P (I - g h')' + R g g'`
 //!
-//! (A. H. Jazwinski, *Stochastic Processes and Filtering Theory*, 1970, section 8.3; the last in
-//! the form of P. D. Joseph).
+//! (A. H. Jazwinski, *Stochastic Processes and Filtering Theory*, 1970, section 8.3; the update of P is in the form of
+//! P. D. Joseph).
 
-use super::belief::{Belief, Matrix, Model, N};
+use super::belief::{AugmentedState, Matrix, Model, N};
 
-/// Takes a sample; returns the innovation and its predicted variance.
-pub(crate) fn step(model: &Model, belief: &mut Belief, e: f64, u: f64) -> [f64; 2] {
+/// Processes a sample. Returns the innovation and its predicted variance.
+pub(crate) fn step(model: &Model, belief: &mut AugmentedState, e: f64, u: f64) -> [f64; 2] {
     let f = model.jacobian(&belief.x, e);
     belief.x = model.transition(&belief.x, e);
     belief.p = congruence(&f, &belief.p);
@@ -40,7 +39,7 @@ fn dot(a: &[f64; N], b: &[f64; N]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// `F P F'`, symmetric.
+/// Returns the symmetric matrix `F P F'`.
 fn congruence(f: &Matrix, p: &Matrix) -> Matrix {
     let fp: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| dot(&f[i], &p[j])));
     let mut product = [[0.0; N]; N];

@@ -1,4 +1,4 @@
-//! The joint filter of state and parameters over samples: start, bounds, restarts.
+//! The recursion of the joint filter of state and parameters: start, bounds and restarts.
 
 use hoid_core::{
     bounds::within,
@@ -15,48 +15,48 @@ use hoid_track::{
 
 use crate::known_noise::lead_of;
 
-use super::belief::{Belief, ETA, Model, N};
+use super::belief::{AugmentedState, ETA, Model, N};
 
-/// Takes a sample; returns the innovation and its predicted variance.
-pub(super) type Update = fn(&Model, &mut Belief, f64, f64) -> [f64; 2];
+/// Function that processes a sample and returns the innovation and its predicted variance.
+pub(super) type Update = fn(&Model, &mut AugmentedState, f64, f64) -> [f64; 2];
 
-/// Variance of n over that of the remnant: a coloured remnant is less informative than a white one of the same
-/// variance.
+/// Ratio of the assumed variance of n to the variance of the remnant. It exceeds one because a coloured remnant is less
+/// informative than a white one of equal variance.
 const OUTPUT_NOISE: f64 = 10.0;
-/// Variance of the noise that drives v in addition to the error within one second, over that of the remnant divided by
-/// K_e_dot.
+/// Variance per second of the noise that drives v in addition to the error, as a multiple of the variance of the
+/// remnant divided by `(g/omega)^2`, where g and omega are as in [`GAIN_DRIFT`].
 const STATE_NOISE: f64 = 10.0;
-/// Drift of K_e and K_e_dot in one second, in units of `g = sqrt(K_e^2 + omega^2 K_e_dot^2)` and
-/// `g/omega` at the crossover omega.
+/// Standard deviations of the drift of K_e and K_e_dot in one second, in units of `g = sqrt(K_e^2 + omega^2 K_e_dot^2)`
+/// and `g/omega`, where omega is the crossover frequency.
 const GAIN_DRIFT: [f64; 2] = [0.02, 0.05];
 /// Crossover frequency, rad/s.
 const CROSSOVER_RAD_S: f64 = 2.0;
-/// Drift of omega_nm and zeta_nm in one second, as a share of them.
+/// Standard deviation of the drift of omega_nm and zeta_nm in one second, relative to their values.
 const NEUROMUSCULAR_DRIFT: f64 = 0.003;
-/// Largest variance of a parameter, as a multiple of the square of its start.
+/// Largest variance of a parameter, as a multiple of the square of its initial value.
 const LARGEST_VARIANCE: f64 = 25.0;
-/// Samples of the impulse response of 1/D.
+/// Length of the computed impulse response of 1/D, samples.
 const RESPONSE: usize = 1000;
 
-/// The recursion.
+/// The recursion of a joint filter.
 pub(crate) struct JointFilter {
     update: Update,
     model: Model,
-    belief: Belief,
-    first: Belief,
+    belief: AugmentedState,
+    first: AugmentedState,
     bounds: [[f64; 2]; OPERATOR],
     delay: DelayLine<Vec<f64>>,
     reported: Reported,
-    /// Predicted innovation variance of the last sample.
+    /// Predicted innovation variance at the last sample.
     expected: f64,
     restarts: u64,
 }
 
 impl JointFilter {
-    /// Starts from the batch fit of the start span.
+    /// Starts the filter from the batch fit of the start span.
     ///
     /// # Errors
-    /// [`IdentError::BadStart`] without a fit.
+    /// [`IdentError::BadStart`] if the start is not a batch fit.
     pub(super) fn new(
         update: Update,
         setup: &Setup,
@@ -69,7 +69,7 @@ impl JointFilter {
             });
         }
         let width = from.values.len();
-        let mut belief = Belief {
+        let mut belief = AugmentedState {
             x: [0.0; N],
             p: [[0.0; N]; N],
         };
@@ -93,7 +93,8 @@ impl JointFilter {
         })
     }
 
-    /// Keeps the parameters within their bounds and their variances within limits; true if something was changed.
+    /// Keeps the parameters within their bounds and limits their variances; restarts if a number is not finite. Returns
+    /// true after a restart or if a parameter was changed.
     fn hold(&mut self) -> bool {
         let mut cut = false;
         let sound =
@@ -150,7 +151,7 @@ fn model(x: &[f64; N], from: &StartState, sample_time: SampleTime) -> Model {
     }
 }
 
-/// Power of the impulse response of 1/D.
+/// Returns the sum of squares of the impulse response of 1/D.
 pub(super) fn power(d: &[f64]) -> f64 {
     let mut response = vec![0.0; RESPONSE];
     response[0] = 1.0;

@@ -1,27 +1,25 @@
-//! Joint estimation of state and parameters, as the literature on time-varying human control has
-//! it: for comparison.
+//! Joint estimation of state and parameters, as published for time-varying human control, for comparison.
 //!
-//! The state of the neuromuscular system, p (its response to the delayed error) and v (the rate of
-//! p), is estimated together with the parameters, which drift:
+//! The state of the neuromuscular system, p (its response to the delayed error) and v (the rate of p), is estimated
+//! together with the drifting parameters:
 //!
 //! `X = [p, v, K_e, K_e_dot, omega_nm, zeta_nm]`, `u = K_e p + K_e_dot v + n`.
 //!
-//! The transition is the exact hold. With [`DividedDifferences`] at the poles times Ts,
-//! `R = omega^2 Ts Phi_1`, `A = q Phi_2` and `m = e - p`,
+//! The transition is the exact hold. With [`DividedDifferences`] at the poles multiplied by Ts, `R = omega^2 Ts Phi_1`,
+//! `A = q Phi_2` and `m = e - p`,
 //!
 //! `p <- e - (1 - A) m + (R/omega^2) v`, `v <- R m + (1 - A - 2 zeta R/omega) v`;
 //!
-//! the parameters make a random walk, the remnant is taken to be white noise in u and in the drive
-//! of v. Neither is true of a coloured remnant in a closed loop; the published estimators assume both. [`ekf`]
-//! linearises (A. Popovici, P. M. T. Zaal, D. M. Pool, *Dual extended Kalman filter for the identification of
-//! time-varying human manual control behavior*, AIAA 2017-3666, there with two filters that take turns), [`ukf`] sends
-//! points through (J. Rojer, D. M. Pool, M. M. van Paassen, M. Mulder, *UKF-based identification of time-varying manual
-//! control behaviour*, IFAC-PapersOnLine 52-19 (2019)).
+//! The parameters are modelled as a random walk, and the remnant as white noise in u and in the input of v. Neither
+//! assumption about the remnant holds for a coloured remnant in a closed loop; the published estimators make both.
+//! [`ekf`] linearises the model (A. Popovici, P. M. T. Zaal, D. M. Pool, *Dual extended Kalman filter for the
+//! identification of time-varying human manual control behavior*, AIAA 2017-3666, with two alternating filters);
+//! [`ukf`] uses sigma points (J. Rojer, D. M. Pool, M. M. van Paassen, M. Mulder, *UKF-based identification of
+//! time-varying manual control behaviour*, IFAC-PapersOnLine 52-19 (2019)).
 //!
-//! The noise of both is in proportion to the variance of the remnant of the start fit, `sigma^2`
-//! times the power of the impulse response of 1/D, and the drift in proportion to the start values;
-//! the factors were set on conditions C3 and C5 with remnants of order 2 and 3, as those of the
-//! method multiple-model were.
+//! Both noise variances are proportional to the variance of the remnant in the start fit, `sigma^2` times the sum of
+//! squares of the impulse response of 1/D. The drift is proportional to the initial values. The factors were set on
+//! conditions C3 and C5 with remnants of order 2 and 3, as for the method multiple-model.
 
 mod belief;
 mod ekf;
@@ -42,7 +40,7 @@ use crate::known_noise::check_model_of_change;
 
 use filter::JointFilter;
 
-/// The words and the step of each filter are its own, the rest is the same.
+/// The two filters differ only in their descriptions and in the function for one sample.
 macro_rules! joint_filter {
     ($options:ident, $name:literal, $help:literal, $source:literal, $step:path) => {
         impl RecursiveMethod for $options {
@@ -56,7 +54,7 @@ macro_rules! joint_filter {
                 }
             }
 
-            /// It follows from a random walk of the parameters.
+            /// The memory length follows from the random walk of the parameters.
             fn default_memory(&self, _parameter: &str) -> Memory {
                 Memory::Infinite
             }
@@ -101,7 +99,7 @@ settings! {
     /// Options of the extended Kalman filter.
     pub struct EkfOptions {}
     groups {
-        /// Bounds.
+        /// Bounds of the parameters.
         pub bounds: BoundOptions,
     }
 }
@@ -109,7 +107,7 @@ settings! {
     /// Options of the unscented Kalman filter.
     pub struct UkfOptions {}
     groups {
-        /// Bounds.
+        /// Bounds of the parameters.
         pub bounds: BoundOptions,
     }
 }

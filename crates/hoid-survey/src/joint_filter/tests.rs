@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used)]
 use super::{
-    belief::{Belief, ETA, Model, N},
+    belief::{AugmentedState, ETA, Model, N},
     ekf,
     filter::power,
     ukf,
@@ -59,7 +59,7 @@ fn both_filters_agree_on_a_linear_model() {
     };
     let mut p = [[0.0; N]; N];
     (p[0][0], p[1][1], p[0][1], p[1][0]) = (0.2, 3.0, 0.1, 0.1);
-    let mut extended = Belief { x: X, p };
+    let mut extended = AugmentedState { x: X, p };
     let mut unscented = extended;
     for t in 0..400 {
         let e = (0.11 * f64::from(t)).sin();
@@ -87,7 +87,7 @@ fn with_little_doubt_both_filters_nearly_agree() {
         drift: MODEL.drift.map(|q| 1e-4 * q),
         ..MODEL
     };
-    let mut extended = Belief { x: X, p };
+    let mut extended = AugmentedState { x: X, p };
     let (mut unscented, mut truth) = (extended, X);
     for t in 0..200 {
         let e = (0.11 * f64::from(t)).sin();

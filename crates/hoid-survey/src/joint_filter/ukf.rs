@@ -1,12 +1,13 @@
-//! The unscented Kalman filter: 2 N points `X ± sqrt(N) L_i`, with `L L' = P`, of equal weight pass through transition
-//! and output, and give their means and covariances (S. J. Julier and J. K. Uhlmann, *Proceedings of the IEEE* 92
-//! (2004) 401-422, with kappa = 0). The points are drawn again after the noise of the transition has been added.
-//! `X <- X + c/s eps`, `P <- P - c c'/s`, with c the covariance of X with the output and s the variance of the output.
+//! The unscented Kalman filter: 2 N points `X ± sqrt(N) L_i` of equal weight, where `L L' = P`, are propagated through
+//! the transition and the output, and give the means and covariances (S. J. Julier and J. K. Uhlmann, *Proceedings of
+//! the IEEE* 92 (2004) 401-422, with kappa = 0). The points are drawn again after the noise of the transition has been
+//! added. The update is `X <- X + c/s eps`, `P <- P - c c'/s`, where c is the covariance of X with the output and s the
+//! variance of the output.
 
-use super::belief::{Belief, Matrix, Model, N};
+use super::belief::{AugmentedState, Matrix, Model, N};
 
-/// Takes a sample; returns the innovation and its predicted variance.
-pub(crate) fn step(model: &Model, belief: &mut Belief, e: f64, u: f64) -> [f64; 2] {
+/// Processes a sample. Returns the innovation and its predicted variance.
+pub(crate) fn step(model: &Model, belief: &mut AugmentedState, e: f64, u: f64) -> [f64; 2] {
     let moved = points(belief).map(|x| model.transition(&x, e));
     belief.x = mean(&moved);
     belief.p = [[0.0; N]; N];
@@ -44,10 +45,10 @@ pub(crate) fn step(model: &Model, belief: &mut Belief, e: f64, u: f64) -> [f64; 
     [innovation, expected]
 }
 
-/// Number of points.
+/// Number of sigma points.
 const COUNT: usize = 2 * N;
 
-fn points(belief: &Belief) -> [[f64; N]; COUNT] {
+fn points(belief: &AugmentedState) -> [[f64; N]; COUNT] {
     let root = root(&belief.p);
     let reach = (N as f64).sqrt();
     std::array::from_fn(|k| {
@@ -60,12 +61,12 @@ fn mean(points: &[[f64; N]; COUNT]) -> [f64; N] {
     std::array::from_fn(|i| points.iter().map(|x| x[i]).sum::<f64>() / COUNT as f64)
 }
 
-/// L with `L L' = P`; a direction whose variance rounding has made negative is left out.
+/// Returns L with `L L' = P`; a direction whose variance has become negative by rounding is omitted.
 fn root(p: &Matrix) -> Matrix {
     let mut l = [[0.0; N]; N];
     for j in 0..N {
         let rest = p[j][j] - (0..j).map(|k| l[j][k] * l[j][k]).sum::<f64>();
-        // A remainder below this share of the variance is rounding error.
+        // A remainder below this fraction of the variance is a rounding error.
         if rest > 1e-14 * p[j][j] {
             l[j][j] = rest.sqrt();
             for i in j + 1..N {

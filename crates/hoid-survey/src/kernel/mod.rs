@@ -1,5 +1,5 @@
-//! The arithmetic of a sample, with fixed capacity: parts that only these methods use, in the form of
-//! [`hoid_core`].
+//! The computations for one sample, with fixed capacity, that only the methods of this crate use; they have the same
+//! form as those of [`hoid_core`].
 //!
 //! | module | contents |
 //! |---|---|

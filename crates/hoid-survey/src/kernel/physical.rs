@@ -1,18 +1,19 @@
 //! The recursive prediction-error method in physical parameters.
 //!
-//! `eta = [K_e, K_e_dot, omega_nm, zeta_nm, c.., d..]`, or with the delay
-//! `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, c.., d..]`. The predictor is that of Box-Jenkins with
-//! the polynomials `theta(eta)` of the exact zero-order hold ([`hoid_core::held_operator`]); its
-//! gradient is `psi_eta = (d theta/d eta)' psi_theta`. The step is that of [`hoid_core::rpem`], but each factor of
-//! forgetting now belongs to a quantity whose rate of change the user knows: operators adapt their gains, and hardly
-//! their neuromuscular system.
+//! The parameters are `eta = [K_e, K_e_dot, omega_nm, zeta_nm, c.., d..]`, or with the delay
+//! `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, c.., d..]`. The predictor is the Box-Jenkins predictor with the
+//! polynomials `theta(eta)` of the exact zero-order hold ([`hoid_core::held_operator`]); its gradient is
+//! `psi_eta = (d theta/d eta)' psi_theta`. The step is computed as in [`hoid_core::rpem`], but each forgetting factor
+//! now belongs to a quantity whose rate of change the user knows: operators adapt their gains, and hardly their
+//! neuromuscular system.
 //!
-//! Each parameter stays within its bounds: a step is cut at the bound. C (and D, with
+//! Each parameter stays within its bounds: a step is cut off at the bound. C (and D, with
 //! [`Stable::PredictorAndNoise`]) is kept stable by halving the step.
 //!
-//! With the delay as a parameter `tau_e = l Ts + delta`, B has three coefficients after a delay of `nk = l + 1`
-//! samples; as tau_e grows over a whole sample, B moves on along the past input that the predictor keeps, without a
-//! transient. The model is continuous there, its derivative has a kink (see [`hoid_core::held_operator`]).
+//! If the delay is a parameter, `tau_e = l Ts + delta`, and B has three coefficients after a delay of `nk = l + 1`
+//! samples. When tau_e passes a whole sample, B is shifted along the past input that the predictor keeps, without a
+//! transient. At such a delay the model is continuous, but its derivative has a kink (see
+//! [`hoid_core::held_operator`]).
 
 use hoid_core::{
     adaptation::Adaptation,
@@ -35,28 +36,28 @@ const TAU: usize = 4;
 /// Model of the recursion: orders, sample time and bounds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicalModel<S, const N: usize> {
-    /// Orders: nc and nd are free, na = 0, nf = 2 and nb = 2, or 3 if tau_e is a parameter.
+    /// Orders: nc and nd are arbitrary, na = 0, nf = 2, and nb = 2, or 3 if tau_e is a parameter.
     pub shape: S,
-    /// Smallest delay nk in samples, for which the recursion receives the input `x(t) = e(t - nk)`, if tau_e is a
-    /// parameter.
+    /// If tau_e is a parameter, the smallest delay nk in samples; the recursion receives the input `x(t) = e(t - nk)`.
     pub smallest_nk: Option<usize>,
     /// Sample time in s.
     pub sample_time: f64,
-    /// Least and largest value of each parameter.
+    /// Smallest and largest value of each parameter.
     pub bounds: [[f64; 2]; N],
     /// Noise polynomials that are kept stable.
     pub stable: Stable,
 }
 
-/// The recursion. N is the capacity for parameters, K that for the errors of its filters
-/// ([`ErrorLayout::filter_errors`]; 0 for the default error bars), L the number of past inputs that are kept: 2
-/// without tau_e, 3 plus the range of the delay with it; at least nc.
+/// The recursion. N is the capacity for parameters; K is the capacity for the errors of the filters
+/// ([`ErrorLayout::filter_errors`]; 0 for the default error bars); L is the number of past inputs that are kept, at
+/// least nc: 2 if tau_e is not a parameter, otherwise 3 plus the range of the delay.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicalRpem<S, const N: usize, const K: usize, const L: usize, A> {
     model: PhysicalModel<S, N>,
     predictor: Predictor<S, N, L>,
     eta: [f64; N],
-    /// Polynomials of eta, their Jacobian with respect to the first parameters, and the whole samples of the delay.
+    /// Polynomials at eta, their Jacobian with respect to the operator's parameters, and the whole samples of the
+    /// delay.
     polynomials: Polynomials<N>,
     psi: [f64; N],
     adaptation: A,
@@ -67,7 +68,7 @@ pub struct PhysicalRpem<S, const N: usize, const K: usize, const L: usize, A> {
 #[derive(Debug, Clone, PartialEq)]
 struct Polynomials<const N: usize> {
     theta: [f64; N],
-    /// Rows b.., f1, f2; columns the operator's parameters.
+    /// The rows are b.., f1, f2; the columns are the operator's parameters.
     jacobian: [[f64; 5]; 5],
     whole_samples: usize,
 }
@@ -78,7 +79,7 @@ hoid_core::state!([S, const N: usize, const K: usize, const L: usize, A: hoid_co
 });
 
 impl<S: Shape, const N: usize> PhysicalModel<S, N> {
-    /// Number of operator parameters before c and d.
+    /// Number of operator parameters, which precede c and d in eta.
     fn operator(&self) -> usize {
         self.shape.nb() + 2
     }
@@ -91,7 +92,7 @@ impl<S: Shape, const N: usize> PhysicalModel<S, N> {
         let (operator, mut whole_samples) = (self.operator(), 0);
         if self.smallest_nk.is_some() {
             let samples = eta[TAU] / self.sample_time;
-            // With a tolerance for rounding: 0.29/0.01 is 28.999999999999996.
+            // The tolerance allows for rounding errors: 0.29/0.01 is 28.999999999999996.
             let whole = libm::floor(samples * (1.0 + 1e-12) + 1e-12).max(0.0);
             whole_samples = whole as usize;
             let delta = (eta[TAU] - whole * self.sample_time).clamp(0.0, self.sample_time);
@@ -124,9 +125,9 @@ impl<S: Shape, const N: usize> PhysicalModel<S, N> {
 }
 
 impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>> PhysicalRpem<S, N, K, L, A> {
-    /// Starts from eta with filters at rest. `None` if the orders are not those of
-    /// [`PhysicalModel::shape`], N, K or L is too small, eta lies outside the bounds, the bounds allow omega_nm or
-    /// zeta_nm to become zero, or the noise model is not stable.
+    /// Starts from eta with filters at rest. `None` if the orders do not satisfy [`PhysicalModel::shape`], if N, K or L
+    /// is too small, if eta lies outside the bounds, if the bounds allow omega_nm or zeta_nm to become zero, or if the
+    /// noise model is not stable.
     pub fn new(model: PhysicalModel<S, N>, eta: [f64; N], adaptation: A, bars: ErrorBars<N, K>) -> Option<Self> {
         let shape = model.shape;
         let predictor = Predictor::new(shape, Regressor::Gradient)?;
@@ -158,7 +159,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         Some(recursion)
     }
 
-    /// Sets the start of B to the delay of the estimate.
+    /// Shifts B in the predictor to the delay of the estimate.
     fn apply_delay(&mut self) {
         if let Some(first) = self.model.smallest_nk {
             let nk = self.polynomials.whole_samples + 1;
@@ -195,8 +196,8 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         row
     }
 
-    /// Takes a sample `x(t) = e(t - nk)`, `u(t)`; nk is [`PhysicalModel::smallest_nk`] if the delay is a parameter.
-    /// Both must be finite.
+    /// Processes a sample `x(t) = e(t - nk)`, `u(t)`; nk is [`PhysicalModel::smallest_nk`] if the delay is a parameter.
+    /// Both values must be finite.
     #[inline]
     pub fn step(&mut self, x: f64, u: f64) -> Step {
         let innovation = self.predict(x, u);
@@ -208,7 +209,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
             .update(&self.psi, limited, &self.eta, self.bars.innovation_variance());
         let (operator, noise) = (self.model.operator(), self.model.shape.nc() + self.model.shape.nd());
         let (shape, stable) = (self.model.shape, self.model.stable);
-        // The operator's part of theta is stable by its bounds; only the noise model has to be tested.
+        // The bounds keep the operator's part of theta stable; only the noise model has to be tested.
         let (allowed, mut eta) = backtrack(&self.eta, &moved.step, |eta| {
             let mut theta = [0.0; N];
             theta[operator - 2..operator - 2 + noise].copy_from_slice(&eta[operator..operator + noise]);
@@ -231,8 +232,8 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         }
     }
 
-    /// Cuts the new estimate at the bounds. Returns the remaining fraction of the step of each parameter, `allowed`
-    /// inside the bounds, and whether one was cut.
+    /// Limits the new estimate to the bounds. Returns the fraction of the step that remains for each parameter, which
+    /// is `allowed` inside the bounds, and whether a parameter was limited.
     #[inline(always)]
     fn cut_at_bounds(&self, step: &[f64; N], allowed: f64, eta: &mut [f64; N]) -> ([f64; N], bool) {
         let (mut fraction, mut cut) = ([allowed; N], false);
@@ -251,7 +252,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         (fraction, cut)
     }
 
-    /// As [`PhysicalRpem::step`], but the estimate stays constant: only the filters move on.
+    /// As [`PhysicalRpem::step`], but only the filters are updated; the estimate stays constant.
     pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         let innovation = self.predict(x, u);
         let (layout, rows) = self.sensitivities();
@@ -272,7 +273,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         self.correct();
     }
 
-    /// Sensitivities with respect to eta, in which the noise parameters follow those of the operator.
+    /// Sensitivities with respect to eta, where the noise parameters follow the operator parameters.
     #[inline(always)]
     fn sensitivities(&self) -> (ErrorLayout, Sensitivities<N, K>) {
         if K == 0 {
@@ -309,7 +310,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         &self.eta
     }
 
-    /// Returns the polynomials of eta, `[b.. c.. d.. f..]`.
+    /// Returns the polynomials at eta, `[b.. c.. d.. f..]`.
     pub fn theta(&self) -> &[f64; N] {
         &self.polynomials.theta
     }
@@ -319,7 +320,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         &self.polynomials.jacobian
     }
 
-    /// Returns psi of the last sample.
+    /// Returns the gradient psi at the last sample.
     pub fn psi(&self) -> &[f64; N] {
         &self.psi
     }
@@ -329,7 +330,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         &self.adaptation
     }
 
-    /// Returns the delay of b0 in samples if tau_e is one of the parameters: its whole samples, and that of the hold.
+    /// Returns the delay of b0 in samples if tau_e is a parameter: the whole samples of tau_e, plus one for the hold.
     pub fn nk(&self) -> usize {
         self.polynomials.whole_samples + 1
     }
@@ -339,7 +340,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         &mut self.adaptation
     }
 
-    /// Returns the covariance of eta over sigma^2.
+    /// Returns the covariance of eta divided by sigma^2.
     pub fn normalised_covariance(&self) -> [[f64; N]; N] {
         self.adaptation.normalised_covariance(&self.bars)
     }

@@ -1,10 +1,10 @@
-//! The bank of hypotheses of the real-time kernel ([`crate::kernel::multiple_model`]) with the interface of a recursion
-//! and with its assumptions about a person, in seconds.
+//! The bank of hypotheses of the real-time kernel ([`crate::kernel::multiple_model`]) as a recursion, with assumptions
+//! about a person in seconds.
 //!
-//! Where the delay is tracked, other delays are proposed every 1.28 s.
+//! If the delay is tracked, other delays are proposed every 1.28 s.
 //!
-//! The numbers were set on conditions C3 and C5 with remnants of order 2 and 3; the errors change
-//! by a tenth or less when any of them is halved or doubled.
+//! The constants were set on conditions C3 and C5 with remnants of order 2 and 3; the errors change by a tenth or less
+//! when any constant is halved or doubled.
 
 mod prior;
 mod smoother;
@@ -38,12 +38,12 @@ use crate::{
 };
 use prior::{bad, change_prior, delays, first_hypothesis, outside};
 
-/// Room for hypotheses where the delay is known, and where it is not.
+/// Capacity for hypotheses if the delay is known; `WITH_DELAYS` is the capacity if it is tracked.
 const HYPOTHESES: usize = 16;
 const WITH_DELAYS: usize = 48;
 /// Limit on innovations, in standard deviations.
 const LIMIT: f64 = 3.5;
-/// Order of the noise model when none is named: the odds need innovations that are white.
+/// Default order of the noise model; the odds require white innovations.
 const DEFAULT_ND: usize = 6;
 
 settings! {
@@ -59,11 +59,11 @@ settings! {
         pub smooth: bool = false,
     }
     groups {
-        /// Bounds.
+        /// Bounds of the parameters.
         pub bounds: BoundOptions,
-        /// A tracked delay.
+        /// Range of a tracked delay.
         pub delay: DelayOptions,
-        /// The guard.
+        /// Options of the guard.
         pub guard: GuardOptions,
     }
 }
@@ -83,7 +83,7 @@ impl RecursiveMethod for MultipleModelOptions {
         Some(DEFAULT_ND)
     }
 
-    /// It follows from a model of the change.
+    /// The memory length follows from the model of the change.
     fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Infinite
     }
@@ -166,7 +166,7 @@ impl RecursiveMethod for MultipleModelOptions {
     }
 }
 
-/// The bank with its filters and its delay line, which is as long as the shortest delay.
+/// The bank with its filters and with a delay line for the shortest delay.
 struct MultipleModelRecursion<const M: usize> {
     model: Box<MultipleModelFilter<M, LARGEST_ND, Vec<Signals>>>,
     delay: DelayLine<Vec<f64>>,
@@ -186,7 +186,7 @@ impl<const M: usize> MultipleModelRecursion<M> {
         let shortest = *delays.start();
         if !delays.contains(&nk) {
             return Err(bad(&format!(
-                "its delay of nk = {nk} is not among those that are tracked, {shortest} to {}",
+                "its delay of nk = {nk} is not among the tracked delays, {shortest} to {}",
                 delays.end()
             )));
         }
@@ -205,8 +205,8 @@ impl<const M: usize> MultipleModelRecursion<M> {
         })
     }
 
-    /// tau_e in s from a mean and a variance of the delay in samples beyond the shortest; no
-    /// variance where it is known.
+    /// Returns tau_e in s for a mean and a variance of the delay in samples beyond the shortest delay; a known delay
+    /// has no variance.
     fn delay_s(&self, [later, variance]: [f64; 2]) -> Estimate {
         let ts = self.sample_time.s();
         let tau_e_s = (self.shortest as f64 - 1.0 + later) * ts;
@@ -217,7 +217,7 @@ impl<const M: usize> MultipleModelRecursion<M> {
     }
 }
 
-/// A change of the kernel in seconds, with the delay tau_e before and after.
+/// Converts a change declared by the kernel to seconds; `tau_e_s` is the delay before and after it.
 fn declared(change: &kernel_change::Change, tau_e_s: [Estimate; 2], sample_time: SampleTime) -> Change {
     let (before, now) = (&change.before, &change.after);
     let pair = |i: usize| {

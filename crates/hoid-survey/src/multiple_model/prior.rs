@@ -1,4 +1,4 @@
-//! Prior of a person and of their changes, in seconds, and the first hypothesis.
+//! Prior of a person and of their changes, in seconds, and the initial hypothesis.
 
 use std::ops::RangeInclusive;
 
@@ -16,43 +16,44 @@ use crate::kernel::multiple_model::{
 const SPACING_S: f64 = 0.32;
 /// Mean time between two changes, s.
 const BETWEEN_CHANGES_S: f64 = 60.0;
-/// Prior standard deviation of a change of K_e and of K_e_dot, in the units of [`ChangePrior::gain_jump`].
-const JUMP: [f64; 2] = [0.15, 0.5];
-/// Drift of the gains in one second, in the same units.
+/// Prior standard deviations of a change of K_e and of K_e_dot, in the units of [`ChangePrior::gain_jump`].
+const CHANGE_SD: [f64; 2] = [0.15, 0.5];
+/// Standard deviation of the drift of each gain in one second, in the units of [`ChangePrior::gain_drift`].
 const DRIFT: f64 = 0.005;
-/// Drift just after a change, for K_e and K_e_dot in the same units, for omega_nm and zeta_nm in those of their
-/// changes; and its time constant, s.
-const UNREST: [f64; OPERATOR] = [0.05, 0.25, 0.2, 0.2];
-const UNREST_FOR_S: f64 = 3.0;
-/// Prior standard deviation of a relative change of omega_nm and of zeta_nm, number of births per birth of this kind,
-/// and its odds against the other kind.
+/// Standard deviations of the drift in one second just after a change, in the units of
+/// [`ChangePrior::transient_drift`]; `TRANSIENT_TIME_CONSTANT_S` is the time constant of its decay, s.
+const TRANSIENT_DRIFT: [f64; OPERATOR] = [0.05, 0.25, 0.2, 0.2];
+const TRANSIENT_TIME_CONSTANT_S: f64 = 3.0;
+/// Prior standard deviations of a relative change of omega_nm and of zeta_nm. A hypothesis of such a change is created
+/// every `NEUROMUSCULAR_EVERY` births; `NEUROMUSCULAR_ODDS` are its odds against a change of the gains alone.
 const NEUROMUSCULAR: [f64; 2] = [0.25, 0.4];
-const WHOLE_EVERY: u32 = 4;
-const WHOLE_ODDS: f64 = 0.3;
-/// Crossover at which the gains are compared, rad/s.
+const NEUROMUSCULAR_EVERY: u32 = 4;
+const NEUROMUSCULAR_ODDS: f64 = 0.3;
+/// Crossover frequency, which scales K_e_dot relative to K_e, rad/s.
 const CROSSOVER_RAD_S: f64 = 2.0;
-/// Memory of the innovation variance, and the part of it that remains after a change, s.
+/// Memory length of the innovation variance, s; `RETAINED_MEMORY_S` is the part of it that remains after a change.
 const LEVEL_MEMORY_S: f64 = 20.0;
-const DOUBT_S: f64 = 1.0;
-/// Number of births for which a hypothesis is kept regardless of its predictions.
+const RETAINED_MEMORY_S: f64 = 1.0;
+/// Number of birth intervals for which a hypothesis is kept regardless of its predictions.
 const PROTECTED_BIRTHS: f64 = 4.0;
 /// Age from which a hypothesis can identify the changed parameters, s.
 const SETTLED_S: f64 = 0.5;
-/// Largest age of a hypothesis of a recent change, s.
+/// Largest age at which a hypothesis represents a recent change, s.
 const RECENT_S: f64 = 4.0;
 
-/// Number of births per proposal of other delays, number of proposed delays, odds of a change of the delay against one
-/// of the gains alone, its standard deviation in s, and probability of a delay next to the likeliest.
+/// Interval between proposals of other delays, in births. The following constants are the number of delays proposed,
+/// the odds of a change of the delay against a change of the gains alone, the standard deviation of that change in s,
+/// and the probability of a delay next to the likeliest.
 const DELAYS_EVERY: u32 = 4;
 const DELAYS_PROPOSED: usize = 8;
 const DELAY_ODDS: f64 = 1.0;
 const DELAY_JUMP_S: f64 = 0.05;
-const NEIGHBOUR: f64 = 0.15;
-/// Effect of 0.01 s of delay on K_e, K_e_dot, omega_nm and zeta_nm, in the units of
+const NEIGHBOUR_PROBABILITY: f64 = 0.15;
+/// Effect of a delay error of 0.01 s on K_e, K_e_dot, omega_nm and zeta_nm, in the units of
 /// [`DelayPrior::error_per_sample`].
-const WORTH: [f64; OPERATOR] = [0.01, 0.03, 0.04, 0.08];
+const DELAY_ERROR_EFFECT: [f64; OPERATOR] = [0.01, 0.03, 0.04, 0.08];
 
-/// Candidate delays, in samples of nk: nk itself, or those of the tracked range.
+/// Candidate delays as values of nk: nk itself, or all values of the tracked range.
 pub(super) fn delays(setup: &Setup, sample_time: SampleTime) -> RangeInclusive<usize> {
     match setup.track_delay_s {
         None => setup.orders.nk..=setup.orders.nk,
@@ -60,10 +61,10 @@ pub(super) fn delays(setup: &Setup, sample_time: SampleTime) -> RangeInclusive<u
     }
 }
 
-/// Returns the prior of changes, in samples.
+/// Returns the prior of changes, with times in samples.
 ///
 /// # Errors
-/// As [`physical_bounds`].
+/// The errors of [`physical_bounds`].
 pub(super) fn change_prior(alarm: f64, setup: &Setup, sample_time: SampleTime) -> Result<ChangePrior, IdentError> {
     let ts = sample_time.s();
     let spacing = (SPACING_S / ts).round().max(1.0);
@@ -73,15 +74,15 @@ pub(super) fn change_prior(alarm: f64, setup: &Setup, sample_time: SampleTime) -
         birth_interval: spacing as u32,
         // The probability of a change between two births is at most one half.
         hazard: (ts / BETWEEN_CHANGES_S).min(0.5 / spacing),
-        gain_jump: JUMP,
+        gain_jump: CHANGE_SD,
         gain_drift: DRIFT * ts.sqrt(),
-        transient_drift: UNREST.map(|u| u * ts.sqrt()),
-        transient_time_constant: UNREST_FOR_S / ts,
+        transient_drift: TRANSIENT_DRIFT.map(|u| u * ts.sqrt()),
+        transient_time_constant: TRANSIENT_TIME_CONSTANT_S / ts,
         neuromuscular_jump: NEUROMUSCULAR,
-        neuromuscular_every: WHOLE_EVERY,
-        neuromuscular_odds: WHOLE_ODDS,
+        neuromuscular_every: NEUROMUSCULAR_EVERY,
+        neuromuscular_odds: NEUROMUSCULAR_ODDS,
         crossover: CROSSOVER_RAD_S,
-        residuals_after_change: (DOUBT_S / ts).max(4.0),
+        residuals_after_change: (RETAINED_MEMORY_S / ts).max(4.0),
         pruning_age: (PROTECTED_BIRTHS * spacing) as u64,
         outlier_limit: setup.limit,
         settling_time: (SETTLED_S / ts).round() as u64,
@@ -95,17 +96,17 @@ pub(super) fn change_prior(alarm: f64, setup: &Setup, sample_time: SampleTime) -
                 change_odds: DELAY_ODDS,
                 proposals: DELAYS_PROPOSED,
                 jump: DELAY_JUMP_S / ts,
-                neighbour_probability: NEIGHBOUR,
-                error_per_sample: WORTH.map(|w| w * ts / 0.01),
+                neighbour_probability: NEIGHBOUR_PROBABILITY,
+                error_per_sample: DELAY_ERROR_EFFECT.map(|w| w * ts / 0.01),
             },
         },
     })
 }
 
-/// Returns the first hypothesis, from the batch fit of the start span, with its covariance scaled by a factor.
+/// Returns the initial hypothesis, from the batch fit of the start span with its covariance multiplied by `times`.
 ///
 /// # Errors
-/// [`IdentError::BadStart`] without a fit, or for one outside the bounds.
+/// [`IdentError::BadStart`] if the start is not a batch fit or lies outside the bounds.
 pub(super) fn first_hypothesis(
     from: &StartState,
     times: f64,

@@ -1,26 +1,26 @@
-//! The two-sided estimate of a recorded run: the operator at each sample, from all samples of the run.
+//! The two-sided estimate for a recorded run: the operator at each sample, from all samples of the run.
 //!
 //! After the whitening filter the model of [`crate::kernel::multiple_model`] has no dynamics:
 //! `y(t) = K_e psi_1 + K_e_dot psi_2 + eps`, with signals that depend only on the record. The bank of hypotheses can
-//! therefore process it from either end. At t the forward run gives `p(eta_t | y_1..y_t) = sum_f P(f) N(m_f, P_f)`,
-//! where f is the time of the last change, and the backward run `p(y_{t+1}..y_N | eta_t)`, in proportion to
-//! `sum_b P(b) N(m_b, P_b)`, where b is the time of the next change. The product is the two-filter smoother (D. C.
-//! Fraser and J. E. Potter, *IEEE Transactions on Automatic Control* 14 (1969) 387-390), here of two mixtures (G.
-//! Kitagawa, *Annals of the Institute of Statistical Mathematics* 46 (1994) 605-623): with `S = P_f + P_b`,
+//! therefore process the record from either end. At time t the forward run gives
+//! `p(eta_t | y_1..y_t) = sum_f P(f) N(m_f, P_f)`, where f is the time of the last change, and the backward run gives
+//! `p(y_{t+1}..y_N | eta_t)`, proportional to `sum_b P(b) N(m_b, P_b)`, where b is the time of the next change. The
+//! product is the two-filter smoother (D. C. Fraser and J. E. Potter, *IEEE Transactions on Automatic Control* 14
+//! (1969) 387-390), here for two mixtures (G. Kitagawa, *Annals of the Institute of Statistical Mathematics* 46 (1994)
+//! 605-623): with `S = P_f + P_b`,
 //!
 //! - `m = m_f + P_f S^-1 (m_b - m_f)`, `P = P_f - P_f S^-1 P_f`;
-//! - `P(f, b) ~ P(f) P(b) N(m_b - m_f; 0, S)`: a past and a future that contradict each other are
-//!   not joined.
+//! - `P(f, b) ~ P(f) P(b) N(m_b - m_f; 0, S)`: a past and a future that contradict each other are not combined.
 //!
-//! Each hypothesis has an innovation variance s2 from n residuals; the same equations hold for `ln s2`, of variance
-//! 2/n. Mean and covariance of the mixture of pairs are reported.
+//! Each hypothesis has an innovation variance s2 from n residuals; the same equations hold for `ln s2`, whose variance
+//! is 2/n. The mean and the covariance of the mixture of pairs are reported.
 //!
-//! The backward run needs a start about which it is linearised: it is the end of the forward run, with
-//! [`KNOWN_LITTLE`] times the covariance of the start fit, from which the forward run starts too. The start therefore
-//! counts twice only with that small weight. omega_nm and zeta_nm, about which the filters are linearised, are those
-//! at the end of the causal estimate.
+//! The backward run starts from the estimate at the end of the forward run, with [`START_COVARIANCE_FACTOR`] times the
+//! covariance of the start fit. The forward run starts with the same covariance, so that the start fit counts twice
+//! only with this small weight. The filters are linearised about omega_nm and zeta_nm at the end of the causal
+//! estimate.
 //!
-//! More hypotheses are affordable here: one is born every 0.08 s, and there is capacity for 64.
+//! Offline, more hypotheses are affordable: a hypothesis is born every 0.08 s, and there is capacity for 64.
 
 use crate::kernel::multiple_model::{
     bank::Bank,
@@ -37,25 +37,25 @@ use hoid_track::building::{Causal, Reported, Setup, StartState, TwoSided};
 
 use super::prior::{change_prior, first_hypothesis, outside};
 
-/// Capacity for hypotheses, and time between two births, s.
+/// Capacity for hypotheses; `SPACING_S` is the time between two births, s.
 const HYPOTHESES: usize = 64;
 const SPACING_S: f64 = 0.08;
-/// Multiple of the covariance of the start fit from which both runs start.
-const KNOWN_LITTLE: f64 = 100.0;
-/// Time after which the initial rest of the filters no longer matters, in time constants of the neuromuscular system.
+/// Factor by which the covariance of the start fit is multiplied at the start of both runs.
+const START_COVARIANCE_FACTOR: f64 = 100.0;
+/// Time after which it no longer matters that the filters start at rest, in time constants of the neuromuscular system.
 const SETTLED: f64 = 6.0;
-/// Least probability of a hypothesis that is joined, and least weight of a pair relative to the largest.
+/// Smallest probability of a hypothesis that is used, and smallest weight of a pair relative to the largest weight.
 const LEAST: f64 = 1e-3;
-/// Limit of the signals, beyond which their products would overflow.
+/// Limit of the signals beyond which their products would overflow.
 const LARGEST: f64 = 1e60;
 
-/// A hypothesis in the form in which it is joined with others.
+/// A forward or backward hypothesis in the form in which it is combined with others.
 #[derive(Debug, Clone, Copy)]
 struct Side {
     log_weight: f64,
     eta: [f64; OPERATOR],
     covariance: [[f64; OPERATOR]; OPERATOR],
-    /// Half the logarithm of the determinant of all variances.
+    /// Half the logarithm of the determinant of the covariance of eta and the log innovation variance.
     size: f64,
     /// Logarithm of the innovation variance, and the variance of this logarithm.
     level: [f64; 2],
@@ -88,10 +88,10 @@ pub(crate) struct Joined {
 /// Output and signals after the whitening filter; `None` if they are unknown.
 type WhitenedSample = Option<(f64, Signals)>;
 
-/// Returns the two-sided estimates of the rows of a causal run.
+/// Returns the two-sided estimates for the rows of a causal run.
 ///
 /// # Errors
-/// [`IdentError::BadStart`] for a start that cannot be used.
+/// [`IdentError::BadStart`] if the start cannot be used.
 pub(super) fn smooth(
     alarm: f64,
     record: &Record,
@@ -118,7 +118,7 @@ pub(super) fn smooth(
     Ok(joined.iter().map(&mut row).collect())
 }
 
-/// Returns the mixtures of pairs at the requested samples, ascending.
+/// Returns the mixtures of pairs at the requested samples; `rows` must be in ascending order.
 fn two_sided(
     record: &Record,
     alarm: f64,
@@ -137,7 +137,7 @@ fn two_sided(
         neuromuscular_every: 0,
         ..default
     };
-    let first = first_hypothesis(from, KNOWN_LITTLE, sample_time)?;
+    let first = first_hypothesis(from, START_COVARIANCE_FACTOR, sample_time)?;
     let bank = |first: Hypothesis| -> Result<Box<Bank<HYPOTHESES>>, IdentError> {
         Ok(Box::new(Bank::new(first, supposed).ok_or_else(outside)?))
     };
@@ -167,7 +167,8 @@ fn two_sided(
     Ok(joined)
 }
 
-/// Output and signals of every sample after D, for filters linearised about a point and started at rest.
+/// Returns output and signals of every sample after the whitening filter D, with filters linearised about `about` and
+/// started at rest.
 fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]) -> Vec<WhitenedSample> {
     let (e, u) = (record.input(), record.output());
     let sound = |v: f64| v.abs() <= largest;
@@ -203,7 +204,8 @@ fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]
         .collect()
 }
 
-/// Returns the likely hypotheses, the likeliest first: a pair of these allows most others to be skipped.
+/// Returns the likely hypotheses with the likeliest first, because a pair of likely hypotheses allows most other pairs
+/// to be skipped.
 fn sides(bank: &Bank<HYPOTHESES>) -> Vec<Side> {
     let likely = bank.hypotheses().filter(|h| h.probability >= LEAST);
     let mut sides: Vec<Side> = likely.map(Side::of).collect();
@@ -211,13 +213,13 @@ fn sides(bank: &Bank<HYPOTHESES>) -> Vec<Side> {
     sides
 }
 
-/// The product of two mixtures.
+/// Returns the product of two mixtures.
 fn join(before: &[Side], after: &[Side]) -> Joined {
     let mut pairs: Vec<(f64, ForwardBackward)> = Vec::with_capacity(before.len() + after.len());
     let (mut most, least) = (f64::NEG_INFINITY, LEAST.ln());
     for f in before {
         for b in after {
-            // NaN if there is no bound: such a pair is computed.
+            // If this bound is NaN, the pair is not skipped.
             let highest = f.log_weight + b.log_weight - f.size.max(b.size);
             if highest < most + least || highest - ForwardBackward::half_square(f, b) < most + least {
                 continue;
@@ -230,7 +232,7 @@ fn join(before: &[Side], after: &[Side]) -> Joined {
     }
     pairs.retain(|(log, _)| *log >= most + least);
     let each: Vec<(f64, Joined)> = if pairs.is_empty() {
-        // No pair could be joined: the causal estimate is used.
+        // If no pair can be combined, the causal estimate is used.
         let shares = before.iter().map(|f| (f.log_weight.exp(), alone(f)));
         shares.collect()
     } else {
@@ -240,7 +242,7 @@ fn join(before: &[Side], after: &[Side]) -> Joined {
     mixed(&each)
 }
 
-/// Mean and covariance of a mixture.
+/// Returns the mean and the covariance of a mixture.
 fn mixed(each: &[(f64, Joined)]) -> Joined {
     let total: f64 = each.iter().map(|(share, _)| share).sum();
     let mut mixture = Joined {
@@ -282,9 +284,9 @@ struct ForwardBackward<'a> {
 }
 
 impl<'a> ForwardBackward<'a> {
-    /// Lower bound of the decrease of the log weight due to the difference: `z'z` is no less than the square of one
-    /// difference over its variance. As S is larger than either covariance, neither of these bounds is violated except
-    /// by rounding.
+    /// Lower bound of the decrease of the log weight due to the differences between f and b: `z'z` is not smaller than
+    /// the squared difference of a single parameter divided by its variance. The constant 0.01 allows for rounding
+    /// errors.
     fn half_square(f: &Side, b: &Side) -> f64 {
         let apart = b.level[0] - f.level[0];
         let mut square = 0.0_f64;
@@ -295,7 +297,8 @@ impl<'a> ForwardBackward<'a> {
         0.5 * (square + apart * apart / (f.level[1] + b.level[1])) - 0.01
     }
 
-    /// Returns the pair with the logarithm of its weight up to a constant. `None` if S is not positive.
+    /// Returns the logarithm of the weight of the pair, up to a constant, and the pair. `None` if S is not positive
+    /// definite.
     fn of(f: &'a Side, b: &'a Side) -> Option<(f64, Self)> {
         let sum = std::array::from_fn(|i| std::array::from_fn(|j| f.covariance[i][j] + b.covariance[i][j]));
         let root = factor(&sum)?;
@@ -309,7 +312,7 @@ impl<'a> ForwardBackward<'a> {
         log.is_finite().then_some((log, Self { f, b, root, z }))
     }
 
-    /// `P_f S^-1 x = (L^-1 P_f)' L^-1 x`.
+    /// Returns the combined estimate of the pair, by `P_f S^-1 x = (L^-1 P_f)' L^-1 x`.
     fn product(&self) -> Joined {
         let (f, b) = (self.f, self.b);
         let mut columns = f.covariance;
@@ -326,8 +329,8 @@ impl<'a> ForwardBackward<'a> {
     }
 }
 
-/// L with `L L' = s`. Known products are summed before they are subtracted, as in [`cholesky::forward`];
-/// [`cholesky::factor`] is the same except for rounding.
+/// Returns L with `L L' = s`. The known products are summed before they are subtracted, as in [`cholesky::forward`];
+/// [`cholesky::factor`] gives the same result except for rounding errors.
 fn factor(s: &[[f64; OPERATOR]; OPERATOR]) -> Option<[[f64; OPERATOR]; OPERATOR]> {
     let mut l = [[0.0; OPERATOR]; OPERATOR];
     for i in 0..OPERATOR {

@@ -1,5 +1,5 @@
-//! The recursive prediction-error method in the operator's parameters: its gradient is that of the
-//! polynomials times the Jacobian of theta.
+//! The recursive prediction-error method in the operator's parameters. Its gradient is the gradient with respect to the
+//! polynomial coefficients multiplied by the Jacobian of theta.
 
 mod recursion;
 
@@ -20,15 +20,15 @@ settings! {
     /// Options of the recursion in physical parameters.
     pub struct PhysicalOptions {}
     groups {
-        /// The gain.
+        /// Options of the gain.
         pub gain: GainOptions,
-        /// Stability.
+        /// Polynomials that are kept stable.
         pub stability: StabilityOptions,
-        /// Bounds.
+        /// Bounds of the parameters.
         pub bounds: BoundOptions,
-        /// A tracked delay.
+        /// Range of a tracked delay.
         pub delay: DelayOptions,
-        /// The guard.
+        /// Options of the guard.
         pub guard: GuardOptions,
     }
 }
@@ -47,7 +47,7 @@ impl RecursiveMethod for PhysicalOptions {
         }
     }
 
-    /// A person hardly changes the others within a run.
+    /// Parameters other than the gains hardly change within a run, so that their memory is infinite.
     fn default_memory(&self, parameter: &str) -> Memory {
         match parameter {
             "K_e" => Memory::Seconds(5.0),

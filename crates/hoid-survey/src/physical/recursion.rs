@@ -1,5 +1,5 @@
-//! The recursion in physical parameters with the common interface: capacity for the parameters, the delay line, the
-//! covariance in units of the coefficients.
+//! The recursion in physical parameters with the interface of all recursions: capacity for the parameters, the delay
+//! line, and conversion of the covariance to that of the coefficients.
 
 use hoid_core::{
     adaptation::Adaptation,
@@ -16,11 +16,11 @@ use hoid_track::{
 
 use crate::kernel::physical::{PhysicalModel, PhysicalRpem};
 
-/// Builds the recursion: with the smallest capacity for its parameters, and with the orders in its type if they are
-/// those of the operator.
+/// Builds the recursion with the smallest sufficient capacity. If the orders are those of the operator, they are
+/// constants of the type.
 ///
 /// # Errors
-/// [`IdentError`] for options that contradict each other, or a start that it cannot use.
+/// [`IdentError`] if options contradict each other, or if the start cannot be used.
 pub(super) fn build(plan: &Plan<'_>) -> Result<Box<dyn Recursion>, IdentError> {
     let o = plan.setup.polynomial_orders();
     let p = plan.parameters();
@@ -33,11 +33,11 @@ pub(super) fn build(plan: &Plan<'_>) -> Result<Box<dyn Recursion>, IdentError> {
     };
     let of_operator = (o.na, o.nb, o.nc, o.nd, o.nf) == (0, 2, 0, 1, 2);
     match (p, taps(plan)) {
-        (5, None) if of_operator => with_room::<_, 5, 2, 5>(plan, FixedShape::<0, 2, 0, 1, 2>),
-        (0..=8, None) => with_room::<_, 8, 8, 8>(plan, any),
-        (0..=16, None) => with_room::<_, 16, 16, 16>(plan, any),
-        (0..=8, Some(0..=128)) => with_room::<_, 8, 8, 128>(plan, any),
-        (0..=16, Some(0..=1024)) => with_room::<_, 16, 16, 1024>(plan, any),
+        (5, None) if of_operator => with_capacity::<_, 5, 2, 5>(plan, FixedShape::<0, 2, 0, 1, 2>),
+        (0..=8, None) => with_capacity::<_, 8, 8, 8>(plan, any),
+        (0..=16, None) => with_capacity::<_, 16, 16, 16>(plan, any),
+        (0..=8, Some(0..=128)) => with_capacity::<_, 8, 8, 128>(plan, any),
+        (0..=16, Some(0..=1024)) => with_capacity::<_, 16, 16, 1024>(plan, any),
         (0..=16, Some(taps)) => Err(IdentError::BadOption {
             option: "the range of the delay".to_owned(),
             found: format!("{taps} samples"),
@@ -47,21 +47,21 @@ pub(super) fn build(plan: &Plan<'_>) -> Result<Box<dyn Recursion>, IdentError> {
     }
 }
 
-/// Smallest delay in samples, if tau_e is tracked.
+/// Smallest delay nk in samples; `None` if tau_e is not tracked.
 fn smallest_nk(plan: &Plan<'_>) -> Option<usize> {
-    // With a tolerance for rounding: 0.29/0.01 is 28.999999999999996.
+    // The tolerance allows for rounding errors: 0.29/0.01 is 28.999999999999996.
     let whole = |low: f64| ((low / plan.sample_time.s() + 1e-9) as usize).saturating_add(1);
     plan.setup.track_delay_s.map(|(low, _)| whole(low))
 }
 
-/// Number of input samples to be kept, if tau_e is tracked.
+/// Number of input samples to be kept; `None` if tau_e is not tracked.
 fn taps(plan: &Plan<'_>) -> Option<usize> {
     let (_, longest) = plan.setup.track_delay_s?;
     let all = (longest / plan.sample_time.s()) as usize + 5;
     Some(all.saturating_sub(smallest_nk(plan).unwrap_or(0)))
 }
 
-fn with_room<S: Shape + Send + Sync + 'static, const N: usize, const K: usize, const L: usize>(
+fn with_capacity<S: Shape + Send + Sync + 'static, const N: usize, const K: usize, const L: usize>(
     plan: &Plan<'_>,
     shape: S,
 ) -> Result<Box<dyn Recursion>, IdentError> {
@@ -138,7 +138,7 @@ impl<
         &self.recursion.theta()[..self.parameters]
     }
 
-    /// `J C J'`, with J the Jacobian of the polynomials, rows `[b.. c.. d.. f..]`.
+    /// Writes `J C J'`, where J is the Jacobian of the polynomials with the rows `[b.. c.. d.. f..]`.
     fn covariance(&self, into: &mut [f64]) -> bool {
         let p = self.parameters;
         let mut of_eta = vec![0.0; p * p];

@@ -1,10 +1,10 @@
-//! The filters of the refined recursion: signals filtered by D/F, and the response of a model to an input.
+//! The filters of the refined recursion: signals filtered by D/F, and the response of the auxiliary model to an input.
 
 use hoid_model::Orders;
 
 use hoid_track::building::{History, bounded, weighted};
 
-/// A signal, and its version filtered by D/F.
+/// Histories of a signal and of the same signal filtered by D/F.
 #[derive(Debug, Clone)]
 pub(crate) struct Filtered {
     pub raw: History,
@@ -32,7 +32,7 @@ impl Filtered {
     }
 }
 
-/// An input, its response, and both filtered.
+/// Histories of an input and its response, and of both filtered by D/F.
 #[derive(Debug, Clone)]
 pub(crate) struct Simulated {
     pub input: History,
@@ -53,12 +53,12 @@ impl Simulated {
         }
     }
 
-    /// Returns the current `(B/F) q^-nk` of the input.
+    /// Returns the current value of `(B/F) q^-nk` applied to the input.
     pub fn response(&self, b: &[f64], f: &[f64], nk: usize) -> f64 {
         bounded(weighted(b, &self.input.newest()[nk..]) - weighted(f, self.response.newest()))
     }
 
-    /// Writes `[e_f(t-nk) .., -x_f(t-1) ..]`, at the positions of B and F in theta.
+    /// Writes `[e_f(t-nk) .., -x_f(t-1) ..]` at the positions of B and F in theta.
     pub fn regressors(&self, p: &Parts<'_>, nk: usize, into: &mut [f64]) {
         let now = self.input_filtered.next(p.d, p.f, self.input.newest()[nk]);
         fill_b(now, &self.input_filtered, p.b.len(), into);
@@ -87,7 +87,7 @@ pub(crate) fn fill_f(output: &Filtered, nf: usize, into: &mut [f64]) {
     }
 }
 
-/// Theta, `[b, d, f]`.
+/// The parts of theta, `[b, d, f]`.
 pub(crate) struct Parts<'t> {
     pub b: &'t [f64],
     pub d: &'t [f64],

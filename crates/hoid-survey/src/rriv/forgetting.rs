@@ -1,9 +1,9 @@
-//! The gain for a vector of instruments: the covariance of the kernel ([`hoid_core::adaptation`]) with z in place of
-//! psi.
+//! The gain for a vector of instruments: the covariance update of the kernel ([`hoid_core::adaptation`]) with z in
+//! place of psi.
 //!
-//! The covariance of the kernel is that of a recursion with the gradient z; whether its innovation is that of a
-//! gradient or of instruments does not affect the gain. If rounding makes it invalid, as after a jump of the scale by
-//! 1e8 or more, it restarts.
+//! The covariance of the kernel is that of a recursion with the gradient z; the gain does not depend on whether the
+//! innovation belongs to a gradient or to instruments. If rounding errors make the covariance invalid, for example
+//! after a jump in scale by 1e8 or more, it is reset to its initial value.
 
 use hoid_core::state::{State, visit_all};
 use hoid_core::{
@@ -15,13 +15,13 @@ use hoid_core::{
 use hoid_track::building::ROOM_WITHOUT_FIT;
 
 /// Capacity for parameters.
-pub(crate) const ROOM: usize = 16;
+pub(crate) const CAPACITY: usize = 16;
 
-/// P, and its forgetting.
+/// The matrix P with its forgetting factors.
 #[derive(Debug, Clone)]
 pub(crate) struct Forgetting {
-    covariance: Box<Covariance<ROOM>>,
-    start: Box<Covariance<ROOM>>,
+    covariance: Box<Covariance<CAPACITY>>,
+    start: Box<Covariance<CAPACITY>>,
 }
 
 impl State for Forgetting {
@@ -31,12 +31,12 @@ impl State for Forgetting {
 }
 
 impl Forgetting {
-    /// Starts from P by rows, and a factor in (0, 1] for each parameter. `None` if P is not positive, or exceeds the
-    /// capacity.
+    /// Starts from P, stored by rows, and a forgetting factor in (0, 1] for each parameter. `None` if P is not positive
+    /// definite or there are more parameters than the capacity.
     pub fn new(start: &[f64], lambda: &[f64]) -> Option<Self> {
         let p = lambda.len();
-        let mut matrix = [[0.0; ROOM]; ROOM];
-        let mut factors = [1.0; ROOM];
+        let mut matrix = [[0.0; CAPACITY]; CAPACITY];
+        let mut factors = [1.0; CAPACITY];
         for (i, l) in lambda.iter().enumerate() {
             *factors.get_mut(i)? = *l;
             matrix[i][..p].copy_from_slice(&start[i * p..(i + 1) * p]);
@@ -44,12 +44,12 @@ impl Forgetting {
         Some(Self::of(UdCovariance::from_matrix(&matrix)?, factors))
     }
 
-    /// Starts from a multiple of the unit matrix, with one factor for all.
+    /// Starts from a multiple of the unit matrix, with one forgetting factor for all parameters.
     pub fn diagonal(size: f64, lambda: f64) -> Self {
-        Self::of(UdCovariance::diagonal([size; ROOM]), [lambda; ROOM])
+        Self::of(UdCovariance::diagonal([size; CAPACITY]), [lambda; CAPACITY])
     }
 
-    fn of(factors: UdCovariance<ROOM>, lambda: [f64; ROOM]) -> Self {
+    fn of(factors: UdCovariance<CAPACITY>, lambda: [f64; CAPACITY]) -> Self {
         let matrix = factors.matrix();
         let bound = std::array::from_fn(|i| ROOM_WITHOUT_FIT * matrix[i][i]);
         let covariance = Box::new(Covariance::new(factors, Rule::Exponential { lambda }, bound));
@@ -59,11 +59,11 @@ impl Forgetting {
         }
     }
 
-    /// Forgets, takes z, and writes the gain.
+    /// Updates P with forgetting and the vector z, and writes the gain.
     pub fn gain(&mut self, z: &[f64], gain: &mut [f64]) {
-        let mut padded = [0.0; ROOM];
+        let mut padded = [0.0; CAPACITY];
         padded[..z.len()].copy_from_slice(z);
-        let moved = self.covariance.update(&padded, 0.0, &[0.0; ROOM], 0.0);
+        let moved = self.covariance.update(&padded, 0.0, &[0.0; CAPACITY], 0.0);
         gain.copy_from_slice(&moved.gain[..z.len()]);
         if !self.covariance.is_valid() || gain.iter().any(|g| !g.is_finite()) {
             self.covariance.clone_from(&self.start);

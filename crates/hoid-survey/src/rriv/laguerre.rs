@@ -1,41 +1,41 @@
-//! The part of the input that follows an external signal, sample by sample.
+//! The part of the input that follows an external signal, computed sample by sample.
 //!
-//! As in the batch method ([`hoid_ident::iv`]) the response of e to f_t is an expansion in Laguerre
-//! filters, `L_0 = sqrt(1 - p^2)/(1 - p q^-1)`, `L_k = L_{k-1} (q^-1 - p)/(1 - p q^-1)` (B.
-//! Wahlberg, *IEEE Trans. Automatic Control* 36 (1991) 551-562); its weights follow by recursive least squares with a
-//! long memory. The value at t is computed with the weights of t - 1: they contain only past noise, attenuated by the
-//! ratio of the number of filters to the memory.
+//! As in the batch method ([`hoid_ident::iv`]), the response of e to f_t is an expansion in Laguerre filters. The
+//! filters are `L_0 = sqrt(1 - p^2)/(1 - p q^-1)` and `L_k = L_{k-1} (q^-1 - p)/(1 - p q^-1)` (B. Wahlberg, *IEEE
+//! Trans. Automatic Control* 36 (1991) 551-562). The weights are estimated by recursive least squares with a long
+//! memory. The value at t is computed with the weights of t - 1, which contain only past noise, attenuated by the ratio
+//! of the number of filters to the memory length.
 
 use super::forgetting::Forgetting;
 use hoid_track::building::{bounded, weighted};
 
-/// Number of filters. A loop has a memory of a second or two: 16 filters with a time constant of 16 samples span about
-/// 500.
+/// Number of filters. The response of a loop lasts a second or two; 16 filters with a time constant of 16 samples span
+/// about 500 samples.
 const FILTERS: usize = 16;
 /// Time constant of the filters in samples.
 const TIME_CONSTANT: f64 = 16.0;
-/// Memory of the weights in samples.
+/// Memory length of the weights in samples.
 const MEMORY: f64 = 4096.0;
-/// P of the weights at the start, for signals of unit power: the prior at zero has the weight of a hundredth of a
+/// Initial variance of the weights for signals of unit power: the prior at zero has the weight of a hundredth of a
 /// sample.
 const START: f64 = 100.0;
 
-/// Filters and weights.
+/// The Laguerre filters and their weights.
 #[derive(Debug, Clone)]
-pub(crate) struct Following {
+pub(crate) struct LaguerreRegression {
     pole: f64,
     filters: [f64; FILTERS],
     weights: [f64; FILTERS],
     p: Forgetting,
-    /// Mean square of the external signal, and its number of samples.
+    /// Mean square of the external signal; `samples` is the number of samples.
     power: f64,
     samples: f64,
 }
 
-hoid_core::state!([] Following { pole, filters, weights, p, power, samples });
+hoid_core::state!([] LaguerreRegression { pole, filters, weights, p, power, samples });
 
-impl Following {
-    /// Builds the filters at rest, with zero weights.
+impl LaguerreRegression {
+    /// Creates filters at rest with zero weights.
     pub fn new() -> Self {
         Self {
             pole: (-1.0 / TIME_CONSTANT).exp(),
@@ -54,7 +54,7 @@ impl Following {
         let following = bounded(weighted(&self.weights, &self.filters));
         self.samples += 1.0;
         self.power += (external * external - self.power) / self.samples.min(MEMORY);
-        // In units of the external signal, so that P does not depend on its scale.
+        // The signals are scaled to unit power of the external signal, so that P does not depend on its scale.
         let scale = self.power.sqrt().recip();
         if scale.is_finite() {
             let z = self.filters.map(|v| bounded(scale * v));
@@ -90,7 +90,7 @@ mod tests {
 
     #[test]
     fn filters_are_orthonormal() {
-        let mut following = Following::new();
+        let mut following = LaguerreRegression::new();
         let mut gram = [[0.0; FILTERS]; FILTERS];
         for t in 0..4000 {
             following.filter(f64::from(u8::from(t == 0)));
@@ -111,7 +111,7 @@ mod tests {
     #[test]
     fn follows_a_delayed_response_at_any_scale() {
         for scale in [1e-6, 1.0, 1e6] {
-            let mut following = Following::new();
+            let mut following = LaguerreRegression::new();
             let f = |t: i32| scale * ((0.05 * f64::from(t)).sin() + (0.31 * f64::from(t)).sin());
             let (mut y, mut rest, mut power) = (0.0, 0.0, 0.0);
             for t in 0..4000 {

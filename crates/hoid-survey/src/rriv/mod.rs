@@ -1,31 +1,30 @@
-//! Recursive refined instrumental variable for `u = (B/F) q^-nk e + (1/D) eps` (P. C. Young,
-//! *Recursive Estimation and Time-Series Analysis*, 2nd ed. 2011, ch. 7 and 8; his C is D here;
-//! *Automatica* 52 (2015) 35-46).
+//! Recursive refined instrumental variable method for `u = (B/F) q^-nk e + (1/D) eps` (P. C. Young, *Recursive
+//! Estimation and Time-Series Analysis*, 2nd ed. 2011, ch. 7 and 8, where D is called C; *Automatica* 52 (2015) 35-46).
 //!
-//! With the auxiliary model, e, u and its noise-free output `x = (B/F) q^-nk e'` are filtered by D/F (index f), and
-//! for
+//! The signals e, u and the noise-free output `x = (B/F) q^-nk e'` are filtered by D/F of an auxiliary model (index f).
+//! For
 //!
 //! `phi = [e_f(t-nk) .., -u_f(t-1) ..]`,  `z = [e'_f(t-nk) .., -x_f(t-1) ..]`
 //!
-//! the symmetric form of the method computes the gain from the instruments alone,
-//! `g = P z/(1 + z' P z)`, `rho <- rho + g (u_f - phi' rho)`; D follows by recursive least squares
-//! on `xi = u - (B/F) q^-nk e`. Histories are a-posteriori: each filter takes a sample again with the updated
-//! auxiliary model.
+//! the symmetric form of the method computes the gain from the instruments alone, `g = P z/(1 + z' P z)`,
+//! `rho <- rho + g (u_f - phi' rho)`. D is estimated by recursive least squares on `xi = u - (B/F) q^-nk e`. Histories
+//! are a posteriori: each filter processes a sample again with the updated auxiliary model.
 //!
-//! **Auxiliary model.** It is the estimate, low-pass filtered with the shortest memory of B and F. With the unfiltered
-//! estimate the instruments would depend on its errors, and with short memories some runs diverge. The reported
-//! innovation, and the innovation variance, are those of the auxiliary model, whose filters run in any case.
+//! **Auxiliary model.** The auxiliary model is the estimate, low-pass filtered with the shortest memory length of B and
+//! F. With the unfiltered estimate the instruments would depend on its errors, and with short memory lengths some runs
+//! diverge. The reported innovation and innovation variance are those of the auxiliary model, whose filters run in any
+//! case.
 //!
-//! **Instruments.** e' is e itself, or the part of e that follows an external signal ([`super::laguerre`]). With e the
-//! method needs the right noise model in a closed loop: z then contains past noise, which is independent only of a
-//! white eps.
+//! **Instruments.** The signal e' is e itself, or the part of e that follows an external signal ([`super::laguerre`]).
+//! With e itself, the method needs the correct noise model in a closed loop: z then contains past noise, which is
+//! uncorrelated only with a white eps.
 //!
-//! **Covariance.** To first order the errors follow `t <- (I - A) t - g eps` with rows
-//! `g_i phi'` for B and F and `g_i psi'` for D (psi the gradient for all parameters: D inherits the errors of B and
-//! F), so that `sigma^2 C` with `C <- (I - A) C (I - A)' + g g'` is the covariance of theta, whatever gain was used:
-//! for lambda = 1 that of the batch method, with forgetting about `P/(1 + lambda)`.
+//! **Covariance.** To first order the errors follow `t <- (I - A) t - g eps`, where A has the rows `g_i phi'` for B and
+//! F and `g_i psi'` for D; psi is the gradient for all parameters, because D inherits the errors of B and F. The
+//! covariance of theta is therefore `sigma^2 C` with `C <- (I - A) C (I - A)' + g g'` for any gain. For lambda = 1 it
+//! is the covariance of the batch method; with forgetting, C is about `P/(1 + lambda)`.
 //!
-//! **Stability.** A step of B and F is halved until the roots of F lie within [`RADIUS`].
+//! **Stability.** A step of B and F is halved until the roots of F lie within a circle of radius [`RADIUS`].
 
 mod filters;
 mod forgetting;
@@ -46,58 +45,59 @@ use hoid_track::{
 };
 
 use filters::{Filtered, Parts, Simulated, fill_f};
-use forgetting::{Forgetting, ROOM};
-use laguerre::Following;
+use forgetting::{Forgetting, CAPACITY};
+use laguerre::LaguerreRegression;
 
 pub use options::RrivOptions;
 
-/// Radius of the circle that contains the roots of F: the filters forget within 10 000 samples.
+/// Radius of the circle that must contain the roots of F; the filters then have time constants of at most 10 000
+/// samples.
 const RADIUS: f64 = 0.9999;
 /// Number of halvings after which a step is omitted.
 const HALVINGS: usize = 20;
-/// Smallest share of the newest theta in the filtered one.
+/// Smallest weight of the newest theta in the low-pass filter of the auxiliary model.
 const LEAST_SHARE: f64 = 1.0 / 1024.0;
-/// Smallest innovation variance as a share of the one at the start.
+/// Smallest innovation variance, as a fraction of the initial one.
 const LEAST: f64 = 1e-16;
 
-/// Start of the recursion: a batch fit, or a guess.
+/// Start of the recursion: a batch fit or a guess.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RefinedStart<'a> {
-    /// In the order of [`Orders::parameter_names`].
+    /// Coefficients in the order of [`Orders::parameter_names`].
     pub theta: &'a [f64],
-    /// By rows.
+    /// Covariance of theta, stored by rows.
     pub covariance: &'a [f64],
     /// Variance of eps.
     pub innovation_variance: f64,
-    /// Number of samples of the fit, from which the distance of P from its stationary level follows.
+    /// Number of samples of the fit, which determines the initial weight of new samples in the innovation variance.
     pub samples: usize,
 }
 
-/// The recursion.
+/// The recursion of the refined instrumental variable method.
 #[derive(Debug, Clone)]
 pub(crate) struct RefinedRecursion {
     orders: Orders,
     theta: Vec<f64>,
-    /// Theta of the filters.
+    /// Theta of the auxiliary model, which the filters use.
     auxiliary: Vec<f64>,
-    /// Share of the newest theta in the auxiliary one.
+    /// Weight of the newest theta in the low-pass filter of the auxiliary model.
     share: f64,
-    /// C, the covariance over sigma^2.
+    /// The matrix C, which is the covariance divided by sigma^2.
     spread: Vec<f64>,
     first_spread: Vec<f64>,
     variance: f64,
     least_variance: f64,
     samples: f64,
-    /// Share of the newest sample in the variance, in the stationary state.
+    /// Weight of the newest sample in the innovation variance in the steady state.
     newest_share: f64,
     system_gain: Forgetting,
     noise_gain: Forgetting,
     measured: Simulated,
-    /// With an external signal: the filters of the instruments.
-    instrument: Option<(Following, Simulated, f64)>,
+    /// Filters of the instruments and the last external value; `None` without an external signal.
+    instrument: Option<(LaguerreRegression, Simulated, f64)>,
     output: Filtered,
-    /// xi.
-    rest: History,
+    /// Past values of xi.
+    output_errors: History,
     shortened: usize,
     work: Work,
 }
@@ -118,7 +118,7 @@ impl State for RefinedRecursion {
             &mut self.noise_gain,
             &mut self.measured,
             &mut self.output,
-            &mut self.rest,
+            &mut self.output_errors,
             &mut self.shortened,
         ];
         visit_all(parts, each);
@@ -128,7 +128,7 @@ impl State for RefinedRecursion {
     }
 }
 
-/// Work vectors of one step, all of the length of theta.
+/// Work arrays of one step.
 #[derive(Debug, Clone)]
 struct Work {
     phi: Vec<f64>,
@@ -144,12 +144,12 @@ struct Work {
 }
 
 impl RefinedRecursion {
-    /// Starts with a forgetting factor in (0, 1] for each parameter; `external` makes the instruments from the
-    /// external signal of each sample (if one is missing, the last one is kept).
+    /// Starts with a forgetting factor in (0, 1] for each parameter. If `external` is true, the instruments are made
+    /// from the external signal; a missing value is replaced by the last one.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for orders with A or C, or factors out of range;
-    /// [`IdentError::BadStart`].
+    /// [`IdentError::BadOption`] if the orders include A or C, or if a factor is out of range; [`IdentError::BadStart`]
+    /// if the start cannot be used.
     pub fn new(orders: Orders, start: RefinedStart<'_>, lambda: &[f64], external: bool) -> Result<Self, IdentError> {
         let p = orders.parameters();
         check(&orders, &start, lambda)?;
@@ -160,7 +160,7 @@ impl RefinedRecursion {
             let block: Vec<f64> = (0..places.len() * places.len()).map(element).collect();
             let factors: Vec<f64> = places.iter().map(|i| lambda[*i]).collect();
             Forgetting::new(&block, &factors).ok_or_else(|| IdentError::BadStart {
-                reason: format!("its covariance is not positive, or {orders} are more than {ROOM} parameters"),
+                reason: format!("its covariance is not positive, or {orders} are more than {CAPACITY} parameters"),
             })
         };
         let noise: Vec<usize> = (orders.nb..orders.nb + orders.nd).collect();
@@ -177,9 +177,9 @@ impl RefinedRecursion {
             samples: start.samples as f64,
             newest_share: 1.0 - lambda.iter().copied().fold(1.0, f64::min),
             measured: Simulated::new(&orders),
-            instrument: external.then(|| (Following::new(), Simulated::new(&orders), 0.0)),
+            instrument: external.then(|| (LaguerreRegression::new(), Simulated::new(&orders), 0.0)),
             output: Filtered::new(&orders),
-            rest: History::new(orders.nd),
+            output_errors: History::new(orders.nd),
             shortened: 0,
             work: Work {
                 phi: zeros.clone(),
@@ -199,13 +199,13 @@ impl RefinedRecursion {
         })
     }
 
-    /// Returns the number of steps that stability shortened.
+    /// Returns the number of steps that were shortened to keep F stable.
     #[cfg(test)]
     pub fn shortened(&self) -> usize {
         self.shortened
     }
 
-    /// If the output is missing, the prediction replaces it.
+    /// Processes a sample. If the output is missing, the prediction replaces it.
     fn take(&mut self, sample: Sample, output: Option<f64>, moves: bool) -> StepOutcome {
         let e = bounded(sample.e);
         let nk = self.orders.nk;
@@ -216,7 +216,7 @@ impl RefinedRecursion {
             simulated.input.push(followed);
         }
         let before = Parts::of(&self.auxiliary, &self.orders);
-        let predicted = self.measured.response(before.b, before.f, nk) - weighted(before.d, self.rest.newest());
+        let predicted = self.measured.response(before.b, before.f, nk) - weighted(before.d, self.output_errors.newest());
         let u = bounded(output.unwrap_or(predicted));
         let innovation = bounded(u - predicted);
         let shortened = moves && self.estimate(u, innovation);
@@ -225,7 +225,7 @@ impl RefinedRecursion {
         }
         let after = Parts::of(&self.auxiliary, &self.orders);
         let xi = u - self.measured.response(after.b, after.f, nk);
-        self.rest.push(xi);
+        self.output_errors.push(xi);
         self.measured.advance(&after, nk);
         if let Some((_, simulated, _)) = &mut self.instrument {
             simulated.advance(&after, nk);
@@ -234,8 +234,8 @@ impl RefinedRecursion {
         StepOutcome { innovation, shortened }
     }
 
-    /// Moves the filters' theta towards the estimate, unless this would leave the region of stable F, which is not
-    /// convex for nf > 2.
+    /// Moves the theta of the auxiliary model toward the estimate, unless F would become unstable: for nf > 2 the
+    /// region of stable F is not convex.
     fn follow_theta(&mut self) {
         let w = &mut self.work;
         for (trial, (auxiliary, theta)) in w.trial.iter_mut().zip(self.auxiliary.iter().zip(&self.theta)) {
@@ -246,7 +246,7 @@ impl RefinedRecursion {
         }
     }
 
-    /// Updates theta, C and the variance; true if the step was shortened.
+    /// Updates theta, C and the innovation variance. Returns true if the step was shortened.
     fn estimate(&mut self, u: f64, innovation: f64) -> bool {
         let Orders { nb, nd, nf, nk, .. } = self.orders;
         let noise = nb..nb + nd;
@@ -261,14 +261,14 @@ impl RefinedRecursion {
             Some((_, simulated, _)) => simulated.regressors(&parts, nk, &mut w.z),
             None => w.z.copy_from_slice(&w.psi),
         }
-        for (place, xi) in w.psi[noise.clone()].iter_mut().zip(self.rest.newest()) {
+        for (place, xi) in w.psi[noise.clone()].iter_mut().zip(self.output_errors.newest()) {
             *place = -xi;
         }
         let error = self.output.next(parts.d, parts.f, u)
             - weighted(now.b, &w.phi[..nb])
             - weighted(now.f, &w.phi[noise.end..]);
 
-        // B and F.
+        // Step of B and F.
         w.short[..nb].copy_from_slice(&w.z[..nb]);
         w.short[nb..].copy_from_slice(&w.z[noise.end..]);
         self.system_gain.gain(&w.short, &mut w.short_gain[..nb + nf]);
@@ -292,7 +292,7 @@ impl RefinedRecursion {
         self.theta.copy_from_slice(&w.trial);
         w.gain.iter_mut().for_each(|g| *g *= share);
 
-        // D, from the residual of the current system.
+        // Step of D, from the residual of the current model.
         let gain = &mut w.short_gain[..nd];
         self.noise_gain.gain(&w.psi[noise.clone()], gain);
         let parts = Parts::of(&self.auxiliary, &self.orders);
@@ -304,7 +304,7 @@ impl RefinedRecursion {
         }
         w.gain[noise.clone()].copy_from_slice(gain);
 
-        let explained = self.spread_on(&noise);
+        let explained = self.update_error_covariance(&noise);
         self.samples += 1.0;
         let newest = (innovation * innovation / (1.0 + explained) - self.variance)
             * self.newest_share.max(1.0 / self.samples.max(1.0));
@@ -314,8 +314,8 @@ impl RefinedRecursion {
         shortened
     }
 
-    /// `C <- (I - A) C (I - A)' + g g'`. Returns the previous `psi' C psi`.
-    fn spread_on(&mut self, noise: &std::ops::Range<usize>) -> f64 {
+    /// Updates `C <- (I - A) C (I - A)' + g g'`. Returns `psi' C psi` before the update.
+    fn update_error_covariance(&mut self, noise: &std::ops::Range<usize>) -> f64 {
         let w = &mut self.work;
         let p = self.theta.len();
         for i in 0..p {
@@ -342,12 +342,12 @@ impl RefinedRecursion {
             }
         }
         if (0..p).any(|i| self.spread[i * (p + 1)] < 0.0) {
-            // C can become invalid by rounding, as can P.
+            // Rounding errors can make C invalid, as they can P.
             self.spread.copy_from_slice(&self.first_spread);
         }
         for i in 0..p {
-            // The first-order recursion of C can be unstable where that of theta is stable: the variance is then
-            // limited to that of an unknown parameter.
+            // The first-order recursion of C can be unstable although that of theta is stable. Each variance is
+            // therefore limited to that of an unknown parameter.
             let limit = LARGEST_GROWTH * self.first_spread[i * (p + 1)];
             let found = self.spread[i * (p + 1)];
             if limit > 0.0 && found > limit {
@@ -425,7 +425,7 @@ fn check(orders: &Orders, start: &RefinedStart<'_>, lambda: &[f64]) -> Result<()
     }
     if !(start.innovation_variance.is_finite() && start.innovation_variance > 0.0) {
         return bad(format!(
-            "its innovation variance is {}; a recursion needs a positive one, which an exact fit does not have",
+            "its innovation variance is {}; a recursion needs a positive variance, which an exact fit does not have",
             start.innovation_variance
         ));
     }

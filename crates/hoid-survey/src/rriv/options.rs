@@ -1,4 +1,4 @@
-//! Report of the method may be, and how it is built.
+//! Options of the recursive refined instrumental variable method, its description, and its construction.
 
 use hoid_ident::{IdentError, iv::FORCING_CHANNEL, settings};
 use hoid_model::{Record, SampleTime, Structure};
@@ -10,14 +10,14 @@ use hoid_track::{
 };
 
 settings! {
-    /// Options of the recursive refined instrumental variable.
+    /// Options of the recursive refined instrumental variable method.
     pub struct RrivOptions {
-        /// Channel outside the loop from which the instruments are made
+        /// Channel from outside the loop, from which the instruments are made
         #[setting(default("f_t where a record has it, else the error itself"))]
         pub instruments: Option<String> = None,
     }
     groups {
-        /// Memories.
+        /// Memory lengths of the parameters.
         pub memories: MemoryOptions,
     }
 }

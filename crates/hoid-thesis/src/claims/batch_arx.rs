@@ -3,7 +3,7 @@
 use super::{
     claim::{Claim, Source, Theme},
     evidence::{Evidence, Study},
-    rules::{ACCEPTABLE, CLOSE, LARGE, LINEAR, MATTERS, Part},
+    rules::{ACCEPTABLE, CLOSE, LARGE, LINEAR, RELEVANT_DIFFERENCE, Part},
     settings::{DELAYS, DISCRETE, HIGHER, LEVELS, NMS, ORDERS, Setting, TRUE_DELAY, bias_of, settings},
     statistics::{linearity, med, median_bias, share_of},
     value::Value,
@@ -131,7 +131,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     },
 ];
 
-/// Magnitude of the median bias of some parameters, each with a test.
+/// Adds the magnitude of the median bias of each named parameter as a cell.
 fn biases(
     study: Study<'_>,
     cells: &[Setting],
@@ -300,7 +300,8 @@ fn only_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![gain, others])
 }
 
-/// Bias measure in C2 minus that in C1, for the zero and for the neuromuscular parameters.
+/// Compares a bias measure in C2 with the same measure in C1: the bias of K_e and T_L is claimed to be larger in C2,
+/// the bias of the neuromuscular parameters smaller.
 pub(super) fn conditions(
     size: &dyn Fn(Setting, &str) -> Result<Value, String>,
     orders: &[usize],
@@ -356,7 +357,7 @@ fn zero_by_noise(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
             ..at
         };
         let [less, more] = [at, more].map(|at| study.median(&at.arx("bias_T_L", TRUE_DELAY)));
-        part.above(at.label(""), more?.minus(less?), MATTERS);
+        part.above(at.label(""), more?.minus(less?), RELEVANT_DIFFERENCE);
     }
     Ok(vec![part])
 }

@@ -1,9 +1,9 @@
-//! Claims on batch fits of Box-Jenkins models with m* = m0 against those of ARX models.
+//! Claims that compare batch fits of Box-Jenkins models with m* = m0 and batch fits of ARX models.
 
 use super::{
     claim::{Claim, Source, Theme},
     evidence::Evidence,
-    rules::{Part, QUARTER},
+    rules::{Part, HEAVY_REDUCTION},
     settings::{DELAYS, DISCRETE, HIGHER, LEVELS, ORDERS, Setting, TRUE_DELAY, WITHOUT_REMNANT, bias_of, settings},
     statistics::{med, median_magnitude},
 };
@@ -76,7 +76,7 @@ fn reduced_at_first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> 
             part.below(
                 at.label(name),
                 study.of(&queries, &|s| median_magnitude(&s[0]) / median_magnitude(&s[1]))?,
-                QUARTER,
+                HEAVY_REDUCTION,
             );
         }
     }

@@ -1,21 +1,21 @@
-//! A statement of the text and how it is tested.
+//! A statement of the text and the way it is tested.
 
 use super::{evidence::Evidence, rules::Part};
 
 /// A statement of the text.
 #[derive(Debug, Clone)]
 pub struct Claim {
-    /// Its unique name.
+    /// Unique name of the claim.
     pub id: &'static str,
-    /// Its subject.
+    /// Subject of the claim.
     pub theme: Theme,
     /// The statement, quoted or abbreviated.
     pub statement: &'static str,
-    /// Section and figures.
+    /// Section and figures in which the statement occurs.
     pub place: &'static str,
-    /// How it is measured.
+    /// Description of the measurement that tests the statement.
     pub measure: &'static str,
-    /// The plans required for the test.
+    /// Plans whose results the test requires.
     pub plans: &'static [&'static str],
     pub(super) source: Source,
 }
@@ -27,9 +27,9 @@ pub enum Theme {
     BatchArx,
     /// Batch fits of Box-Jenkins models.
     BatchBj,
-    /// The order of the noise model.
+    /// Order of the noise model.
     RemnantOrder,
-    /// The starts of searches.
+    /// Starting points of searches.
     InitialConditions,
     /// Recursive estimates.
     Recursive,

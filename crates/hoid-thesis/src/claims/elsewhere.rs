@@ -1,4 +1,4 @@
-//! Claims for which there are no data here.
+//! Claims that cannot be tested here, because there are no data for them.
 
 use super::claim::{Claim, Source, Theme};
 

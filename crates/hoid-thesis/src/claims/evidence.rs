@@ -1,16 +1,15 @@
-//! The results of studies as evidence: statistics of a cell with their Monte Carlo errors.
+//! The results of studies as evidence: statistics of a cell and their Monte Carlo errors.
 //!
-//! - *Bias of a median trace*: mean over a span of the relative error of the median over
-//!   replications. If the errors at all times of a run were fully correlated, its error would be
-//!   the mean over the span of that of a median, 0.93 IQR / sqrt(M) (of a normal sample 1.253 s /
-//!   sqrt(M), IQR = 1.349 s). A bootstrap over runs gave for the span of 30.72 s: 0.3 to 0.57 of it
-//!   if all parameters forget in 2.56 s (RLS and RPEM), and 0.33 to 0.45 for K_e, T_L and K_e_dot
-//!   if only b does (RLS); 0.46 to 1.5 for the others there. So half of it is used in the first two
-//!   cases, all of it in the last.
-//! - *Settling of a median trace*: time after t_M at which it has covered 90 % of its own step,
-//!   from its mean over the 10.24 s before t_M to its mean over the last 15.36 s: a biased estimate
-//!   settles at its own value. Its error is half the difference between the settling times of the
-//!   median plus and minus its own error, and at least half the interval of the stored times.
+//! - *Bias of a median trace*: mean over a span of the relative error of the median over replications. If the errors at
+//!   all times of a run were fully correlated, the error of the bias would be the mean over the span of the error of a
+//!   median, 0.93 IQR / sqrt(M) (for a normal sample 1.253 s / sqrt(M) with IQR = 1.349 s). For the span of 30.72 s a
+//!   bootstrap over runs gave 0.3 to 0.57 of this error if all parameters forget within 2.56 s (RLS and RPEM). If only
+//!   b forgets so fast (RLS), it gave 0.33 to 0.45 for K_e, T_L and K_e_dot, and 0.46 to 1.5 for the other parameters.
+//!   Half of the error is therefore used in the first two cases, and all of it in the last.
+//! - *Settling of a median trace*: time after t_M at which the trace has covered 90 % of its own step, from its mean
+//!   over the 10.24 s before t_M to its mean over the last 15.36 s: a biased estimate settles at its own value. The
+//!   error is half the difference between the settling times of the median plus and minus its error, and at least half
+//!   the interval between stored times.
 
 use std::collections::BTreeMap;
 
@@ -22,11 +21,12 @@ use hoid_study::{
 use hoid_track::Memory;
 
 use super::{
-    statistics::{ENOUGH, NOTHING, jackknife, magnitudes, mean_of, median_of, share_of},
+    statistics::{SMALLEST_VALID_SHARE, NOTHING, jackknife, magnitudes, mean_of, median_of, share_of},
     value::Value,
 };
 
-/// Spans of the levels before the change and at the end, s.
+/// Length of the span before the change that gives the initial level, s; `AFTER_S` is the length of the span at the end
+/// that gives the final level.
 const BEFORE_S: f64 = 10.24;
 
 const AFTER_S: f64 = 15.36;
@@ -34,12 +34,12 @@ const AFTER_S: f64 = 15.36;
 /// Start of the second span of the batch fits of section V.B, s.
 const LAST_SPAN_FROM_S: f64 = 51.2;
 
-/// The results of studies, by the names of their plans.
+/// The results of studies by the names of their plans.
 #[derive(Debug, Clone, Default)]
 pub struct Evidence<'a>(BTreeMap<&'a str, &'a Results>);
 
 impl<'a> Evidence<'a> {
-    /// Creates an empty set.
+    /// Creates evidence without any studies.
     pub fn new() -> Self {
         Self::default()
     }
@@ -52,7 +52,7 @@ impl<'a> Evidence<'a> {
     /// The results of a plan.
     ///
     /// # Errors
-    /// The reason if it was not run.
+    /// The reason if the plan was not run.
     pub(super) fn study(&self, name: &str) -> Result<Study<'a>, String> {
         let results = self
             .0
@@ -62,14 +62,14 @@ impl<'a> Evidence<'a> {
     }
 }
 
-/// The numbers of a study; a missing one is an error with its reason.
+/// The results of one study; a query that finds nothing returns the reason as an error.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Study<'a> {
     results: &'a Results,
 }
 
 impl<'a> Study<'a> {
-    /// The values of a quantity of one estimator in one cell, by replication.
+    /// The values of a quantity for one estimator in one cell, one value per replication.
     pub fn sample(&self, query: &Query) -> Result<Vec<f64>, String> {
         let name = &self.results.plan.name;
         match self.results.count(query) {
@@ -82,7 +82,7 @@ impl<'a> Study<'a> {
         Ok(self.results.values(query))
     }
 
-    /// True parameters in the cell that a query selects, after the change.
+    /// True parameters after the change in the cell that a query selects.
     pub fn truth(&self, query: &Query) -> Result<TrueState, String> {
         let cells = self.results.cells(query);
         let cell = cells.first().ok_or_else(|| format!("no cell has {query}"))?;
@@ -99,25 +99,25 @@ impl<'a> Study<'a> {
         Ok(mean_of(&self.sample(query)?))
     }
 
-    /// Median of the magnitude: the typical error of one estimate.
+    /// Median of the magnitude, which is the typical error of one estimate.
     pub fn typical(&self, query: &Query) -> Result<Value, String> {
         Ok(median_of(&magnitudes(&self.sample(query)?)))
     }
 
-    /// A function of the values of several queries; replications stay paired.
+    /// A function of the values of several queries; values of the same replication stay paired.
     pub fn of(&self, queries: &[Query], f: &dyn Fn(&[Vec<f64>]) -> f64) -> Result<Value, String> {
         let samples: Result<Vec<_>, _> = queries.iter().map(|query| self.sample(query)).collect();
         Ok(jackknife(&samples?, f))
     }
 
-    /// Median over replications of the difference of two quantities, first minus second.
+    /// Median over replications of the difference between two quantities, the first minus the second.
     pub fn difference(&self, first: &Query, second: &Query) -> Result<Value, String> {
         let (a, b) = (self.sample(first)?, self.sample(second)?);
         Ok(median_of(&a.iter().zip(&b).map(|(a, b)| a - b).collect::<Vec<_>>()))
     }
 
-    /// Share of ones of a quantity of 0 and 1 over all replications of all rows that a query
-    /// selects. For none or all of n the error is 1.5 / n: its 95 % limit is 3 / n.
+    /// Share of ones in a quantity that is 0 or 1, over all replications of all rows that a query selects. The error is
+    /// at least 1.5 / n, because for none or all of n the 95 % limit is 3 / n.
     pub fn share(&self, query: &Query) -> Result<Value, String> {
         if self.results.count(query) == 0 || !self.results.has_quantity(query) {
             return Err(format!(
@@ -128,16 +128,15 @@ impl<'a> Study<'a> {
         Ok(share_of(&self.results.values(query)))
     }
 
-    /// Bias of the median trace of a parameter, % of the true value of the last state, over the
-    /// span from 51.2 s on.
+    /// Bias of the median trace of a parameter over the span from 51.2 s to the end, in % of the true value at the end.
     pub fn trace_bias(&self, query: &Query, parameter: &str) -> Result<Value, String> {
         let (traces, truth) = self.trace(query, parameter)?;
         let Some(bands) = traces.parameters.get(parameter) else {
             return Ok(NOTHING);
         };
-        // The median of the few runs that can be converted carries no information about the others.
+        // If only a few runs can be converted, their median carries no information about the others.
         if OPERATOR.contains(&parameter)
-            && self.mean(&query.clone().quantity_of("share_not_convertible"))?.value > ENOUGH
+            && self.mean(&query.clone().quantity_of("share_not_convertible"))?.value > SMALLEST_VALID_SHARE
         {
             return Ok(NOTHING);
         }
@@ -161,9 +160,9 @@ impl<'a> Study<'a> {
         })
     }
 
-    /// Mean over a span of the interquartile range of the traces of a parameter over the runs, % of
-    /// the true value of the last state. Its error is that of the range of a normal sample, 1.166
-    /// of it over sqrt(M), assuming fully correlated errors over the span.
+    /// Interquartile range over the runs of the traces of a parameter, averaged over a span, in % of the true value at
+    /// the end. Its relative error is that of the interquartile range of a normal sample, 1.166 / sqrt(M), if errors
+    /// are fully correlated over the span.
     pub fn trace_range(&self, query: &Query, parameter: &str, (from_s, to_s): (f64, f64)) -> Result<Value, String> {
         let (traces, truth) = self.trace(query, parameter)?;
         let Some(bands) = traces.parameters.get(parameter) else {
@@ -185,8 +184,8 @@ impl<'a> Study<'a> {
         })
     }
 
-    /// Settling time of the median trace of a parameter, s. A trace that does not settle has the
-    /// time to its end.
+    /// Settling time of the median trace of a parameter, s. For a trace that does not settle it is the time to the end
+    /// of the trace.
     pub fn settling(&self, query: &Query, parameter: &str) -> Result<Value, String> {
         let (traces, _) = self.trace(query, parameter)?;
         let cell = self.results.cells(query);
@@ -221,8 +220,7 @@ impl<'a> Study<'a> {
         })
     }
 
-    /// The traces of one estimator in one cell, and the true value of a parameter before and after
-    /// the change.
+    /// The traces of one estimator in one cell, and the true values of a parameter before and after the change.
     fn trace(&self, query: &Query, parameter: &str) -> Result<(&'a TraceSummary, [f64; 2]), String> {
         let missing = || {
             format!(
@@ -258,8 +256,8 @@ impl<'a> Study<'a> {
     }
 }
 
-/// True if the estimate of a parameter forgets within a small part of the span: gains do so with b,
-/// others if all parameters do.
+/// True if the estimate of a parameter forgets within a small part of the span: the gains do so if b does, other
+/// parameters if all do.
 fn forgets(estimator: &EstimatorCell, parameter: &str) -> bool {
     const LONGEST_S: f64 = 5.0;
     const TEXT_SAMPLE_TIME_S: f64 = 0.01;

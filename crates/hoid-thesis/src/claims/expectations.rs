@@ -1,10 +1,10 @@
-//! The five expectations of the recursive Box-Jenkins estimator at the end of Part II (6.2.2),
-//! compared with the results of Part I and its setting.
+//! The five expectations of the recursive Box-Jenkins estimator at the end of Part II (6.2.2), compared with results
+//! obtained in the setting of Part I.
 
 use super::{
     claim::{Claim, Source, Theme},
     evidence::Evidence,
-    rules::{ACCEPTABLE, CLOSE, Part, QUARTER},
+    rules::{ACCEPTABLE, CLOSE, Part, HEAVY_REDUCTION},
     settings::{DISCRETE, LEVELS, ORDERS, RECURSIVE_LEVELS, Setting, settings, with_f},
     value::Value,
 };
@@ -13,9 +13,9 @@ use hoid_study::{OPERATOR, Query};
 const PLANS: &[&str] = &["recursive"];
 const PLACE: &str = "6.2.2";
 const GAINS: [&str; 3] = ["K_e", "T_L", "K_e_dot"];
-/// Span after the change at 40.96 s, s.
+/// Time span of the transition after the change at 40.96 s, s.
 const TRANSITION_S: (f64, f64) = (40.96, 51.2);
-/// Starts of the plan, with poles, gains or both close to the true values (Table 6.1).
+/// Starts in the plan, with poles, gains or both close to the true values (Table 6.1).
 const STARTS: [&str; 9] = ["base", "IC1", "IC2", "IC3", "IC4", "IC5", "IC6", "IC7", "IC8"];
 
 pub(super) const CLAIMS: &[Claim] = &[
@@ -79,7 +79,7 @@ fn diminished(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![part])
 }
 
-/// Share of runs with an error above 100 %, or without an estimate.
+/// Share of the runs with an error above 100 % or without an estimate.
 fn beyond(errors: &[Vec<f64>]) -> f64 {
     let all = errors.concat();
     let far = all.iter().filter(|error| error.is_nan() || **error > 100.0);
@@ -97,7 +97,7 @@ fn t_l_stable(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
             let (rpem, rls) = s.split_at(s.len() / 2);
             beyond(rpem) / beyond(rls)
         })?;
-        part.below(format!("C2, m0 = {m0}"), ratio, QUARTER);
+        part.below(format!("C2, m0 = {m0}"), ratio, HEAVY_REDUCTION);
         for (name, queries) in [("RLS", rls), ("RPEM", rpem)] {
             part.show(
                 format!("share of {name} at m0 = {m0}"),

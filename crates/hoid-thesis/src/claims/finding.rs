@@ -1,4 +1,4 @@
-//! Evidence of the data on a claim.
+//! What the data show about a claim.
 
 use hoid_study::Statistics;
 
@@ -8,14 +8,14 @@ use super::{
     rules::{self, CellOutcome, CellTest, Part, Verdict},
 };
 
-/// Evidence of the data on a claim.
+/// Evidence from the data about a claim.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
     /// Verdict on the claim.
     pub verdict: Verdict,
-    /// Its parts with all cells.
+    /// Parts of the claim with all their cells.
     pub parts: Vec<Part>,
-    /// The numbers, a few for each part.
+    /// The measured numbers, a few for each part.
     pub measured: Vec<Measured>,
     /// Number of cells that pass.
     pub passed: usize,
@@ -23,31 +23,31 @@ pub struct Finding {
     pub exceeded: usize,
     /// Number of cells that fail.
     pub failed: usize,
-    /// Number of all cells; the others are undecided.
+    /// Number of all cells, including the undecided ones.
     pub of: usize,
-    /// The findings, as text.
+    /// The findings as text.
     pub text: String,
 }
 
-/// A measured number over the cells of a part.
+/// A number measured in the cells of a part.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
-    /// Its name.
+    /// Name of the number.
     pub label: String,
     /// Median over the cells that have a value.
     pub value: f64,
-    /// Monte Carlo error of one cell, the median over the cells.
+    /// Monte Carlo error of one cell: the median over the cells.
     pub error: f64,
-    /// Smallest value of a cell.
+    /// Smallest value in any cell.
     pub least: f64,
-    /// Largest value of a cell.
+    /// Largest value in any cell.
     pub most: f64,
     /// Number of cells with a value.
     pub cells: usize,
 }
 
 impl Claim {
-    /// Evaluates the claim with the evidence of the data.
+    /// Evaluates the claim with the evidence from the data.
     pub fn evaluate(&self, evidence: &Evidence<'_>) -> Finding {
         let found = match self.source {
             Source::Data(measure) => measure(evidence),
@@ -78,8 +78,8 @@ fn measured(part: &Part) -> Vec<Measured> {
         label: part.label.clone(),
         value: values.median,
         error: of(|test| test.measured.error).median,
-        least: values.least,
-        most: values.most,
+        least: values.min,
+        most: values.max,
         cells: values.count,
     };
     let shown = part.shown.iter().map(|(label, value)| Measured {

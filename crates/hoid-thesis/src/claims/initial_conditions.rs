@@ -1,9 +1,9 @@
-//! Claims on the start of Box-Jenkins searches (Table 6.1), m* = m0, condition C1.
+//! Claims on the starting points of Box-Jenkins searches (Table 6.1), with m* = m0 and condition C1.
 
 use super::{
     claim::{Claim, Source, Theme},
     evidence::{Evidence, Study},
-    rules::{CLOSE, LARGE, MATTERS, Part},
+    rules::{CLOSE, LARGE, RELEVANT_DIFFERENCE, Part},
     settings::{DISCRETE, LEVELS, ORDERS, RECURSIVE_LEVELS, Setting, TRUE_DELAY, bias_of, settings, with_f},
     statistics::{jackknife, median_of, share_of},
     value::Value,
@@ -78,7 +78,7 @@ fn fit(at: Setting, quantity: &str, nk: usize, start: &str) -> Query {
     at.query(&with_f(quantity)).name("BJ").nk(nk).start(start)
 }
 
-/// Differences of the bias to that of the base start, percentage points.
+/// Bias from a start minus bias from the base start for each replication, percentage points.
 fn differences(study: Study<'_>, at: Setting, name: &str, nk: usize, start: &str) -> Result<Vec<f64>, String> {
     let of = |start: &str| study.sample(&fit(at, &bias_of(name), nk, start));
     Ok(of(start)?.iter().zip(&of("base")?).map(|(a, b)| a - b).collect())
@@ -133,7 +133,7 @@ fn poles_matter(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
                     let each: Vec<f64> = s.iter().map(|v| mean_size(v)).collect();
                     0.5 * (each[0] + each[1] - each[2] - each[3])
                 });
-                part.above(at.label(&format!("n_k* = {nk}, {name}")), found, MATTERS);
+                part.above(at.label(&format!("n_k* = {nk}, {name}")), found, RELEVANT_DIFFERENCE);
             }
         }
     }
@@ -147,7 +147,7 @@ fn third_improves(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         for name in DISCRETE {
             let of = |start| fit(at, &bias_of(name), 29, start);
             let found = study.of(&[of("IC3"), of("base")], &|s| mean_size(&s[0]) - mean_size(&s[1]))?;
-            part.below(at.label(name), found, -MATTERS);
+            part.below(at.label(name), found, -RELEVANT_DIFFERENCE);
         }
     }
     Ok(vec![part])
@@ -166,7 +166,7 @@ fn convergence(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![near, far])
 }
 
-/// Share of searches at the true delay that do not converge or end in a worse minimum than that of
+/// Share of the searches at the true delay that do not converge, or that end in a worse minimum than the search from
 /// the base start.
 fn failures(study: Study<'_>, name: &str, start: &str) -> Result<Value, String> {
     let mut failed = Vec::new();
@@ -180,7 +180,7 @@ fn failures(study: Study<'_>, name: &str, start: &str) -> Result<Value, String> 
             from("BJ", "base", "loss")?,
         );
         for ((converged, loss), base) in converged.iter().zip(&loss).zip(&base) {
-            // A loss that is not a number belongs to a failed search.
+            // If a search fails, its loss is NaN.
             let reached = *converged == 1.0 && *loss <= 1.01 * base;
             failed.push(f64::from(u8::from(!reached)));
         }
@@ -196,7 +196,7 @@ fn from_ols(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         for at in settings(&["C1", "C2", "C3", "C4", "C5", "C6"], &[1], &RECURSIVE_LEVELS) {
             let converged = study.sample(&at.query("converged").name(name))?;
             let f1 = study.sample(&at.query("f1").name(name))?;
-            // No condition changes the poles.
+            // The poles are the same in all conditions.
             let truth = study.truth(&at.query("f1").name(name))?.discrete[0];
             let off = |f1: f64| f1.is_nan() || (f1 - truth).abs() > LARGE / 100.0 * truth.abs();
             wrong.extend(

@@ -1,10 +1,9 @@
-//! Statements of the thesis, tested by the data of studies.
+//! Statements of the thesis, tested with the data of studies.
 //!
-//! A claim contains the statement of the text and its place, the plans that measure it and the
-//! method. Its verdict comes from the data by the rules of the module [`rules`], the same for all
-//! claims. A claim whose plan was not run, or which needs data that the results do not have, cannot
-//! be tested and gives the reason; so does one on experiments with people, for which there are no
-//! data here.
+//! A claim contains a statement of the text and its place, the plans that provide the data, and the measurement. Its
+//! verdict follows from the data by the rules of the module [`rules`], which are the same for all claims. If a plan was
+//! not run, or if the results lack the required data, the claim cannot be tested and the verdict gives the reason. The
+//! same holds for claims on experiments with people, for which there are no data here.
 //!
 //! | module | theme |
 //! |---|---|
@@ -12,9 +11,9 @@
 //! | `batch_bj`, `bj_against_arx` | batch fits of Box-Jenkins models |
 //! | `variance_and_zero` | innovation variance, b at a wrong delay, the zero in C2 |
 //! | `remnant_order` | the order of the noise model |
-//! | `initial_conditions` | where searches start |
-//! | `recursive_arx`, `recursive_bj` | RLS, and RPEM against RLS |
-//! | `expectations` | expectations of Part II for the recursion |
+//! | `initial_conditions` | starting points of searches |
+//! | `recursive_arx`, `recursive_bj` | RLS, and RPEM compared with RLS |
+//! | `expectations` | expectations of the recursive estimator in Part II |
 //! | `noise` | noise level, remnant time constant, sample time |
 //! | `elsewhere` | claims that are not tested here |
 //!
@@ -58,7 +57,7 @@ pub use rules::{Bound, CellOutcome, CellTest, Part, Verdict};
 pub use table::claims_table;
 pub use value::Value;
 
-/// All claims, by theme.
+/// All claims, grouped by theme.
 pub fn claims() -> Vec<Claim> {
     [
         batch_arx::CLAIMS,
@@ -76,7 +75,7 @@ pub fn claims() -> Vec<Claim> {
     .concat()
 }
 
-/// All claims with the evidence of the data on them.
+/// All claims with the evidence from the data.
 pub fn findings(evidence: &Evidence<'_>) -> Vec<(Claim, Finding)> {
     let with_finding = |claim: Claim| {
         let finding = claim.evaluate(evidence);

@@ -70,7 +70,7 @@ fn scatter_of_level(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![part])
 }
 
-/// Specified noise levels of the plan.
+/// Noise levels specified in the plan.
 fn demanded() -> [f64; 18] {
     std::array::from_fn(|i| (5 * (i + 1)) as f64 / 100.0)
 }

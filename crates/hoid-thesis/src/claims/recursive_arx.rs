@@ -1,10 +1,10 @@
-//! Claims on recursive least squares of ARX models, with a factor (V.B) and with a matrix (6.2.1)
-//! of forgetting.
+//! Claims on recursive least squares for ARX models, with a forgetting factor (V.B) and with a forgetting matrix
+//! (6.2.1).
 
 use super::{
     claim::{Claim, Source, Theme},
     evidence::Evidence,
-    rules::{ACCEPTABLE, CLOSE, LARGE, Part, QUARTER},
+    rules::{ACCEPTABLE, CLOSE, LARGE, Part, HEAVY_REDUCTION},
     settings::{DISCRETE, HIGHER, LEVELS, NMS, RECURSIVE_LEVELS, Setting, bias_of, settings, with_f},
     statistics::med,
 };
@@ -195,7 +195,7 @@ fn heavily_reduced(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     for at in settings(&["C3"], &HIGHER, &LEVELS) {
         for name in DISCRETE {
             let [reference, found] = [Setting { m0: 1, ..at }, at].map(|at| study.trace_bias(&at.rls(""), name));
-            part.below(at.label(name), found?.abs().over(reference?.abs()), QUARTER);
+            part.below(at.label(name), found?.abs().over(reference?.abs()), HEAVY_REDUCTION);
         }
     }
     Ok(vec![part])

@@ -1,5 +1,5 @@
-//! Claims on the recursive prediction-error method of BJ(m* = 1), and its comparison with recursive
-//! least squares.
+//! Claims on the recursive prediction-error method for BJ(m* = 1) models, and its comparison with recursive least
+//! squares.
 
 use super::{
     claim::{Claim, Source, Theme},
@@ -202,14 +202,13 @@ fn diverges(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![diverged, oscillates])
 }
 
-/// RMS error of a trace by RPEM minus that by RLS, of the same runs.
+/// RMS error of a parameter estimated by RPEM minus that by RLS in the same run: median over the runs.
 fn rms(study: Study<'_>, at: Setting, name: &str) -> Result<Value, String> {
     let quantity = format!("rms_{name}");
     study.difference(&at.rpem(&quantity), &at.rls(&quantity))
 }
 
-/// Reduction in percent of the median RMS error of one trace compared with another, of the same
-/// runs.
+/// Percentage by which the median RMS error of the first trace is smaller than that of the second, in the same runs.
 fn less_rms(study: Study<'_>, one: Query, other: Query) -> Result<Value, String> {
     study.of(&[one, other], &|s| 100.0 * (1.0 - med(&s[0]) / med(&s[1])))
 }

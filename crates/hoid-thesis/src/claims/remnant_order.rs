@@ -3,7 +3,7 @@
 use super::{
     claim::{Claim, Source, Theme},
     evidence::Evidence,
-    rules::{CLOSE, LARGE, MATTERS, Part},
+    rules::{CLOSE, LARGE, RELEVANT_DIFFERENCE, Part},
     settings::{DELAYS, DISCRETE, HIGHER, LEVELS, NMS, ORDERS, Setting, TRUE_DELAY, bias_of, settings},
     statistics::{interquartile_range, mean_of, med, median_bias, median_magnitude, spread},
     value::Value,
@@ -186,7 +186,7 @@ fn vaf_lower(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         for nk in DELAYS {
             let queries = [at.bj("vaf", 4, nk), at.bj("vaf", 1, nk)];
             let found = study.of(&queries, &|s| mean(&s[0]) - mean(&s[1]))?;
-            part.below(at.label(&format!("n_k* = {nk}")), found, -MATTERS);
+            part.below(at.label(&format!("n_k* = {nk}")), found, -RELEVANT_DIFFERENCE);
         }
     }
     Ok(vec![part])
@@ -228,7 +228,7 @@ fn better_at_fourth(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
             part.below(
                 at.label(name),
                 study.of(&queries, &|s| median_bias(&s[0]) - median_bias(&s[1]))?,
-                -MATTERS,
+                -RELEVANT_DIFFERENCE,
             );
         }
     }
@@ -247,7 +247,7 @@ fn loss_at_high_orders(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         part.above(
             format!("{}, m0 = {}", at.condition, at.m0),
             Value::mean(&levels),
-            MATTERS,
+            RELEVANT_DIFFERENCE,
         );
     }
     Ok(vec![part])
@@ -307,7 +307,7 @@ fn remnant_wrong(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(parts)
 }
 
-/// Queries of a quantity over all delays with m* = m0, then over all orders at the true delay.
+/// Queries for a quantity: first for all delays with m* = m0, then for all orders at the true delay.
 fn over_both(at: Setting, quantity: &str) -> Vec<hoid_study::Query> {
     let delays = DELAYS.map(|nk| at.bj(quantity, at.m0, nk));
     delays

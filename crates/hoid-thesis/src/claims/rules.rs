@@ -1,74 +1,71 @@
-//! From numbers with Monte Carlo errors to a verdict.
+//! Rules that convert numbers with Monte Carlo errors to a verdict.
 //!
-//! 1. **A cell.** A claim is tested in each cell (a scenario, an estimator, a parameter) to which
-//!    it applies, with the measured value x, its Monte Carlo error s and a margin of 2 s.
-//!    - *Comparison* (larger, smaller, no larger than): the cell passes if x is beyond the limit by
-//!      more than the margin, fails if it is on the other side by more, and is undecided within the
-//!      margin.
-//!    - *Number* (around 50 %, 10 times): the cell passes if x lies within the range of the wording, widened by the
-//!      margin, and fails otherwise. It is undecided if it would pass with a margin of more than half the range: such
-//!      an x carries no information about the number. If the number is the size of an effect (so many times slower, so
-//!      much less error), an x beyond the range on the side of the larger effect *exceeds* the claim: the statement is
-//!      true, and the effect is larger.
-//!    - If less than half of the replications give a value (models that cannot be converted) the
-//!      cell is undecided.
-//! 2. **A part** of a claim (same figure of merit, same test) holds if 90 % of its decided cells
-//!    pass. It holds, and more so, if 90 % pass or exceed the claim and fewer than 90 % pass. It
-//!    holds in part if 50 % pass or exceed, and does not hold otherwise. If less than half of its
-//!    cells are decided, the replications do not decide it.
-//! 3. **A claim** holds if all its parts hold, and more so if one of them does. It does not hold if
-//!    none of its parts holds even in part, and holds in part otherwise. If no part is decided, it
-//!    cannot be tested.
+//! 1. **A cell.** A claim is tested in each cell (a scenario, an estimator, a parameter) to which it applies. The
+//!    measured value is x, its Monte Carlo error s, and the margin 2 s.
+//!    - *Comparison* (larger, smaller, no larger than): the cell passes if x is on the claimed side of the limit by
+//!      more than the margin, fails if it is on the other side by more than the margin, and is undecided otherwise.
+//!    - *Number* (around 50 %, 10 times): the cell passes if x lies within the range that the wording allows, widened
+//!      by the margin, and fails otherwise. A cell that would pass is undecided if the margin exceeds half the range,
+//!      because such an x carries no information about the number. If the number is the size of an effect (so many
+//!      times slower, so much less error), an x beyond the range on the side of the larger effect *exceeds* the claim:
+//!      the statement is true, and the effect is larger.
+//!    - If less than half of the replications give a value (because models cannot be converted), the cell is undecided.
+//! 2. **A part** of a claim (same figure of merit, same test) *holds* if 90 % of its decided cells pass. It *holds and
+//!    more so* if fewer pass, but 90 % pass or exceed the claim. It *holds in part* if 50 % pass or exceed the claim,
+//!    and *does not hold* otherwise. If less than half of its cells are decided, the part is undecided.
+//! 3. **A claim** *holds* if all its parts hold. It *holds and more so* if all parts hold and at least one of them
+//!    holds and more so. It *does not hold* if no part holds even in part, and *holds in part* otherwise. If no part is
+//!    decided, the claim *cannot be tested*.
 //!
-//! Meaning of words, the same for all claims:
+//! Meaning of the wording, the same for all claims:
 //!
 //! | wording | test |
 //! |---|---|
 //! | around x, x %, x times | from x / 2 to 3 x / 2 |
-//! | x % more, x % less, reduced by x % | of the value that it is compared with, also where both are % of a true value |
+//! | x % more, x % less, reduced by x % | relative to the value with which it is compared, even if both values are in % of a true value |
 //! | large, important, considerable, huge, wrong bias | beyond 25 % of the true value |
 //! | acceptable, accurate, always accurate | within 10 % |
-//! | close to zero, null on average, the same, not affected | within 5 points of % of the true value |
+//! | close to zero, null on average, the same, not affected | within 5 percentage points of the true value |
 //! | null without remnant | within 0.001 % |
-//! | heavily, highly reduced | less than a quarter remains |
+//! | heavily, highly reduced | less than a quarter of the quantity remains |
 //! | much higher | at least one and a half times |
-//! | the same VAF | within 1 point of % |
-//! | slight, small, matters more | at least 0.1 points of % of the true value |
-//! | a linear trend | R^2 of the straight line at least 0.9 |
+//! | the same VAF | within 1 percentage point |
+//! | slight, small, matters more | at least 0.1 percentage points of the true value |
+//! | a linear trend | R^2 of the fitted straight line at least 0.9 |
 
 use super::value::Value;
 
-/// A large bias, % of the true value.
+/// Limit for a large bias, % of the true value.
 pub(super) const LARGE: f64 = 25.0;
-/// An acceptable bias, % of the true value.
+/// Limit for an acceptable bias, % of the true value.
 pub(super) const ACCEPTABLE: f64 = 10.0;
-/// A bias close to zero, or to another, percentage points of the true value.
+/// Limit for a bias close to zero or to another bias, percentage points of the true value.
 pub(super) const CLOSE: f64 = 5.0;
-/// The smallest relevant difference, percentage points of the true value.
-pub(super) const MATTERS: f64 = 0.1;
-/// Remaining fraction of a quantity that is heavily reduced.
-pub(super) const QUARTER: f64 = 0.25;
-/// Smallest ratio of a quantity that is much higher.
-pub(super) const MUCH: f64 = 1.5;
-/// R^2 of a linear trend.
+/// Smallest relevant difference, percentage points of the true value.
+pub(super) const RELEVANT_DIFFERENCE: f64 = 0.1;
+/// Largest remaining fraction of a quantity that is heavily reduced.
+pub(super) const HEAVY_REDUCTION: f64 = 0.25;
+/// Smallest ratio for a quantity that is much higher.
+pub(super) const MUCH_HIGHER_RATIO: f64 = 1.5;
+/// Smallest R^2 of a linear trend.
 pub(super) const LINEAR: f64 = 0.9;
 
 const MARGIN: f64 = 2.0;
-const HOLDS_FROM: f64 = 0.9;
-const IN_PART_FROM: f64 = 0.5;
+const HOLDS_SHARE: f64 = 0.9;
+const HOLDS_IN_PART_SHARE: f64 = 0.5;
 
-/// Verdict of the data on a claim.
+/// Verdict on a claim from the data.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Verdict {
-    /// It holds.
+    /// The claim holds.
     Holds,
-    /// The statement is true, and the effect is larger than the claimed number.
+    /// The claim is true, and the effect is larger than the claimed number.
     HoldsAndMoreSo,
-    /// It holds in part.
+    /// The claim holds in part.
     HoldsInPart,
-    /// It does not hold.
+    /// The claim does not hold.
     DoesNotHold,
-    /// It cannot be tested, with the reason.
+    /// The claim cannot be tested, for this reason.
     CannotBeTested(String),
 }
 
@@ -94,33 +91,33 @@ impl std::fmt::Display for Verdict {
     }
 }
 
-/// Outcome of a cell.
+/// Outcome of the test in a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellOutcome {
-    /// As claimed.
+    /// The value is as claimed.
     Passes,
-    /// Beyond the claimed number, on the side of the larger effect.
+    /// The value is beyond the claimed number, on the side of the larger effect.
     Exceeds,
-    /// Not as claimed.
+    /// The value is not as claimed.
     Fails,
-    /// Within the margin, or without a value.
+    /// The value is within the margin, or there is no value.
     Undecided,
 }
 
-/// The bound on the value of a cell.
+/// Claimed bound on the value of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bound {
-    /// Larger than this.
+    /// The value is larger than this limit.
     Above(f64),
-    /// Smaller than this.
+    /// The value is smaller than this limit.
     Below(f64),
-    /// A claimed number: from, to.
+    /// The value lies in the range of a claimed number.
     Between(f64, f64),
-    /// A claimed size of an effect, from, to; a larger value is a larger effect.
+    /// The value lies in the range of a claimed effect size; a larger value is a larger effect.
     Effect(f64, f64),
 }
 
-/// A claim in one cell.
+/// Test of a claim in one cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellTest {
     /// Name of the cell.
@@ -132,7 +129,7 @@ pub struct CellTest {
 }
 
 impl CellTest {
-    /// Compares the value with the claim.
+    /// Compares the measured value with the claimed bound.
     pub fn outcome(&self) -> CellOutcome {
         let Value { value, error } = self.measured;
         if !value.is_finite() || !error.is_finite() {
@@ -165,14 +162,14 @@ impl CellTest {
     }
 }
 
-/// The cells of a claim with one figure of merit and one test.
+/// The cells of a claim with the same figure of merit and the same test.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
     /// The figure of merit and the claim.
     pub label: String,
-    /// Its cells.
+    /// Tests in the cells of the part.
     pub tests: Vec<CellTest>,
-    /// Additional numbers that are not tested.
+    /// Additional numbers that are shown but not tested.
     pub shown: Vec<(String, Value)>,
 }
 
@@ -185,7 +182,7 @@ impl Part {
         }
     }
 
-    /// Shows a number that is not tested.
+    /// Adds a number that is shown but not tested.
     pub(super) fn show(&mut self, label: String, value: Value) {
         self.shown.push((label, value));
     }
@@ -209,27 +206,27 @@ impl Part {
         self.between(label, measured, 0.5 * number, 1.5 * number);
     }
 
-    /// Adds a cell in which an effect, which increases with the value, is claimed to have this size.
+    /// Adds a cell in which an effect is claimed to have this size; a larger value is a larger effect.
     pub(super) fn effect(&mut self, label: String, measured: Value, size: f64) {
         self.add(label, measured, Bound::Effect(0.5 * size, 1.5 * size));
     }
 
-    /// Adds a cell in which an effect is claimed to be in a range of sizes.
+    /// Adds a cell in which the size of an effect is claimed to lie in a range.
     pub(super) fn effect_between(&mut self, label: String, measured: Value, low: f64, high: f64) {
         self.add(label, measured, Bound::Effect(low, high));
     }
 
-    /// Adds a cell in which the value is claimed to be in a range.
+    /// Adds a cell in which the value is claimed to lie in a range.
     pub(super) fn between(&mut self, label: String, measured: Value, low: f64, high: f64) {
         self.add(label, measured, Bound::Between(low, high));
     }
 
-    /// Number of cells with an outcome.
+    /// Number of cells with this outcome.
     pub fn count(&self, outcome: CellOutcome) -> usize {
         self.tests.iter().filter(|test| test.outcome() == outcome).count()
     }
 
-    /// Numbers of cells whose value is above and below the range of a claimed number by more than the margin.
+    /// Numbers of failed cells whose value is above and below the range of a claimed number.
     pub fn beyond(&self) -> (usize, usize) {
         let fails = self.tests.iter().filter(|test| test.outcome() == CellOutcome::Fails);
         fails.fold((0, 0), |(above, below), test| match test.bound {
@@ -244,7 +241,7 @@ impl Part {
         })
     }
 
-    /// Rule 2; none if the replications do not decide.
+    /// Verdict on the part by rule 2; `None` if the replications do not decide.
     pub fn verdict(&self) -> Option<Verdict> {
         let [passes, exceeds, fails] =
             [CellOutcome::Passes, CellOutcome::Exceeds, CellOutcome::Fails].map(|outcome| self.count(outcome));
@@ -253,11 +250,11 @@ impl Part {
             return None;
         }
         let share = |cells: usize| cells as f64 / decided as f64;
-        Some(if share(passes) >= HOLDS_FROM {
+        Some(if share(passes) >= HOLDS_SHARE {
             Verdict::Holds
-        } else if share(passes + exceeds) >= HOLDS_FROM {
+        } else if share(passes + exceeds) >= HOLDS_SHARE {
             Verdict::HoldsAndMoreSo
-        } else if share(passes + exceeds) >= IN_PART_FROM {
+        } else if share(passes + exceeds) >= HOLDS_IN_PART_SHARE {
             Verdict::HoldsInPart
         } else {
             Verdict::DoesNotHold
@@ -265,7 +262,7 @@ impl Part {
     }
 }
 
-/// Rule 3.
+/// Verdict on a claim from its parts by rule 3.
 pub fn verdict(parts: &[Part]) -> Verdict {
     let each: Vec<Option<Verdict>> = parts.iter().map(Part::verdict).collect();
     let is = |asked: &Verdict| each.iter().filter(|found| found.as_ref() == Some(asked)).count();

@@ -1,31 +1,31 @@
-//! The simulated settings of the claims, and the queries for their estimates.
+//! The simulated settings for the claims, and queries for the estimates in these settings.
 
 use hoid_study::Query;
 
-/// Noise levels of the batch plans, except 0.
+/// Nonzero noise levels in the batch plans.
 pub(super) const LEVELS: [f64; 3] = [0.1, 0.2, 0.3];
 /// Orders of the simulated remnant.
 pub(super) const ORDERS: [usize; 4] = [1, 2, 3, 4];
-/// Orders for which ARX has enough poles.
+/// Remnant orders for which an ARX model has enough poles.
 pub(super) const HIGHER: [usize; 3] = [2, 3, 4];
-/// Delays of the batch plans, samples.
+/// Delays in the batch plans, samples.
 pub(super) const DELAYS: [usize; 6] = [25, 26, 27, 28, 29, 30];
 /// The simulated delay, samples.
 pub(super) const TRUE_DELAY: usize = 29;
-/// Coefficients by the names of the text.
+/// Coefficients by their names in the text.
 pub(super) const DISCRETE: [&str; 4] = ["a1", "a2", "b0", "b1"];
 /// Neuromuscular parameters.
 pub(super) const NMS: [&str; 2] = ["omega_nm", "zeta_nm"];
-/// Noise levels of the plan of V.B.
+/// Noise levels in the plan for section V.B.
 pub(super) const RECURSIVE_LEVELS: [f64; 3] = [0.01, 0.1, 0.2];
-/// Without remnant there is one record, for any m0.
+/// Setting without remnant, for which there is one record regardless of m0.
 pub(super) const WITHOUT_REMNANT: Setting = Setting {
     condition: "C1",
     m0: 1,
     level: 0.0,
 };
 
-/// A simulated setting of a plan: condition, order of the remnant, noise level.
+/// A simulated setting in a plan: condition, order of the remnant, noise level.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Setting {
     pub condition: &'static str,
@@ -47,7 +47,7 @@ pub(super) fn settings(conditions: &[&'static str], orders: &[usize], levels: &[
     all
 }
 
-/// The name of a quantity of models with F: a1 and a2 of the text are f1 and f2 there.
+/// Name of a quantity for models with F, in which a1 and a2 of the text are called f1 and f2.
 pub(super) fn with_f(quantity: &str) -> String {
     match quantity
         .strip_suffix("a1")
@@ -67,22 +67,22 @@ impl Setting {
             .noise_level(self.level)
     }
 
-    /// The batch fit of an ARX model.
+    /// Query for the batch fit of an ARX model.
     pub fn arx(self, quantity: &str, nk: usize) -> Query {
         self.query(quantity).name("ARX").nk(nk)
     }
 
-    /// The batch fit of a Box-Jenkins model with m* and nk*.
+    /// Query for the batch fit of a Box-Jenkins model with m* (`nd`) and nk* (`nk`).
     pub fn bj(self, quantity: &str, nd: usize, nk: usize) -> Query {
         self.query(&with_f(quantity)).name("BJ").nd(nd).nk(nk)
     }
 
-    /// Recursive least squares.
+    /// Query for recursive least squares.
     pub fn rls(self, quantity: &str) -> Query {
         self.query(quantity).name("RLS")
     }
 
-    /// The recursive prediction-error method.
+    /// Query for the recursive prediction-error method.
     pub fn rpem(self, quantity: &str) -> Query {
         self.query(&with_f(quantity)).name("RPEM")
     }
@@ -96,7 +96,7 @@ impl Setting {
     }
 }
 
-/// The relative bias of a parameter.
+/// Name of the quantity that is the relative bias of a parameter.
 pub(super) fn bias_of(parameter: &str) -> String {
     format!("bias_{parameter}")
 }

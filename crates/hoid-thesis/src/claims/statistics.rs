@@ -1,37 +1,35 @@
-//! Statistics of the replications with Monte Carlo errors: medians, shares, jackknifed functions of
-//! paired values.
+//! Statistics over replications with Monte Carlo errors: medians, shares, and jackknifed functions of paired values.
 //!
-//! - The error of a median is that of the module [`hoid_study::statistics`].
-//! - Other functions of the values of replications get the error of the delete-a-group jackknife
-//!   (Kott, *Journal of Official Statistics* 17, 2001): with the g-th tenth of the replications
-//!   left out of all samples at once, `s^2 = (G - 1)/G sum (x_g - mean x_g)^2`. Estimators applied
-//!   to the same records stay paired.
+//! - The error of a median is computed by the module [`hoid_study::statistics`].
+//! - The error of any other function of the replications is computed by the delete-a-group jackknife (Kott, *Journal of
+//!   Official Statistics* 17, 2001): x_g is the value with the g-th tenth of the replications omitted from all samples,
+//!   and `s^2 = (G - 1)/G sum (x_g - mean x_g)^2`. Estimators applied to the same records stay paired.
 
 use hoid_numerics::statistics::{mean, squared_deviations};
 use hoid_study::{Statistics, statistics::median};
 
 use super::value::Value;
 
-/// Groups of the jackknife.
+/// Number of groups of the jackknife.
 const GROUPS: usize = 10;
 /// Smallest share of the replications that must give a value.
-pub(super) const ENOUGH: f64 = 0.5;
+pub(super) const SMALLEST_VALID_SHARE: f64 = 0.5;
 
-/// No value, since too few replications give one.
+/// Missing value, used if too few replications give a value.
 pub(super) const NOTHING: Value = Value {
     value: f64::NAN,
     error: f64::NAN,
 };
 
-/// Magnitudes of some values.
+/// Magnitudes of the values.
 pub(super) fn magnitudes(values: &[f64]) -> Vec<f64> {
     values.iter().map(|v| v.abs()).collect()
 }
 
-/// True if there are enough values to represent all replications.
+/// True if enough replications give a value for their statistic to represent all.
 fn enough(values: &[f64]) -> bool {
     let finite = values.iter().filter(|v| v.is_finite()).count();
-    finite > 0 && finite as f64 >= ENOUGH * values.len() as f64
+    finite > 0 && finite as f64 >= SMALLEST_VALID_SHARE * values.len() as f64
 }
 
 fn value_of(values: &[f64], figure: fn(&Statistics) -> (f64, f64)) -> Value {
@@ -63,7 +61,7 @@ pub(super) fn share_of(values: &[f64]) -> Value {
     }
 }
 
-/// The median, if there are enough values.
+/// The median; NaN if there are not enough values.
 pub(super) fn med(values: &[f64]) -> f64 {
     if enough(values) { median(values) } else { f64::NAN }
 }
@@ -100,7 +98,7 @@ pub(super) fn spread(values: impl Iterator<Item = f64>) -> f64 {
     most - least
 }
 
-/// R^2 of the straight line through equidistant values.
+/// R^2 of the straight line fitted to evenly spaced values.
 pub(super) fn linearity(values: &[f64]) -> f64 {
     let n = values.len() as f64;
     let (x0, y0) = (0.5 * (n - 1.0), mean(values));
@@ -114,7 +112,7 @@ pub(super) fn linearity(values: &[f64]) -> f64 {
     xy * xy / (xx * yy)
 }
 
-/// A function of samples with the error of the delete-a-group jackknife.
+/// Value of a function of samples, with its error by the delete-a-group jackknife.
 pub(super) fn jackknife(samples: &[Vec<f64>], f: &dyn Fn(&[Vec<f64>]) -> f64) -> Value {
     let value = f(samples);
     let n = samples.iter().map(Vec::len).max().unwrap_or(0);

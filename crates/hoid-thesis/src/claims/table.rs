@@ -7,7 +7,7 @@ use super::{
     finding::{Finding, Measured},
 };
 
-/// A table of claims, one row each, with the measurements as text and the first of the numbers.
+/// Creates a table of claims, one row for each, with the measurements as text and the first measured number.
 pub fn claims_table(findings: &[(Claim, Finding)]) -> OutputTable {
     let text = |name: &str, of: &dyn Fn(&Claim, &Finding) -> String| OutputColumn {
         name: name.to_owned(),
@@ -27,7 +27,7 @@ pub fn claims_table(findings: &[(Claim, Finding)]) -> OutputTable {
         ),
     };
     OutputTable {
-        comments: vec!["Statements of the thesis and the evidence of the data on them".to_owned()],
+        comments: vec!["Statements of the thesis and the evidence from the data".to_owned()],
         columns: vec![
             text("id", &|claim, _| claim.id.to_owned()),
             text("theme", &|claim, _| claim.theme.title().to_owned()),

@@ -1,16 +1,16 @@
-//! Numbers with Monte Carlo errors, and those of their differences, means and ratios.
+//! Numbers with Monte Carlo errors, and the errors of their differences, means and ratios.
 
-/// A number and its Monte Carlo error, 0 for one without random error.
+/// A number and its Monte Carlo error; the error is zero if the number is not random.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Value {
-    /// The number; not a number if too few replications give one.
+    /// The number; NaN if too few replications give a value.
     pub value: f64,
-    /// Its Monte Carlo error.
+    /// Monte Carlo error of the number.
     pub error: f64,
 }
 
 impl Value {
-    /// The magnitude, with the same error.
+    /// The magnitude of the number, with the same error.
     #[must_use]
     pub fn abs(self) -> Self {
         Self {
@@ -19,7 +19,7 @@ impl Value {
         }
     }
 
-    /// The difference to a number from other replications.
+    /// The difference from a number that is based on other replications.
     #[must_use]
     pub fn minus(self, other: Self) -> Self {
         Self {
@@ -28,7 +28,7 @@ impl Value {
         }
     }
 
-    /// The mean of numbers from different replications.
+    /// The mean of numbers that are based on different replications.
     #[must_use]
     pub fn mean(values: &[Self]) -> Self {
         let n = values.len() as f64;
@@ -38,7 +38,7 @@ impl Value {
         }
     }
 
-    /// The ratio to a number from other replications; errors to first order.
+    /// The ratio to a number that is based on other replications; the error is correct to first order.
     #[must_use]
     pub fn over(self, other: Self) -> Self {
         let value = self.value / other.value;
@@ -48,7 +48,7 @@ impl Value {
         }
     }
 
-    /// Percentage by which it is less than a number from other replications.
+    /// Percentage by which the number is smaller than a number that is based on other replications.
     #[must_use]
     pub fn less_than(self, other: Self) -> Self {
         let ratio = self.over(other);

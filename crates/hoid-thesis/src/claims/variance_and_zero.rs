@@ -1,24 +1,23 @@
-//! Claims on batch fits beyond the bias of the coefficients: the innovation variance by order of
-//! the remnant and in C2, b at a wrong delay, and the zero in C2.
+//! Claims on batch fits that do not concern the bias of the coefficients: the innovation variance by order of the
+//! remnant and in C2, b at a wrong delay, and the zero in C2.
 //!
-//! The text's *modified remnant noise variance* is the variance of the innovation that drives 1/D.
-//! Its reference value is that of the backward Euler form (eq. B.12),
-//! `sigma'^2 = (K_n (Ts/(Tn + Ts))^m)^2`. The remnant is held exactly over a sample, in the
-//! simulations of the text as here, so that the innovations of an exact model have another
-//! variance, which is shown as well.
+//! The *modified remnant noise variance* of the text is the variance of the innovation that drives 1/D. Its reference
+//! value is that of the backward Euler form (eq. B.12), `sigma'^2 = (K_n (Ts/(Tn + Ts))^m)^2`. In the simulations, both
+//! those of the text and those here, the remnant is held exactly over a sample. The innovations of an exact model
+//! therefore have a different variance, which is shown as well.
 
 use super::{
     claim::{Claim, Source, Theme},
     evidence::{Evidence, Study},
-    rules::{LARGE, MUCH, Part},
+    rules::{LARGE, MUCH_HIGHER_RATIO, Part},
     settings::{HIGHER, LEVELS, ORDERS, Setting, TRUE_DELAY, bias_of, settings},
     statistics::{interquartile_range, med, median_magnitude},
     value::Value,
 };
 
 const PLANS: &[&str] = &["bias"];
-/// Delays far from the simulated one.
-const FAR: [usize; 2] = [25, 26];
+/// Delays far from the simulated delay, samples.
+const FAR_DELAYS: [usize; 2] = [25, 26];
 
 pub(super) const CLAIMS: &[Claim] = &[
     Claim {
@@ -70,11 +69,11 @@ pub(super) const CLAIMS: &[Claim] = &[
 
 /// The reference value of the innovation variance (eq. B.12).
 fn backward_euler_variance(study: Study<'_>, at: Setting) -> Result<f64, String> {
-    // For all scenarios of the plan.
+    // These values are valid for all scenarios of the plan.
     const TS_S: f64 = 0.01;
     const T_N_S: f64 = 0.06;
     let k_n = study.truth(&at.bj("loss", at.m0, TRUE_DELAY))?.k_n;
-    let m = i32::try_from(at.m0).map_err(|_| format!("the order m0 = {} is none of a remnant", at.m0))?;
+    let m = i32::try_from(at.m0).map_err(|_| format!("m0 = {} is not the order of a remnant", at.m0))?;
     Ok((k_n * (TS_S / (T_N_S + TS_S)).powi(m)).powi(2))
 }
 
@@ -132,7 +131,7 @@ fn remnant_in_second(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
             let second = Setting { condition: "C2", ..at };
             better.below(at.label(""), of(second, med)?.abs().minus(of(at, med)?.abs()), 0.0);
             let ratio = of(second, interquartile_range)?.over(of(at, interquartile_range)?);
-            wider.above(at.label(""), ratio, MUCH);
+            wider.above(at.label(""), ratio, MUCH_HIGHER_RATIO);
         }
         parts.extend([better, wider]);
     }
@@ -144,7 +143,7 @@ fn wrong_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut large = Part::new("BJ: |median bias| of b0 and b1 beyond 25 %");
     let mut smaller = Part::new("|median bias| of b0 and b1, BJ less ARX, below 0");
     for at in settings(&["C1"], &ORDERS, &LEVELS) {
-        for nk in FAR {
+        for nk in FAR_DELAYS {
             for name in ["b0", "b1"] {
                 let [bj, arx] =
                     [at.bj(&bias_of(name), at.m0, nk), at.arx(&bias_of(name), nk)].map(|query| study.median(&query));
@@ -158,14 +157,14 @@ fn wrong_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![large, smaller])
 }
 
-/// Relative errors of the zero 1/T_L, %, from those of T_L.
+/// Relative errors of the zero 1/T_L, %, computed from the relative errors of T_L.
 fn of_zero(t_l_percent: &[f64]) -> Vec<f64> {
     let of = |error: &f64| 100.0 * (1.0 / (1.0 + error / 100.0) - 1.0);
     t_l_percent.iter().map(of).collect()
 }
 
-/// Median magnitude of the relative error of the zero in C2 minus that in C1; for the estimators of
-/// two queries, first minus second.
+/// Median magnitude of the relative error of the zero in C2 minus that in C1. If `of` gives two queries, the magnitude
+/// for the second is first subtracted from that for the first.
 fn zero_change(study: Study<'_>, of: &dyn Fn(Setting) -> Vec<hoid_study::Query>, at: Setting) -> Result<Value, String> {
     let error = |condition| {
         study.of(&of(Setting { condition, ..at }), &|s| {

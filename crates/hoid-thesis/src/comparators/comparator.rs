@@ -1,4 +1,4 @@
-//! Interface of a comparator: it tracks the operator over a record, and returns its estimate at given times.
+//! Interface of a comparator, which tracks the operator over a record and returns estimates at given times.
 
 use hoid_ident::settings::Settings;
 use hoid_model::{OperatorParameters, Record, SampleTime, delayed_operator};
@@ -9,17 +9,17 @@ use crate::ThesisError;
 /// Description of a comparator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct About {
-    /// Its name in a plan.
+    /// Name of the comparator in a plan.
     pub name: &'static str,
-    /// Description.
+    /// Short description.
     pub help: &'static str,
-    /// Author, year, publication.
+    /// Author and year of the publication.
     pub source: &'static str,
-    /// Information that it has and a recursion does not, as text; empty if there is none.
-    pub told: &'static str,
+    /// Information that the comparator needs and a recursion does not, as text; empty if there is none.
+    pub extra_information: &'static str,
 }
 
-/// A record and its task.
+/// Task for a comparator: a record, and the estimates that are requested.
 #[derive(Debug, Clone, Copy)]
 pub struct Task<'a> {
     /// The record.
@@ -28,7 +28,7 @@ pub struct Task<'a> {
     pub at: &'a [usize],
     /// Frequencies of the lines of the forcing function, rad/s.
     pub lines_rad_s: &'a [f64],
-    /// Frequencies at which the response is requested, rad/s; some of the lines.
+    /// Frequencies at which the response is requested, rad/s; each is the frequency of a line.
     pub omega_rad_s: &'a [f64],
     /// Span of the start fit, s.
     pub start_s: (f64, f64),
@@ -36,21 +36,21 @@ pub struct Task<'a> {
     pub nk: usize,
     /// A second run of the same person in the same task, if available.
     pub validation: Option<&'a Record>,
-    /// Time of the change of the controlled element, s, and its rate, 1/s; `None` if it is constant.
+    /// Time (s) and rate (1/s) of the change of the controlled element; `None` if the element is constant.
     pub change: Option<(f64, f64)>,
 }
 
 /// Result of a comparator, one entry for each requested sample.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Followed {
-    /// The response at each frequency.
+pub struct TrackingResult {
+    /// Response at each requested frequency.
     pub response: Vec<Vec<Complex64>>,
-    /// The operator, if the method gives a valid one.
+    /// Operator; `None` if the method does not give a valid one.
     pub operator: Vec<Option<OperatorParameters>>,
 }
 
-impl Followed {
-    /// Result of a method that gives only a response.
+impl TrackingResult {
+    /// Creates the result of a method that estimates only a response.
     pub fn without_operator(response: Vec<Vec<Complex64>>) -> Self {
         Self {
             operator: vec![None; response.len()],
@@ -58,7 +58,7 @@ impl Followed {
         }
     }
 
-    /// Adds the operator at the next requested sample; its response is that of the operator, NaN if there is none.
+    /// Adds the operator at the next requested sample and its response; the response is NaN if there is no operator.
     pub(super) fn push(&mut self, task: &Task<'_>, operator: Option<OperatorParameters>) -> Result<(), ThesisError> {
         self.response.push(match &operator {
             Some(operator) => response_of(operator, task.record.sample_time(), task.omega_rad_s)?,
@@ -69,16 +69,16 @@ impl Followed {
     }
 }
 
-/// A method for comparison with others.
+/// A method that is included for comparison with others.
 pub trait Comparator: Settings + Send + Sync {
-    /// Returns its description.
+    /// Returns the description of the method.
     fn about(&self) -> About;
 
     /// Tracks the operator over a record.
     ///
     /// # Errors
-    /// [`ThesisError`] for an unsuitable record.
-    fn follow(&self, task: &Task<'_>) -> Result<Followed, ThesisError>;
+    /// [`ThesisError`] if the record is unsuitable.
+    fn follow(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError>;
 }
 
 impl Task<'_> {
@@ -116,7 +116,7 @@ impl Task<'_> {
     }
 }
 
-/// The response of an operator with any delay, after a zero-order hold, at given frequencies.
+/// The response at given frequencies of an operator with any delay, including the zero-order hold.
 pub(crate) fn response_of(
     operator: &OperatorParameters,
     sample_time: SampleTime,

@@ -1,28 +1,28 @@
-//! Fourier coefficients at the lines of the forcing function, in a window that moves (M. M. van
-//! Paassen and M. Mulder, *Identification of human operator control behaviour in multiple-loop
-//! tracking tasks*, IFAC Man-Machine Systems, 1998).
+//! Fourier coefficients at the lines of the forcing function, in a moving window (M. M. van Paassen and M. Mulder,
+//! *Identification of human operator control behaviour in multiple-loop tracking tasks*, IFAC Man-Machine Systems,
+//! 1998).
 //!
-//! The forcing function is a sum of sines, and so are e and u except for the remnant. In a window
-//! of length T around t,
+//! The forcing function is a sum of sinusoids, and so are e and u except for the remnant. In a window of length T
+//! around t, the model
 //!
 //! `x(k) = sum_i (a_i cos omega_i t_k + b_i sin omega_i t_k) + r(k)`
 //!
-//! for x = e and x = u, all lines at once by least squares: over a whole period of the forcing
-//! function these are its Fourier coefficients, over less than one the lines are distinguished as
-//! far as their distances allow. `H(j omega_i) = U(j omega_i)/E(j omega_i)`, `X = a_i - j b_i`. The
-//! window reaches T/2 into anything after t; at the ends of the record it is the first or last T.
+//! is fitted to x = e and x = u by least squares for all lines at once. Over a whole period of the forcing function the
+//! estimates are its Fourier coefficients; over less than a period the lines are separated as far as their distances
+//! allow. The response is `H(j omega_i) = U(j omega_i)/E(j omega_i)` with `X = a_i - j b_i`. The window extends T/2
+//! beyond t; near the ends of the record it is the first or last T.
 
 use hoid_ident::{settings, settings::Bounds};
 use num_complex::Complex64;
 
 use super::{
-    comparator::{About, Comparator, Followed, Task},
+    comparator::{About, Comparator, TrackingResult, Task},
     least_squares::NormalEquations,
 };
 use crate::ThesisError;
 
 const NAME: &str = "fourier";
-/// Keeps lines apart that a short window does not distinguish: share of their power.
+/// Ridge, as a fraction of the power of a line, that regularises lines which a short window cannot separate.
 const RIDGE: f64 = 1e-4;
 
 settings! {
@@ -35,7 +35,7 @@ settings! {
 }
 
 impl FourierCoefficients {
-    /// Coefficients of e and u at the lines over some samples.
+    /// Returns the coefficients of e and u at the lines over a span of samples.
     fn coefficients(
         task: &Task<'_>,
         (e, u): (&[f64], &[f64]),
@@ -63,11 +63,11 @@ impl Comparator for FourierCoefficients {
             name: NAME,
             help: "Fourier coefficients at the lines, in a moving window",
             source: "van Paassen and Mulder 1998",
-            told: "the lines of the forcing function; half a window of data after each time",
+            extra_information: "the lines of the forcing function; half a window of data after each time",
         }
     }
 
-    fn follow(&self, task: &Task<'_>) -> Result<Followed, ThesisError> {
+    fn follow(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
         let signals = task.signals(NAME, 2 * task.lines_rad_s.len())?;
         let n = task.record.len();
         let length = ((self.window / task.record.sample_time().s()).round() as usize).clamp(1, n);
@@ -81,7 +81,7 @@ impl Comparator for FourierCoefficients {
             };
             response.push(task.omega_rad_s.iter().map(at_line).collect());
         }
-        Ok(Followed::without_operator(response))
+        Ok(TrackingResult::without_operator(response))
     }
 }
 

@@ -1,22 +1,21 @@
-//! Maximum likelihood of an operator whose gains follow a sigmoid, from a genetic search (P. M. T.
-//! Zaal, D. M. Pool, Q. P. Chu, M. M. van Paassen, M. Mulder and J. A. Mulder, *Modeling human
-//! multimodal perception and control using genetic maximum likelihood estimation*, J. Guidance,
-//! Control, and Dynamics 32 (2009) 1089-1099; with a sigmoid: P. M. T. Zaal and B. T. Sweet, AIAA
-//! 2011-6474).
+//! Maximum-likelihood estimate, by a genetic search, of an operator whose gains follow a sigmoid (P. M. T. Zaal, D. M.
+//! Pool, Q. P. Chu, M. M. van Paassen, M. Mulder and J. A. Mulder, *Modeling human multimodal perception and control
+//! using genetic maximum likelihood estimation*, J. Guidance, Control, and Dynamics 32 (2009) 1089-1099; with a
+//! sigmoid: P. M. T. Zaal and B. T. Sweet, AIAA 2011-6474).
 //!
-//! The likelihood has many maxima over t_M, G and the delay. The genetic search needs no start: a
-//! population of parameter vectors drawn from wide ranges, of which each generation keeps the best,
-//! and makes the others from two parents each, the better of three drawn ones (a *tournament*),
-//! every gene from a range that reaches half of the parents' distance beyond both (*blend
-//! crossover*, L. J. Eshelman and J. D. Schaffer 1993), at intervals moved by a normal deviate. It minimises the
-//! one-step prediction error,
+//! The likelihood has many maxima over t_M, G and the delay. The genetic search needs no start. Its first population
+//! consists of parameter vectors drawn from wide ranges. Each generation keeps the best members and replaces the others
+//! by children of two parents, each of which is the best of three randomly drawn members (a *tournament*). Every gene
+//! of a child is drawn from a range that extends half of the parents' distance beyond both parents (*blend crossover*,
+//! L. J. Eshelman and J. D. Schaffer 1993), and with a given probability a normal deviate is added. The search
+//! minimises the mean square of the one-step prediction error,
 //!
 //! `eps(k) = v(k) + d1 v(k-1)`, `v = u - K_e(t) y_0 - K_e_dot(t) y_1`, `K_e_dot = K_e T_L`,
 //!
-//! with the unit responses y_0, y_1 of [`super::unit_responses`] and K_e, T_L along the sigmoid
-//! `1/(1 + e^(-G (t - t_M)))`; d1 is the least-squares value for each v. The best of the last
-//! generation is the start of [`SigmoidChange`], which continues by Gauss-Newton steps to the
-//! maximum of the likelihood, as the source does.
+//! where y_0 and y_1 are the unit responses of [`super::unit_responses`], K_e and T_L follow the sigmoid
+//! `1/(1 + e^(-G (t - t_M)))`, and d1 is the least-squares value for each v. The best member of the last generation is
+//! the start of [`SigmoidChange`], which continues by Gauss-Newton steps to the maximum of the likelihood, as in the
+//! source.
 
 use std::f64::consts::TAU;
 
@@ -25,14 +24,14 @@ use hoid_model::OperatorParameters;
 use hoid_sim::RunSeed;
 
 use super::{
-    comparator::{About, Comparator, Followed, Task},
+    comparator::{About, Comparator, TrackingResult, Task},
     unit_responses::unit_responses,
 };
 use crate::ThesisError;
 
 const NAME: &str = "genetic-sigmoid";
-/// Ranges of K_e and T_L at both ends, ln G, omega_nm, ln zeta_nm, tau_e; t_M lies in the middle
-/// eight tenths of the record.
+/// Ranges of the genes: K_e at both ends, T_L at both ends, t_M, ln G, omega_nm, ln zeta_nm, tau_e. t_M lies in the
+/// middle eight tenths of the record.
 const RANGES: [(f64, f64); 9] = [
     (0.01, 0.3),
     (0.01, 0.3),
@@ -44,15 +43,15 @@ const RANGES: [(f64, f64); 9] = [
     (-3.0, 0.7),
     (0.1, 0.5),
 ];
-/// Genes.
+/// Number of genes.
 const N: usize = RANGES.len();
-/// Place of t_M.
+/// Index of the gene for t_M.
 const MIDPOINT: usize = 4;
-/// Members that continue as they are.
+/// Number of members that are kept unchanged.
 const ELITE: usize = 2;
-/// Members that are drawn for each parent.
+/// Number of members drawn in the tournament for each parent.
 const DRAWN: usize = 3;
-/// Distance beyond its parents within which a gene may lie, as a fraction of the distance between them.
+/// Distance beyond the parents within which a gene may lie, as a fraction of the distance between the parents.
 const BLEND: f64 = 0.5;
 
 settings! {
@@ -72,7 +71,7 @@ settings! {
     }
 }
 
-/// A member: its genes within 0 and 1, and its cost.
+/// A member of the population: its genes, between 0 and 1, and its cost.
 #[derive(Debug, Clone, Copy)]
 struct Member {
     genes: [f64; N],
@@ -80,11 +79,11 @@ struct Member {
 }
 
 impl GeneticSigmoid {
-    /// The cheapest member of the last generation.
+    /// Returns the member of the last generation with the lowest cost.
     fn search(&self, cost: &dyn Fn(&[f64; N]) -> f64) -> Member {
         let member = |genes: [f64; N]| {
             let found = cost(&genes);
-            // What has no cost is never chosen.
+            // A member without a finite cost is never preferred.
             let cost = if found.is_finite() { found } else { f64::INFINITY };
             Member { genes, cost }
         };
@@ -105,11 +104,11 @@ impl GeneticSigmoid {
             all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
             let mut numbers = drawn(generation, self.population * (2 * DRAWN + 4 * N));
             let mut next = || numbers.next().unwrap_or_default();
-            // The population shrinks around the optimum, and so do the moves.
+            // The population contracts around the optimum, and the mutations become smaller accordingly.
             let size = 0.3 * (1.0 - generation as f64 / (self.generations + 1) as f64);
             let mut children = all[..ELITE.min(all.len())].to_vec();
             while children.len() < all.len() {
-                // Sorted: the first is the best.
+                // The members are sorted, so that the smallest index is the best member.
                 let mut parent = || {
                     let places = (0..DRAWN).map(|_| (next() * all.len() as f64) as usize);
                     all[places.min().unwrap_or(0).min(all.len() - 1)]
@@ -134,7 +133,7 @@ impl GeneticSigmoid {
         all[0]
     }
 
-    /// The parameters of genes: K_e and T_L at both ends, t_M, G, omega_nm, zeta_nm, tau_e.
+    /// Converts genes to parameters: K_e at both ends, T_L at both ends, t_M, G, omega_nm, zeta_nm, tau_e.
     fn parameters(genes: &[f64; N], span_s: (f64, f64)) -> [f64; N] {
         let length = span_s.1 - span_s.0;
         std::array::from_fn(|i| {
@@ -148,7 +147,7 @@ impl GeneticSigmoid {
         })
     }
 
-    /// Mean square of eps, and d1.
+    /// Returns the mean square of eps, and d1.
     fn criterion(task: &Task<'_>, e: &[f64], u: &[f64], of: &[f64; N]) -> (f64, f64) {
         let [k_1, k_2, t_1, t_2, midpoint_s, rate, omega, zeta, tau_s] = *of;
         let ts = task.record.sample_time();
@@ -166,12 +165,12 @@ impl GeneticSigmoid {
             last = v;
         }
         let d1 = if before > 0.0 { -products / before } else { 0.0 };
-        // sum (v + d1 v')^2 with that d1.
+        // This is the sum of (v + d1 v')^2 for the least-squares d1.
         let loss = (squares + d1 * products) / (e.len() - nk) as f64;
         (loss, d1.clamp(-0.999, 0.999))
     }
 
-    /// The start that the genetic search finds, in the order of [`SigmoidChange::names`].
+    /// Returns the start found by the genetic search, in the order of [`SigmoidChange::names`].
     fn start(&self, task: &Task<'_>, e: &[f64], u: &[f64]) -> Vec<f64> {
         let span_s = (task.record.time_s(0), task.record.time_s(e.len() - 1));
         let cost = |genes: &[f64; N]| Self::criterion(task, e, u, &Self::parameters(genes, span_s)).0;
@@ -192,7 +191,7 @@ impl GeneticSigmoid {
     }
 }
 
-/// The operator of a fit at a time.
+/// Returns the operator of a fit at a time.
 fn operator_at(fit: &SigmoidFit, time_s: f64) -> Option<OperatorParameters> {
     if !fit.change_found() {
         return Some(fit.constant_operator().lead()?.parameters());
@@ -214,13 +213,13 @@ impl Comparator for GeneticSigmoid {
             name: NAME,
             help: "maximum likelihood of gains that follow a sigmoid, from a genetic search",
             source: "Zaal et al. 2009; Zaal and Sweet 2011",
-            told: "the assumption of one change, a sigmoid; the whole record (not the delay)",
+            extra_information: "the assumption of one change, a sigmoid; the whole record (not the delay)",
         }
     }
 
-    fn follow(&self, task: &Task<'_>) -> Result<Followed, ThesisError> {
+    fn follow(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
         let fit = self.fit(task)?;
-        let mut found = Followed::default();
+        let mut found = TrackingResult::default();
         for at in task.at {
             found.push(task, operator_at(&fit, task.record.time_s(*at)))?;
         }

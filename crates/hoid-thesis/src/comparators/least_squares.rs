@@ -1,15 +1,14 @@
-//! Least squares by normal equations, for regressions with some hundred coefficients over thousands
-//! of samples.
+//! Least squares by normal equations, for regressions with several hundred coefficients over thousands of samples.
 //!
-//! `theta = (Phi' Phi + D)^-1 Phi' y`, by the Cholesky factor of the sum; D is the prior precision
-//! of theta (A. N. Tikhonov 1963; A. E. Hoerl and R. W. Kennard, *Technometrics* 12 (1970) 55-67).
-//! Squaring the condition number of Phi does no harm if D bounds it.
+//! `theta = (Phi' Phi + D)^-1 Phi' y`, computed from the Cholesky factor of the sum; D is the prior precision of theta
+//! (A. N. Tikhonov 1963; A. E. Hoerl and R. W. Kennard, *Technometrics* 12 (1970) 55-67). Squaring the condition number
+//! of Phi is harmless if D bounds the condition number of the sum.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::ThesisError;
 
-/// Sums of products of regressors, and of regressors with y.
+/// Normal equations: sums of products of the regressors with each other and with y.
 #[derive(Debug, Clone)]
 pub(super) struct NormalEquations {
     /// Lower triangle of Phi' Phi.
@@ -45,7 +44,7 @@ impl NormalEquations {
 
     /// Returns theta. `prior` is D, of which only the lower triangle is read.
     pub fn solve(&self, method: &'static str, prior: &DMatrix<f64>) -> Result<DMatrix<f64>, ThesisError> {
-        // The Cholesky factorisation reads the lower triangle only.
+        // The Cholesky factorisation reads only the lower triangle.
         let factor: Option<Cholesky<f64, Dyn>> = (&self.gram + prior).cholesky();
         let singular = || ThesisError::Unsuited {
             method,
@@ -61,7 +60,8 @@ impl NormalEquations {
         }
     }
 
-    /// A prior that only keeps the matrix positive definite: `share` of the mean of its diagonal.
+    /// Returns a prior that only keeps the matrix positive definite: `share` times the mean of its diagonal, for every
+    /// coefficient.
     pub fn ridge(&self, share: f64) -> DMatrix<f64> {
         let n = self.gram.nrows();
         let level = share * self.gram.trace() / n as f64;

@@ -1,38 +1,38 @@
-//! Predictor-based subspace identification of a model whose parameters vary linearly with a signal
-//! that is known (J.-W. van Wingerden and M. Verhaegen, *Subspace identification of bilinear and LPV
-//! systems for open- and closed-loop data*, Automatica 45 (2009) 372-381; of operators: R. F. M.
-//! Duarte, D. M. Pool, M. M. van Paassen and M. Mulder, *Experimental scheduling functions for
-//! global LPV human controller modeling*, IFAC 2017).
+//! Predictor-based subspace identification of a model whose parameters vary linearly with a known signal (J.-W. van
+//! Wingerden and M. Verhaegen, *Subspace identification of bilinear and LPV systems for open- and closed-loop data*,
+//! Automatica 45 (2009) 372-381; for human operators: R. F. M. Duarte, D. M. Pool, M. M. van Paassen and M. Mulder,
+//! *Experimental scheduling functions for global LPV human controller modeling*, IFAC 2017).
 //!
 //! `x(k+1) = A x(k) + (B_0 + mu(k) B_1) v(k) + K eps(k)`, `u(k) = C x(k) + eps(k)`.
 //!
-//! At 100 Hz consecutive states differ only by hundredths, in which B is lost; therefore every d-th sample of u is
-//! used, and v(k) is the mean of the d values of e, nk - 1 samples before, that act until the next sample used. The
-//! scheduling mu is the sigmoid of the controlled element, which the experimenter knows (the analytical scheduling of
-//! the source). Only the gains of an operator change, so that A, C and K do not depend on mu and the number of
-//! coefficients grows with the window p and not with 2^p. Steps:
+//! At 100 Hz consecutive states differ by a few hundredths, too little to determine B. Therefore only every d-th sample
+//! of u is used, and v(k) is the mean of the d values of e that act until the next sample used, delayed by nk - 1
+//! samples. The scheduling signal mu is the sigmoid of the controlled element, which the experimenter knows (the
+//! analytical scheduling of the source). Only the gains of an operator change, so that A, C and K do not depend on mu,
+//! and the number of coefficients is proportional to the window p instead of 2^p. The steps are:
 //!
-//! 1. The predictor `u(k) = sum_{i=1..p} C Ã^(i-1) [B_0, B_1, K] z(k-i) + eps`, with
-//!    `z = [v, mu v, u]` and `Ã = A - K C`, by least squares; p so long that Ã^p is nothing.
-//! 2. The same coefficients, shifted, times z are `Gamma x(k)`, the information of the past about the next f outputs;
-//!    its n main directions over the record are a state.
-//! 3. With that state, C by least squares, its residuals are eps, and A, B_0, B_1, K again by least
+//! 1. Estimate by least squares the predictor `u(k) = sum_{i=1..p} C Ã^(i-1) [B_0, B_1, K] z(k-i) + eps`, with
+//!    `z = [v, mu v, u]` and `Ã = A - K C`; p is so large that Ã^p is negligible.
+//! 2. The same coefficients, shifted and multiplied by z, give `Gamma x(k)`, the prediction of the next f outputs from
+//!    the past. Its n principal directions over the record are a state.
+//! 3. With this state, estimate C by least squares; the residuals are eps. Then estimate A, B_0, B_1 and K by least
 //!    squares.
 //!
-//! The response at t is that of the model with mu(t) held. If nothing changes, mu is omitted.
+//! The response at t is the response of the model with mu(t) held constant. If nothing changes, mu is omitted.
 
 use hoid_ident::{settings, settings::Bounds};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use super::{
-    comparator::{About, Comparator, Followed, Task},
+    comparator::{About, Comparator, TrackingResult, Task},
     least_squares::NormalEquations,
 };
 use crate::ThesisError;
 
 const NAME: &str = "lpv-subspace";
-/// Keeps the predictor's equations positive where the input is a few lines: share of their mean.
+/// Ridge, as a fraction of the mean diagonal, that keeps the predictor's normal equations positive definite if the
+/// input consists of a few lines.
 const RIDGE: f64 = 1e-9;
 
 settings! {
@@ -53,11 +53,11 @@ settings! {
     }
 }
 
-/// The model.
+/// State-space model from v and mu v to u.
 #[derive(Debug, Clone)]
 struct Model {
     a: DMatrix<f64>,
-    /// B_0, and B_1 where there is one.
+    /// B_0, and B_1 if there is a scheduling signal.
     b: Vec<DVector<f64>>,
     c: DVector<f64>,
 }
@@ -80,13 +80,13 @@ impl Model {
     }
 }
 
-/// The scheduling at a time.
+/// Returns the scheduling signal mu at a time.
 fn scheduling(change: Option<(f64, f64)>, t_s: f64) -> f64 {
     change.map_or(0.0, |(at_s, rate)| 1.0 / (1.0 + (-rate * (t_s - at_s)).exp()))
 }
 
 impl LpvSubspace {
-    /// Fits the model to z = [v, (mu v), u] at each sample, the last entry being the output.
+    /// Fits the model to z = [v, (mu v), u] at each sample; the last entry is the output.
     fn fit(&self, z: &[Vec<f64>]) -> Result<Model, ThesisError> {
         let (width, p, f) = (z[0].len(), self.past, self.future.min(self.past));
         let output = |k: usize| z[k][width - 1];
@@ -100,7 +100,7 @@ impl LpvSubspace {
             predictor.add(1.0, &regressors, &[output(k)]);
         }
         let theta = predictor.solve(NAME, &predictor.ridge(RIDGE))?;
-        // Row r of Gamma x(k): the coefficients from block r on, for the same past.
+        // Row r of Gamma x(k) uses the coefficients from block r on, for the same past.
         let mut ahead = DMatrix::zeros(f, z.len() - p);
         for k in p..z.len() {
             let known: Vec<f64> = past(k).collect();
@@ -113,7 +113,7 @@ impl LpvSubspace {
         self.of_states(z, &states)
     }
 
-    /// The main directions of the prediction of the future from the past, of unit power.
+    /// Returns the principal directions of the prediction of the future from the past, scaled to unit power.
     fn states(&self, ahead: &DMatrix<f64>) -> Result<DMatrix<f64>, ThesisError> {
         let gram = (ahead * ahead.transpose()) / ahead.ncols() as f64;
         let eigen = gram.symmetric_eigen();
@@ -140,7 +140,7 @@ impl LpvSubspace {
         Ok(DMatrix::from_rows(&rows))
     }
 
-    /// A, B, C of a known state.
+    /// Estimates A, B and C for a known state.
     fn of_states(&self, z: &[Vec<f64>], states: &DMatrix<f64>) -> Result<Model, ThesisError> {
         let (n, width, p) = (self.order, z[0].len(), self.past);
         let mut output = NormalEquations::new(n, 1);
@@ -148,7 +148,7 @@ impl LpvSubspace {
             output.add(1.0, x.as_slice(), &[z[p + i][width - 1]]);
         }
         let c = output.solve(NAME, &output.ridge(0.0))?.column(0).into_owned();
-        // The state, the inputs, and the innovation instead of the output.
+        // The regressors are the state, the inputs, and the innovation in place of the output.
         let mut next = NormalEquations::new(n + width, n);
         for i in 0..states.ncols() - 1 {
             let x = states.column(i);
@@ -171,11 +171,11 @@ impl Comparator for LpvSubspace {
             name: NAME,
             help: "predictor-based subspace identification of an LPV model",
             source: "van Wingerden and Verhaegen 2009; Duarte et al. 2017",
-            told: "the time and the rate of the change of the controlled element; the whole record",
+            extra_information: "the time and the rate of the change of the controlled element; the whole record",
         }
     }
 
-    fn follow(&self, task: &Task<'_>) -> Result<Followed, ThesisError> {
+    fn follow(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
         let d = self.decimate;
         let (e, u) = task.signals(NAME, d * (4 * self.past + 4) + task.nk)?;
         let ts = task.record.sample_time().s();
@@ -201,7 +201,7 @@ impl Comparator for LpvSubspace {
             task.omega_rad_s.iter().map(of).collect()
         };
         let response: Vec<Vec<Complex64>> = task.at.iter().map(at).collect();
-        Ok(Followed::without_operator(response))
+        Ok(TrackingResult::without_operator(response))
     }
 }
 

@@ -1,21 +1,22 @@
-//! The survey's other methods as comparators: those that Part II of the thesis describes (section 2.4) and that need
-//! more than the samples so far: the lines, what comes after, a second run. The recursive ones are in `hoid_survey`.
+//! The other methods of the survey as comparators: methods described in Part II of the thesis (section 2.4) that need
+//! more than the samples so far, such as the lines, later samples or a second run. The recursive methods are in
+//! `hoid_survey`.
 //!
-//! A comparator processes a record and returns, at requested times, the operator's response at some frequencies, and
-//! its parameters if it has them. Each is small, follows the source that it names, was tuned on separate runs
-//! (`research/notes/survey-methods.md` states how), and is used by the plan of a [survey](crate::survey), not by
-//! `track --method`: these methods are included only for comparison.
+//! A comparator processes a record and returns the operator's response at some frequencies at requested times, and the
+//! operator's parameters if it estimates them. Each comparator is small, follows the source that it names, and was
+//! tuned on separate runs (described in `research/notes/survey-methods.md`). The comparators are used by the plan of a
+//! [survey](crate::survey), not by `track --method`, because they are included only for comparison.
 //!
 //! | module | method |
 //! |---|---|
 //! | `comparator` | [`Comparator`]: the interface common to all methods |
-//! | `rls_fir` | finite impulse response by regularised recursive least squares, as a frequency response |
-//! | `fourier` | Fourier coefficients at the lines, in a window that moves |
+//! | `rls_fir` | finite impulse response by regularised recursive least squares, converted to a frequency response |
+//! | `fourier` | Fourier coefficients at the lines, in a moving window |
 //! | `wavelet` | wavelet transforms at the lines |
-//! | `genetic_sigmoid` | maximum likelihood of a sigmoid, from a genetic search |
+//! | `genetic_sigmoid` | maximum likelihood of a sigmoid by a genetic search |
 //! | `lpv_subspace` | predictor-based subspace identification of an LPV model |
-//! | `rpem_by_vaf` | RPEM, its covariance updated by the VAF of a validation set (a proposal of section VII) |
-//! | `unit_responses` | the operator's responses to error and error rate, of unit gain |
+//! | `rpem_by_vaf` | RPEM whose covariance is updated by the VAF of a validation set (a proposal in section VII) |
+//! | `unit_responses` | the operator's responses to error and error rate with unit gain |
 //! | `least_squares` | normal equations |
 
 mod comparator;
@@ -29,7 +30,7 @@ mod unit_responses;
 mod wavelet;
 
 pub(crate) use comparator::response_of;
-pub use comparator::{About, Comparator, Followed, Task};
+pub use comparator::{About, Comparator, TrackingResult, Task};
 pub use fourier::FourierCoefficients;
 pub use genetic_sigmoid::GeneticSigmoid;
 pub use lpv_subspace::LpvSubspace;
@@ -37,7 +38,7 @@ pub use rls_fir::RlsFir;
 pub use rpem_by_vaf::RpemByVaf;
 pub use wavelet::WaveletRatio;
 
-/// All comparators with their defaults.
+/// All comparators with their default options.
 pub fn comparators() -> Vec<Box<dyn Comparator>> {
     vec![
         Box::new(RlsFir::default()),
@@ -49,8 +50,8 @@ pub fn comparators() -> Vec<Box<dyn Comparator>> {
     ]
 }
 
-/// Reason why a comparator, given by its name or the first word of it, does not track a recording, and the command that
-/// runs it; `None` for a name that no comparator has.
+/// Message that explains why a comparator, given by its name or the first word of the name, does not track a recording,
+/// and which command runs it; `None` if no comparator has this name.
 pub fn not_tracked(name: &str) -> Option<String> {
     let typed = name.trim().to_ascii_lowercase();
     let (_, about) = names().find(|(word, _)| *word == typed)?;
@@ -58,16 +59,16 @@ pub fn not_tracked(name: &str) -> Option<String> {
         name,
         help,
         source,
-        told,
+        extra_information,
     } = about;
-    let (what, why) = match told {
-        // A recursion, of more coefficients than a model has.
+    let (what, why) = match extra_information {
+        // Only a recursion needs no further information; it has more coefficients than a tracked model.
         "" => (
             "does not track recordings",
             "with more coefficients than the 64 of a tracked model; up to 64 are followed by --method rls --structure fir"
                 .to_owned(),
         ),
-        told => ("is not a recursion over a recording", format!("which needs {told}")),
+        extra_information => ("is not a recursion over a recording", format!("which needs {extra_information}")),
     };
     Some(format!(
         "{name} {what}: {help} ({source}), {why}. It follows simulated runs only: cargo run --release -p hoid-evidence \
@@ -76,8 +77,8 @@ pub fn not_tracked(name: &str) -> Option<String> {
     ))
 }
 
-/// The names under which [`not_tracked`] knows the comparators: each with its first word, such as `lpv`, unless that is
-/// a recursive method.
+/// The names that [`not_tracked`] accepts: the name of each comparator and its first word, such as `lpv`, unless that
+/// word names a recursive method.
 pub fn names() -> impl Iterator<Item = (&'static str, About)> {
     let all = comparators().into_iter().map(|one| one.about());
     all.flat_map(|about| {

@@ -1,30 +1,29 @@
-//! A finite impulse response by recursive least squares, shown as a frequency response over time
-//! (M. Olivari, J. Venrooij, F. M. Nieuwenhuizen, L. Pollini and H. H. Bülthoff, *Identifying
-//! time-varying pilot responses: a regularized recursive least-squares algorithm*, AIAA SciTech
-//! 2016).
+//! A finite impulse response estimated by recursive least squares and converted to a frequency response over time (M.
+//! Olivari, J. Venrooij, F. M. Nieuwenhuizen, L. Pollini and H. H. Bülthoff, *Identifying time-varying pilot responses:
+//! a regularized recursive least-squares algorithm*, AIAA SciTech 2016).
 //!
-//! `u(t) = sum_{i=0}^{nb-1} g_i e(t - i) + n(t)`, and after every sample the g that minimises
+//! The model is `u(t) = sum_{i=0}^{nb-1} g_i e(t - i) + n(t)`; after every sample, g minimises
 //!
 //! `sum_k lambda^(t-k) (u(k) - g' phi(k))^2 + p var(u) g' K^-1 g`.
 //!
-//! The forcing function has ten lines, which excite twenty directions of nb: without the second term the others are
-//! whatever noise and rounding make of them, and the covariance of the common form of the recursion grows as lambda^-t
-//! along them until it is not a covariance. K is the *tuned-correlated* kernel `K_ij = decay^max(i, j)` (T. Chen, H.
-//! Ohlsson and L. Ljung, *Automatica* 48 (2012) 1525-1535), the covariance of a response that decays and is smooth; its
-//! inverse is that of independent increments,
+//! The forcing function has ten lines, which excite only twenty of the nb directions. Without the second term the other
+//! directions would be determined by noise and rounding errors, and along them the covariance of the standard recursion
+//! would grow as lambda^-t until it were no longer positive definite. K is the *tuned-correlated* kernel
+//! `K_ij = decay^max(i, j)` (T. Chen, H. Ohlsson and L. Ljung, *Automatica* 48 (2012) 1525-1535), the covariance of a
+//! smooth, decaying response. Its inverse is that of independent increments,
 //!
 //! `g' K^-1 g = sum_i (g_i - g_{i+1})^2/(decay^i - decay^(i+1)) + g_{nb-1}^2/decay^(nb-1)`.
 //!
-//! The recursion is in the information form, `R(t) = lambda R(t-1) + phi phi'` and the same of `phi u`: sums of squares
-//! that stay positive whatever the excitation. They are solved where an estimate is requested. The Fourier transform of
-//! g is the response, `H = sum g_i e^(-j omega i Ts)`. It has no poles, and so no operator parameters.
+//! The recursion is in information form: `R(t) = lambda R(t-1) + phi phi'`, and the same recursion for `phi u`. These
+//! sums stay positive for any excitation; the equations are solved when an estimate is requested. The response is the
+//! Fourier transform of g, `H = sum g_i e^(-j omega i Ts)`. It has no poles and therefore no operator parameters.
 
 use hoid_ident::{settings, settings::Bounds};
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::{
-    comparator::{About, Comparator, Followed, Task},
+    comparator::{About, Comparator, TrackingResult, Task},
     least_squares::NormalEquations,
 };
 use crate::ThesisError;
@@ -50,7 +49,7 @@ settings! {
 }
 
 impl RlsFir {
-    /// K^-1: tridiagonal.
+    /// Returns K^-1, which is tridiagonal.
     fn inverse_kernel(&self) -> DMatrix<f64> {
         let mut inverse = DMatrix::zeros(self.nb, self.nb);
         let mut size = 1.0;
@@ -69,7 +68,7 @@ impl RlsFir {
         inverse
     }
 
-    /// The impulse responses after the samples that are requested.
+    /// Returns the impulse responses after the requested samples.
     fn impulse_responses(&self, task: &Task<'_>) -> Result<Vec<Vec<f64>>, ThesisError> {
         let (e, u) = task.signals(NAME, self.nb)?;
         let lambda = 1.0 - 1.0 / self.memory;
@@ -81,7 +80,7 @@ impl RlsFir {
         for k in 0..e.len() {
             regressors.rotate_right(1);
             regressors[0] = e[k];
-            // The signals before the record are not known: the regressors are complete from here on.
+            // The signals before the record are unknown, so that the regressors are complete only from this sample on.
             if k + 1 >= self.nb {
                 equations.add(lambda, &regressors, &[u[k]]);
             }
@@ -100,11 +99,11 @@ impl Comparator for RlsFir {
             name: NAME,
             help: "regularised recursive least squares of a finite impulse response, as a frequency response",
             source: "Olivari et al. 2016",
-            told: "",
+            extra_information: "",
         }
     }
 
-    fn follow(&self, task: &Task<'_>) -> Result<Followed, ThesisError> {
+    fn follow(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
         let ts = task.record.sample_time().s();
         let of = |g: &Vec<f64>| {
             let at = |omega: &f64| {
@@ -116,7 +115,7 @@ impl Comparator for RlsFir {
             task.omega_rad_s.iter().map(at).collect()
         };
         let all = self.impulse_responses(task)?;
-        Ok(Followed::without_operator(all.iter().map(of).collect()))
+        Ok(TrackingResult::without_operator(all.iter().map(of).collect()))
     }
 }
 

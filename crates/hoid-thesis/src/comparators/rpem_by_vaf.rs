@@ -1,15 +1,15 @@
-//! The recursive prediction-error method of BJ(nb = 2, nd = 1, nf = 2), its covariance updated by the VAF of a
-//! validation set, as the discussion of the thesis proposes (VII: *the covariance matrix could be updated based on VAF
-//! from a validation data set, in order to reduce the strong oscillations that are given in state s2*).
+//! The recursive prediction-error method for BJ(nb = 2, nd = 1, nf = 2), with a covariance that is updated by the VAF
+//! of a validation set, as the discussion of the thesis proposes (VII: *the covariance matrix could be updated based on
+//! VAF from a validation data set, in order to reduce the strong oscillations that are given in state s2*).
 //!
-//! It is `rpem` of `hoid_track` by the settings of the text, with [`track_validated`], which contains the rule. The
-//! validation set is a second run of the same person in the same task, with its own remnant.
+//! It is the method `rpem` of `hoid_track` with the settings of the text and with [`track_validated`], which contains
+//! the update rule. The validation set is a second run of the same person in the same task, with a different remnant.
 
 use hoid_ident::{settings, settings::Bounds};
 use hoid_model::{PolynomialModel, Structure};
 use hoid_track::{CovarianceUpdates, Method, StartAt, TrackOptions, track_validated};
 
-use super::comparator::{About, Comparator, Followed, Task};
+use super::comparator::{About, Comparator, TrackingResult, Task};
 use crate::ThesisError;
 
 const NAME: &str = "rpem-by-vaf";
@@ -44,11 +44,11 @@ impl Comparator for RpemByVaf {
             name: NAME,
             help: "recursive prediction-error method, its covariance updated by the VAF of a validation set",
             source: "the thesis, section VII",
-            told: "a second run of the same person in the same task",
+            extra_information: "a second run of the same person in the same task",
         }
     }
 
-    fn follow(&self, task: &Task<'_>) -> Result<Followed, ThesisError> {
+    fn follow(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
         let (e, _) = task.signals(NAME, task.nk)?;
         let unsuited = |found: String| ThesisError::Unsuited {
             method: NAME,
@@ -80,7 +80,7 @@ impl Comparator for RpemByVaf {
             power: self.power,
         };
         let trace = track_validated(task.record, validation, &options.with(&of_the_text)?, &updates, 1)?;
-        let mut found = Followed::default();
+        let mut found = TrackingResult::default();
         for at in task.at {
             let theta = trace.theta(*at).to_vec();
             let model = PolynomialModel::new(structure, orders, task.record.sample_time(), theta)?;

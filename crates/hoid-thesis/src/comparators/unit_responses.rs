@@ -1,12 +1,12 @@
-//! The operator's responses to error and error rate, with unit gain.
+//! The operator's responses to error and error rate with unit gain.
 //!
-//! With a known neuromuscular part, `u = K_e y_0 + K_e_dot y_1 + n`: y_0 is the exact response of
-//! `omega^2/(s^2 + 2 zeta omega s + omega^2)` to the held error of nk - 1 samples before, y_1 its
-//! rate. It is the form of [`hoid_ident::SigmoidChange`] for a whole delay.
+//! With a known neuromuscular part, `u = K_e y_0 + K_e_dot y_1 + n`. The signal y_0 is the exact response of
+//! `omega^2/(s^2 + 2 zeta omega s + omega^2)` to the held error, delayed by nk - 1 samples, and y_1 is its rate. This
+//! is the form of [`hoid_ident::SigmoidChange`] for a delay of whole samples.
 
 use hoid_model::{SampleTime, second_order::HeldStates};
 
-/// y_0 and y_1, from rest.
+/// Returns y_0 and y_1, starting from rest.
 pub(super) fn unit_responses(
     e: &[f64],
     omega_rad_s: f64,
@@ -19,7 +19,7 @@ pub(super) fn unit_responses(
     let mut state = [0.0; 2];
     let (mut y_0, mut y_1) = (Vec::with_capacity(e.len()), Vec::with_capacity(e.len()));
     for k in 0..e.len() {
-        // The response to e(k - nk) starts at k.
+        // The response to e(k - nk) starts at sample k.
         let before = if k >= nk { e[k - nk] } else { 0.0 };
         state = held.step(state, before);
         y_0.push(square * state[0]);

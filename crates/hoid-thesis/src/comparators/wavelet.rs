@@ -1,26 +1,25 @@
-//! The ratio of wavelet transforms at the lines (P. M. Thompson, D. H. Klyde, E. N. Bachelder and
-//! T. J. Rosenthal, *Development of wavelet-based techniques for detecting loss of control*, AIAA
-//! 2004-5064).
+//! Ratio of wavelet transforms at the lines (P. M. Thompson, D. H. Klyde, E. N. Bachelder and T. J. Rosenthal,
+//! *Development of wavelet-based techniques for detecting loss of control*, AIAA 2004-5064).
 //!
-//! With Morlet's wavelet of c radians, whose envelope at the frequency omega has the width
-//! `s = c/omega`,
+//! With Morlet's wavelet of c radians, whose envelope at the frequency omega has the width `s = c/omega`, the transform
+//! is
 //!
 //! `X(omega, t) = sum_k x(k) exp(-(t_k - t)^2/(2 s^2)) e^(-j omega t_k)`,
 //!
-//! and `H(j omega, t) = U/E`: what share of each frequency there is, where it is. The width falls
-//! with frequency, so that a slow line is seen over tens of seconds and a fast one over seconds; in
-//! frequency the envelope has the width omega/c, and of two lines that are closer than some of it
-//! each disturbs the other. The response at t takes as much from after t as from before.
+//! and `H(j omega, t) = U/E`. The transform shows how much of each frequency a signal contains near time t. The width
+//! of the envelope decreases with frequency, so that a slow line is averaged over tens of seconds and a fast one over
+//! seconds. In frequency the envelope has the width omega/c, and lines that are closer than about this width disturb
+//! each other. The response at t uses as much data after t as before it.
 
 use hoid_ident::{settings, settings::Bounds};
 use num_complex::Complex64;
 
-use super::comparator::{About, Comparator, Followed, Task};
+use super::comparator::{About, Comparator, TrackingResult, Task};
 use crate::ThesisError;
 
 const NAME: &str = "wavelet";
-/// Widths of the envelope after which it is nothing: 3e-4.
-const REACH: f64 = 4.0;
+/// Distance, in widths of the envelope, beyond which the envelope is neglected: it is 3e-4 there.
+const ENVELOPE_WIDTHS: f64 = 4.0;
 
 settings! {
     /// Options of the wavelet transforms.
@@ -32,10 +31,10 @@ settings! {
 }
 
 impl WaveletRatio {
-    /// The transform of e and of u at one frequency and time.
+    /// Returns the transforms of e and u at one frequency and time.
     fn transforms(&self, signals: [&[f64]; 2], omega: f64, at: usize, ts: f64) -> [Complex64; 2] {
         let width = self.radians / (omega * ts);
-        let reach = (REACH * width).ceil() as usize;
+        let reach = (ENVELOPE_WIDTHS * width).ceil() as usize;
         let (first, last) = (at.saturating_sub(reach), (at + reach).min(signals[0].len() - 1));
         let mut sums = [Complex64::default(); 2];
         for k in first..=last {
@@ -55,11 +54,11 @@ impl Comparator for WaveletRatio {
             name: NAME,
             help: "ratio of the wavelet transforms of u and e at the lines",
             source: "Thompson et al. 2004",
-            told: "the lines of the forcing function; as much data after each time as before it",
+            extra_information: "the lines of the forcing function; as much data after each time as before it",
         }
     }
 
-    fn follow(&self, task: &Task<'_>) -> Result<Followed, ThesisError> {
+    fn follow(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
         let (e, u) = task.signals(NAME, 1)?;
         let ts = task.record.sample_time().s();
         let of = |at: &usize| {
@@ -70,7 +69,7 @@ impl Comparator for WaveletRatio {
             task.omega_rad_s.iter().map(ratio).collect()
         };
         let response: Vec<Vec<Complex64>> = task.at.iter().map(of).collect();
-        Ok(Followed::without_operator(response))
+        Ok(TrackingResult::without_operator(response))
     }
 }
 

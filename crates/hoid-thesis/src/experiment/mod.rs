@@ -1,20 +1,20 @@
 //! The experiment of section VI and appendix I of the thesis, with virtual or recorded people.
 //!
-//! The recordings of the text are of three subjects in a simulator and are not public. Its procedure can be applied to
-//! virtual people with known parameters: three different subjects, seven runs in each of C1 to C6, of which the last
-//! five are evaluated; and to the user's own recordings. For each run ([`procedure`]):
+//! The recordings of the text come from three subjects in a simulator and are not public. Its procedure can be applied
+//! to virtual people with known parameters (three different subjects, seven runs in each of C1 to C6, of which the last
+//! five are evaluated), and to the user's own recordings. For each run ([`procedure`]):
 //!
-//! 1. Batch fits of the first and the last three eighths, [0, 30.72] and [51.20, 81.92] s of the text, ARX by OLS and
-//!    BJ(m* = 1) by PEM, with every delay of a range. In each span the delay with the highest VAF is the best; the
-//!    n_k* of the run and structure is the mean of the two, rounded, and T_n* that of their two time constants
-//!    of the remnant (the text: *the average between the best two sub-batch-fitting estimations
+//! 1. Batch fits to the first and the last three eighths of the run, [0, 30.72] and [51.20, 81.92] s in the text: ARX
+//!    by OLS and BJ(m* = 1) by PEM, with every delay of a range. In each span the delay with the highest VAF is the
+//!    best. The n_k* of the run and structure is the mean of the two best delays, rounded; T_n* is the mean of the
+//!    remnant time constants of the two fits (the text: *the average between the best two sub-batch-fitting estimations
 //!    made*).
-//! 2. With that n_k*, OLS and PEM of both spans again.
-//! 3. RLS and RPEM with lambda = 1 - 1/256 and P0 = 0.1 I over the run, from the fit of the first span. T_n* is
-//!    reported in Table 3 and not used further: d1 is a parameter of RPEM and starts with that of its fit, as in
-//!    section V.B.
+//! 2. With this n_k*, OLS and PEM fits to both spans are repeated.
+//! 3. RLS and RPEM with lambda = 1 - 1/256 and P0 = 0.1 I track the run, starting from the fit of the first span. T_n*
+//!    is reported in Table 3 and not used further: d1 is a parameter of RPEM and starts from the value in its fit, as
+//!    in section V.B.
 //!
-//! Figures show the average over the five runs, as in the text, and the median as well.
+//! Figures show the average over the five runs, as in the text, and also the median.
 //!
 //! | module | contents |
 //! |---|---|
@@ -35,30 +35,30 @@ pub use recorded::RecordedPeople;
 use crate::ThesisError;
 use procedure::{RunOutcome, evaluate};
 
-/// Whose run it is, in which condition, and which.
+/// Identification of a run: subject, condition and number of the run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunKey {
     /// Subject.
     pub subject: String,
     /// Condition.
     pub condition: String,
-    /// Run within the subject and condition.
+    /// Run of the subject in the condition.
     pub run: String,
 }
 
-/// A condition of an experiment, and that of the text with the same course of the controlled element.
+/// A condition of an experiment, and the condition of the text in which the controlled element changes in the same way.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ExperimentCondition {
-    /// Its name.
+    /// Name of the condition in the experiment.
     pub name: String,
-    /// The condition of the text.
+    /// Corresponding condition of the text.
     pub of_text: Condition,
 }
 
-/// A run with its times from the start of the measurement.
+/// A run whose times are counted from the start of the measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredRun {
-    /// The measurement, from 0 s.
+    /// The measurement; it starts at 0 s.
     pub record: Record,
     /// Time of a known change of the controlled element, s.
     pub change_s: Option<f64>,
@@ -66,23 +66,23 @@ pub struct MeasuredRun {
 
 /// People whose runs are evaluated.
 pub trait Experiment: Send + Sync {
-    /// The runs that are evaluated, by subject, condition and run.
+    /// The runs that are evaluated, ordered by subject, condition and run.
     fn runs(&self) -> Vec<RunKey>;
 
-    /// The conditions.
+    /// The conditions of the experiment.
     fn conditions(&self) -> Vec<ExperimentCondition>;
 
-    /// First and last delay tried, samples.
+    /// First and last delay that is tried, samples.
     fn delays(&self) -> (usize, usize);
 
     /// The record of a run.
     ///
     /// # Errors
-    /// [`ThesisError::Study`] for a run that cannot be read or simulated.
+    /// [`ThesisError::Study`] if the run cannot be read or simulated.
     fn measured(&self, run: &RunKey) -> Result<MeasuredRun, ThesisError>;
 
-    /// Number of estimates of a run: for each structure the fits of two spans with every delay and with the best one,
-    /// and a recursive one.
+    /// Number of estimates for a run: for each structure, the fits to two spans with every delay and with n_k*, and one
+    /// recursive estimate.
     fn estimates_of_run(&self) -> u64 {
         let (first, last) = self.delays();
         2 * (2 * (last + 1).saturating_sub(first) as u64 + 2 + 1)
@@ -92,32 +92,32 @@ pub trait Experiment: Send + Sync {
 /// An evaluated run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EvaluatedRun {
-    /// Which.
+    /// Identification of the run.
     pub key: RunKey,
     /// Time of a known change of the controlled element, s.
     pub change_s: Option<f64>,
-    /// The results.
+    /// Results for the run.
     pub outcome: RunOutcome,
 }
 
-/// The runs of an experiment.
+/// Results of all runs of an experiment.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Evaluation {
-    /// Evaluated runs, by subject, condition and run.
+    /// Evaluated runs, ordered by subject, condition and run.
     pub runs: Vec<EvaluatedRun>,
-    /// Runs that could not be evaluated, and why.
+    /// Runs that could not be evaluated, with the reason.
     pub failed: Vec<(RunKey, String)>,
 }
 
-/// Carries out an experiment. `each` is called after each run; runs are left out from the moment at which `goes_on` is
-/// false.
+/// Evaluates the runs of an experiment. `each` is called after each run. Once `keep_running` returns false, the
+/// remaining runs are omitted.
 pub fn experiment(
     people: &dyn Experiment,
     each: &(dyn Fn() + Sync),
-    goes_on: &(dyn Fn() -> bool + Sync),
+    keep_running: &(dyn Fn() -> bool + Sync),
 ) -> Evaluation {
     let one = |key: RunKey| {
-        if !goes_on() {
+        if !keep_running() {
             return None;
         }
         let evaluated = people.measured(&key).and_then(|MeasuredRun { record, change_s }| {

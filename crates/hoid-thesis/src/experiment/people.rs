@@ -7,27 +7,27 @@ use toml::{Table, Value};
 use super::{Experiment, ExperimentCondition, MeasuredRun, RunKey};
 use crate::ThesisError;
 
-/// The built-in plan.
+/// Text of the built-in plan.
 pub const EXPERIMENT: &str = include_str!("../../plans/experiment.toml");
 
-/// People of the experiment, and the processing of their runs.
+/// The virtual people of the experiment, and the processing of their runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExperimentPlan {
     /// Seed of all random streams.
     pub seed: u64,
     /// Number of subjects.
     pub subjects: u64,
-    /// Number of runs of each subject and condition.
+    /// Number of runs per subject and condition.
     pub runs: u64,
-    /// Number of runs that are evaluated, the last ones.
+    /// Number of runs that are evaluated; these are the last runs.
     pub evaluated: u64,
-    /// Spread of the parameters between subjects, and between the runs of one.
+    /// Spread of the parameters between subjects, and between the runs of a subject.
     pub spreads: (f64, f64),
     /// Order of the remnant.
     pub remnant_order: usize,
     /// Noise level before the spread is applied.
     pub noise_level: f64,
-    /// First and last delay tried, samples.
+    /// First and last delay that is tried, samples.
     pub delays: (usize, usize),
 }
 
@@ -54,7 +54,7 @@ impl ExperimentPlan {
     /// Reads and checks the text of a plan.
     ///
     /// # Errors
-    /// [`ThesisError::Unsuited`] with the key and the remedy.
+    /// [`ThesisError::Unsuited`] with the invalid key and the remedy.
     pub fn parse(text: &str) -> Result<Self, ThesisError> {
         const KEYS: [&str; 9] = [
             "seed",
@@ -110,10 +110,10 @@ impl ExperimentPlan {
         Ok(plan)
     }
 
-    /// A run of a subject in a condition.
+    /// Simulates a run of a subject in a condition.
     ///
     /// # Errors
-    /// [`ThesisError::Study`] for people without stable loops.
+    /// [`ThesisError::Study`] if no people with stable loops are found.
     pub fn record(&self, subject: u64, condition: Condition, run: u64) -> Result<Record, ThesisError> {
         let experiment = VirtualExperiment {
             subjects: self.subjects,
@@ -160,7 +160,7 @@ impl Experiment for ExperimentPlan {
         self.delays
     }
 
-    /// The simulated operator, in the record, has the change.
+    /// Returns no time of change, because the record contains the simulated operator with its change.
     fn measured(&self, key: &RunKey) -> Result<MeasuredRun, ThesisError> {
         let number = |key: &str, text: &str| {
             let number = text.parse::<u64>();

@@ -9,65 +9,65 @@ use hoid_track::{Method, StartAt, TrackOptions, track_from};
 
 use crate::ThesisError;
 
-/// Share of a run in each of the two batch fits, at its start and at its end: 30.72 of 81.92 s.
+/// Fraction of a run in each of the two batch fits, at the start and at the end: 30.72 of 81.92 s.
 const SHARE: f64 = 0.375;
-/// Samples between stored estimates.
+/// Number of samples between stored estimates.
 const EVERY: usize = 32;
-/// P0 and memory, as in section V.B.
+/// Memory length and initial covariance P0, as in section V.B.
 const SETTINGS: [(&str, &str); 2] = [("memory", "256"), ("covariance", "0.1")];
 
-/// Coefficients and operator of one moment.
+/// Coefficients and operator at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct State {
-    /// a1, a2 (f1, f2 of a Box-Jenkins model), b0, b1.
+    /// Coefficients a1, a2 (f1, f2 of a Box-Jenkins model), b0, b1.
     pub discrete: [f64; 4],
-    /// K_e, T_L, K_e_dot, omega_nm, zeta_nm; not numbers if the model cannot be converted.
+    /// Parameters K_e, T_L, K_e_dot, omega_nm, zeta_nm; NaN if the model cannot be converted.
     pub operator: [f64; 5],
 }
 
-/// An estimate over time.
+/// A recursive estimate over time.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Course {
+pub struct RecursiveTrace {
     /// Times, s.
     pub times_s: Vec<f64>,
     /// Coefficients and operator at each time.
     pub states: Vec<State>,
-    /// Variances of a1, a2, b0, b1, and d1 if there is one.
+    /// Variances of a1, a2, b0, b1 and, if the model has it, d1.
     pub variances: Vec<[f64; 5]>,
 }
 
 /// The simulated operator of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {
-    /// Its delay including that of the hold, samples.
+    /// Delay including that of the hold, samples.
     pub nk: usize,
-    /// At the start and at the end.
+    /// Operator at the start and at the end of the run.
     pub states: [State; 2],
 }
 
-/// Results of one run, by structure (ARX and Box-Jenkins) and by span.
+/// Results of one run; arrays are by structure (ARX, Box-Jenkins), then by span.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunOutcome {
-    /// The two spans, s.
+    /// The two spans of the batch fits, s.
     pub spans_s: [(f64, f64); 2],
-    /// n_k*, samples.
+    /// Delay n_k* by structure, samples.
     pub nk: [usize; 2],
-    /// The best delay of each span, samples.
+    /// Best delay in each span, samples.
     pub nk_of_span: [[usize; 2]; 2],
-    /// T_n* of the Box-Jenkins model, s; not a number if neither span has one.
+    /// Time constant T_n* of the Box-Jenkins model, s; NaN if neither span gives one.
     pub t_n_s: f64,
-    /// Batch fits.
+    /// Batch fits with the delay n_k*.
     pub batch: [[State; 2]; 2],
-    /// RLS and RPEM.
-    pub courses: [Course; 2],
-    /// The simulated operator; none of recorded people.
+    /// Recursive estimates by RLS and RPEM.
+    pub courses: [RecursiveTrace; 2],
+    /// The simulated operator; `None` for recorded people.
     pub truth: Option<Truth>,
 }
 
-/// Applies the procedure of section VI to one run, with the delays from first to last.
+/// Applies the procedure of section VI to one run, trying all delays from the first to the last.
 ///
 /// # Errors
-/// [`ThesisError::Estimator`] for a model that cannot be fitted or tracked.
+/// [`ThesisError::Estimator`] if a model cannot be fitted or tracked.
 pub fn evaluate(record: &Record, delays: (usize, usize)) -> Result<RunOutcome, ThesisError> {
     let spans_s = spans_s(record);
     let span = |(from_s, to_s): (f64, f64)| record.span(from_s, to_s);
@@ -85,7 +85,7 @@ pub fn evaluate(record: &Record, delays: (usize, usize)) -> Result<RunOutcome, T
     })
 }
 
-/// The two spans of a record, s.
+/// Returns the two spans of a record for the batch fits, s.
 fn spans_s(record: &Record) -> [(f64, f64); 2] {
     let from_s = record.time_s(0);
     let length_s = record.len() as f64 * record.sample_time().s();
@@ -93,13 +93,13 @@ fn spans_s(record: &Record) -> [(f64, f64); 2] {
     [(from_s, from_s + first), (from_s + last, from_s + length_s)]
 }
 
-/// Results with one structure.
+/// Results for one structure.
 struct OfStructure {
     nk: usize,
     nk_of_span: [usize; 2],
     t_n_s: f64,
     batch: [State; 2],
-    course: Course,
+    course: RecursiveTrace,
 }
 
 fn of_structure(
@@ -130,7 +130,7 @@ fn of_structure(
     })
 }
 
-/// The fit of a span with the delay of the highest VAF, simulated as everywhere (eq. 39).
+/// Returns the fit of a span with the delay that gives the highest VAF of the simulated output (eq. 39).
 fn best_delay(span: &Record, structure: Structure, (first, last): (usize, usize)) -> Result<Fit, ThesisError> {
     let mut best: Option<(f64, Fit)> = None;
     let mut failed = None;
@@ -161,7 +161,7 @@ fn best_delay(span: &Record, structure: Structure, (first, last): (usize, usize)
     }
 }
 
-/// Mean of the available time constants, by backward Euler.
+/// Returns the mean of the available remnant time constants, retrieved by backward Euler; NaN if there is none.
 fn time_constant(fits: &[Fit; 2]) -> f64 {
     let of = |fit: &Fit| {
         fit.remnant(RemnantDiscretisation::BackwardEuler)
@@ -172,8 +172,8 @@ fn time_constant(fits: &[Fit; 2]) -> f64 {
     mean(&all)
 }
 
-/// RLS or RPEM from the fit of the first span.
-fn course(record: &Record, start: &Fit) -> Result<Course, ThesisError> {
+/// Tracks a record by RLS or RPEM, starting from the fit of the first span.
+fn course(record: &Record, start: &Fit) -> Result<RecursiveTrace, ThesisError> {
     let (structure, orders) = (start.model().structure(), start.orders());
     let options = match structure {
         Structure::BoxJenkins => {
@@ -188,7 +188,7 @@ fn course(record: &Record, start: &Fit) -> Result<Course, ThesisError> {
     };
     let trace = track_from(record, &options, EVERY, Some(start))?;
     let places = places(&orders);
-    let mut course = Course::default();
+    let mut course = RecursiveTrace::default();
     for row in 0..trace.len() {
         let theta = trace.theta(row);
         let operator = trace.operator_values(row).ok().map(|found| found.parameters());
@@ -208,7 +208,7 @@ fn course(record: &Record, start: &Fit) -> Result<Course, ThesisError> {
     Ok(course)
 }
 
-/// Positions of a1, a2 (or f1, f2), b0, b1 and d1 in theta.
+/// Returns the positions of a1, a2 (or f1, f2), b0, b1 and d1 in theta.
 fn places(orders: &Orders) -> [Option<usize>; 5] {
     let names = orders.parameter_names();
     let of = |wanted: &[&str]| names.iter().position(|name| wanted.contains(&name.as_str()));
@@ -237,7 +237,7 @@ fn values(operator: Option<OperatorParameters>) -> [f64; 5] {
     })
 }
 
-/// The simulated operator, if the record has its parameters.
+/// Returns the simulated operator; `None` if the record does not contain its parameters.
 fn truth(record: &Record) -> Option<Truth> {
     let states = [true_state(record, 0)?, true_state(record, record.len() - 1)?];
     let tau_s = *record.channel("tau_e")?.first()?;
@@ -247,7 +247,7 @@ fn truth(record: &Record) -> Option<Truth> {
     })
 }
 
-/// The simulated operator at a sample.
+/// Returns the simulated operator at a sample.
 fn true_state(record: &Record, k: usize) -> Option<State> {
     let of = |name: &str| record.channel(name)?.get(k).copied();
     let operator = OperatorParameters {

@@ -1,13 +1,14 @@
-//! Recorded people: the runs of the manifest of a group ([`Manifest`]), read and prepared as `hoid group` does.
+//! Recorded people: the runs in the manifest of a group ([`Manifest`]), read and prepared as by `hoid group`.
 //!
-//! Of each person in a condition the last five runs that count are evaluated, as in the text. Times are those since the
-//! start of the span that counts, `from_s` of the manifest: the text leaves a run-in of 8.08 s out.
+//! For each person and condition the last five runs that count are evaluated, as in the text. Times are measured from
+//! the start of the evaluated span, `from_s` in the manifest; the text omits a run-in of 8.08 s.
 //!
-//! A condition is shown where the text shows the one with the same course of the controlled element. That is known from
-//! `controlled_element`, `changes_to`, `change_s` and `change_per_s` of the manifest: an element is s1 or s2 of the text
-//! by the slope of its logarithmic gain `d ln|H| / d ln w` at 2 rad/s, near the crossover of people, -1.1 in s1 and -2.0
-//! in s2; a change is sudden if its middle 80 % take less than a second, `2 ln 9 / G`. Without an element its name
-//! decides, C1 to C6.
+//! A condition is shown in place of the condition of the text in which the controlled element changes in the same way.
+//! This is determined from `controlled_element`, `changes_to`, `change_s` and `change_per_s` of the manifest. An
+//! element counts as s1 or s2 of the text according to the slope of its logarithmic gain `d ln|H| / d ln w` at 2 rad/s,
+//! near the crossover frequency of people; the slope is -1.1 for s1 and -2.0 for s2. A change is sudden if its middle
+//! 80 %, which takes `2 ln 9 / G`, takes less than a second. If no element is given, the name of the condition (C1 to
+//! C6) decides.
 
 use std::path::{Path, PathBuf};
 
@@ -19,12 +20,12 @@ use crate::ThesisError;
 
 /// Frequency at which the slopes of elements are compared, rad/s.
 const NEAR_CROSSOVER_RAD_S: f64 = 2.0;
-/// Slope between those of a single and of a double integrator.
+/// Limit between the slopes of a single and a double integrator.
 const SLOPE_BETWEEN: f64 = -1.5;
-/// Longest duration of the middle 80 % of a sudden change, s.
+/// Limit for the duration of the middle 80 % of a sudden change, s.
 const SUDDEN_S: f64 = 1.0;
 
-/// Recordings of people.
+/// Recordings of people that are evaluated.
 #[derive(Debug, Clone)]
 pub struct RecordedPeople {
     manifest: Manifest,
@@ -36,13 +37,13 @@ pub struct RecordedPeople {
 }
 
 impl RecordedPeople {
-    /// The recordings of a directory with a manifest, or of a manifest.
+    /// Opens the recordings of a manifest, given by its path or its directory.
     ///
     /// # Errors
-    /// [`ThesisError::Study`] for a missing or invalid manifest, or if no run can be read;
-    /// [`ThesisError::Recordings`] if no condition is one of the text.
+    /// [`ThesisError::Study`] if the manifest is missing or invalid, or if no run can be read;
+    /// [`ThesisError::Recordings`] if no condition corresponds to one of the text, or if no run counts.
     pub fn open(place: &Path) -> Result<Self, ThesisError> {
-        let path = Manifest::place(place)?;
+        let path = Manifest::manifest_path(place)?;
         let manifest = Manifest::read(&path)?;
         let base = path.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
         let (conditions, left_out) = conditions(&manifest);
@@ -50,7 +51,7 @@ impl RecordedPeople {
             let reasons: Vec<String> = left_out.iter().map(|(name, why)| format!("{name}: {why}")).collect();
             return Err(ThesisError::Recordings {
                 place: path.display().to_string(),
-                reason: format!("no condition is one of the text; {}", reasons.join("; ")),
+                reason: format!("no condition is a condition of the thesis; {}", reasons.join("; ")),
             });
         }
         let count = ExperimentPlan::parse(EXPERIMENT)?.evaluated as usize;
@@ -58,7 +59,7 @@ impl RecordedPeople {
             .iter()
             .flat_map(|condition| last_runs(&manifest, &condition.name, count))
             .collect();
-        // The first run that can be read has the sample time; if none can be read, the first has the reason.
+        // The first readable run gives the sample time. If no run can be read, the error of the first is returned.
         let mut failed = None;
         let read = evaluated.iter().find_map(|entry| {
             let read = RecordedRun::read(&manifest, &base, entry);
@@ -68,7 +69,7 @@ impl RecordedPeople {
             return Err(failed.map_or_else(
                 || ThesisError::Recordings {
                     place: path.display().to_string(),
-                    reason: "no run counts, expected some with counts = true".to_owned(),
+                    reason: "no run counts, expected runs with counts = true".to_owned(),
                 },
                 ThesisError::from,
             ));
@@ -90,7 +91,7 @@ impl RecordedPeople {
         &self.manifest.name
     }
 
-    /// Conditions that are none of the text, and why.
+    /// Conditions that correspond to none of the text, with the reason.
     pub fn left_out(&self) -> &[(String, String)] {
         &self.left_out
     }
@@ -132,7 +133,7 @@ fn key_of(entry: &RunEntry) -> RunKey {
     }
 }
 
-/// The last runs of each person in a condition, by their numbers where all have one.
+/// Returns the last runs of each person in a condition, ordered by number if all runs of the person have one.
 fn last_runs(manifest: &Manifest, condition: &str, count: usize) -> Vec<RunEntry> {
     let own: Vec<&RunEntry> = (manifest.runs.iter())
         .filter(|run| run.counts && run.condition == condition)
@@ -155,7 +156,8 @@ fn last_runs(manifest: &Manifest, condition: &str, count: usize) -> Vec<RunEntry
     last
 }
 
-/// Conditions with those of the text, and the names of the others with the reason.
+/// Returns the conditions with the corresponding conditions of the text, and the names of the other conditions with the
+/// reason.
 fn conditions(manifest: &Manifest) -> (Vec<ExperimentCondition>, Vec<(String, String)>) {
     let mut names: Vec<&str> = manifest.runs.iter().map(|run| run.condition.as_str()).collect();
     names.sort_unstable();
@@ -174,7 +176,7 @@ fn conditions(manifest: &Manifest) -> (Vec<ExperimentCondition>, Vec<(String, St
     (found, others)
 }
 
-/// The condition of the text with the same course of the controlled element.
+/// Returns the condition of the text in which the controlled element changes in the same way.
 fn of_text(name: &str, facts: &ConditionSettings) -> Result<Condition, String> {
     let unknown = |what: &str| {
         format!(
@@ -212,7 +214,7 @@ fn of_text(name: &str, facts: &ConditionSettings) -> Result<Condition, String> {
     }
 }
 
-/// Whether an element resembles a double integrator near the crossover, like s2.
+/// True if an element resembles a double integrator near the crossover frequency, as s2 does.
 fn is_double(element: &str) -> Result<bool, String> {
     let element: ContinuousTransferFunction = element.parse().map_err(|error| format!("{error}"))?;
     let step = 1e-3_f64;

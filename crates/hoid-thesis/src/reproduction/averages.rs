@@ -1,8 +1,8 @@
-//! Figs. H.1 to H.12 as in the text, *obtained values averaged from M realizations*: the averages
-//! over the runs, and the medians.
+//! Figs. H.1 to H.12 as in the text, *obtained values averaged from M realizations*: averages over the runs, with the
+//! medians for comparison.
 //!
-//! `T_L = K_e_dot/K_e` of a single run in which K_e nearly vanishes dominates the average of all;
-//! therefore the figures of the same number show the medians (`traces`).
+//! A single run in which K_e nearly vanishes dominates the average of `T_L = K_e_dot/K_e`. The figures of the module
+//! `traces` with the same numbers therefore show the medians.
 
 use hoid_study::{Query, Results};
 
@@ -14,7 +14,7 @@ use super::{
 };
 use hoid_report::figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, trace_panels};
 
-/// The displayed noise level: averages and medians of three levels would be twelve lines.
+/// The displayed noise level. Averages and medians at three levels would be twelve lines.
 const LEVEL: f64 = 0.1;
 
 pub(super) fn items() -> Vec<Item> {

@@ -10,13 +10,13 @@ use super::{
 };
 use hoid_report::figures::{BoxGrid, BoxPanel, BoxRange, BoxSeries, BoxStatistics, Shade, box_plots};
 
-/// The estimator of a figure.
+/// Estimator shown in a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Model {
     Arx,
-    /// m* = m0.
+    /// Box-Jenkins model with m* = m0.
     Matched,
-    /// m* = 1.
+    /// Box-Jenkins model with m* = 1.
     First,
 }
 
@@ -29,12 +29,12 @@ impl Model {
         }
     }
 
-    /// Index of the method for its hue.
+    /// Index of the method, which determines the hue.
     pub(super) fn method(self) -> usize {
         usize::from(self != Self::Arx)
     }
 
-    /// The estimator in the study of biases.
+    /// Restricts a query to this estimator in the study of biases.
     pub(super) fn of(self, query: Query, remnant_order: usize) -> Query {
         match self {
             Self::Arx => query.name("ARX"),
@@ -44,7 +44,7 @@ impl Model {
     }
 }
 
-/// The parameters of a figure: columns of the study for ARX and Box-Jenkins, label.
+/// Group of parameters shown in a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Parameters {
     Discrete,
@@ -52,7 +52,7 @@ enum Parameters {
     Remnant,
 }
 
-/// Quantity of the study for ARX, for Box-Jenkins, its symbol, and the symbol in letters.
+/// A parameter: its name in the study for ARX, its name for Box-Jenkins, its symbol, and its name in the table.
 type Row = (&'static str, &'static str, &'static str, &'static str);
 
 const DISCRETE: [Row; 4] = [
@@ -98,12 +98,12 @@ impl Parameters {
     }
 }
 
-/// Limit of the linear part of an ordinate for which [`bends`] is true, %.
+/// Limit, in %, up to which an ordinate is linear if [`has_large_biases`] is true.
 const LINEAR_WITHIN: f64 = 10.0;
 
-/// True for biases of up to thousands of times the value: the innovation variance of a first-order
-/// model of a higher-order remnant is not that of the remnant.
-fn bends(model: Model, remnant_order: usize, letters: &str) -> bool {
+/// True if biases may reach thousands of times the true value: the innovation variance of a first-order model differs
+/// from that of a higher-order remnant.
+fn has_large_biases(model: Model, remnant_order: usize, letters: &str) -> bool {
     model == Model::First && remnant_order > 1 && matches!(letters, "innovation variance" | "T_n" | "K_n")
 }
 
@@ -157,7 +157,7 @@ fn item(name: &str, condition: &'static str, model: Model, parameters: Parameter
 }
 
 fn make(item: &Item, results: &Results, condition: &str, model: Model, parameters: Parameters) -> ItemOutput {
-    // Without remnant its parameters have no true values.
+    // Without remnant, its parameters have no true values.
     let levels = if parameters == Parameters::Remnant {
         &LEVELS[1..]
     } else {
@@ -213,7 +213,7 @@ fn make(item: &Item, results: &Results, condition: &str, model: Model, parameter
                 name: format!("B_r({symbol})"),
                 unit: "%".to_owned(),
                 boxes,
-                linear_within: bends(model, m0, letters).then_some(LINEAR_WITHIN),
+                linear_within: has_large_biases(model, m0, letters).then_some(LINEAR_WITHIN),
                 ..BoxPanel::default()
             });
         }

@@ -1,4 +1,4 @@
-//! The page of the reproduction: tables, figures with their data, claims, studies with their plans.
+//! The page of the reproduction: tables, figures with their data, claims, and studies with their plans.
 
 use crate::claims::{Claim, Finding, Measured, Verdict};
 use hoid_io::{ColumnValues, OutputTable};
@@ -9,32 +9,32 @@ use hoid_report::{numbers, render_with};
 
 use crate::ThesisError;
 
-/// The page.
+/// Contents of the page of the reproduction.
 #[derive(Debug, Default)]
 pub struct IndexPage {
-    /// Inputs and processing, as name and value.
+    /// Inputs and processing, as pairs of name and value.
     pub settings: Vec<(String, String)>,
     /// Remarks for the reader.
     pub notes: Vec<String>,
     entries: Vec<Value>,
     claims: Vec<Value>,
-    /// Numbers of claims that hold, hold and more so, hold in part, do not hold, cannot be tested.
+    /// Numbers of claims by verdict: hold, hold and more so, hold in part, do not hold, cannot be tested.
     tally: [usize; 5],
     studies: Vec<Value>,
 }
 
-/// A study of the page.
+/// Entry for a study on the page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StudyEntry {
-    /// Its name.
+    /// Name of the study.
     pub name: String,
-    /// Its title.
+    /// Title of the study.
     pub title: String,
-    /// Path of its directory, relative to the page; empty if it is not kept.
+    /// Path of the directory of the study, relative to the page; empty if the results are not stored.
     pub directory: String,
     /// Number of estimates.
     pub estimates: u64,
-    /// Duration, s; `None` if the study already existed.
+    /// Duration, s; `None` if the results already existed.
     pub seconds: Option<f64>,
 }
 
@@ -49,11 +49,11 @@ impl IndexPage {
         });
     }
 
-    /// Adds the claims of the text with their evidence.
+    /// Adds the claims of the text with the evidence about them.
     pub fn add_claims(&mut self, findings: &[(Claim, Finding)]) {
         let mut theme = "";
         for (claim, finding) in findings {
-            // The heading precedes the first claim of its theme.
+            // Only the first claim of a theme has a heading.
             let heading = (claim.theme.title() != theme).then(|| claim.theme.title());
             theme = claim.theme.title();
             let class = match finding.verdict {
@@ -78,7 +78,7 @@ impl IndexPage {
         ];
     }
 
-    /// Numbers of claims that hold, hold and more so, hold in part, do not hold, cannot be tested.
+    /// Returns the numbers of claims by verdict: hold, hold and more so, hold in part, do not hold, cannot be tested.
     pub fn tally(&self) -> [usize; 5] {
         self.tally
     }
@@ -91,10 +91,10 @@ impl IndexPage {
         });
     }
 
-    /// The page as HTML text.
+    /// Returns the page as HTML text.
     ///
     /// # Errors
-    /// [`ThesisError::Report`] for a defect of the template.
+    /// [`ThesisError::Report`] if the template is defective.
     pub fn to_html(&self) -> Result<String, ThesisError> {
         let facts: Vec<_> = self
             .settings
@@ -118,7 +118,7 @@ impl IndexPage {
     }
 }
 
-/// A measured value as text: with its error, and its range over the cells if there are several.
+/// Formats a measured value with its error and, if there are several cells, its range over the cells.
 fn measured(of: &Measured) -> String {
     let (value, error) = numbers::with_uncertainty(of.value, Some(of.error).filter(|error| *error > 0.0));
     let error = if of.error > 0.0 {
@@ -134,7 +134,7 @@ fn measured(of: &Measured) -> String {
     format!("{}: {value}{error}{range}", of.label)
 }
 
-/// Cells of a table as text.
+/// Returns the cells of a table as text.
 fn table_rows(table: &OutputTable) -> Vec<Vec<String>> {
     let rows = table.columns.first().map_or(0, |c| c.values.len());
     let cell = |values: &ColumnValues, row: usize| match values {
@@ -148,7 +148,7 @@ fn table_rows(table: &OutputTable) -> Vec<Vec<String>> {
         .collect()
 }
 
-/// Formats up to six significant digits.
+/// Formats a number with up to six significant digits.
 fn number(value: f64) -> String {
     if !value.is_finite() {
         return "\u{2013}".to_owned();

@@ -1,4 +1,4 @@
-//! A table or figure of the text, and how it is made from the results of its study.
+//! A table or figure of the text, made from the results of its study.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -8,57 +8,57 @@ use hoid_study::Results;
 use super::table_builder::TableBuilder;
 use crate::ThesisError;
 
-/// Name that selects the claims, among those of the tables and figures.
+/// Name that selects the claims; it is used like the name of a table or figure.
 pub const CLAIMS: &str = "claims";
 
-/// Results of the named plans, by name.
+/// Results of the named plans by the name of the plan.
 pub type Studies = BTreeMap<String, Results>;
 
-/// Makes an item from the results of its plan.
+/// Function that makes an item from the results of its plan.
 type Maker = Box<dyn Fn(&Item, Option<&Results>) -> ItemOutput + Send + Sync>;
 
-/// Runs that several items share and no plan describes. They are made before the items are drawn:
-/// otherwise a thread that makes the runs for one item could, while it waits for a part of them, be
-/// given another item that waits for all of them.
+/// Runs that several items share and that belong to no plan. They are made before any item is drawn. Otherwise a thread
+/// that makes the runs for one item could, while it waits for a part of them, start on another item that waits for all
+/// of them.
 #[derive(Clone)]
 pub(super) struct SharedRuns {
-    /// Their name and title.
+    /// Name of the runs; `title` is their title.
     pub name: &'static str,
     pub title: &'static str,
-    /// Number of estimates.
+    /// Number of estimates in all runs.
     pub estimates: u64,
-    /// Makes the runs; notes on those that failed, or the error of all of them.
+    /// Makes the runs and returns notes about failed runs; an error if all runs fail.
     pub make: MakeRuns,
 }
 
-/// Makes shared runs.
-type MakeRuns = Arc<dyn Fn(&Watch<'_>) -> Result<Vec<String>, ThesisError> + Send + Sync>;
+/// Function that makes shared runs.
+type MakeRuns = Arc<dyn Fn(&ProgressCallbacks<'_>) -> Result<Vec<String>, ThesisError> + Send + Sync>;
 
-/// Steps after the runs are made.
-pub(super) struct Watch<'a> {
-    /// Called with a number of completed estimates.
+/// Callbacks for progress and cancellation while shared runs are made.
+pub(super) struct ProgressCallbacks<'a> {
+    /// Called with the number of newly completed estimates.
     pub done: &'a (dyn Fn(u64) + Sync),
-    /// Whether the reproduction continues.
-    pub goes_on: &'a (dyn Fn() -> bool + Sync),
+    /// Returns true if the reproduction continues.
+    pub keep_running: &'a (dyn Fn() -> bool + Sync),
 }
 
-impl Watch<'_> {
-    /// No output, and the reproduction continues.
-    pub const NONE: Watch<'static> = Watch {
+impl ProgressCallbacks<'_> {
+    /// Callbacks that report no progress and never cancel.
+    pub const NONE: ProgressCallbacks<'static> = ProgressCallbacks {
         done: &|_| (),
-        goes_on: &|| true,
+        keep_running: &|| true,
     };
 }
 
 /// One table or figure.
 pub struct Item {
-    /// Its name, such as `fig-5`, `C.1` or `table-2`.
+    /// Name of the item, such as `fig-5`, `C.1` or `table-2`.
     pub name: String,
-    /// Its title, one line.
+    /// Title of the item in one line.
     pub title: String,
-    /// Notes for the reader.
+    /// Caption with notes for the reader.
     pub caption: String,
-    /// The plan whose results it shows; `None` if nothing is simulated.
+    /// Plan whose results the item shows; `None` if it shows no results of a plan.
     pub plan: Option<&'static str>,
     pub(super) shared: Option<SharedRuns>,
     make: Maker,
@@ -70,20 +70,20 @@ impl std::fmt::Debug for Item {
     }
 }
 
-/// Draws a grid of panels under a name and a title.
+/// Function that draws a grid of panels with a name and a title.
 type Drawing<G> = fn(&str, &str, &G) -> String;
 
 /// The figure and the numbers of an item.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ItemOutput {
-    /// The figure; `None` for a table.
+    /// The figure as SVG text; `None` for a table.
     pub svg: Option<String>,
-    /// Its numbers, or the table itself.
+    /// Data of the figure, or the table itself.
     pub data: OutputTable,
 }
 
 impl From<OutputTable> for ItemOutput {
-    /// A table without a figure.
+    /// Creates the output of a table without a figure.
     fn from(data: OutputTable) -> Self {
         Self { svg: None, data }
     }
@@ -107,14 +107,14 @@ impl Item {
         }
     }
 
-    /// Adds runs that it shares with other items.
+    /// Adds runs that this item shares with other items.
     #[must_use]
     pub(super) fn sharing(mut self, runs: &SharedRuns) -> Self {
         self.shared = Some(runs.clone());
         self
     }
 
-    /// A figure of a study.
+    /// Creates an item that is made from the results of a study.
     pub(super) fn of_study(
         name: impl Into<String>,
         title: impl Into<String>,
@@ -128,7 +128,7 @@ impl Item {
         })
     }
 
-    /// The figure of a grid, and its numbers.
+    /// Draws the figure of a grid and adds its data.
     pub(super) fn drawn<G>(&self, draw: Drawing<G>, grid: &G, data: TableBuilder) -> ItemOutput {
         ItemOutput {
             svg: Some(draw(&self.name, &self.title, grid)),
@@ -136,7 +136,7 @@ impl Item {
         }
     }
 
-    /// Makes the item from the results of the studies; without those of its plan it is empty.
+    /// Makes the item from the results of the studies; the output is empty if the results of its plan are missing.
     pub fn make(&self, studies: &Studies) -> ItemOutput {
         (self.make)(self, self.plan.and_then(|plan| studies.get(plan)))
     }

@@ -1,5 +1,5 @@
-//! Maps over the delay nk* and the order m* of the noise model: VAF, its difference to ARX,
-//! absolute biases. Figs. 7, 8, E.1 to E.16.
+//! Maps over the delay n_k* and the order m* of the noise model: VAF, its difference from that of ARX, absolute biases.
+//! Figs. 7, 8, E.1 to E.16.
 
 use hoid_study::{Query, Results};
 
@@ -10,11 +10,11 @@ use super::{
 };
 use hoid_report::figures::{MapColours, MapGrid, MapPanel, maps};
 
-/// Delays of the maps.
+/// Delays in the maps, samples.
 const DELAYS: [usize; 6] = [25, 26, 27, 28, 29, 30];
 const TRUE_DELAY: usize = 29;
 
-/// Quantity of a map.
+/// Quantity shown in a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Shown {
     Vaf,
@@ -133,15 +133,15 @@ fn make(item: &Item, results: &Results, condition: &str, m0: usize, shown: Shown
         });
     }
     let grid = |panels: Vec<MapPanel>, titles: Vec<String>| MapGrid {
-        // With two columns the cells have space for their numbers. Biases of b, a and the noise
-        // differ by an order of magnitude: one colour bar for each pair.
+        // With two columns the cells have space for their numbers. The biases of b, a and the noise model differ by
+        // orders of magnitude, so that each pair has its own colour bar.
         columns: 2,
         panels,
         titles,
         abscissa: "n_k^*".to_owned(),
-        x_places: DELAYS.iter().map(usize::to_string).collect(),
+        x_categories: DELAYS.iter().map(usize::to_string).collect(),
         ordinate: "m^*".to_owned(),
-        y_places: REMNANT_ORDERS.iter().map(usize::to_string).collect(),
+        y_categories: REMNANT_ORDERS.iter().map(usize::to_string).collect(),
         value: match shown {
             Shown::Vaf => "VAF (%)".to_owned(),
             Shown::VafDifference => "\u{394}VAF (%)".to_owned(),

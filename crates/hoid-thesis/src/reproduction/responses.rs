@@ -14,7 +14,7 @@ use hoid_report::figures::{BodeColumn, BodeCurve, BodeGrid, LineKind, Shade, bod
 
 const TRUE_DELAY: usize = 29;
 
-/// The curves of a figure.
+/// Curves shown in a figure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Curves {
     /// One model at one noise level, by delay.
@@ -81,7 +81,7 @@ fn omegas() -> Vec<f64> {
         .collect()
 }
 
-/// The response of the averaged model; none if no run gives a value.
+/// Returns the response of the averaged model; `None` if no run gives a value.
 fn averaged(
     results: &Results,
     condition: &str,
@@ -110,7 +110,7 @@ fn averaged(
     response(&theta?, nk, omega)
 }
 
-/// Response of `(b0 + b1 q^-1) q^-nk / (1 + f1 q^-1 + f2 q^-2)` at 100 Hz.
+/// Returns the response of `(b0 + b1 q^-1) q^-nk / (1 + f1 q^-1 + f2 q^-2)` at 100 Hz.
 fn response(theta: &[f64], nk: usize, omega: &[f64]) -> Option<Vec<Complex64>> {
     let orders = Orders {
         nb: 2,

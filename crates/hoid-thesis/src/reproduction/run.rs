@@ -1,8 +1,8 @@
-//! The whole reproduction in a directory: runs the required plans, draws tables and figures, tests
-//! the claims, writes the index page.
+//! The whole reproduction in a directory: it runs the required plans, draws tables and figures, tests the claims, and
+//! writes the index page.
 //!
-//! Studies are in `studies/NAME`, figures and numbers in `figures` and `tables`. An existing study
-//! is used unchanged, so that a stopped reproduction continues.
+//! Studies are stored in `studies/NAME`, figures and tables in `figures` and `tables`. An existing study is used
+//! unchanged, so that an interrupted reproduction can be continued.
 
 use std::{
     collections::BTreeSet,
@@ -19,7 +19,7 @@ use super::{
     catalogue::{items, recorded_items},
     experiment::NAME as EXPERIMENT_RUNS,
     index::{IndexPage, StudyEntry},
-    item::{CLAIMS, Item, Studies, Watch},
+    item::{CLAIMS, Item, Studies, ProgressCallbacks},
 };
 use hoid_report::write_page;
 
@@ -33,13 +33,13 @@ use crate::{
 /// Options of a reproduction.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reproduction {
-    /// Tables, figures, appendices, studies, or [`CLAIMS`]; all if empty.
+    /// Names of the selected tables, figures, appendices or studies, or [`CLAIMS`]; empty for everything.
     pub only: Vec<String>,
-    /// Replications of each cell.
+    /// Number of replications of each cell.
     pub replications: u64,
-    /// Number of threads; `None` for one per core.
+    /// Number of threads; `None` for one thread per core.
     pub jobs: Option<usize>,
-    /// Directory or manifest of recorded people: their experiment replaces everything else.
+    /// Directory or manifest of recorded people; if given, only the experiment with these people is made.
     pub recordings: Option<PathBuf>,
 }
 
@@ -61,7 +61,7 @@ pub enum ReproductionEvent<'a> {
     Progress(Progress),
     /// A study is complete.
     Study(&'a StudyEntry),
-    /// Warnings about a study: damaged blocks that were computed again.
+    /// A note, for example about damaged blocks of a study that were computed again.
     Note(&'a str),
 }
 
@@ -72,27 +72,26 @@ pub struct ReproductionSummary {
     pub index: PathBuf,
     /// Number of tables and figures.
     pub items: usize,
-    /// Numbers of claims that hold, hold and more so, hold in part, do not hold, cannot be tested;
-    /// none if they were not selected.
+    /// Numbers of claims by verdict: hold, hold and more so, hold in part, do not hold, cannot be tested; `None` if the
+    /// claims were not selected.
     pub tally: Option<[usize; 5]>,
     /// Duration of the studies, s.
     pub simulated_s: f64,
-    /// Duration of the drawing, s.
+    /// Duration of drawing the tables and figures, s.
     pub drawn_s: f64,
 }
 
-/// Runs the reproduction in a directory; `None` if `goes_on` has stopped it, in which case a further
-/// call continues.
+/// Runs the reproduction in a directory. Returns `None` if `keep_running` has stopped it; another call then continues
+/// it.
 ///
 /// # Errors
-/// [`ThesisError::UnknownItem`]; [`ThesisError::NotTheExperiment`] and [`ThesisError::Recordings`] for recordings that
-/// cannot be used; [`ThesisError::Study`] and [`ThesisError::Io`] for failures of
-/// running, reading or writing.
+/// [`ThesisError::UnknownItem`]; [`ThesisError::NotTheExperiment`] and [`ThesisError::Recordings`] if the recordings
+/// cannot be used; [`ThesisError::Study`] and [`ThesisError::Io`] if running, reading or writing fails.
 pub fn reproduce(
     wanted: &Reproduction,
     directory: &Path,
     notify: &(dyn Fn(ReproductionEvent<'_>) + Sync),
-    goes_on: &(dyn Fn() -> bool + Sync),
+    keep_running: &(dyn Fn() -> bool + Sync),
 ) -> Result<Option<ReproductionSummary>, ThesisError> {
     let begin = Instant::now();
     let mut index = IndexPage::default();
@@ -118,7 +117,7 @@ pub fn reproduce(
     }
     let mut studies = Studies::new();
     for named in TEXT_PLANS.iter().filter(|named| plans.contains(named.name)) {
-        let Some((entry, results)) = study(named, wanted, directory, notify, goes_on)? else {
+        let Some((entry, results)) = study(named, wanted, directory, notify, keep_running)? else {
             return Ok(None);
         };
         notify(ReproductionEvent::Study(&entry));
@@ -130,21 +129,21 @@ pub fn reproduce(
         if !shared_runs.insert(shared.name) {
             continue;
         }
-        if !goes_on() {
+        if !keep_running() {
             return Ok(None);
         }
         let begin = Instant::now();
         let done = AtomicU64::new(0);
-        let watch = Watch {
+        let watch = ProgressCallbacks {
             done: &|estimates| {
                 let done = done.fetch_add(estimates, Ordering::Relaxed) + estimates;
                 let total = shared.estimates;
                 notify(ReproductionEvent::Progress(Progress { done, total, known: 0 }));
             },
-            goes_on,
+            keep_running,
         };
         let notes = on_threads(wanted.jobs, || (shared.make)(&watch))??;
-        if !goes_on() {
+        if !keep_running() {
             return Ok(None);
         }
         for note in notes {
@@ -165,7 +164,7 @@ pub fn reproduce(
     for name in ["figures", "tables"] {
         make_directory(&directory.join(name))?;
     }
-    // Collected by position, so that the page does not depend on the order of drawing.
+    // The items are collected by position, so that the page does not depend on the order in which they are drawn.
     let made: Vec<_> = chosen
         .par_iter()
         .map(|item| write(item, &studies, directory))
@@ -204,7 +203,7 @@ pub fn reproduce(
     }))
 }
 
-/// Does something on `jobs` threads, or one per core.
+/// Runs a function on a pool of `jobs` threads, or one thread per core.
 fn on_threads<R: Send>(jobs: Option<usize>, work: impl FnOnce() -> R + Send) -> Result<R, ThesisError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.unwrap_or(0)).build();
     let pool = pool.map_err(|error| StudyError::Threads {
@@ -213,8 +212,8 @@ fn on_threads<R: Send>(jobs: Option<usize>, work: impl FnOnce() -> R + Send) -> 
     Ok(pool.install(work))
 }
 
-/// The selected items, by their name, their plan, the runs they share or the letter of an appendix, and whether the
-/// claims are selected; those of recorded people have none.
+/// Returns the selected items and whether the claims are selected. An item is selected by its name, its plan, the runs
+/// it shares, or the letter of an appendix. With recorded people no claims are selected.
 fn chosen(all: Vec<Item>, wanted: &Reproduction) -> Result<(Vec<Item>, bool), ThesisError> {
     let only = &wanted.only;
     if only.is_empty() {
@@ -244,7 +243,7 @@ fn chosen(all: Vec<Item>, wanted: &Reproduction) -> Result<(Vec<Item>, bool), Th
     Ok((items.collect(), names.contains(&CLAIMS)))
 }
 
-/// Tests the claims of the text: writes their table and their part of the page, and counts their verdicts.
+/// Tests the claims of the text, writes their table, adds them to the page, and counts the verdicts.
 fn test_claims(studies: &Studies, index: &mut IndexPage, directory: &Path) -> Result<[usize; 5], ThesisError> {
     let mut evidence = Evidence::new();
     for results in studies.values() {
@@ -256,13 +255,13 @@ fn test_claims(studies: &Studies, index: &mut IndexPage, directory: &Path) -> Re
     Ok(index.tally())
 }
 
-/// Runs a named plan, or reads its existing results; `None` if it was stopped.
+/// Runs a named plan or reads its existing results. Returns `None` if the run was stopped.
 fn study(
     named: &NamedPlan,
     wanted: &Reproduction,
     directory: &Path,
     notify: &(dyn Fn(ReproductionEvent<'_>) + Sync),
-    goes_on: &(dyn Fn() -> bool + Sync),
+    keep_running: &(dyn Fn() -> bool + Sync),
 ) -> Result<Option<(StudyEntry, Results)>, ThesisError> {
     let plan = named.plan()?.with_replications(wanted.replications)?;
     let directory = directory.join("studies").join(named.name);
@@ -277,7 +276,7 @@ fn study(
         &directory,
         &options,
         &|progress| notify(ReproductionEvent::Progress(progress)),
-        goes_on,
+        keep_running,
     )?;
     for note in &outcome.notes {
         notify(ReproductionEvent::Note(&format!("{}: {note}", plan.name)));
@@ -295,19 +294,19 @@ fn study(
     Ok(Some((entry, Results::read(&directory)?)))
 }
 
-/// Paths of the parts of an item, relative to the page.
-struct Written {
+/// Paths of the figure and the data of an item, relative to the page.
+struct ItemFiles {
     svg: Option<String>,
     data: String,
     table: OutputTable,
 }
 
-fn write(item: &Item, studies: &Studies, directory: &Path) -> Result<Written, ThesisError> {
+fn write(item: &Item, studies: &Studies, directory: &Path) -> Result<ItemFiles, ThesisError> {
     let made = item.make(studies);
     let folder = if made.svg.is_some() { "figures" } else { "tables" };
     let data = format!("{folder}/{}.csv", item.name);
     write_table(&directory.join(&data), &made.data)?;
-    let mut written = Written {
+    let mut written = ItemFiles {
         svg: None,
         data,
         table: made.data,

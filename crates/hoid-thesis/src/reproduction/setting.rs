@@ -1,5 +1,5 @@
-//! The setting of the text: forcing function, states, conditions, starts, remnant gain. Tables 1, 2
-//! (4.2, 4.3), 4.4, 6.1; Figs. 3, 4, A.1.
+//! The setting of the text: forcing function, states, conditions, starting points, remnant gain. Tables 1, 2 (4.2,
+//! 4.3), 4.4, 6.1; Figs. 3, 4, A.1.
 
 use hoid_model::{
     forcing::{ForcingFunction, REFERENCE_PERIOD_S},
@@ -58,7 +58,7 @@ pub(super) fn items() -> Vec<Item> {
         Item::new(
             "fig-4",
             "Error gain K_e in conditions C1 to C6",
-            "Conditions that share their states lie on each other before and after the change, so that slow and fast ones are in separate panels.",
+            "Conditions with the same states coincide before and after the change, so that slow and fast ones are in separate panels.",
             None,
             |item, _| schedules(item),
         ),
@@ -168,7 +168,7 @@ fn starts_table(title: &str) -> hoid_io::OutputTable {
     let mut data = TableBuilder::new(&["start"], &["b0", "b1", "a1", "a2"]);
     let plan = plans::find("initial-conditions").and_then(|named| named.plan().ok());
     let mut known: Vec<String> = Vec::new();
-    // The starts of Table 6.1; distant ones belong to a claim.
+    // Only the starts of Table 6.1 are shown; the more distant starts belong to a claim.
     let of_the_table = |estimator: &&hoid_study::plan::EstimatorCell| estimator.name == "BJ";
     for estimator in plan.iter().flat_map(|plan| &plan.estimators).filter(of_the_table) {
         if known.contains(&estimator.start) {

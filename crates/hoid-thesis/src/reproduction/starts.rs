@@ -1,4 +1,4 @@
-//! Fits from other starts against those from the base start: Figs. F.1 to F.8.
+//! Comparison of fits from other starts with fits from the base start: Figs. F.1 to F.8.
 
 use hoid_study::{Query, Results};
 

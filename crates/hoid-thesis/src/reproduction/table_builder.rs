@@ -1,8 +1,8 @@
-//! The numbers of a figure as a table.
+//! Table of the data of a figure.
 
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
 
-/// A table built row by row: texts and numbers in named columns.
+/// A table with named columns of texts and numbers that is built row by row.
 pub(super) struct TableBuilder {
     texts: Vec<(&'static str, Vec<String>)>,
     numbers: Vec<(&'static str, Vec<f64>)>,

@@ -1,4 +1,4 @@
-//! Recursive estimates over time, medians over all runs: Figs. 11, 12, G.1 to G.8 and H.1 to H.12.
+//! Recursive estimates over time as medians over all runs: Figs. 11, 12, G.1 to G.8 and H.1 to H.12.
 
 use hoid_study::{Query, Results, plan::Cell, statistics::quantile};
 
@@ -9,7 +9,7 @@ use super::{
 };
 use hoid_report::figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, trace_panels};
 
-/// Parameter of a row of panels: the column of RLS, that of RPEM, name and unit of the panel.
+/// Parameter in a row of panels: its column for RLS, its column for RPEM, and the name and unit of the panel.
 pub(super) type Row = (&'static str, &'static str, &'static str, &'static str);
 
 pub(super) const DISCRETE: [Row; 4] = [
@@ -26,7 +26,7 @@ pub(super) const OPERATOR: [Row; 5] = [
     ("zeta_nm", "zeta_nm", "zeta_nm", ""),
 ];
 
-/// An estimator of a figure: index of its method for the colour, name in the plan, its batch fits.
+/// Estimator in a figure: index of the method for the colour, name in the plan, and its batch fits with their spans.
 type Curves = (usize, &'static str, &'static [(&'static str, f64, f64)]);
 
 const RLS: Curves = (0, "RLS", &[("OLS first", 0.0, 30.72), ("OLS last", 51.2, 81.92)]);
@@ -201,7 +201,7 @@ fn make(
         }
     }
     let alone = orders.len() == 1;
-    // Two columns, unless the last row would have a single panel.
+    // There are two columns, unless the last row would have a single panel.
     let of_one = if panels.len().is_multiple_of(2) { 2 } else { 1 };
     let grid = TraceGrid {
         panels,
@@ -217,11 +217,12 @@ fn make(
     item.drawn(trace_panels, &grid, data)
 }
 
-/// Time from which the estimates determine the range of their panels, s: before, they move away from their start.
+/// Time from which the estimates determine the range of their panels, s; before it they are still moving away from
+/// their initial values.
 const SETTLED_S: f64 = 15.0;
 
-/// Range of all curves from [`SETTLED_S`] on, except their highest and lowest three per cent: each
-/// estimator contributes, even if another one is better.
+/// Range of all curves from [`SETTLED_S`] on, without the highest and lowest three per cent of each estimate. Every
+/// estimator contributes, even if another is better.
 fn ordinate(curves: &[TraceCurve]) -> Ordinate {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for curve in curves {
@@ -244,7 +245,7 @@ fn ordinate(curves: &[TraceCurve]) -> Ordinate {
     }
 }
 
-/// The simulated operator over time.
+/// Curve of a parameter or coefficient of the simulated operator over time.
 fn truth(cell: &Cell, name: &str) -> TraceCurve {
     let scenario = cell.resolved.scenario();
     let times_s: Vec<f64> = (0..=512)

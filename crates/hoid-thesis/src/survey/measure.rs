@@ -1,39 +1,39 @@
 //! Errors of a method in one run.
 //!
-//! At each stored time `E(t) = sqrt(mean_i |H(j omega_i, t)/H_0(j omega_i, t) - 1|^2)` over the
-//! lines of the forcing function from 0.6 to 11 rad/s (the third to the ninth: the two below have a
-//! few periods in the whole run, the last has hardly any power); H_0 is the operator at that time,
-//! with the hold. The reported value is the root mean square of E over a span, in %:
+//! At each stored time `E(t) = sqrt(mean_i |H(j omega_i, t)/H_0(j omega_i, t) - 1|^2)` is computed over the lines of
+//! the forcing function from 0.6 to 11 rad/s, the third to the ninth: the first two have only a few periods in the
+//! whole run, and the last has hardly any power. H_0 is the response of the operator at that time, including the hold.
+//! The reported value is the root mean square of E over a span, in %:
 //!
-//! | span | from, to |
+//! | span | interval |
 //! |---|---|
-//! | before | 30.72 s, after the start span, to the change (or the middle) at 40.96 s |
-//! | through | the 5.12 s after it |
-//! | after | the last 20.48 s |
+//! | before | from 30.72 s, the end of the start span, to the change (or the middle) at 40.96 s |
+//! | through | the 5.12 s after the change |
+//! | after | the last 20.48 s of the run |
 //!
-//! For the operator's parameters it is the root mean square of the relative error from 10 s on, as
-//! in the studies.
+//! For the operator's parameters, the reported value is the root mean square of the relative error from 10 s on, as in
+//! the studies.
 
 use std::ops::Range;
 
 use hoid_model::{OperatorParameters, Record};
 use num_complex::Complex64;
 
-use crate::{ThesisError, comparators::Followed, comparators::response_of};
+use crate::{ThesisError, comparators::TrackingResult, comparators::response_of};
 
-/// Spans, s.
+/// Spans over which the error of the response is averaged, s.
 const SPANS_S: [(f64, f64); 3] = [(30.72, 40.96), (40.96, 46.08), (61.44, 81.93)];
 /// Time from which parameters are evaluated, s.
 const PARAMETERS_FROM_S: f64 = 10.0;
 /// Indices of the evaluated lines of the forcing function.
 pub(super) const LINES: Range<usize> = 2..9;
 
-/// Errors of one run, %; not numbers if there is no estimate.
+/// Errors of one run, %; NaN if there is no estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
-    /// Of the response: before, during and after the change.
+    /// Errors of the response before, during and after the change.
     pub response: [f64; 3],
-    /// Of K_e, T_L, K_e_dot, omega_nm, zeta_nm.
+    /// Errors of K_e, T_L, K_e_dot, omega_nm and zeta_nm.
     pub operator: [f64; 5],
 }
 
@@ -61,8 +61,8 @@ fn root_mean_square(squares: &[f64]) -> f64 {
 /// Computes the errors of the estimates after the samples `at`.
 ///
 /// # Errors
-/// [`ThesisError::Model`] for a record without the true operator.
-pub fn errors(record: &Record, at: &[usize], omega_rad_s: &[f64], found: &Followed) -> Result<Errors, ThesisError> {
+/// [`ThesisError::Model`] if the record does not contain the true operator.
+pub fn errors(record: &Record, at: &[usize], omega_rad_s: &[f64], found: &TrackingResult) -> Result<Errors, ThesisError> {
     let mut spans = [const { Vec::new() }; 3];
     let mut parameters = [const { Vec::new() }; 5];
     for (i, k) in at.iter().enumerate() {
@@ -114,7 +114,7 @@ mod tests {
             }
         };
         let all: Vec<OperatorParameters> = at.iter().map(|k| operator(*k)).collect();
-        let found = Followed {
+        let found = TrackingResult {
             response: all
                 .iter()
                 .map(|o| response_of(o, record.sample_time(), &omega).unwrap())
@@ -133,7 +133,7 @@ mod tests {
         assert!((errors.operator[0] - 10.0 * f64::sqrt(share)).abs() < 0.1, "{errors:?}");
         assert!(errors.operator[1] < 1e-10);
         // A missing estimate is not a number.
-        let none = Followed {
+        let none = TrackingResult {
             response: vec![vec![Complex64::new(f64::NAN, 0.0); 2]; at.len()],
             operator: vec![None; at.len()],
         };

@@ -1,8 +1,8 @@
-//! All methods of the survey on the same runs.
+//! All methods of the survey, applied to the same runs.
 //!
-//! Part II of the thesis describes the methods by which others have identified time-varying operators (section 2.4). A
-//! survey applies all of them to the same simulated runs: the recursive methods, as estimators of a study, and the
-//! [`comparators`](crate::comparators), tables in a separate file:
+//! Part II of the thesis describes methods with which others have identified time-varying operators (section 2.4). A
+//! survey applies all of them to the same simulated runs. The recursive methods are estimators of a study; the
+//! [`comparators`](crate::comparators) are tables in a separate file:
 //!
 //! ```toml
 //! [[comparators]]
@@ -11,14 +11,14 @@
 //! radians = 6
 //! ```
 //!
-//! All methods give the response `H(j omega, t)`, by which they are compared ([`measure`]); parameters are compared
-//! only for methods that have them.
+//! All methods give the response `H(j omega, t)`, which is used to compare them ([`measure`]); parameters are compared
+//! only for methods that estimate them.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `plan` | [`SurveyPlan`] |
+//! | `plan` | [`SurveyPlan`]: the plan of a study and a file of comparators |
 //! | [`measure`] | errors of a method in one run |
-//! | `run` | [`survey()`]: runs and methods |
+//! | `run` | [`survey()`]: applies all methods to all runs |
 //! | `table` | the tables of `research/notes/survey-methods.md` |
 
 pub mod measure;
@@ -30,6 +30,6 @@ pub use plan::SurveyPlan;
 pub use run::{MethodErrors, survey};
 pub use table::survey_tables;
 
-/// The comparators of `research/notes/survey-methods.md`; its study is the named plan
+/// File of the comparators of `research/notes/survey-methods.md`; the study of the same survey is the named plan
 /// [`SURVEY`](crate::plans::SURVEY).
 pub const COMPARATORS: &str = include_str!("../../plans/survey-comparators.toml");

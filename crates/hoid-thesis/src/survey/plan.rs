@@ -1,4 +1,4 @@
-//! The plan of a survey: that of a study, and a file of comparators.
+//! The plan of a survey: the plan of a study, and a file of comparators.
 
 use hoid_study::Plan;
 use toml::{Table, Value};
@@ -12,7 +12,7 @@ use crate::{
 pub struct SurveyPlan {
     /// Scenarios and estimators.
     pub study: Plan,
-    /// Comparators by the names of their tables.
+    /// Comparators with the names of their tables.
     pub comparators: Vec<(String, Box<dyn Comparator>)>,
 }
 
@@ -20,8 +20,8 @@ impl SurveyPlan {
     /// Reads and checks the texts of a study and of its comparators.
     ///
     /// # Errors
-    /// [`ThesisError::Study`] for problems of the study, [`ThesisError::Unsuited`] and
-    /// [`ThesisError::Estimator`] for a comparator or one of its options.
+    /// [`ThesisError::Study`] if the study is invalid; [`ThesisError::Unsuited`] or [`ThesisError::Estimator`] if a
+    /// comparator or one of its options is invalid.
     pub fn parse(study: &str, comparators: &str, path: &str) -> Result<Self, ThesisError> {
         let study = Plan::parse(study, path)?;
         let wrong = |quantity: &str, found: String, expected: String| ThesisError::Unsuited {

@@ -1,4 +1,4 @@
-//! Runs of a survey and the results of each method.
+//! Runs of a survey, and the results of each method.
 
 use std::time::Instant;
 
@@ -15,12 +15,12 @@ use super::{
 };
 use crate::{
     ThesisError,
-    comparators::{Followed, Task},
+    comparators::{TrackingResult, Task},
 };
 
-/// Samples between stored estimates.
+/// Number of samples between stored estimates.
 const EVERY: usize = 32;
-/// First replication of the validation sets: no run of a survey has this number.
+/// Number of the first replication used as a validation set; no evaluated run has such a number.
 const VALIDATION: u64 = 1 << 40;
 
 /// Errors of one method over the runs of one cell.
@@ -30,20 +30,19 @@ pub struct MethodErrors {
     pub cell: u64,
     /// Name of the method in the plan.
     pub name: String,
-    /// Information used in addition to e and u; empty if there is none.
-    pub told: &'static str,
-    /// Errors by run; the reason if the method failed.
+    /// Information that the method needs in addition to e, u and the delay; empty if there is none.
+    pub extra_information: &'static str,
+    /// Errors in each run, or the reason why the method failed.
     pub runs: Vec<Result<Errors, String>>,
-    /// Processor time of one run, s, the median.
+    /// Median elapsed time for one run, s.
     pub seconds: f64,
 }
 
-/// Applies all methods of a plan to all its runs; cells in their order, and in each the estimators
-/// before the comparators. `each` is called after every run.
+/// Applies all methods of a plan to all its runs. The results are ordered by cell; in each cell the estimators precede
+/// the comparators. `each` is called after every run.
 ///
 /// # Errors
-/// [`ThesisError`] for a scenario that cannot be simulated. The failure of a method on a run is
-/// reported in its errors.
+/// [`ThesisError`] if a scenario cannot be simulated. If a method fails on a run, the reason is part of its results.
 pub fn survey(plan: &SurveyPlan, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<MethodErrors>, ThesisError> {
     let mut all = Vec::new();
     for cell in &plan.study.cells {
@@ -71,7 +70,7 @@ pub fn survey(plan: &SurveyPlan, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Met
             all.push(MethodErrors {
                 cell: cell.index,
                 name: first.name.clone(),
-                told: first.told,
+                extra_information: first.extra_information,
                 runs: runs.iter().map(|run| run[i].errors.clone()).collect(),
                 seconds: seconds[seconds.len() / 2],
             });
@@ -83,7 +82,7 @@ pub fn survey(plan: &SurveyPlan, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Met
 /// Result of one method in one run.
 struct MethodResult {
     name: String,
-    told: &'static str,
+    extra_information: &'static str,
     errors: Result<Errors, String>,
     seconds: f64,
 }
@@ -103,14 +102,14 @@ fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Reco
         validation: Some(validation),
         change: scenario.schedule.change_s().zip(scenario.schedule.rate_per_s()),
     };
-    let measured = |name: &str, told: &'static str, follow: &dyn Fn() -> Result<Followed, ThesisError>| {
+    let measured = |name: &str, extra_information: &'static str, follow: &dyn Fn() -> Result<TrackingResult, ThesisError>| {
         let begin = Instant::now();
         let followed = follow();
         let seconds = begin.elapsed().as_secs_f64();
         let errors = followed.and_then(|found| errors(record, &at, omega, &found));
         MethodResult {
             name: name.to_owned(),
-            told,
+            extra_information,
             errors: errors.map_err(|error| error.to_string()),
             seconds,
         }
@@ -121,13 +120,14 @@ fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Reco
     });
     let comparators = plan.comparators.iter().map(|(name, of)| {
         let follow = || of.follow(&task);
-        measured(name, of.about().told, &follow)
+        measured(name, of.about().extra_information, &follow)
     });
     estimators.chain(comparators).collect()
 }
 
-/// Result of an estimator of a study: a recursion at each time, a batch fit the same at all times.
-fn of_estimator(estimator: &EstimatorCell, cell: &Cell, task: &Task<'_>) -> Result<Followed, ThesisError> {
+/// Result of an estimator of a study: a recursive method gives an estimate at each time, a batch fit the same estimate
+/// at all times.
+fn of_estimator(estimator: &EstimatorCell, cell: &Cell, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
     match estimator.task_for(&cell.resolved) {
         StudyTask::Track(options) => of_trace(&track(task.record, &options, EVERY)?, task),
         StudyTask::Fit(options) => {
@@ -138,7 +138,7 @@ fn of_estimator(estimator: &EstimatorCell, cell: &Cell, task: &Task<'_>) -> Resu
             let fit = options.fit(std::slice::from_ref(&span))?;
             let operator = fit.operator().ok().map(|found| found.parameters());
             let response = responses(fit.model(), task.omega_rad_s);
-            Ok(Followed {
+            Ok(TrackingResult {
                 response: vec![response; task.at.len()],
                 operator: vec![operator; task.at.len()],
             })
@@ -152,8 +152,8 @@ fn of_estimator(estimator: &EstimatorCell, cell: &Cell, task: &Task<'_>) -> Resu
     }
 }
 
-fn of_trace(trace: &Trace, task: &Task<'_>) -> Result<Followed, ThesisError> {
-    let (options, mut found) = (trace.options(), Followed::default());
+fn of_trace(trace: &Trace, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
+    let (options, mut found) = (trace.options(), TrackingResult::default());
     for row in 0..task.at.len().min(trace.len()) {
         let theta = trace.theta(row).to_vec();
         let model = PolynomialModel::new(options.structure, options.orders, trace.sample_time(), theta)?;

@@ -6,13 +6,13 @@ use hoid_study::{plan::Cell, statistics::median};
 
 use super::{measure::Errors, plan::SurveyPlan, run::MethodErrors};
 
-/// Values displayed for one run: three spans of the response, and K_e, K_e_dot and omega_nm.
+/// Returns the values displayed for one run: the response in three spans, and K_e, K_e_dot and omega_nm.
 fn shown(errors: &Errors) -> [f64; 6] {
     let ([before, through, after], o) = (errors.response, errors.operator);
     [before, through, after, o[0], o[2], o[3]]
 }
 
-/// Formats two digits, a bar for a missing value, and a limit for diverged ones.
+/// Formats a value with about two digits, as a dash if it is missing, and as `> 1000` if the method diverged.
 fn digits(value: f64) -> String {
     match value {
         v if v.is_nan() => "–".to_owned(),
@@ -22,7 +22,7 @@ fn digits(value: f64) -> String {
     }
 }
 
-/// Medians over runs, if more than half of them give a number.
+/// Returns the medians over the runs, NaN if at most half of the runs give a number, and the number of failed runs.
 fn medians(of: &MethodErrors) -> ([f64; 6], usize) {
     let runs: Vec<[f64; 6]> = of.runs.iter().flatten().map(shown).collect();
     let column = |i: usize| {
@@ -48,7 +48,7 @@ fn heading(cell: &Cell) -> String {
     words.join(", ")
 }
 
-/// A table for each cell, in Markdown, and one of all methods over the cells.
+/// Returns the tables in Markdown: one with the medians of all methods over the cells, and one for each cell.
 pub fn survey_tables(plan: &SurveyPlan, found: &[MethodErrors]) -> String {
     let mut text = String::new();
     let mut everywhere: BTreeMap<&str, Vec<[f64; 6]>> = BTreeMap::new();
@@ -75,7 +75,7 @@ pub fn survey_tables(plan: &SurveyPlan, found: &[MethodErrors]) -> String {
             digits(if finite.is_empty() { f64::NAN } else { median(&finite) })
         };
         let cells: Vec<String> = (0..6).map(column).collect();
-        let mark = if of.told.is_empty() { "" } else { " *" };
+        let mark = if of.extra_information.is_empty() { "" } else { " *" };
         text += &format!(
             "| {}{mark} | {} | {} |\n",
             of.name,
@@ -83,15 +83,15 @@ pub fn survey_tables(plan: &SurveyPlan, found: &[MethodErrors]) -> String {
             digits(1e3 * of.seconds)
         );
     }
-    let told: Vec<String> = plan
+    let extra_information: Vec<String> = plan
         .comparators
         .iter()
-        .filter(|(_, of)| !of.about().told.is_empty())
-        .map(|(name, of)| format!("- *{name}*: {}.", of.about().told))
+        .filter(|(_, of)| !of.about().extra_information.is_empty())
+        .map(|(name, of)| format!("- *{name}*: {}.", of.about().extra_information))
         .collect();
     format!(
         "{text}\n\\* needs more than e, u and n_k:\n\n{}\n{each}",
-        told.join("\n")
+        extra_information.join("\n")
     )
 }
 
@@ -115,7 +115,7 @@ mod tests {
         let of = MethodErrors {
             cell: 0,
             name: "one".to_owned(),
-            told: "",
+            extra_information: "",
             runs: vec![
                 errors(10.0, f64::NAN),
                 errors(12.0, f64::NAN),

@@ -1,44 +1,44 @@
 //! Verdict on a trace, and the reliability of the estimate of one sample.
 //!
-//! A trace depends on its start and on its rows. All findings of [`hoid_ident::diagnostics`] about the start fit
-//! count, as doubts at most: the recursion may leave it. A change inside the start span is a note for methods that
-//! forget and a doubt for the others. Of the rows in which the estimate is updated, at most [`ROWS`] are examined, at
-//! equal distances:
+//! A trace depends on its start and on its rows. Findings of [`hoid_ident::diagnostics`] about the start fit are
+//! included, at most as warnings, because the recursion may move away from the start. A change inside the start span is
+//! a note for methods that forget and a warning for the others. Of the rows in which the estimate is updated, at most
+//! [`ROWS`] are examined, evenly spaced:
 //!
 //! | kind | observation |
 //! |---|---|
-//! | `start-explains-little` | VAF of the simulated start fit on its span below 20 % |
+//! | `start-explains-little` | the simulated start fit has a VAF below 20 % on its span |
 //! | `not-convertible` | more than 5 % of the rows do not correspond to any operator |
-//! | `gain` | K_e and K_e_dot are both open (within two standard errors of zero) in most rows |
-//! | `undetermined-parameter` | K_e is; where K_e_dot alone is, they answer like a gain (a note) |
-//! | `neuromuscular-lag` | poles of no person, or omega_nm at its bound, in a quarter of the rows |
-//! | `delay-at-bound` | the tracked delay rests at an end of its range in a quarter of the rows |
-//! | `covariance-blown-up` | a standard error 30 times its median: the data carry too little information to forget |
-//! | `steps-shortened` | more than 5 % of the steps made shorter by stability or a bound |
+//! | `gain` | K_e and K_e_dot are both undetermined (within two standard errors of zero) in most rows |
+//! | `undetermined-parameter` | K_e alone is undetermined in most rows; if K_e_dot alone is, the person responds like a gain (a note) |
+//! | `neuromuscular-lag` | the poles are implausible for a person, or omega_nm is at its bound, in a quarter of the rows |
+//! | `delay-at-bound` | the tracked delay is at an end of its range in a quarter of the rows |
+//! | `covariance-blown-up` | a standard error rises to 30 times its median: the data carry too little information for the rate of forgetting |
+//! | `steps-shortened` | stability or a bound shortened more than 5 % of the steps |
 //! | `faults` | more than 10 % of the samples were faulty |
-//! | `held-back` | outliers that the guard held back (a note), in more than 1 % of the samples (a doubt) |
-//! | `hostile-span` | spans that cannot come from tracking, at which the estimate stayed constant |
-//! | `learnt-at-rest` | e and u stay constant for a second, and the guard that would hold the estimate there is off |
+//! | `held-back` | the guard held back outliers (a note), or more than 1 % of the samples (a warning) |
+//! | `hostile-span` | the estimate was kept constant in spans that cannot come from tracking |
+//! | `learnt-at-rest` | e and u stay constant for a second while the estimate is updated, because the guard was turned off |
 //! | `restarted` | the guard restarted the estimate |
-//! | `steps-in-signals` | jumps of e or u that stayed (a note) |
+//! | `steps-in-signals` | lasting jumps of e or u (a note) |
 //! | `gain-sign` | K_e is significantly positive in some rows and negative in others |
 //! | `negative-lead` | K_e and K_e_dot have significantly opposite signs in more than a tenth of the rows |
-//! | `idle-head` | a head in which neither e nor u moves: left out of the start span (a note), or in it (a doubt) |
-//! | `many-changes` | three or more changes, on average at least one per half minute |
-//! | `supposed` | omega_nm, zeta_nm or tau_e of the last row is not determined by the record: its value is that of the prior, or one of several that predict u equally well (a note) |
-//! | `last-row` | the estimate at the end is doubtful or missing, regardless of the other rows |
-//! | `not-followed` | the last few seconds of the record disagree with the last row |
-//! | `structure` | earlier errors carry more information about u than the operator at the end does |
-//! | `sign` | the response at .5 rad/s would push the error away, where no controlled element is named |
-//! | `unstable-loop`, `no-crossover` | with the controlled element, the loop of the last row could not have been held |
-//! | `undeclared-change`, `drifting`, `swaying` | the response is not the same where no change is declared |
+//! | `idle-head` | neither e nor u moves at the start of the record, which is excluded from the start span (a note) or part of it (a warning) |
+//! | `many-changes` | three or more declared changes, on average at least one per half minute |
+//! | `supposed` | the record does not determine omega_nm, zeta_nm or tau_e of the last row: its value is that of the prior, or one of several that predict u equally well (a note) |
+//! | `last-row` | neither K_e nor K_e_dot is determined in the last row, regardless of the other rows |
+//! | `not-followed` | the last 16 or 30 s of the record disagree with the last row |
+//! | `structure` | past errors explain more of u than the operator of the last row does |
+//! | `sign` | without a given controlled element: the response at 0.5 rad/s would increase the error |
+//! | `unstable-loop`, `no-crossover` | with the controlled element, a person could not have kept the loop of the last row stable |
+//! | `undeclared-change`, `drifting`, `swaying` | the response varies between declared changes |
 //! | `no-answer` | e does not respond to u |
-//! | `not-finite` | an estimate that is not a number |
+//! | `not-finite` | an estimate is not a finite number |
 //!
-//! `operators` judges the operators of the rows, `recording` the actions of the guard and the head and end of the
+//! `operators` examines the operators of the rows, `recording` the actions of the guard and the start and end of the
 //! record, `structure` the form of the operator, `steadiness` its constancy, and `moment` a single sample. If the
-//! response is known at the end, a gain and a lead that are undetermined, or a lead below zero, give only notes: gain
-//! and lead are one description of the response, which may have another form.
+//! response is known at the end, an undetermined gain or lead, or a negative lead, gives only a note: gain and lead are
+//! only one description of the response, which may have another form.
 
 mod moment;
 mod operators;
@@ -57,20 +57,20 @@ use crate::trace::Trace;
 
 /// Largest number of rows that are examined.
 const ROWS: usize = 400;
-/// VAF in % of the simulated start fit below which it explains little.
+/// VAF in % below which the simulated start fit explains little.
 const LEAST_START_VAF: f64 = 20.0;
-/// Shares of steps and of samples beyond which a finding is reported.
+/// Share of shortened steps, and share of faulty samples, beyond which a finding is reported.
 const SHORTENED: f64 = 0.05;
 const FAULTS: f64 = 0.1;
 /// Ratio of a standard error to its median beyond which the covariance has blown up.
-const BLOWN_UP: f64 = 30.0;
+const EXCESSIVE_ERROR_RATIO: f64 = 30.0;
 
 impl Trace {
     /// Returns the verdict on the trace, for the record from which it was made and the search that chose its orders,
     /// if there was one.
     ///
     /// # Errors
-    /// Errors of the residuals of the start fit.
+    /// The errors of the residuals of the start fit.
     pub fn verdict(&self, record: &Record, choice: Option<&Choice>) -> Result<Verdict, IdentError> {
         let mut all = self.start_findings(record, choice)?;
         let rows = self.rows_judged();
@@ -95,13 +95,13 @@ impl Trace {
         }
         all.extend(self.many_changes_finding());
         all.extend(self.missed_structure(record));
-        all.extend(self.response_doubt.clone());
+        all.extend(self.response_finding.clone());
         all.extend(self.unsteady_finding(record));
         all.extend(self.answer_finding(record));
         Ok(Verdict::of(all))
     }
 
-    /// Findings of the start fit, limited to doubts.
+    /// Findings about the start fit, limited to warnings.
     fn start_findings(&self, record: &Record, choice: Option<&Choice>) -> Result<Vec<Finding>, IdentError> {
         let (Some(fit), Some((from, to))) = (self.start(), self.options().start_span(record)) else {
             return Ok(Vec::new());
@@ -109,8 +109,8 @@ impl Trace {
         let span = [record.span(from, to)?];
         let of_start = |finding: &Finding| Finding {
             severity: match finding.kind {
-                // A method that forgets follows the change; one that weights the start against all later samples
-                // starts between the two.
+                // A method that forgets follows the change. A method that weights the start against all later samples
+                // starts from a mean of the operators before and after the change.
                 "not-constant" if !self.options().method.is_model_of_change() => Severity::Note,
                 _ => finding.severity.min(Severity::Doubt),
             },
@@ -125,7 +125,7 @@ impl Trace {
                     "start-explains-little",
                     format!(
                         "the start fit explains {vaf:.0} % of u (VAF of the simulation, expected {LEAST_START_VAF:.0} \
-                         % or more); use a longer span, or another"
+                         % or more); use a longer span, or another span"
                     ),
                 ));
             }
@@ -133,7 +133,7 @@ impl Trace {
         Ok(all)
     }
 
-    /// Finding of the parameters of the last row that still have their prior values.
+    /// Finding about the parameters of the last row that still have their prior values.
     fn supposed_finding(&self) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self
@@ -156,8 +156,8 @@ impl Trace {
         })
     }
 
-    /// Rows in which the estimate is updated, at equal distances, including the last. A method that starts by itself
-    /// has no earlier estimate.
+    /// Rows in which the estimate is updated, evenly spaced, including the last row. For a method that needs no start
+    /// fit, rows before its first estimate are excluded.
     fn rows_judged(&self) -> Vec<usize> {
         let from = self.updated_from_s() - self.sample_time().s() / 2.0;
         let mut first = self.times_s().partition_point(|t| *t < from);
@@ -171,9 +171,9 @@ impl Trace {
         rows
     }
 
-    /// Finding of a standard error that grew without bound, among the coefficients that have one.
+    /// Finding about a coefficient whose standard error grew far above its median.
     fn covariance_finding(&self, rows: &[usize]) -> Option<Finding> {
-        // A start from nothing has large standard errors.
+        // A start without knowledge has large standard errors.
         let rows = &rows[rows.len() / 2..];
         let names = self.parameter_names();
         let estimates: Vec<Vec<Estimate>> = rows.iter().map(|row| self.parameters(*row)).collect();
@@ -181,7 +181,7 @@ impl Trace {
             let mut errors: Vec<f64> = estimates.iter().filter_map(|e| e[i].standard_error).collect();
             let median = upper_median(&mut errors)?;
             let largest = errors.into_iter().max_by(f64::total_cmp)?;
-            (median > 0.0 && largest > BLOWN_UP * median).then_some(largest / median)
+            (median > 0.0 && largest > EXCESSIVE_ERROR_RATIO * median).then_some(largest / median)
         };
         let (name, ratio) = names
             .iter()
@@ -189,7 +189,7 @@ impl Trace {
             .filter_map(|(i, name)| Some((name, grown(i)?)))
             .max_by(|a, b| a.1.total_cmp(&b.1))?;
         let remedy = match self.options().method.memories() {
-            Some(_) => " for the memory in use; use a longer one",
+            Some(_) => " for the memory in use; use a longer memory",
             None => "",
         };
         Some(Finding::doubt(
@@ -208,7 +208,7 @@ impl Trace {
             let share = 100.0 * counts.skipped as f64 / samples;
             all.push(Finding::doubt(
                 "faults",
-                format!("{share:.0} % of the samples are faults in e or u, at which the estimate is held"),
+                format!("{share:.0} % of the samples are faulty in e or u; the estimate is kept constant there"),
             ));
         }
         let last = self.times_s().last().copied().unwrap_or(f64::NAN);
@@ -222,8 +222,8 @@ impl Trace {
             all.push(Finding::doubt(
                 "steps-shortened",
                 format!(
-                    "{:.0} % of the steps were shortened to stay stable or within bounds: the estimate is not where \
-                     the data would put it",
+                    "{:.0} % of the steps were shortened to stay stable or within bounds: the estimate differs from \
+                     the value that the data would give",
                     100.0 * counts.shortened as f64 / moved
                 ),
             ));

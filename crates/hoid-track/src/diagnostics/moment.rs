@@ -31,7 +31,7 @@ impl Tracker {
         if self.options().method.starts_itself() && self.covariance().is_none() {
             return VerdictLevel::NotDetermined;
         }
-        // If none of them has a standard error, they may be unknown.
+        // If no coefficient has a standard error, the coefficients may be unknown.
         let known = |e: &Estimate| e.standard_error.is_some_and(|s| s > 0.0);
         if !self.parameters().iter().any(known) {
             return VerdictLevel::Doubtful;

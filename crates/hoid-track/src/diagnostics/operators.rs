@@ -1,5 +1,5 @@
-//! Findings about the operators of the rows of a trace: how many rows have one, whether the gains are determined and
-//! have a plausible sign and lead, and whether poles and delay are plausible for a person.
+//! Findings about the operators of the rows of a trace: the share of rows that have an operator, the significance and
+//! sign of the gains, the lead, and the plausibility of poles and delay.
 
 use hoid_ident::diagnostics::{is_open, leads_backwards, neuromuscular_finding};
 use hoid_model::{
@@ -12,7 +12,7 @@ use crate::trace::Trace;
 /// The operator of one row, or the reason why it has none.
 pub(super) type Operator = Result<OperatorEstimate, NotConvertible>;
 
-/// True if the coefficients do not represent an operator.
+/// True if orders or form of the model are not those of the operator.
 pub(super) fn is_other(operator: &Operator) -> bool {
     matches!(
         operator,
@@ -45,7 +45,7 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
             "{:.0} % of the rows do not correspond to any operator{reason}",
             100.0 * lacking
         );
-        // A gain of zero in all rows is not a model of another form: no response was found.
+        // A gain of zero in all rows does not indicate another form: no response was found.
         let nothing = operators.iter().all(|o| matches!(o, Err(NotConvertible::ZeroGain)));
         all.push(match nothing {
             true => Finding::undetermined("not-convertible", words),
@@ -54,7 +54,7 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
     }
     let rows_with = |is: &dyn Fn(&OperatorEstimate) -> bool| share(found.iter().filter(|o| is(o)).count(), found.len());
     let remembers = trace.options().method.memories().is_some();
-    // If the response is known, gain and lead are one description of it, which need not be the right one.
+    // If the response is known, gain and lead are only one description of it, which need not be the right one.
     let of_response = |finding: Finding| match trace.response_is_known {
         true => Finding {
             severity: Severity::Note,
@@ -89,7 +89,7 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
             all.push(Finding::doubt(
                 "delay-at-bound",
                 format!(
-                    "in {:.0} % of the rows the delay is at an end of its range {low} to {high} s; widen it",
+                    "in {:.0} % of the rows the delay is at an end of its range {low} to {high} s; widen this range",
                     100.0 * at_end
                 ),
             ));
@@ -98,7 +98,8 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
     all
 }
 
-/// Finding of a gain that changes its sign: people do not change it, but an inverted channel does.
+/// Finding about a gain that changes its sign: people do not reverse their gain, but a channel may be inverted during
+/// the run.
 fn sign_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
     let beyond = |e: &Estimate, sign: f64| e.standard_error.is_some_and(|s| sign * e.value > 3.0 * s);
     let positive = rows_with(&|o| beyond(&o.k_e, 1.0));
@@ -115,16 +116,16 @@ fn sign_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
     })
 }
 
-/// Finding of a negative lead: people have none, but gain and lead that approximate a lag can have one.
+/// Finding about a negative lead: people have none, but gain and lead that approximate a lag can include one.
 fn lead_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
     let negative = rows_with(&leads_backwards);
     (negative > NEGATIVE_LEAD).then(|| {
         Finding::doubt(
             "negative-lead",
             format!(
-                "the lead T_L is negative in {:.0} % of the rows, by two standard errors of K_e and of K_e_dot: this \
-                 person does not have the form of a gain and a lead and may have a lag; K_e, T_L and K_e_dot are then \
-                 not parameters of the person, only the response is valid (hoid identify finds the form)",
+                "the lead T_L is negative in {:.0} % of the rows, by two standard errors of K_e and of K_e_dot: a gain \
+                 and a lead do not describe this person, who may have a lag; K_e, T_L and K_e_dot are then not \
+                 parameters of the person, only the response is valid (hoid identify finds the form)",
                 100.0 * negative
             ),
         )
@@ -134,7 +135,8 @@ fn lead_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
 /// Share of the rows whose operator has a property.
 type ShareOfRows<'a> = dyn Fn(&dyn Fn(&OperatorEstimate) -> bool) -> f64 + 'a;
 
-/// Finding of gains that are undetermined in most rows. A method with a memory is advised to use a longer one.
+/// Finding about gains that are undetermined in most rows. For methods with a memory length, it recommends a longer
+/// one.
 fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Finding> {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let both = rows_with(&|o| is_open(&o.k_e) && is_open(&o.k_e_dot));

@@ -1,5 +1,5 @@
-//! Findings of the recording about a trace: the actions of the guard, an idle head, and whether the last row agrees
-//! with the last few seconds.
+//! Findings about a trace that follow from the recording: the actions of the guard, an idle head, and agreement of the
+//! last row with the last few seconds.
 
 use hoid_ident::diagnostics::{is_open, leads_backwards, operator_step};
 use hoid_model::{Finding, Record};
@@ -10,20 +10,20 @@ use crate::{
     trace::Trace,
 };
 
-/// Share of held-back samples beyond which the finding is a doubt.
-const HELD: f64 = 0.01;
-/// Largest number of spans that are named one by one.
+/// Share of held-back samples beyond which the finding is a warning.
+const MANY_HELD_BACK: f64 = 0.01;
+/// Largest number of spans that are listed individually.
 const NAMED: usize = 3;
 /// Lengths of the end of the record with which the last row is compared, s.
 const LAST_S: [f64; 2] = [16.0, 30.0];
-/// Number of changes from which there are many, and the least length of record per change, s.
-const MANY: usize = 3;
+/// Smallest number of changes that counts as many, and length of record per change above which it does not, s.
+const MANY_CHANGES: usize = 3;
 const FOR_EACH_S: f64 = 30.0;
-/// p-value of one of ten comparisons below which the two differ.
+/// p-value of one comparison, out of ten, below which the end of the record differs from the last row.
 const UNLIKELY: f64 = 1e-4;
 
 impl Trace {
-    /// Findings from the actions of the guard.
+    /// Findings about the actions of the guard.
     pub(super) fn guard_findings(&self) -> Vec<Finding> {
         let mut all = Vec::new();
         let of = |is: &dyn Fn(&TrackFault) -> bool| -> Vec<TrackFault> {
@@ -40,7 +40,7 @@ impl Trace {
             let count = samples(&held);
             let sample = if count == 1.0 { "sample" } else { "samples" };
             let words = format!("{count} {sample} held back as outliers ({})", named(&held));
-            all.push(match count > HELD * self.counts().samples as f64 {
+            all.push(match count > MANY_HELD_BACK * self.counts().samples as f64 {
                 true => Finding::doubt("held-back", words),
                 false => Finding::note("held-back", words),
             });
@@ -65,14 +65,14 @@ impl Trace {
         if !again.is_empty() {
             all.push(Finding::doubt(
                 "restarted",
-                format!("the estimate was started again after {} of them", again.len()),
+                format!("the estimate was restarted after {} of them", again.len()),
             ));
         }
         all
     }
 
-    /// Finding of spans in which e and u stay constant and the estimate continues, as requested: they carry no
-    /// information, and the error bars go to zero with the innovations ([`crate::stationary`]).
+    /// Finding about spans in which e and u stay constant while the estimate is updated, because the guard was turned
+    /// off: the spans carry no information, and the error bars go to zero with the innovations ([`crate::stationary`]).
     pub(super) fn learnt_at_rest(&self, record: &Record) -> Option<Finding> {
         if self.options().method.guard() != Some(GuardChoice::No) {
             return None;
@@ -86,20 +86,20 @@ impl Trace {
             Finding::doubt(
                 "learnt-at-rest",
                 format!(
-                    "neither e nor u moves from {from:.2} to {to:.2} s and the estimate is updated there: its error bars shrink without \
-                     information; keep the default guard, which holds the estimate"
+                    "neither e nor u moves from {from:.2} to {to:.2} s and the estimate is updated there: its error \
+                     bars shrink without information; keep the default guard, which keeps the estimate constant"
                 ),
             )
         })
     }
 
     /// Compares the last few seconds of the record with the last row: the delay may have changed, or the estimate may
-    /// not have returned. A finding is a step of [`operator_step`] that is [`UNLIKELY`], given its own error and that
-    /// of the row; for a delay in whole samples, a step beyond one and a half samples.
+    /// not have recovered. A step of [`operator_step`] gives a finding if it is [`UNLIKELY`], given its own error and
+    /// that of the row. For a delay in whole samples, the step must also exceed one and a half samples.
     pub(super) fn not_followed(&self, record: &Record) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self.operator(row).ok()?;
-        // Gain and lead that approximate another form have a response other than that of the estimate.
+        // If gain and lead approximate another form, their response differs from that of the estimate.
         if self.response_is_known && (is_open(&operator.k_e) || leads_backwards(&operator)) {
             return None;
         }
@@ -132,7 +132,8 @@ impl Trace {
                 if p_value < UNLIKELY && worst.as_ref().is_none_or(|(known, _)| p_value < *known) {
                     let words = format!(
                         "the last {length:.0} s require a {name} that differs from the last row by {}: the person \
-                         changed in a way that the estimate does not follow, or it has not recovered; restart it there",
+                         changed in a way that the estimate does not follow, or the estimate has not recovered; \
+                         restart it there",
                         step.by
                     );
                     worst = Some((p_value, words));
@@ -142,7 +143,7 @@ impl Trace {
         worst.map(|(_, words)| Finding::doubt("not-followed", words))
     }
 
-    /// Finding of an estimate that is not valid at the end, regardless of its earlier values.
+    /// Finding that neither gain is determined at the end, regardless of earlier values.
     pub(super) fn last_row_finding(&self) -> Option<Finding> {
         let operator = self.operator(self.len().checked_sub(1)?).ok()?;
         let nothing = is_open(&operator.k_e) && is_open(&operator.k_e_dot) && !self.response_is_known;
@@ -154,11 +155,11 @@ impl Trace {
         })
     }
 
-    /// Finding of more changes than people make.
+    /// Finding that more changes are declared than people make.
     pub(super) fn many_changes_finding(&self) -> Option<Finding> {
         let changes = self.changes().len();
         let length = self.times_s().last()? - self.times_s().first()?;
-        (changes >= MANY && changes as f64 * FOR_EACH_S >= length).then(|| {
+        (changes >= MANY_CHANGES && changes as f64 * FOR_EACH_S >= length).then(|| {
             Finding::doubt(
                 "many-changes",
                 format!(
@@ -169,7 +170,7 @@ impl Trace {
         })
     }
 
-    /// Finding of an idle head of the record.
+    /// Finding about an idle head of the record.
     pub(super) fn idle_finding(&self, record: &Record) -> Option<Finding> {
         let idle_s = self.idle_s();
         let (from, _) = self.options().start_span(record)?;
@@ -183,13 +184,13 @@ impl Trace {
         } else {
             Finding::doubt(
                 "idle-head",
-                format!("{words}, which are in the start fit; start it after them"),
+                format!("{words}, which are in the start fit; start the fit after them"),
             )
         })
     }
 }
 
-/// Names the first spans as text.
+/// Lists the first spans as text.
 fn named(faults: &[TrackFault]) -> String {
     let one = |f: &TrackFault| format!("{} in {} at {:.2} to {:.2} s", f.kind, f.channel, f.from_s, f.to_s);
     let mut text = faults.iter().take(NAMED).map(one).collect::<Vec<_>>().join("; ");

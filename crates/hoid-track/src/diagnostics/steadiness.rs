@@ -11,17 +11,18 @@ use hoid_model::{Finding, Record};
 use super::structure::columns;
 use crate::trace::Trace;
 
-/// Probability below which a response varies within a stretch. Instants of a jump, and frequencies and phases of an
-/// oscillation, are counted one by one although neighbours are correlated: less than one in a hundred steady people is
-/// below it.
+/// p-values below which the response is considered to vary within a stretch: by a step, a drift or an oscillation. All
+/// instants of a step, and all frequencies and phases of an oscillation, are counted as independent although
+/// neighbouring ones are correlated; fewer than one in a hundred people who do not change are below these limits.
 const UNLIKELY_STEP: f64 = 0.02;
 const UNLIKELY_DRIFT: f64 = 0.01;
 const UNLIKELY_SWAY: f64 = 0.05;
-/// Share of the part of e unexplained by older e and u that the latest u explains; below it e does not respond to u.
-/// In closed loops it is above one half, for two runs with the same forcing below .03.
+/// Limit on the share of the innovations of e (the part not explained by older e and u) that the latest u explains;
+/// below it, e does not respond to u. The share is above one half in closed loops, and below 0.03 for two runs with the
+/// same forcing function.
 const NO_ANSWER: f64 = 0.05;
-/// Time before and after a declared change that belongs to neither stretch, s.
-const ABOUT_S: f64 = 5.0;
+/// Time before and after a declared change that is excluded from the stretches, s.
+const EXCLUDED_S: f64 = 5.0;
 
 impl Trace {
     /// Stretches without a reported change, in samples of the record.
@@ -37,15 +38,15 @@ impl Trace {
             .collect();
         times.sort_by(f64::total_cmp);
         for at in times {
-            all.push(from..sample(at - ABOUT_S));
-            from = from.max(sample(at + ABOUT_S));
+            all.push(from..sample(at - EXCLUDED_S));
+            from = from.max(sample(at + EXCLUDED_S));
         }
         all.push(from..record.len());
         all.retain(|stretch| stretch.start < stretch.end);
         all
     }
 
-    /// Test result for each stretch, the most significant first; the p-values account for the number of stretches.
+    /// Test results for all stretches, the most significant first; the p-values account for the number of stretches.
     pub(super) fn unsteady(&self, record: &Record) -> Vec<Unsteady> {
         let Some((_, signals)) = self.signals(record) else {
             return Vec::new();
@@ -65,8 +66,9 @@ impl Trace {
         all
     }
 
-    /// Finding of a response that varies otherwise than the trace reports. A method that forgets, or that models how
-    /// people drift, does not assume a constant person between changes.
+    /// Finding that the response varies in a way that the trace does not report. The test is limited to methods with a
+    /// basis; other methods forget, or model how people drift, and do not assume that a person is constant between
+    /// changes.
     pub(super) fn unsteady_finding(&self, record: &Record) -> Option<Finding> {
         self.options().method.lag_of_basis_s()?;
         let unlikely = |found: &Unsteady| match found.course {
@@ -86,22 +88,24 @@ impl Trace {
             Course::Step => (
                 "undeclared-change",
                 format!(
-                    "their {name} changes by {size} about {:.0} s after the start (p = {p:.0e}), where the trace declares no change",
+                    "the {name} of the person changes by {size} about {:.0} s after the start (p = {p:.0e}), where the \
+                     trace declares no change",
                     record.time_s(found.at) - record.time_s(0)
                 ),
             ),
             Course::Drift => (
                 "drifting",
-                format!("their {name} drifts by {size} if the trace declares no change (p = {p:.0e})"),
+                format!("the {name} of the person drifts by {size} where the trace declares no change (p = {p:.0e})"),
             ),
             Course::Sway(period) => (
                 "swaying",
-                format!("their {name} oscillates by {size} with a period of about {period:.0} s (p = {p:.0e})"),
+                format!("the {name} of the person oscillates by {size} with a period of about {period:.0} s (p = \
+                         {p:.0e})"),
             ),
         };
         Some(Finding::doubt(
             kind,
-            format!("{words}; the bands assume a constant person and are too narrow here"),
+            format!("{words}; the bands assume a person who does not change, and are too narrow here"),
         ))
     }
 

@@ -1,9 +1,9 @@
 //! Tests whether the operator of the last row has the structure of the person.
 //!
-//! The basis of people can estimate the numerator, corrections of the poles and of the delay, and a level; together
-//! they span the six signals of its filter. The last of these filtered once more by the lag gives a correction of the
-//! lag, in case only the lag is wrong. The test asks whether earlier errors, since the last change, carry more
-//! information about u ([`hoid_ident::diagnostics::residual_response()`]).
+//! With the basis for people, the numerator, corrections of the poles and of the delay, and a level can be estimated;
+//! together they span the six signals of its filter. One of these signals, filtered once more by the lag, gives a
+//! correction of the lag, in case only the lag is wrong. The test examines whether earlier errors, since the last
+//! change, carry more information about u ([`hoid_ident::diagnostics::residual_response()`]).
 
 use hoid_core::adaptive::basis::{Basis, Point, Signals};
 use hoid_ident::diagnostics::{ResidualResponse, residual_response};
@@ -11,18 +11,18 @@ use hoid_model::{Finding, Record};
 
 use crate::{guard::GuardKind, trace::Trace};
 
-/// Probability below which part of the structure is missing.
+/// p-value below which part of the structure is considered missing.
 const UNLIKELY: f64 = 1e-3;
-/// Probability from which another lag explains the residual.
-const OF_LAG: f64 = 0.02;
-/// Longest span that is examined, s, and the part left out at the start, where the filter is at rest.
+/// p-value above which a corrected lag is considered to explain the residual.
+const LAG_EXPLAINS: f64 = 0.02;
+/// Longest span that is examined, s, and the time excluded at its start, s, because the filters start at rest.
 const LONGEST_S: f64 = 120.0;
 const SETTLING_S: f64 = 10.0;
 /// Lag of the basis for methods without one, s.
 const LAG_S: f64 = 3.0;
 
 impl Trace {
-    /// Finding of the record against the structure.
+    /// Finding that the record contradicts the structure of the operator.
     pub(super) fn missed_structure(&self, record: &Record) -> Option<Finding> {
         let found = self.residual_response(record)?;
         (found.p_value < UNLIKELY).then(|| {
@@ -39,7 +39,7 @@ impl Trace {
         })
     }
 
-    /// The test itself, for methods with a basis.
+    /// Result of the test, for methods with a basis.
     pub(super) fn residual_response(&self, record: &Record) -> Option<ResidualResponse> {
         self.options().method.lag_of_basis_s()?;
         let ts = self.sample_time().s();
@@ -54,14 +54,15 @@ impl Trace {
         columns.push(slower(&columns[0], basis.point().lag, ts));
         let of = |columns: &[Vec<f64>]| residual_response(columns, record.input(), record.output(), first, ts);
         let corrected = of(&columns)?;
-        if corrected.p_value > OF_LAG {
+        if corrected.p_value > LAG_EXPLAINS {
             return Some(corrected);
         }
         columns.pop();
         of(&columns)
     }
 
-    /// Time from which the filters of the basis have settled: samples without tracking remain in them until then.
+    /// Time from which the filters of the basis have settled; until then they contain samples that do not come from
+    /// tracking.
     pub(super) fn settled_s(&self, record: &Record) -> f64 {
         let outliers = [GuardKind::Outlier, GuardKind::Step];
         let hostile = self.faults().iter().filter(|fault| !outliers.contains(&fault.kind));
@@ -88,7 +89,7 @@ impl Trace {
     }
 }
 
-/// Filters a signal by the lag once more: the basis then has a correction of the lag, as of poles and delay.
+/// Filters a signal by the lag once more, which gives a correction of the lag in addition to those of poles and delay.
 fn slower(signal: &[f64], lag_s: f64, sample_time_s: f64) -> Vec<f64> {
     let pole = (-sample_time_s / lag_s).exp();
     let step = |state: &mut f64, z: &f64| {

@@ -1,8 +1,8 @@
-//! Tests, learning and snapshots at the end of a block, once a second.
+//! Tests, learning and snapshots at the end of each block of one second.
 
 use hoid_core::guard::{
     channel::ChannelGuard,
-    profile::{Block, CHANNELS, STILL, Trouble},
+    profile::{Block, CHANNELS, CONSTANT_FRACTION, Fault},
 };
 
 use super::{FLOOR, Guard, LARGEST, LEAST_AGE, SOUND_EVERY, event::GuardKind};
@@ -21,7 +21,7 @@ impl Guard {
             self.sound_blocks = 0;
             return;
         }
-        let trouble = self.profile.judge(&block, self.resting.is_rest());
+        let trouble = self.profile.find_fault(&block, self.resting.is_rest());
         if let Some(reference) = &mut self.reference {
             if self.pause.kind > 0 {
                 reference.begin();
@@ -41,9 +41,9 @@ impl Guard {
         match trouble {
             Some(trouble) => {
                 let (kind, channel) = named(trouble);
-                let blocks = self.profile.lasting(trouble);
+                let blocks = self.profile.duration_blocks(trouble);
                 let seen = u64::from(blocks) * u64::from(self.block_length);
-                self.go_back(recursion, seen);
+                self.restore_older_state(recursion, seen);
                 self.begin_pause(kind, channel, seen.min(self.samples), 0.0);
             }
             None if self.in_ring == 0 => {
@@ -66,7 +66,7 @@ impl Guard {
         }
     }
 
-    /// Starts to learn the tails of signals without prior knowledge.
+    /// Starts to learn the tails of the signals if their typical values are not known yet.
     fn learn_tails(&mut self, block: &Block) {
         if !self.profile.is_known() {
             for (channel, means) in self.channels.iter_mut().zip(block.differences) {
@@ -75,23 +75,23 @@ impl Guard {
         }
     }
 
-    fn judge_pause(&mut self, recursion: &mut dyn Recursion, trouble: Option<Trouble>, block: &Block) {
+    fn judge_pause(&mut self, recursion: &mut dyn Recursion, trouble: Option<Fault>, block: &Block) {
         self.pause.bad_block = trouble.is_some();
         if trouble.is_some() {
             self.pause.good = 0;
         }
         if trouble.is_some() && self.former.resembles(block) {
             let former = self.former;
-            self.learn_anew(recursion);
+            self.restart_and_forget(recursion);
             self.profile = former;
             self.set_limits();
-        } else if trouble.is_some_and(Trouble::may_be_the_new_level) {
-            self.pause.doubtful += u64::from(self.block_length);
+        } else if trouble.is_some_and(Fault::may_be_the_new_level) {
+            self.pause.suspect_samples += u64::from(self.block_length);
         }
     }
 
-    /// Restores the recursion to its state before the last `samples` samples, or earlier.
-    fn go_back(&self, recursion: &mut dyn Recursion, samples: u64) {
+    /// Restores a state of the recursion that is older than the last `samples` samples.
+    fn restore_older_state(&self, recursion: &mut dyn Recursion, samples: u64) {
         let least = samples.max(LEAST_AGE * u64::from(self.block_length));
         let sound = (0..2)
             .filter(|i| self.sound_at[*i] > 0 && self.samples - self.sound_at[*i] >= least)
@@ -102,7 +102,7 @@ impl Guard {
         };
     }
 
-    /// Sets the limits that follow from the long-run values.
+    /// Sets the limits that follow from the typical values.
     pub(super) fn set_limits(&mut self) {
         if !self.profile.is_known() {
             return;
@@ -113,27 +113,27 @@ impl Guard {
             let size = typical.magnitude[c];
             self.largest[c] = if size > 0.0 { LARGEST * size } else { f64::INFINITY };
             self.channels[c].set_floor(FLOOR[c] * size);
-            let still = STILL * typical.differences[c][0];
+            let still = CONSTANT_FRACTION * typical.differences[c][0];
             self.channels[c].set_resting(still);
             if !self.channels[c].is_known() {
                 self.channels[c].start_learning(typical.differences[c]);
-                self.channels[c].watch();
+                self.channels[c].start_detection();
             }
         }
-        self.resting.set_tolerance(STILL * typical.differences[1][0]);
+        self.resting.set_tolerance(CONSTANT_FRACTION * typical.differences[1][0]);
     }
 }
 
 /// Returns the kind and the channel of a fault.
-fn named(trouble: Trouble) -> (GuardKind, usize) {
+fn named(trouble: Fault) -> (GuardKind, usize) {
     match trouble {
-        Trouble::FrozenInput => (GuardKind::Frozen, 0),
-        Trouble::FrozenOutput => (GuardKind::Frozen, 1),
-        Trouble::Idle => (GuardKind::Idle, 2),
-        Trouble::Larger => (GuardKind::Level, 2),
-        Trouble::RescaledInput => (GuardKind::Level, 0),
-        Trouble::RescaledOutput => (GuardKind::Level, 1),
-        Trouble::Swapped => (GuardKind::Swapped, 2),
-        Trouble::Misfit => (GuardKind::Misfit, 2),
+        Fault::FrozenInput => (GuardKind::Frozen, 0),
+        Fault::FrozenOutput => (GuardKind::Frozen, 1),
+        Fault::Idle => (GuardKind::Idle, 2),
+        Fault::Larger => (GuardKind::Level, 2),
+        Fault::RescaledInput => (GuardKind::Level, 0),
+        Fault::RescaledOutput => (GuardKind::Level, 1),
+        Fault::Swapped => (GuardKind::Swapped, 2),
+        Fault::Misfit => (GuardKind::Misfit, 2),
     }
 }

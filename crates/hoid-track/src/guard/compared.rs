@@ -1,6 +1,6 @@
-//! Schedule of the comparison of the estimate with the model of the start: in the first [`COMPARED`] of every
-//! [`EVERY`] blocks, which keeps the cost low, and in all blocks for [`SUSPECT_FOR`] after something unusual. The
-//! filters of the model start at rest and have [`SETTLING`] blocks to settle.
+//! Schedule of the comparison between the estimate and the start model: the first [`COMPARED`] of every [`EVERY`]
+//! blocks are compared, which keeps the cost low, and after something unusual all of the next [`SUSPECT_BLOCKS`]
+//! blocks. The filters of the start model start at rest and have [`SETTLING`] blocks to settle.
 
 use hoid_core::{
     delay::DelayLine,
@@ -11,19 +11,19 @@ use hoid_core::{
     state::{State, visit_all},
 };
 
-/// Blocks of a round, and number of them that are compared.
+/// Number of blocks in a round, and number of these that are compared.
 const EVERY: u32 = 44;
 const COMPARED: u32 = 11;
 const SETTLING: u32 = 3;
 /// Number of blocks that are compared after something unusual.
-const SUSPECT_FOR: u32 = 30;
+const SUSPECT_BLOCKS: u32 = 30;
 
-/// The model of the start with its delay line.
+/// The start model with its delay line.
 #[derive(Debug, Clone)]
 pub(super) struct Reference {
     model: ReferenceModel,
     delay: DelayLine<Vec<f64>>,
-    /// Blocks of the round so far, and number of blocks that are compared in it.
+    /// Number of blocks of the round so far, and number of blocks that are compared in the round.
     over: u32,
     compared: u32,
 }
@@ -47,19 +47,19 @@ impl Reference {
         }
     }
 
-    /// Starts a round, with all filters at rest.
+    /// Starts a round in which many blocks are compared, with all filters at rest.
     pub fn begin(&mut self) {
         self.model.reset();
-        (self.over, self.compared) = (0, SUSPECT_FOR);
+        (self.over, self.compared) = (0, SUSPECT_BLOCKS);
     }
 
-    /// Reports something unusual: this block does not count, and the next ones are compared.
+    /// Reports something unusual: this block does not count, and the next blocks are compared.
     pub fn suspect(&mut self) {
         if self.over >= self.compared {
             self.begin();
         } else {
             self.model.skip_block();
-            self.compared = self.over.saturating_add(SUSPECT_FOR);
+            self.compared = self.over.saturating_add(SUSPECT_BLOCKS);
         }
     }
 

@@ -5,19 +5,19 @@ use hoid_model::SampleTime;
 /// Kind of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardKind {
-    /// One to a few samples that the signal does not predict and after which it returns.
+    /// One to a few samples that deviate from the prediction, after which the signal returns.
     Outlier,
     /// A jump after which the signal does not return.
     Step,
-    /// Samples that are not numbers, for longer than an outlier lasts.
+    /// Samples that are not finite numbers, for longer than an outlier lasts.
     Missing,
-    /// A signal 30 times as large as before.
+    /// A signal at more than 30 times its typical magnitude.
     Level,
     /// A signal that stays constant.
     Frozen,
-    /// Both signals are nearly silent.
+    /// Neither signal moves noticeably.
     Idle,
-    /// e is as u was before, and u as e was.
+    /// e looks as u did before, and u as e did.
     Swapped,
     /// The model predicts u worse than the past of u does.
     Misfit,
@@ -40,9 +40,9 @@ hoid_model::named_choice!(GuardKind, "kind of fault", 9, {
 /// Action of the guard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardAction {
-    /// Predictions replaced the samples; the estimate stayed constant.
+    /// The samples were replaced by predictions, and the estimate was kept constant.
     Held,
-    /// Held back at first, then taken as recorded; the result is that without a guard.
+    /// The samples were first held back and then used as recorded; the result is the same as without a guard.
     Accepted,
     /// The estimate stays constant from here on.
     Paused,
@@ -50,7 +50,7 @@ pub enum GuardAction {
     Resumed,
     /// The estimate is updated again, from its state before the span.
     Restarted,
-    /// The estimate is updated again, from the start of the recursion.
+    /// The estimate is updated again, after a restart of the recursion from its start.
     Relearnt,
 }
 
@@ -70,7 +70,7 @@ pub enum GuardChannel {
     Input,
     /// u.
     Output,
-    /// Both.
+    /// Both e and u.
     Both,
 }
 
@@ -80,19 +80,19 @@ hoid_model::named_choice!(GuardChannel, "channel", 3, {
     Both => "e, u",
 });
 
-/// A faulty span and the action taken, as reported at one of its samples or after it.
+/// A faulty span and the action taken, reported at one of its samples or after it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GuardEvent {
     /// Kind of the event.
     pub kind: GuardKind,
     /// Signal of the event.
     pub channel: GuardChannel,
-    /// Number of samples since the first one of the span.
+    /// Number of samples since the first sample of the span.
     pub ago: u64,
     /// Number of samples of the span so far.
     pub samples: u64,
-    /// Largest distance from the prediction for outliers and steps, largest magnitude for levels, in the unit of the
-    /// signal; zero for other kinds.
+    /// Size of the event: largest distance from the prediction for outliers and steps, largest magnitude for levels, in
+    /// the unit of the signal; zero for other kinds.
     pub size: f64,
     /// Action of the guard.
     pub action: GuardAction,
@@ -105,9 +105,9 @@ pub struct TrackFault {
     pub kind: GuardKind,
     /// Signal of the event.
     pub channel: GuardChannel,
-    /// Time of its first sample, s.
+    /// Time of the first sample of the span, s.
     pub from_s: f64,
-    /// Time of the sample after its last, s.
+    /// Time of the first sample after the span, s.
     pub to_s: f64,
     /// Size, as [`GuardEvent::size`].
     pub size: f64,
@@ -116,7 +116,7 @@ pub struct TrackFault {
 }
 
 impl GuardEvent {
-    /// Converts to times, for an event that was reported at `now_s`.
+    /// Converts an event that was reported at `now_s` to a fault with times.
     pub fn at(&self, now_s: f64, sample_time: SampleTime) -> TrackFault {
         let ts = sample_time.s();
         let from_s = now_s - self.ago as f64 * ts;
@@ -132,16 +132,16 @@ impl GuardEvent {
 }
 
 impl TrackFault {
-    /// True for a span in which the estimate stayed constant and whose end is not known.
+    /// True for a span in which the estimate is kept constant and whose end is not known yet.
     pub fn is_open(&self) -> bool {
         self.action == GuardAction::Paused
     }
 
-    /// Appends a fault to those before it; the end of a pause replaces its start.
-    pub(crate) fn put(self, behind: &mut Vec<Self>) {
-        if behind.last().is_some_and(Self::is_open) {
-            behind.pop();
+    /// Appends the fault to the earlier faults; the end of a pause replaces its start.
+    pub(crate) fn append_to(self, faults: &mut Vec<Self>) {
+        if faults.last().is_some_and(Self::is_open) {
+            faults.pop();
         }
-        behind.push(self);
+        faults.push(self);
     }
 }

@@ -1,4 +1,4 @@
-//! Held-back samples, and their later treatment: interpolated, or taken as recorded.
+//! Held-back samples and their later treatment: interpolation, or use as recorded.
 
 use hoid_core::guard::profile::CHANNELS;
 
@@ -9,7 +9,7 @@ use super::{
 use crate::recursion::{Recursion, Sample};
 
 impl Guard {
-    /// Handles a sample that is held back, or the one with which the signals have returned.
+    /// Handles a sample that is held back, or the sample with which the signals return.
     #[cold]
     pub(super) fn hold(
         &mut self,
@@ -34,7 +34,7 @@ impl Guard {
                 let errors = channel.errors(x[c]);
                 channel.accept(x[c], &errors);
             } else if held > 0 && channel.is_back(x[c]) {
-                let (size, largest_move) = (channel.size(), channel.largest_move());
+                let (size, largest_move) = (channel.largest_error(), channel.largest_move());
                 channel.resume(x[c]);
                 if c == 1 && self.is_pulse(place, held, size, x[c], largest_move) {
                     let first = place.saturating_sub(held as usize);
@@ -78,8 +78,8 @@ impl Guard {
         }
     }
 
-    /// True for an excursion of u, ended by sample x at an index of the ring, that a hand can make: it leaves by a jump
-    /// and returns over several samples.
+    /// True if a hand can make an excursion of u that ends with sample x at index `place` of the ring: it starts with a
+    /// jump and returns over several samples.
     fn is_pulse(&self, place: usize, held: u32, size: f64, x: f64, largest_move: f64) -> bool {
         let Some(last) = place.checked_sub(1).map(|k| self.ring[k].values[1]) else {
             return false;
@@ -90,8 +90,9 @@ impl Guard {
             && (x - last).abs() <= 0.5 * size
     }
 
-    /// Handles the return of both signals: the recursion takes the samples again from before the excursion, with the
-    /// held-back ones on a parabola through the last good one, with its slope, and the next good one.
+    /// Handles the return of both signals. The recursion takes the samples again from the start of the excursion.
+    /// Held-back samples are replaced by values on a parabola through the last good sample, with its slope, and the
+    /// next good sample.
     fn take_again(&mut self, recursion: &mut dyn Recursion, sample: Sample) -> Guarded {
         for c in 0..CHANNELS {
             let mut last = self.channels_before[c].last();
@@ -130,8 +131,9 @@ impl Guard {
                 u: raw.values[1],
                 ..sample
             };
-            // e acts only after the delay, so that the current innovation does not contain it. A tenth of a second of
-            // interpolated u changes an estimate less than suspending the births of a bank of hypotheses for that time.
+            // e acts on u only after the delay, so that the current innovation does not contain the interpolated e. A
+            // tenth of a second of interpolated u affects an estimate less than if a bank created no hypotheses for
+            // that time.
             outcome = Some(if raw.moves {
                 recursion.step(taken)
             } else {
@@ -145,7 +147,7 @@ impl Guard {
     /// Handles a signal that has been held back for too long to be an outlier.
     fn lasting(&mut self, recursion: &mut dyn Recursion, c: usize, sample: Sample) -> Guarded {
         let x = [sample.e, sample.u];
-        let (held, size) = (u64::from(self.channels[c].held()), self.channels[c].size());
+        let (held, size) = (u64::from(self.channels[c].held()), self.channels[c].largest_error());
         if !x[c].is_finite() {
             self.begin_pause(GuardKind::Missing, c, held, 0.0);
             return self.paused(recursion, sample);
@@ -183,12 +185,13 @@ impl Guard {
                 [_, false] => recursion.bridge(taken),
             }
         }
-        // e jumps with its target and moves as before, while the person responds only after the delay.
+        // A step of the target moves e at once, after which e varies as before; the person responds only after the
+        // delay.
         let ring = &self.ring[..self.in_ring];
-        // More samples are held back than exist only if the saved numbers were changed.
+        // The number of held-back samples exceeds that in the ring only if the saved numbers were altered.
         let first = self.in_ring.saturating_sub(held as usize);
         let behind = ring[first..].iter().map(|raw| raw.values[0]);
-        let is_target = c == 0 && !ring.iter().any(|raw| raw.held[1]) && self.channels_before[0].moves_as_usual(behind);
+        let is_target = c == 0 && !ring.iter().any(|raw| raw.held[1]) && self.channels_before[0].moves_typically(behind);
         self.in_ring = 0;
         if !is_target {
             self.tell(GuardKind::Step, c, held, size, GuardAction::Accepted, 0);

@@ -1,43 +1,45 @@
-//! A guard in front of a recursion: treatment of samples and spans that no tracking produces. [`hoid_core::guard`]
+//! A guard in front of a recursion: treatment of samples and spans that cannot come from tracking. [`hoid_core::guard`]
 //! detects them.
 //!
-//! | found | input of the recursion | estimate | afterwards |
+//! | observation | input of the recursion | estimate | afterwards |
 //! |---|---|---|---|
-//! | outlier of up to [`LONGEST_S`] | the prediction of e; the recursion's own prediction of u | stays | the recursion is put back to before it and takes the samples again, those that were held back interpolated |
-//! | a jump that stays, a pulse of the hand | the same | stays | the recursion is put back to before it and takes the samples as they came: the result is that without a guard |
-//! | no numbers for longer | the same | stays | continues once the filters have settled |
-//! | 30 times the typical magnitude | the long-run mean of e, the prediction of u | stays | continues from there once the filters have settled |
-//! | frozen, idle, larger or rescaled, swapped, misfit (by blocks of a second) | the samples, into the filters alone | is put back to before it | continues from there once the span is over and the filters have settled |
-//! | an estimate that has gone diverged by [`hoid_core::guard::reference`] | the samples, into the filters alone | is put back to the start | continues from there once the filters have settled |
+//! | outlier of up to [`LONGEST_S`] | predictions: of e by the guard, of u by the recursion | constant | the recursion is restored to its state before the outlier and takes the samples again; those that were held back are interpolated |
+//! | lasting jump, or pulse of the hand | the same predictions | constant | the recursion is restored to its state before the jump and takes the samples as recorded: the result is the same as without a guard |
+//! | samples that are not numbers, for longer than an outlier | the same predictions | constant | the estimate is updated again once the filters have settled |
+//! | 30 times the typical magnitude | the long-run mean of e, the prediction of u | constant | the estimate is updated again once the filters have settled |
+//! | frozen, idle, larger or rescaled, swapped, misfit (tested in blocks of a second) | the samples, for the filters only | restored to a state before the fault | the estimate is updated again once the span is over and the filters have settled |
+//! | an estimate that has diverged according to [`hoid_core::guard::reference`] | the samples, for the filters only | restored to the start | the estimate is updated again once the filters have settled |
 //!
-//! **Steps and pulses.** `e = r - y`: a step of the target moves e by the same amount within one sample, and y
-//! continues; so does u, since the person responds after the delay. A jump of e that stays, after which e moves as
-//! before while u continues as predicted, is tracking and is not reported. A disturbed sensor recovers as fast as it
-//! failed: an excursion that ends by a jump is an outlier. A fast hand leaves a dead zone at once but returns over
-//! several samples: an excursion of u of [`PULSE_S`] or more within [`PULSE`] times its mean magnitude, whose last
-//! step is within the normal moves of u, is a pulse and is taken as recorded.
+//! **Steps and pulses.** `e = r - y`: a step of the target moves e by the same amount within one sample, while y and u
+//! continue smoothly, since the person responds only after the delay. A lasting jump of e, after which e moves as
+//! before while u continues as predicted, is therefore tracking and is not reported. A disturbed sensor recovers as
+//! fast as it failed: an excursion that ends with a jump is an outlier. A fast hand leaves a dead zone at once but
+//! returns over several samples: an excursion of u of [`PULSE_S`] or more within [`PULSE`] times its mean magnitude,
+//! whose last step is within the normal moves of u, is a pulse and is used as recorded.
 //!
-//! **Restoring.** The numbers of a recursion are few ([`hoid_core::state`]). They are stored when a sample is first
-//! held back, every [`SOUND_EVERY`] blocks without a fault (the last two are kept; the one that is older than the time
-//! in which the rules detect a fault is used), and at the start. The ring of samples that may have to be taken again is
-//! [`LONGEST_S`] long. Memory is bounded, and nothing is allocated once the snapshots have their size.
+//! **Restoring.** The state of a recursion consists of few numbers ([`hoid_core::state`]). It is stored at the start,
+//! when a sample is first held back, and every [`SOUND_EVERY`] blocks without a fault. Of the snapshots after such
+//! blocks, the last two are kept, and the newest one that is older than the time in which the rules detect a fault is
+//! restored. The ring of samples that may have to be taken again is twice [`LONGEST_S`] long, because both signals may
+//! be held back one after the other. Memory is bounded, and nothing is allocated once the snapshots have reached their
+//! size.
 //!
-//! **Filters have settled** after the delay and [`SETTLE_S`]: the slowest poles of people's neuromuscular systems
-//! (omega zeta of 2 to 4 rad/s) leave less than 2 % after that time.
+//! **Filters have settled** when the delay and [`SETTLE_S`] have passed: after that time the slowest poles of people's
+//! neuromuscular systems (omega zeta of 2 to 4 rad/s) leave less than 2 %.
 //!
-//! A misfit, exchanged channels or a larger level that last for [`GIVEN_UP_S`] are accepted as the new signals: the
+//! A misfit, exchanged channels or a larger level that last for [`ACCEPTED_AFTER_S`] are accepted as normal: the
 //! recursion restarts from its start, and the typical levels are estimated again. If the signals then return to their
 //! former levels, the former typical levels are used again. Silence has no time limit.
 //!
 //! | file | contents |
 //! |---|---|
-//! | `holding` | samples that are held back, and the treatment of them |
+//! | `holding` | samples that are held back, and their later treatment |
 //! | `pausing` | pauses, from their start to their end |
 //! | `blocks` | checks, learning and snapshots once a second |
-//! | `prime` | the default, from the record of the start span |
-//! | `compared` | the model of the start next to the signals |
-//! | `snapshot` | the numbers of a recursion, kept and put back |
-//! | `event`, `options` | events for reports; options |
+//! | `prime` | typical values from the record of the start span |
+//! | `compared` | comparison of the estimate with the start model |
+//! | `snapshot` | stored states of a recursion |
+//! | `event`, `options` | events for reports; the option of the guard |
 
 mod blocks;
 mod compared;
@@ -73,24 +75,24 @@ const LONGEST_S: f64 = 0.1;
 pub(crate) const SETTLE_S: f64 = 2.0;
 /// Length of a block, s.
 const BLOCK_S: f64 = 1.0;
-/// Sound blocks between two snapshots, and least age in blocks of the snapshot that is restored.
+/// Number of sound blocks between two snapshots, and smallest age in blocks of a snapshot that is restored.
 const SOUND_EVERY: u32 = 5;
 const LEAST_AGE: u64 = 4;
-/// Magnitude, in units of the typical mean magnitude, beyond which the level of a signal has changed.
+/// Multiple of the typical mean magnitude beyond which the level of a signal has changed.
 const LARGEST: f64 = 30.0;
-/// Lower limit of outliers in units of the mean magnitude: e passes a low-pass filter before it reaches an innovation,
-/// u enters the innovation directly.
+/// Smallest size of an outlier as a multiple of the mean magnitude: e passes a low-pass filter before it reaches an
+/// innovation, while u enters the innovation directly.
 const FLOOR: [f64; CHANNELS] = [0.3, 1e-3];
-/// Shortest pulse of the hand, s, and its largest size in units of the mean magnitude.
+/// Shortest pulse of the hand, s, and its largest size as a multiple of the mean magnitude.
 const PULSE_S: f64 = 0.03;
 const PULSE: f64 = 6.0;
-/// Time after which a misfit or swapped channels are accepted as the new typical level, s.
-const GIVEN_UP_S: f64 = 120.0;
+/// Time after which a misfit or swapped channels are accepted as normal, s.
+const ACCEPTED_AFTER_S: f64 = 120.0;
 
 /// Decision of the guard on a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Guarded {
-    /// Outcome of the recursion; without innovation if the sample did not reach it as recorded.
+    /// Outcome of the recursion; `None` if the sample did not reach it as recorded.
     pub outcome: Option<StepOutcome>,
     /// True if the sample was held back or the estimate is paused.
     pub held: bool,
@@ -106,10 +108,10 @@ struct Raw {
 
 hoid_core::state!([] Raw { values, held, moves });
 
-/// A pause.
+/// A pause, in which the estimate is kept constant.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Pause {
-    /// One more than the index of its kind in [`GuardKind::ALL`]; 0 for none.
+    /// Index of the kind in [`GuardKind::ALL`], plus one; 0 without a pause.
     kind: usize,
     channel: usize,
     first: u64,
@@ -119,10 +121,10 @@ struct Pause {
     /// Number of consecutive samples without a fault.
     good: u64,
     /// Number of samples of a larger level, of a misfit or of swapped channels.
-    doubtful: u64,
+    suspect_samples: u64,
 }
 
-hoid_core::state!([] Pause { kind, channel, first, size, bad_block, good, doubtful });
+hoid_core::state!([] Pause { kind, channel, first, size, bad_block, good, suspect_samples });
 
 impl Pause {
     fn kind(&self) -> GuardKind {
@@ -142,26 +144,26 @@ pub(crate) struct Guard {
     channels: [ChannelGuard; CHANNELS],
     profile: Profile,
     resting: Resting,
-    /// The typical values before they were learnt again.
+    /// The former typical values, from before they were learnt again.
     former: Profile,
     block: Block,
     in_block: u32,
     sound_blocks: u32,
     centre: [f64; CHANNELS],
     largest: [f64; CHANNELS],
-    /// State before the held-back samples: recursion, channels, and those samples.
+    /// States of recursion and channels before the held-back samples, and these samples.
     before: Snapshot,
     channels_before: [ChannelGuard; CHANNELS],
     ring: Vec<Raw>,
     in_ring: usize,
     sound: [Snapshot; 2],
-    /// Number of the sample at which each snapshot was taken; 0 for none.
+    /// Sample number at which each snapshot was taken; 0 if it was not.
     sound_at: [u64; 2],
     start: Snapshot,
     reference: Option<Reference>,
     pause: Pause,
     restarts: u64,
-    /// Number of the sample of the last restart.
+    /// Sample number of the last restart.
     restarted_at: u64,
     event: Option<GuardEvent>,
 }
@@ -196,7 +198,8 @@ impl State for Guard {
         if let Some(reference) = &mut self.reference {
             reference.visit(each);
         }
-        // The next held-back sample takes its place. A pause, a snapshot and a restart are not later than now.
+        // The ring must have room for the next held-back sample. A pause, a snapshot and a restart cannot be in the
+        // future.
         self.in_ring = self.in_ring.min(self.ring.len().saturating_sub(1));
         self.pause.first = self.pause.first.min(self.samples);
         self.sound_at = self.sound_at.map(|at| at.min(self.samples));
@@ -208,8 +211,8 @@ impl State for Guard {
 
 impl Guard {
     /// Builds the guard of a recursion at its start, with a delay of nk samples. Typical values are learnt from the
-    /// record of the start span or, without one, from the first seconds, in which only values that are not numbers are
-    /// held back.
+    /// record of the start span or, without one, from the first few seconds, in which only values that are not finite
+    /// numbers are held back.
     pub fn new(recursion: &mut dyn Recursion, nk: usize, span: Option<&Record>, sample_time: SampleTime) -> Self {
         let ts = sample_time.s();
         let longest = (LONGEST_S / ts).round().max(1.0) as u32;
@@ -234,7 +237,7 @@ impl Guard {
             largest: [f64::INFINITY; CHANNELS],
             before: Snapshot::default(),
             channels_before: [channel; CHANNELS],
-            // Both signals may be held back one after the other.
+            // Both signals may be held back, one after the other.
             ring: vec![Raw::default(); 2 * longest as usize + 2],
             in_ring: 0,
             sound: [Snapshot::default(), Snapshot::default()],
@@ -252,7 +255,7 @@ impl Guard {
         guard
     }
 
-    /// Takes a sample, with NaN for values that are not numbers, and decides whether it reaches the recursion.
+    /// Takes a sample, in which NaN marks a missing value, and decides whether it reaches the recursion.
     #[inline]
     pub fn take(&mut self, recursion: &mut dyn Recursion, sample: Sample, moves: bool) -> Guarded {
         self.samples += 1;
@@ -293,7 +296,7 @@ impl Guard {
         guarded
     }
 
-    /// Compares with the model of the start from now on.
+    /// Compares the estimate with the start model from now on.
     pub fn compare_with(&mut self, model: ReferenceModel, nk: usize) {
         self.reference = Some(Reference::new(model, nk));
     }
@@ -309,7 +312,7 @@ impl Guard {
         });
     }
 
-    /// Returns the event at the last sample.
+    /// Returns the event reported at the last sample.
     pub fn event(&self) -> Option<GuardEvent> {
         self.event
     }
@@ -324,7 +327,7 @@ impl Guard {
         self.restarts
     }
 
-    /// Returns the seconds since the last restart, if there was one.
+    /// Returns the time since the last restart in s; `None` without a restart.
     pub fn since_restart_s(&self) -> Option<f64> {
         (self.restarts > 0).then(|| (self.samples - self.restarted_at) as f64 * self.sample_time.s())
     }

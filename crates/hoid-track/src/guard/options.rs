@@ -5,7 +5,7 @@ use hoid_ident::{
     settings::{Kind, Value},
 };
 
-/// Whether a guard is in front of a recursion.
+/// Choice of a guard in front of a recursion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardChoice {
     /// A guard is in front of the recursion.
@@ -33,7 +33,7 @@ impl Value for GuardChoice {
 }
 
 settings! {
-    /// Whether samples and spans that no tracking produces are kept from the recursion.
+    /// Option to keep samples and spans that cannot come from tracking from the recursion.
     pub struct GuardOptions {
         /// Guard: outliers of e and u are held back, spans that no tracking produces are excluded, and the estimate
         /// restarts after them

@@ -1,9 +1,9 @@
-//! Pauses: the estimate stays constant, and the samples enter only the filters, if possible.
+//! Pauses: the estimate is kept constant, and the samples enter only the filters, if possible.
 
 use hoid_core::guard::profile::{Block, CHANNELS};
 
 use super::{
-    GIVEN_UP_S, Guard, Guarded, Pause,
+    ACCEPTED_AFTER_S, Guard, Guarded, Pause,
     event::{GuardAction, GuardKind},
 };
 use crate::recursion::{Recursion, Sample};
@@ -24,17 +24,17 @@ impl Guard {
             size,
             bad_block: !matches!(kind, GuardKind::Missing | GuardKind::Level | GuardKind::Diverged),
             good: 0,
-            doubtful: 0,
+            suspect_samples: 0,
         };
         self.block = Block::default();
         self.in_block = 0;
         self.tell(kind, channel, samples, size, GuardAction::Paused, 0);
     }
 
-    /// Handles a sample of a pause: it enters the filters if possible.
+    /// Handles a sample during a pause: it enters the filters if possible.
     #[cold]
     pub(super) fn paused(&mut self, recursion: &mut dyn Recursion, sample: Sample) -> Guarded {
-        self.resting.doubt();
+        self.resting.reject();
         let mut values = [sample.e, sample.u];
         let mut good = [true; CHANNELS];
         let mut errors = [[0.0; 4]; CHANNELS];
@@ -69,9 +69,9 @@ impl Guard {
             recursion.bridge(taken);
         }
         let larger = (0..CHANNELS).any(|c| !good[c] && [sample.e, sample.u][c].is_finite());
-        self.pause.doubtful += u64::from(larger);
-        if self.pause.doubtful as f64 * self.sample_time.s() > GIVEN_UP_S {
-            self.learn_anew(recursion);
+        self.pause.suspect_samples += u64::from(larger);
+        if self.pause.suspect_samples as f64 * self.sample_time.s() > ACCEPTED_AFTER_S {
+            self.restart_and_forget(recursion);
             return Guarded { outcome, held: true };
         }
         self.pause.good = if good == [true; CHANNELS] {
@@ -106,7 +106,7 @@ impl Guard {
     }
 
     /// Restarts the recursion from its start and forgets the typical values of the signals.
-    pub(super) fn learn_anew(&mut self, recursion: &mut dyn Recursion) {
+    pub(super) fn restart_and_forget(&mut self, recursion: &mut dyn Recursion) {
         self.start.restore(recursion);
         self.former = std::mem::take(&mut self.profile);
         self.sound_at = [0; 2];

@@ -1,25 +1,25 @@
 //! Typical values from the record of the start span.
 //!
-//! For each mean of a block ([`hoid_core::guard::profile`]) the median over all blocks is taken, and for each
-//! difference the largest of three estimates of its 99 % quantile: its own, and those that follow from the 50 and 95 %
-//! quantiles for Gaussian errors. A few outliers in the span change neither; heavy tails are included. Samples at which
-//! a signal stays constant are left out of the quantiles, as during a run ([`hoid_core::guard::channel`]); the rests of
-//! u are learnt too.
+//! The typical value of each mean of a block ([`hoid_core::guard::profile`]) is its median over all blocks. The typical
+//! value of each difference is the largest of three estimates of its 99 % quantile: the quantile itself, and the values
+//! that follow from the 50 and 95 % quantiles for Gaussian errors. Neither is affected by a few outliers in the span;
+//! heavy tails are included. Samples at which a signal stays constant are excluded from the quantiles, as during a run
+//! ([`hoid_core::guard::channel`]). Spans in which u rests are learnt too.
 
 use hoid_core::guard::{
     channel::ORDERS,
-    profile::{Block, CHANNELS, Profile, STILL},
+    profile::{Block, CHANNELS, Profile, CONSTANT_FRACTION},
 };
 use hoid_model::Record;
 use hoid_numerics::statistics::{mean, upper_quantile};
 
 use super::Guard;
 
-/// Quantiles of the magnitude of a Gaussian number, in standard deviations.
+/// Quantiles of the magnitude of a Gaussian variable, in standard deviations.
 const QUANTILES: [(f64, f64); 3] = [(0.5, 0.6745), (0.95, 1.96), (0.99, 2.5758)];
-/// The inner quantile, by its own count.
+/// Probability of the inner quantile, which is estimated directly.
 const INNER: f64 = 0.9;
-/// Least number of blocks of a record from which typical values are learnt.
+/// Smallest number of blocks of a record from which typical values are learnt.
 const LEAST: usize = 5;
 
 impl Guard {
@@ -101,14 +101,14 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     upper_quantile(&mut values, share).unwrap_or(0.0)
 }
 
-/// True for each first difference that is larger than those of a constant signal.
+/// Returns true for each first difference that is larger than those of a constant signal.
 fn moving(signal: &[f64]) -> Vec<bool> {
     let sizes: Vec<f64> = signal.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     let mean = mean(&sizes);
-    sizes.iter().map(|size| *size > STILL * mean).collect()
+    sizes.iter().map(|size| *size > CONSTANT_FRACTION * mean).collect()
 }
 
-/// The 99 % quantile of the magnitudes, by its own count or from the inner quantiles.
+/// The 99 % quantile of the magnitudes: the largest of its direct estimate and of those from the inner quantiles.
 fn tail(values: &[f64]) -> f64 {
     let magnitudes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
     let scale = QUANTILES.map(|(share, deviations)| quantile(magnitudes.clone(), share) / deviations);

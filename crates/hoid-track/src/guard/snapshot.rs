@@ -1,13 +1,13 @@
-//! The numbers of a recursion, stored so that they can be restored.
+//! Stored states of a recursion, which can be restored.
 
 use hoid_core::state::State;
 
 use crate::recursion::Recursion;
 
-/// Longest snapshot that is accepted from saved numbers.
+/// Largest length of a snapshot that is accepted from saved numbers.
 const LONGEST: usize = 1 << 20;
 
-/// The numbers of a recursion. Their memory grows to the largest snapshot and is kept.
+/// The numbers that are the state of a recursion. Their memory grows to the largest snapshot and is kept.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Snapshot {
     numbers: Vec<f64>,

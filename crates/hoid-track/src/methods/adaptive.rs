@@ -1,14 +1,15 @@
-//! The recursion in the basis that people share ([`hoid_core::adaptive`]), with the interface of a recursion and with
+//! The recursion with gains in a basis for people ([`hoid_core::adaptive`]), with the interface of a recursion and with
 //! defaults for people, in seconds.
 //!
-//! It needs no start fit: it starts with the defaults for people ([`hoid_core::adaptive::default`]). The delay starts
-//! at that of nk (.2 s if nothing is specified), plus half a sample for an error that is held.
+//! The method needs no start fit: it starts with the defaults for people ([`hoid_core::adaptive::default`]). The
+//! initial delay follows from nk (0.2 s if nothing is specified), plus half a sample for an error that is held.
 //!
-//! **Prior knowledge of the person** before the first sample is set by `prior`: the default, almost none, some
-//! parameters, or an earlier fit, from whose estimate and covariance the recursion starts (`starting_point`).
+//! **Prior knowledge of the person** before the first sample is selected by the option `prior`: the default, almost
+//! none, some parameters, or an earlier fit, from whose estimate and covariance the recursion starts
+//! (`starting_point`).
 //!
-//! **Reported estimate.** The gain and lead that are nearest to the gains of the basis ([`AdaptiveFilter::operator`]).
-//! The polynomials are the hold of this operator, with the delay of nk.
+//! **Reported estimate.** Gain and lead whose response is nearest to that of the gains of the basis
+//! ([`AdaptiveFilter::operator`]). The polynomials are this operator after a zero-order hold, with the delay nk.
 
 mod starting_point;
 
@@ -42,7 +43,7 @@ use crate::{
 };
 
 settings! {
-    /// Options of the recursion in the basis that people share.
+    /// Options of the recursion with gains in a basis for people.
     pub struct AdaptiveOptions {
         /// Accepted false alarms per hour: a lower number detects fewer changes, and later
         #[setting(unit("1/h"), bounds(Bounds::PositiveFinite))]
@@ -84,7 +85,7 @@ impl RecursiveMethod for AdaptiveOptions {
         Some(defaults::ORDER)
     }
 
-    /// It follows from the weights of the drifts.
+    /// Not used: the memory follows from the weights of the drifts.
     fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Infinite
     }
@@ -109,8 +110,8 @@ impl RecursiveMethod for AdaptiveOptions {
             return Err(bad_option(
                 "the start of adaptive",
                 start.to_owned(),
-                "a prior in its place: it starts from the defaults for people, from almost no knowledge (prior = none) \
-                 or from an earlier fit of the person; rpem, physical and rls take a start",
+                "a prior instead: adaptive starts from the defaults for people, from almost no knowledge (prior = \
+                 none) or from an earlier fit of the person; rpem, physical and rls take a start",
             ));
         }
         Ok(())
@@ -135,7 +136,8 @@ impl RecursiveMethod for AdaptiveOptions {
 
     fn memory_as_text(&self) -> Option<String> {
         Some(format!(
-            "since the last change where nothing changes; a change is declared with {} expected false alarm{} per hour",
+            "since the last change, as long as the person does not change; a change is declared with {} expected false \
+             alarm{} per hour",
             self.false_alarms,
             if self.false_alarms == 1.0 { "" } else { "s" }
         ))
@@ -150,7 +152,7 @@ impl RecursiveMethod for AdaptiveOptions {
     }
 
     fn spread_before(&self) -> Option<[f64; DYNAMICS]> {
-        // Parameters that a fit determined are known, whatever the data show.
+        // Parameters that a fit determined are known, regardless of the data.
         let known = self.prior.fit().is_some();
         let StartingPoint { point, spread } = StartingPoint::of(&self.prior, 0.0, false, SampleTime::HUNDREDTH).ok()?;
         (!known).then_some([spread[0] * point.omega, spread[1] * point.zeta, spread[2]])
@@ -171,7 +173,7 @@ impl RecursiveMethod for AdaptiveOptions {
     }
 }
 
-/// The filter with its report.
+/// The filter with its reported estimate.
 struct AdaptiveRecursion {
     model: Box<AdaptiveFilter<Vec<f64>>>,
     reported: Reported,
@@ -186,7 +188,7 @@ impl AdaptiveRecursion {
     ) -> Result<Self, IdentError> {
         let ts = sample_time.s();
         let nk = setup.orders.nk;
-        // A delay that is not the default one has been given.
+        // A delay other than the default was given by the user.
         let is_given = nk != sample_time.nk(DEFAULT_DELAY_S);
         let beginning = StartingPoint::of(&options.prior, (nk as f64 - 0.5) * ts, is_given, sample_time)?;
         let point = beginning.point;
@@ -196,8 +198,7 @@ impl AdaptiveRecursion {
         let supposed = DefaultOperator {
             point,
             spread: beginning.spread,
-            // A structure without a noise model, or with one pole, does not report how it is
-            // coloured.
+            // An nd of 0 or 1 gives no information about the colour of the noise, so that the default order is used.
             order: match setup.orders.nd {
                 0 | 1 => defaults::ORDER,
                 nd => nd,
@@ -222,7 +223,7 @@ impl AdaptiveRecursion {
         Ok(made)
     }
 
-    /// True for the response of an estimate: if all gains are zero, it has no size in dB and no phase.
+    /// True if an estimate exists and its response is not zero; a response of zero has no gain in dB and no phase.
     fn answers(&self, [re, im]: [f64; 2]) -> bool {
         self.model.has_started() && (re != 0.0 || im != 0.0)
     }
@@ -233,8 +234,8 @@ impl AdaptiveRecursion {
         self.reported.set_noise(self.model.d());
     }
 
-    /// K_e, K_e_dot, omega, zeta and tau before the last change, and the amounts by which they changed: zero for those
-    /// that did not.
+    /// K_e, K_e_dot, omega, zeta and tau before the last change, and the amounts by which they changed; the amount is
+    /// zero for parameters that did not change.
     fn of_change(&self) -> [[Estimate; PARAMETERS]; 2] {
         let detector = self.model.detector();
         let map = self.model.gain_and_lead();

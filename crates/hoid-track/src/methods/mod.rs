@@ -1,5 +1,5 @@
-//! A recursive method with its options, and the methods that track people: the default, and the two of the thesis. The
-//! methods for comparison, and the list of all, are in `hoid-survey`.
+//! A recursive method with its options, and the methods that track people: the default method, and the two methods of
+//! the thesis. The methods for comparison, and the list of all methods, are in `hoid-survey`.
 
 mod adaptive;
 mod rls;
@@ -22,7 +22,7 @@ pub use adaptive::AdaptiveOptions;
 pub use rls::RlsOptions;
 pub use rpem::{DEFAULT_LIMIT, RpemOptions, short_for_b};
 
-/// A recursive method with its options; its self-description is that of [`RecursiveMethod`].
+/// A recursive method with its options, described by [`RecursiveMethod`].
 #[derive(Debug)]
 pub struct Method(Box<dyn RecursiveMethod>);
 
@@ -53,7 +53,7 @@ impl Deref for Method {
 }
 
 impl Method {
-    /// Returns the method with gains in a basis that people share: Box-Jenkins with nc = 0.
+    /// Returns the method with gains in a basis for people: Box-Jenkins with nc = 0.
     pub fn adaptive() -> Self {
         AdaptiveOptions::default().into()
     }
@@ -72,23 +72,23 @@ impl Method {
         &mut *self.0
     }
 
-    /// Returns its known properties.
+    /// Returns name, description and options of the method.
     pub fn spec(&self) -> MethodSpec {
         spec(&*self.0)
     }
 
-    /// True if orders, delay or memory count samples; otherwise the rate is free, and a high one is lowered
+    /// True if orders, delay or memory are in samples. If they are not, a high sampling rate may be reduced
     /// ([`hoid_model::Decimation`]).
     pub fn counts_samples(&self) -> bool {
         !(self.starts_itself() || self.is_model_of_change())
     }
 
-    /// Returns its name on the command line.
+    /// Returns the name of the method on the command line.
     pub fn name(&self) -> &'static str {
         self.about().name
     }
 
-    /// Returns its options by name.
+    /// Returns the options of the method by name.
     pub fn settings(&self) -> &dyn Settings {
         &*self.0
     }
@@ -115,7 +115,7 @@ impl Method {
         Ok(self)
     }
 
-    /// Starts from an earlier fit of the person.
+    /// Selects an earlier fit of the person as the start.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] for a method that starts from the record.
@@ -131,8 +131,8 @@ impl Method {
         }
     }
 
-    /// Returns the operator's orders with the default noise model of the method: that of the structure, or of the
-    /// order that the method names.
+    /// Returns the orders of the operator with the default noise model of the method, which has the order of the
+    /// structure or an order that the method specifies.
     pub fn default_orders(&self, nk: usize) -> Orders {
         let orders = self.default_structure().operator_orders(nk);
         match self.default_nd() {
@@ -151,7 +151,7 @@ impl Method {
     }
 }
 
-/// [`Method::adaptive`]: it needs no start fit, and works for recorded people.
+/// [`Method::adaptive`]: it needs no start fit, and is suitable for recorded people.
 impl Default for Method {
     fn default() -> Self {
         Self::adaptive()

@@ -46,7 +46,7 @@ impl RecursiveMethod for RlsOptions {
         }
     }
 
-    /// The 256 samples of the thesis at 100 Hz.
+    /// 256 samples at 100 Hz, as in the thesis.
     fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Seconds(2.56)
     }
@@ -76,7 +76,7 @@ impl RecursiveMethod for RlsOptions {
         Some(&self.gain)
     }
 
-    /// Off with the settings of the thesis, which has ARX models.
+    /// Off for ARX models with the settings of the thesis.
     fn windup_guard(&self, structure: Structure) -> Option<WindupGuard> {
         match structure {
             Structure::Arx => self.gain.windup_guard(self.limit()),

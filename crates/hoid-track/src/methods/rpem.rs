@@ -36,7 +36,7 @@ settings! {
     }
 }
 
-/// Limit of an innovation in the update, in standard deviations.
+/// Default limit on an innovation in the update, in standard deviations.
 pub const DEFAULT_LIMIT: f64 = 5.0;
 
 impl RecursiveMethod for RpemOptions {
@@ -90,7 +90,7 @@ impl RecursiveMethod for RpemOptions {
         Some(&self.gain)
     }
 
-    /// Off with the settings of the thesis, which has Box-Jenkins models.
+    /// Off for Box-Jenkins models with the settings of the thesis.
     fn windup_guard(&self, structure: Structure) -> Option<WindupGuard> {
         match structure {
             Structure::BoxJenkins => self.gain.windup_guard(self.limit()),
@@ -119,7 +119,7 @@ impl RecursiveMethod for RpemOptions {
     }
 }
 
-/// B follows the gains and is short, the others long.
+/// Short memory for B, which follows the gains, and long memories for the other polynomials.
 pub fn short_for_b(parameter: &str) -> Memory {
     if parameter.starts_with('b') {
         Memory::Seconds(2.56)

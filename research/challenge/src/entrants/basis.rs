@@ -1,13 +1,12 @@
-//! Three gains in the basis of a nominal operator.
+//! Estimation of three gains in the basis of a nominal operator.
 //!
-//! `u = sum over i = 0..2 of theta_i x_i + c + v`, `x_i` the response of
-//! `s^i/((T_I s + 1)(s^2/omega^2 + 2 zeta s/omega + 1)) e^(-tau s)` to e, with T_I = 3 s, omega =
-//! 11 rad/s, zeta = .25, tau = .2 s for all operators; v is autoregressive. Data of a few seconds
-//! determine the numerator, not poles, lag and delay (the principle of basis functions: P. S. C.
-//! Heuberger, P. M. J. Van den Hof and B. Wahlberg, *Modelling and Identification with Rational
-//! Orthogonal Basis Functions*, 2005). The noise model is fitted on the start span, alternating
-//! least squares and autocovariance, and then fixed. All signals are decimated to 50 to 60 samples
-//! per second.
+//! `u = sum over i = 0..2 of theta_i x_i + c + v`, where `x_i` is the response of `s^i/((T_I s + 1)(s^2/omega^2 + 2
+//! zeta s/omega + 1)) e^(-tau s)` to e, with T_I = 3 s, omega = 11 rad/s, zeta = .25, tau = .2 s for all operators, and
+//! v is autoregressive. A few seconds of data determine the numerator, but not the poles, the lag and the delay (the
+//! principle of basis functions: P. S. C. Heuberger, P. M. J. Van den Hof and B. Wahlberg, *Modelling and
+//! Identification with Rational Orthogonal Basis Functions*, 2005). The noise model is fitted to the start span by
+//! alternating least squares and autocovariances, and then fixed. All signals are decimated to 50 to 60 samples per
+//! second.
 
 use hoid_model::Complex64;
 
@@ -17,19 +16,19 @@ use super::super::{
     operator::{Canonical, Operator, hold},
 };
 
-/// Gains and constant.
+/// Number of regression coefficients: three gains and a constant.
 pub(super) const GAINS: usize = 4;
-/// Vector and square matrix of this size.
+/// Vector with one element for each regression coefficient; `Square` is the corresponding square matrix.
 pub(super) type Gains = [f64; GAINS];
 pub(super) type Square = [[f64; GAINS]; GAINS];
 
 /// Order of the noise model.
 const ORDER: usize = 16;
-/// Rate of the decimated signals, Hz.
+/// Smallest sampling rate of the decimated signals, Hz.
 const RATE_HZ: f64 = 50.0;
-/// Omitted seconds at the start: the filters start at rest.
+/// Time omitted at the start, because the filters start at rest, s.
 const SETTLING_S: f64 = 5.0;
-/// Limit of the residuals of the start span, standard deviations.
+/// Limit of the residuals in the start span, standard deviations.
 const LIMIT: f64 = 3.5;
 
 const NOMINAL: Operator = Operator {
@@ -50,17 +49,17 @@ pub(super) struct White {
     pub t_s: f64,
     pub x: Gains,
     pub y: f64,
-    /// True if it gives no update: a value is missing, or it is history.
+    /// True if the sample gives no update, because a value is missing or it belongs to the history.
     pub is_void: bool,
 }
 
-/// The whole run after the whitening filter, with the start estimate.
+/// The whole run after the whitening filter, with the estimate from the start span.
 #[derive(Debug)]
 pub(super) struct Whitened {
     pub samples: Vec<White>,
-    /// Sample interval, s.
+    /// Sample time of the decimated signals, s.
     pub every_s: f64,
-    /// The gains of the start span, their covariance, and the variance of the innovations.
+    /// Gains from the start span; `covariance` is their covariance and `variance` the variance of the innovations.
     pub theta: Gains,
     pub covariance: Square,
     pub variance: f64,
@@ -68,7 +67,7 @@ pub(super) struct Whitened {
     pub size_u: f64,
 }
 
-/// One decimated sample: time, regressors, u.
+/// One decimated sample: time, regressors and u.
 struct Plain {
     t_s: f64,
     x: Gains,
@@ -77,7 +76,7 @@ struct Plain {
 }
 
 /// # Errors
-/// If the start span does not determine the gains.
+/// The reason, if the start span does not determine the gains.
 pub(super) fn whitened(task: &Task) -> Result<Whitened, String> {
     let plain = regressors(task);
     let thin = thinning(task);
@@ -127,7 +126,7 @@ fn thinning(task: &Task) -> usize {
 fn regressors(task: &Task) -> Vec<Plain> {
     let ts = task.sample_time.s();
     let thin = thinning(task);
-    // Steps of the integration within a sample, of 5 ms or less.
+    // Number of integration steps of at most 5 ms within a sample.
     let steps = (ts / 0.005 - 1e-9).ceil().max(1.0) as usize;
     let h = ts / steps as f64;
     let denominator = NOMINAL.denominator();
@@ -147,7 +146,7 @@ fn regressors(task: &Task) -> Vec<Plain> {
             });
         }
         for i in 0..steps {
-            // The error of the middle of the step, tau ago.
+            // Position of the error tau before the middle of the step.
             let place = count as f64 + (i as f64 + 0.5) / steps as f64 - NOMINAL.tau_e_s / ts;
             let v = if place < 0.0 { 0.0 } else { errors[place as usize] };
             state.advance(&denominator, [v; 3], h);
@@ -157,7 +156,7 @@ fn regressors(task: &Task) -> Vec<Plain> {
     plain
 }
 
-/// A sample after the filter `1 + a_1 q^-1 + ...`.
+/// Returns a sample after the whitening filter `1 + a_1 q^-1 + ...`.
 fn at(plain: &[Plain], i: usize, a: &[f64]) -> White {
     let own = &plain[i];
     let is_void = i < ORDER || own.is_history || plain[i - ORDER..=i].iter().any(|p| !p.u.is_finite());
@@ -185,7 +184,7 @@ fn autocovariance(values: &[f64]) -> Vec<f64> {
     all
 }
 
-/// Least squares, with outliers limited in a second pass.
+/// Solves the regression by least squares, with outliers limited in a second pass.
 fn least_squares(white: &[White]) -> Result<Whitened, String> {
     let mut sums = Sums::default();
     white.iter().for_each(|w| sums.add(&w.x, w.y));
@@ -250,7 +249,7 @@ impl Sums {
     }
 
     /// # Errors
-    /// If the gains are not determined.
+    /// The reason, if the gains are not determined.
     pub fn solve(&self) -> Result<Solved, String> {
         let inverse = inverse(&self.xx).ok_or("the gains are not determined")?;
         let theta: Gains = std::array::from_fn(|i| product(&inverse[i], &self.xy));
@@ -271,7 +270,7 @@ pub(super) fn product(a: &Gains, b: &Gains) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The inverse of a positive definite matrix by Cholesky factors, scaled to a unit diagonal.
+/// Returns the inverse of a positive definite matrix, by a Cholesky factorisation after scaling to a unit diagonal.
 fn inverse(matrix: &Square) -> Option<Square> {
     let scale: Gains = std::array::from_fn(|i| matrix[i][i].sqrt());
     if scale.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
@@ -301,17 +300,17 @@ fn inverse(matrix: &Square) -> Option<Square> {
     }))
 }
 
-/// Response of each regressor at a frequency, after the hold; zero for the constant.
-pub(super) fn worth(task: &Task, omega_rad_s: f64) -> [Complex64; GAINS] {
+/// Returns the response of each regressor at a frequency, including the hold; zero for the constant.
+pub(super) fn regressor_responses(task: &Task, omega_rad_s: f64) -> [Complex64; GAINS] {
     let common = NOMINAL.response(omega_rad_s) * hold(omega_rad_s, task.sample_time);
     let s = Complex64::new(0.0, omega_rad_s);
     [common, common * s, common * s * s, Complex64::from(0.0)]
 }
 
-/// Estimate of the response from the gains.
+/// Returns the estimate of the response that corresponds to the gains.
 pub(super) fn reported(task: &Task, theta: &Gains, covariance: &Square) -> ReportedResponse {
     let covariance: Vec<f64> = covariance.iter().flatten().copied().collect();
-    let each: Vec<_> = task.lines_rad_s.iter().map(|omega| worth(task, *omega)).collect();
+    let each: Vec<_> = task.lines_rad_s.iter().map(|omega| regressor_responses(task, *omega)).collect();
     ReportedResponse {
         response: each
             .iter()

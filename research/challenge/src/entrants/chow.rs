@@ -1,13 +1,12 @@
-//! Test of the difference of the complex response at 2.5 rad/s between the last 5 s and up to 40 s
-//! before them, each with its own variance (G. C. Chow, Econometrica 28 (1960) 591-605; without the
-//! common variance it is Wald's test).
+//! Test of the difference in the complex response at 2.5 rad/s between the last 5 s and up to 40 s before them, each
+//! with its own variance (G. C. Chow, Econometrica 28 (1960) 591-605; without a common variance it is Wald's test).
 //!
-//! `d = H_now - H_before`, `T = d' (C_now + C_before)^-1 d`; whitened residuals are limited at 3.5 standard deviations
-//! of the fit before. Without a change T would be chi-square with two degrees of freedom if the remnant were white
-//! after the filter of the start and the basis were that of the operator. Since neither holds, T is divided by its
-//! level so far, from the mean of its logarithm (that of a chi-square is `ln 2 - gamma`), and compared with
-//! [`THRESHOLD`]. After an alarm the data before it are discarded. The reported response is that of all seconds since,
-//! at most 40.
+//! The statistic is `T = d' (C_now + C_before)^-1 d` with `d = H_now - H_before`; whitened residuals are limited to 3.5
+//! standard deviations of the fit to the earlier data. Without a change T would be chi-square distributed with two
+//! degrees of freedom if the remnant were white after the filter from the start span and the basis were that of the
+//! operator. Since neither condition holds, T is divided by its average level, computed from the mean of its logarithm
+//! (for a chi-square variable `ln 2 - gamma`), and compared with [`THRESHOLD`]. After an alarm all data except those of
+//! the last 3 s are discarded. The reported response is estimated from the remaining data, at most 40 s.
 
 use std::collections::VecDeque;
 
@@ -15,29 +14,30 @@ use hoid_model::Complex64;
 
 use super::{
     super::entrant::{Alarm, Entrant, EntrantResult, Task, of_complex},
-    basis::{Solved, Square, Sums, product, reported, whitened, worth},
+    basis::{Solved, Square, Sums, product, reported, whitened, regressor_responses},
 };
 
-/// Length of a block, s, and blocks of present and past; the smallest number before.
+/// Length of a block, s. `PRESENT_BLOCKS` and `PAST_BLOCKS` are the numbers of blocks in the present and the past, and
+/// `MIN_PAST_BLOCKS` is the smallest number in the past.
 const BLOCK_S: f64 = 0.25;
-const NOW: usize = 20;
-const BEFORE: usize = 160;
-const LEAST_BEFORE: usize = 24;
-/// Number of seconds before an alarm that are kept.
-const KEPT: usize = 12;
+const PRESENT_BLOCKS: usize = 20;
+const PAST_BLOCKS: usize = 160;
+const MIN_PAST_BLOCKS: usize = 24;
+/// Number of blocks before an alarm that are kept.
+const KEPT_BLOCKS: usize = 12;
 const AT_RAD_S: f64 = 2.5;
 const LIMIT: f64 = 3.5;
-/// Ratio of T to its level above which a change is declared, in a given number of consecutive blocks. In runs 2 to 5 of
-/// the cases without a change (open seeds; 1.8 h), which are in no table, 6, 8, 12 and 25 are exceeded 32, 15, 9 and 5
-/// times; excluding a missing and a silent span 21, 5, 0 and 0 times.
+/// Ratio of T to its level above which a change is declared, if it is exceeded in `PERSISTENCE` consecutive blocks. In
+/// runs 2 to 5 of the cases without a change (open seeds; 1.8 h), which are in no table, ratios of 6, 8, 12 and 25 are
+/// exceeded 32, 15, 9 and 5 times; without the cases with a missing and a silent span, 21, 5, 0 and 0 times.
 const THRESHOLD: f64 = 10.0;
 const PERSISTENCE: usize = 4;
-/// Expectation of the logarithm of a chi-square with two degrees of freedom; prior of the level
-/// above it, its weight in blocks, and the memory of the mean in blocks; largest increase by one
-/// logarithm.
+/// Expectation of the logarithm of a chi-square variable with two degrees of freedom. The following constants are the
+/// prior of the level above it, the weight of this prior in blocks, the memory length of the mean in blocks, and the
+/// largest excess of a logarithm over the level.
 const MEAN_LOG: f64 = 0.115_931_515_658_412_45;
 const DEFAULT_LEVEL: f64 = 0.5;
-const SUPPOSED: f64 = 10.0;
+const PRIOR_WEIGHT: f64 = 10.0;
 const LONGEST: f64 = 480.0;
 const MOST: f64 = 3.0;
 
@@ -55,15 +55,15 @@ impl Entrant for Chow {
             covariance: run.covariance,
             variance: run.variance,
         };
-        let gradient = worth(task, AT_RAD_S);
+        let gradient = regressor_responses(task, AT_RAD_S);
         let per_block = (BLOCK_S / run.every_s).round() as usize;
         let (mut blocks, mut open) = (VecDeque::<Sums>::new(), Sums::default());
         let (mut before, mut whole, mut alarms) = (start, start, Vec::new());
-        let (mut level, mut levels, mut above) = (MEAN_LOG + DEFAULT_LEVEL, SUPPOSED, 0);
+        let (mut level, mut levels, mut above) = (MEAN_LOG + DEFAULT_LEVEL, PRIOR_WEIGHT, 0);
         let mut answer = EntrantResult::default();
         for (i, sample) in run.samples.iter().enumerate() {
-            while (task.asked_s.get(answer.said.len())).is_some_and(|t| *t < sample.t_s) {
-                answer.said.push(reported(task, &whole.theta, &whole.covariance));
+            while (task.asked_s.get(answer.estimates.len())).is_some_and(|t| *t < sample.t_s) {
+                answer.estimates.push(reported(task, &whole.theta, &whole.covariance));
             }
             if !sample.is_void {
                 let bound = LIMIT * before.variance.sqrt();
@@ -74,7 +74,7 @@ impl Entrant for Chow {
                 continue;
             }
             blocks.push_back(std::mem::take(&mut open));
-            if blocks.len() > NOW + BEFORE {
+            if blocks.len() > PRESENT_BLOCKS + PAST_BLOCKS {
                 blocks.pop_front();
             }
             let sum = |from: usize, to: usize| {
@@ -83,13 +83,13 @@ impl Entrant for Chow {
                 sums.solve().ok()
             };
             let n = blocks.len();
-            if let Some(solved) = sum(n.saturating_sub(BEFORE), n) {
+            if let Some(solved) = sum(n.saturating_sub(PAST_BLOCKS), n) {
                 whole = solved;
             }
-            if n < NOW + LEAST_BEFORE {
+            if n < PRESENT_BLOCKS + MIN_PAST_BLOCKS {
                 continue;
             }
-            let (Some(past), Some(now)) = (sum(0, n - NOW), sum(n - NOW, n)) else {
+            let (Some(past), Some(now)) = (sum(0, n - PRESENT_BLOCKS), sum(n - PRESENT_BLOCKS, n)) else {
                 continue;
             };
             before = past;
@@ -104,14 +104,14 @@ impl Entrant for Chow {
                     t_s: sample.t_s,
                     of_remnant: false,
                 });
-                blocks.drain(..n - KEPT);
+                blocks.drain(..n - KEPT_BLOCKS);
                 if let Some(solved) = now_of(&blocks) {
                     (before, whole) = (solved, solved);
                 }
             }
         }
         answer
-            .said
+            .estimates
             .resize_with(task.asked_s.len(), || reported(task, &whole.theta, &whole.covariance));
         answer.alarms = Some(alarms);
         Ok(answer)
@@ -124,7 +124,7 @@ fn now_of(blocks: &VecDeque<Sums>) -> Option<Solved> {
     sums.solve().ok()
 }
 
-/// Wald's statistic of the difference of the responses.
+/// Returns Wald's statistic for the difference between the responses.
 fn distance(gradient: &[Complex64], before: &Solved, now: &Solved) -> f64 {
     let flat = |c: &Square| c.iter().flatten().copied().collect::<Vec<f64>>();
     let [a, b] = [before, now].map(|solved| of_complex(gradient, &flat(&solved.covariance)));

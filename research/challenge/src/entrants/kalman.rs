@@ -1,19 +1,19 @@
-//! Three gains of a nominal operator as a random walk, after a whitening filter: recursive least
-//! squares with a population basis (R. E. Kalman, J. Basic Engineering 82 (1960) 35-45; L. Ljung,
-//! *System Identification*, 1999, section 11.6).
+//! Estimation of three gains of a nominal operator as a random walk, after a whitening filter: recursive least squares
+//! with basis functions of a typical operator (R. E. Kalman, J. Basic Engineering 82 (1960) 35-45; L. Ljung, *System
+//! Identification*, 1999, section 11.6).
 //!
-//! The gains drift by a tenth of the response at 2 rad/s per root second; innovations are limited
-//! at 3.5 standard deviations. No changes are declared.
+//! The standard deviation of the drift of the gains is a tenth of the response at 2 rad/s per root second; innovations
+//! are limited to 3.5 standard deviations. The method declares no changes.
 
 use super::{
     super::entrant::{Entrant, EntrantResult, Task},
-    basis::{GAINS, product, reported, whitened, worth},
+    basis::{GAINS, product, reported, whitened, regressor_responses},
 };
 
 const DRIFT: f64 = 0.1;
 const DRIFT_AT_RAD_S: f64 = 2.0;
 const LIMIT: f64 = 3.5;
-/// Memory of the innovation variance, s.
+/// Memory length of the innovation variance, s.
 const MEMORY_S: f64 = 20.0;
 
 pub(super) struct Kalman;
@@ -26,7 +26,7 @@ impl Entrant for Kalman {
     fn follow(&self, task: &Task) -> Result<EntrantResult, String> {
         let run = whitened(task)?;
         let (mut theta, mut p, mut variance) = (run.theta, run.covariance, run.variance);
-        let worth = worth(task, DRIFT_AT_RAD_S);
+        let worth = regressor_responses(task, DRIFT_AT_RAD_S);
         let response = worth
             .iter()
             .zip(&theta)
@@ -39,8 +39,8 @@ impl Entrant for Kalman {
         let forgets = 1.0 - (-run.every_s / MEMORY_S).exp();
         let mut answer = EntrantResult::default();
         for sample in &run.samples {
-            while (task.asked_s.get(answer.said.len())).is_some_and(|t| *t < sample.t_s) {
-                answer.said.push(reported(task, &theta, &p));
+            while (task.asked_s.get(answer.estimates.len())).is_some_and(|t| *t < sample.t_s) {
+                answer.estimates.push(reported(task, &theta, &p));
             }
             if sample.is_void || sample.t_s < task.start_s.1 {
                 continue;
@@ -61,7 +61,7 @@ impl Entrant for Kalman {
             variance += forgets * variance * (innovation * innovation / expected - 1.0);
         }
         answer
-            .said
+            .estimates
             .resize_with(task.asked_s.len(), || reported(task, &theta, &p));
         Ok(answer)
     }

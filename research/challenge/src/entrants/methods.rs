@@ -1,7 +1,7 @@
 //! The methods of `hoid_track` with their default options.
 //!
-//! If the delay is given, it is used; otherwise it is selected on the start span over the range of
-//! the program, with the other orders unchanged. H is the response of a row or of a tracker.
+//! If the delay is given, it is used; otherwise it is selected on the start span over the default range of hoid, with
+//! the other orders unchanged. The response H is that of a row of the trace or of the tracker.
 
 use hoid_ident::{
     OrderRanges,
@@ -12,7 +12,7 @@ use hoid_track::{Change, Method, Response, Sample, StartAt, TrackOptions, TrackP
 
 use super::super::entrant::{Alarm, Entrant, EntrantResult, ReportedResponse, Task};
 
-/// A method.
+/// A method of `hoid_track` as an entrant.
 pub(super) struct OfMethod(pub Method);
 
 impl Entrant for OfMethod {
@@ -24,7 +24,7 @@ impl Entrant for OfMethod {
         let options = self.options(task)?;
         match task.record() {
             Some(record) if task.seam.is_none() => {
-                // Rows every half second, which include all requested times.
+                // There is a row every half second, so that the rows include all requested times.
                 let every = (0.5 / task.sample_time.s()).round() as usize;
                 let trace = track(&record, &options, every).map_err(|e| e.to_string())?;
                 let row = |t_s: &f64| ((t_s / task.sample_time.s() / every as f64 + 1e-6) as usize).max(1) - 1;
@@ -35,7 +35,7 @@ impl Entrant for OfMethod {
                 });
                 let verdict = trace.verdict(&record, None).map_err(|e| e.to_string())?;
                 Ok(EntrantResult {
-                    said: said.collect(),
+                    estimates: said.collect(),
                     alarms: (!trace.change_odds().is_empty()).then(|| alarms(trace.changes())),
                     findings: verdict.findings().iter().map(|f| f.kind.to_owned()).collect(),
                 })
@@ -76,8 +76,8 @@ fn alarms(changes: &[(f64, Change)]) -> Vec<Alarm> {
     changes.iter().map(of).collect()
 }
 
-/// Sample by sample: for data that a record cannot hold, missing samples and the history of a
-/// second recording.
+/// Tracks sample by sample, for data that a record cannot contain: missing samples, and the history of a second
+/// recording.
 fn over_samples(task: &Task, options: &TrackOptions) -> Result<EntrantResult, String> {
     let span = task.start_record().ok_or("the start span is not all there")?;
     let mut tracker = Tracker::new(options, Some(&span), task.sample_time).map_err(|e| e.to_string())?;
@@ -96,11 +96,11 @@ fn over_samples(task: &Task, options: &TrackOptions) -> Result<EntrantResult, St
         let t_s = task.time_s(k);
         tracker.update(sample, t_s >= moves_from - task.sample_time.s() / 2.0);
         changes.extend(tracker.change().map(|change| (t_s, change)));
-        // The last sample before the time, as in the rows of a trace.
+        // The last sample before the requested time, as in the rows of a trace.
         while task.asked_s.get(next).is_some_and(|t| task.sample(*t) <= k + 1) {
             let each = task.lines_rad_s.iter().map(|omega| tracker.response(*omega));
             answer
-                .said
+                .estimates
                 .push(reported(each.collect(), tracker.operator().ok().as_ref()));
             next += 1;
         }
@@ -109,7 +109,7 @@ fn over_samples(task: &Task, options: &TrackOptions) -> Result<EntrantResult, St
     Ok(answer)
 }
 
-/// The estimate at a time; nothing while one of the responses is missing.
+/// Returns the estimate at a time; it is empty if one of the responses is missing.
 fn reported(responses: Option<Vec<Response>>, operator: Option<&OperatorEstimate>) -> ReportedResponse {
     let Some(responses) = responses else {
         return ReportedResponse::default();
@@ -144,7 +144,7 @@ mod tests {
     use super::*;
     use crate::{
         RunOf, Seeds, cases,
-        measure::{Posed, posed_task},
+        measure::{EvaluationRun, posed_task},
     };
 
     fn task(name: &str) -> Task {
@@ -172,8 +172,8 @@ mod tests {
             let (over_record, options) = (own.follow(&task).unwrap(), own.options(&task).unwrap());
             let by_sample = over_samples(&task, &options).unwrap();
             assert_eq!(over_record.alarms, by_sample.alarms, "{}", own.name());
-            assert_eq!(over_record.said.len(), task.asked_s.len());
-            for (a, b) in over_record.said.iter().zip(&by_sample.said) {
+            assert_eq!(over_record.estimates.len(), task.asked_s.len());
+            for (a, b) in over_record.estimates.iter().zip(&by_sample.estimates) {
                 assert_eq!(a.response, b.response, "{}", own.name());
             }
         }
@@ -188,7 +188,7 @@ mod tests {
             seeds: Seeds::Open,
             number: 1,
         };
-        let line = Posed::new(&case, of).unwrap().line(&OfMethod(Method::adaptive()));
+        let line = EvaluationRun::new(&case, of).unwrap().line(&OfMethod(Method::adaptive()));
         let errors: Vec<f64> = line.moments.iter().map(|m| m.error).collect();
         assert!(errors.iter().all(|e| *e < 0.3), "{errors:?}");
     }
@@ -197,10 +197,10 @@ mod tests {
     fn missing_samples_are_no_end() {
         let task = task("none-missing");
         let answer = OfMethod(hoid_survey::physical()).follow(&task).unwrap();
-        assert_eq!(answer.said.len(), task.asked_s.len());
+        assert_eq!(answer.estimates.len(), task.asked_s.len());
         assert!(
             answer
-                .said
+                .estimates
                 .iter()
                 .flat_map(|said| &said.response)
                 .all(|h| h.norm().is_finite())

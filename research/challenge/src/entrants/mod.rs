@@ -1,12 +1,12 @@
-//! The participants.
+//! The participants of the challenge.
 //!
 //! | file | contents |
 //! |---|---|
-//! | `methods` | every method of [`hoid_track::Method`], as it is by default |
-//! | `basis` | three gains in the basis of a nominal person, and what whitens a remnant |
-//! | `kalman` | a random walk of these gains |
-//! | `chow` | a test of the present against the past |
-//! | `threshold` | the published baseline: the size of the error |
+//! | `methods` | every method of [`hoid_track::Method`] with its default options |
+//! | `basis` | estimation of three gains in the basis of a nominal operator, and the whitening filter |
+//! | `kalman` | the gains as a random walk |
+//! | `chow` | a test of the present response against the past one |
+//! | `threshold` | the published baseline: a threshold on the size of the error |
 
 mod basis;
 mod chow;

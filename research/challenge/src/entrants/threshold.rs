@@ -1,6 +1,6 @@
-//! The published baseline: a change is declared if the error or its rate exceeds three of its
-//! standard deviations in the start span (R. A. Hess, J. Guidance, Control, and Dynamics 32 (2009);
-//! [`ErrorThreshold`]). There are no further alarms within 8 s. It estimates no response.
+//! The published baseline: a change is declared if the error or its rate exceeds three times its standard deviation in
+//! the start span (R. A. Hess, J. Guidance, Control, and Dynamics 32 (2009); [`ErrorThreshold`]). After an alarm there
+//! is no further alarm within 8 s. The method does not estimate a response.
 
 use hoid_track::ErrorThreshold;
 
@@ -31,7 +31,7 @@ impl Entrant for Threshold {
             }
         }
         Ok(EntrantResult {
-            said: vec![ReportedResponse::default(); task.asked_s.len()],
+            estimates: vec![ReportedResponse::default(); task.asked_s.len()],
             alarms: Some(alarms),
             findings: Vec::new(),
         })

@@ -1,4 +1,4 @@
-//! A description as a page of text.
+//! Text output for a described response.
 
 use hoid::analysis::Described;
 use hoid::ident::frequency::Realisation;
@@ -14,7 +14,7 @@ pub struct Shown<'a> {
 }
 
 impl Shown<'_> {
-    /// Description of the response, in one line.
+    /// Returns the description of the response in one line.
     pub fn title(&self) -> String {
         let (found, names) = (
             &self.described.found,
@@ -41,7 +41,7 @@ impl Shown<'_> {
         )
     }
 
-    /// The page: its verdict first; all settings with `verbose`.
+    /// Returns the page, with the verdict first; `verbose` adds all settings.
     pub fn page(&self, verbose: bool) -> String {
         let Described { found, data, settings } = self.described;
         let function = &found.function;
@@ -80,7 +80,8 @@ impl Shown<'_> {
             format!("{scaled} %")
         };
         page.push_str(&format!(
-            "Remnant: {} of the power of the output at non-excited frequencies, {} with its part at the lines (P_n).\n",
+            "Remnant: {} of the power of the output at non-excited frequencies, {} including its part at the lines \
+             (P_n).\n",
             percent(&function.off_line_share),
             percent(&function.noise_ratio),
         ));

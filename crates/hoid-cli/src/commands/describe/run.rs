@@ -1,4 +1,4 @@
-//! From records to a describing function: read, describe, draw.
+//! Computes the describing function of records: reading, description, figure.
 
 use std::path::{Path, PathBuf};
 
@@ -27,14 +27,14 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
         &[],
     )?;
     let (reading, offsets) = without_offsets(&reading::of(&args.read, Some(&args.mask), true)?);
-    let read = reading.files(&args.records, reading::told)?;
+    let read = reading.files(&args.records, reading::report_problems)?;
     let describing = Describing {
         options: DescriptionOptions {
             excitation: args.excitation.clone(),
             lines_rad_s: args.lines.clone(),
             period_s: args.period,
             controlled_element: args.controlled_element.clone(),
-            // Span and trend are part of reading.
+            // Span and trend were already treated when the records were read.
             ..DescriptionOptions::default()
         },
         offsets,

@@ -1,4 +1,4 @@
-//! A finished group as a page of text and as a JSON object.
+//! Output for a finished group, as a page of text and as a JSON object.
 
 use hoid::ident::family::Parameter;
 use hoid::model::VerdictLevel;
@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 
 use crate::{json, text};
 
-/// A group with its files.
+/// A finished group with the files written for it.
 pub struct Finished<'a> {
     pub name: &'a str,
     pub summary: &'a GroupSummary,
@@ -17,7 +17,7 @@ pub struct Finished<'a> {
 }
 
 impl Finished<'_> {
-    /// The page: failures and doubtful results first, then the people.
+    /// Returns the page: failures and doubtful results first, then the people.
     pub fn page(&self, verbose: bool) -> String {
         let GroupSummary {
             runs,
@@ -38,7 +38,7 @@ impl Finished<'_> {
             page.push_str(&format!(
                 "\nOperators, each from all runs of a person in a condition\n{}\n{}\n\
                  Value \u{b1} standard error from the scatter between runs. Values that the data do not determine are \
-                 in parentheses, or beyond a bound (> is a limit of 95 %). In brackets: Student's 95 % intervals.\n",
+                 in parentheses or are given as bounds (> is a 95 % limit). In brackets: Student's 95 % intervals.\n",
                 columns_of(&table, &in_loop),
                 columns_of(&table, &parameters),
             ));
@@ -75,7 +75,7 @@ impl Finished<'_> {
     }
 }
 
-/// Some columns of the table of people: all of them are too wide for a screen.
+/// Formats some columns of the table of people, since all columns would be too wide for a screen.
 fn columns_of(table: &PeopleTable, columns: &[usize]) -> String {
     let headings: Vec<&str> = columns.iter().map(|i| table.headings[*i].as_str()).collect();
     let mut rows = text::table(&headings);
@@ -122,7 +122,7 @@ fn person(p: &Person) -> Value {
     Value::Object(map)
 }
 
-/// Open ends of an interval are null.
+/// An unbounded end of an interval is null in JSON.
 fn parameter(p: &Parameter) -> Value {
     json!({
         "value": json::number(p.value),

@@ -1,5 +1,5 @@
-//! `hoid group`: recorded runs by subject and condition. `form` formats the results as text and
-//! JSON, `pooled` computes the estimates of each person with partial pooling.
+//! `hoid group`: analysis of recorded runs by subject and condition. `form` formats the results as text and JSON;
+//! `pooled` computes the estimates for each person with partial pooling.
 
 mod form;
 mod pooled;
@@ -27,7 +27,7 @@ use crate::{
     json, output,
 };
 
-/// Maximum number of reasons in the message of a group without result; the page contains all of them.
+/// Maximum number of reasons in the error message for a group without a result; the page contains all reasons.
 const REASONS_OF_EXIT: usize = 3;
 
 pub fn run(args: &GroupArgs) -> Result<(), CliError> {
@@ -106,7 +106,7 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
     let piped = path.as_os_str() == "-";
     if !piped && path.exists() {
         return Err(CliError::Usage(format!(
-            "{} is already present; remove it or name another with --out",
+            "{} is already present; remove it or name another file with --out",
             path.display()
         )));
     }
@@ -147,7 +147,7 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
         said.push_str(&format!("- {place}{colon}{}\n", one.words));
     }
     said.push_str(&format!(
-        "Look {} through, then: hoid group {} --out results\n",
+        "Check {}, then: hoid group {} --out results\n",
         path.display(),
         path.display()
     ));
@@ -155,7 +155,7 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
 }
 
 fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError> {
-    let path = &Manifest::place(path)?;
+    let path = &Manifest::manifest_path(path)?;
     if let Some(figure) = &args.picture.figure {
         figure::check(figure)?;
         output_paths::check(&[path], &[Some(figure)], &[])?;
@@ -163,7 +163,7 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
     paper_table::check(&args.show)?;
     output_paths::check(&[path], &[args.show.table.as_deref()], &[])?;
     let manifest = Manifest::read(path)?;
-    // A resumed group writes no manifest.
+    // When a group is resumed, its manifest already exists.
     if !args.resume {
         hoid::io::check_output_directory(out, &[path])?;
     }
@@ -218,18 +218,18 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
 pub fn analysed(manifest: &Manifest, path: &Path, out: &Path, options: &RunOptions) -> Result<Outcome, CliError> {
     let base = path.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
     let runs = manifest.runs.iter().filter(|run| run.counts).count();
-    with_progress(&manifest.name, out, (runs, "runs"), |progress, go_on| {
-        run_group(manifest, &base, out, options, progress, go_on)
+    with_progress(&manifest.name, out, (runs, "runs"), |progress, should_continue| {
+        run_group(manifest, &base, out, options, progress, should_continue)
     })
 }
 
-/// One file for each condition: the given name for one condition, with the condition appended for
-/// several.
+/// Writes one figure for each condition. With several conditions, the name of the condition is appended to the given
+/// file name.
 fn draw(figures: &[(String, String)], place: &Path, width_mm: Option<f64>) -> Result<(), CliError> {
     if figures.is_empty() {
         output::notice(
             "",
-            "no figure: it shows describing functions, and no condition of the manifest names its excitation"
+            "no figure: a figure would show describing functions, and no condition of the manifest names its excitation"
                 .to_owned(),
         );
     }

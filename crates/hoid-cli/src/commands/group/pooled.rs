@@ -1,4 +1,4 @@
-//! `hoid group --pool`: estimates of people with partial pooling, and the populations of the conditions, as files and
+//! `hoid group --pool`: estimates for people with partial pooling, and the population of each condition, as files and
 //! on the page.
 
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use crate::{error::CliError, text};
 
 const TABLE: &str = "pooled.csv";
 
-/// Returns the populations, and the written files.
+/// Returns the populations and the paths of the files written.
 pub fn pooled(
     manifest: &Manifest,
     summary: &GroupSummary,
@@ -37,17 +37,17 @@ pub fn pooled(
     Ok((populations, files))
 }
 
-/// A condition as part of a file name.
+/// Converts the name of a condition for use in a file name.
 pub fn in_a_file_name(condition: &str) -> String {
     condition.replace(|c: char| !c.is_ascii_alphanumeric() && c != '-' && c != '_', "-")
 }
 
-/// The populations as objects.
+/// Returns the populations as JSON objects.
 pub fn objects(populations: &[Population]) -> Value {
     populations.iter().map(Population::json).collect()
 }
 
-/// The part of the page about the populations.
+/// Returns the part of the page that describes the populations.
 pub fn page(populations: &[Population], files: &[PathBuf]) -> String {
     let mut rows = text::table(&[
         "condition",

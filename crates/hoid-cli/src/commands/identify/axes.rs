@@ -9,7 +9,7 @@ use crate::{args::IdentifyArgs, commands::reading, error::CliError, json, output
 pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let ResolvedRequest::Operator(identification) = request::asked(args)? else {
         return Err(CliError::Usage(
-            "--pair is for the structure operator, without --noise remnant and --change sigmoid".to_owned(),
+            "--pair is for the structure operator, without --noise remnant or --change sigmoid".to_owned(),
         ));
     };
     let others = [
@@ -36,19 +36,19 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         .iter()
         .map(|axis| CliError::of_verdict(&axis.identified.verdict))
         .collect();
-    // One axis that is determined is a result.
+    // The command succeeds if the data determine the operator of at least one axis.
     if verdicts.iter().all(Result::is_err) {
         return verdicts.into_iter().next().unwrap_or(Ok(()));
     }
     Ok(())
 }
 
-/// The recordings with the signals of an axis.
+/// Reads the recordings with the signals of one axis.
 fn recordings(args: &IdentifyArgs, pair: &AxisPair) -> Result<Recordings, CliError> {
     let mut read = args.read.clone();
     read.inputs = vec![pair.input.clone()];
     read.output.clone_from(&pair.output);
-    Ok(reading::of(&read, Some(&args.mask), true)?.files(&args.records, reading::told)?)
+    Ok(reading::of(&read, Some(&args.mask), true)?.files(&args.records, reading::report_problems)?)
 }
 
 fn page(args: &IdentifyArgs, identification: &Identification, all: &[Axis]) -> Result<String, CliError> {

@@ -1,4 +1,4 @@
-//! `hoid identify` by default: the operator of a person, of the family of operators.
+//! `hoid identify` by default: an operator of the family of operators.
 
 use hoid::analysis::{Identification, Identified, Recordings};
 use hoid::report::{Report, operator_figure, write_report};

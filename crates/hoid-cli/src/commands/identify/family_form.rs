@@ -1,4 +1,4 @@
-//! The operator of a person as text.
+//! Text output for the operator of a person.
 
 use hoid::analysis::{Account, Identified, Setting};
 use hoid::ident::{
@@ -11,19 +11,20 @@ use hoid::report::{numbers, sentence_of_operator, undetermined};
 
 use crate::{error::CliError, text};
 
-/// Standard errors of tau_e, and a time in s, that half a sample must exceed for both delays to be printed.
+/// Both delays are printed only if half a sample exceeds this number of standard errors of tau_e and the time below, in
+/// s.
 const STRAIGHT_ERRORS: f64 = 2.0;
 const LEAST_HALF_S: f64 = 0.007;
 
-/// Frequencies at which a response to a target is shown in series with the controlled element, rad/s.
+/// Frequencies in rad/s at which the response to a target in series with the controlled element is printed.
 const AT_RAD_S: [f64; 3] = [1.0, 2.5, 4.0];
 
-/// All results.
+/// An identified operator with everything that its page shows.
 pub struct FamilyReport<'a> {
     pub identified: &'a Identified,
     pub fit: &'a FamilyFit,
     pub files: &'a [String],
-    /// The records of the fit, without their mean.
+    /// The records of the fit, with their means removed.
     pub records: &'a [Record],
     pub accounts: &'a [Account],
     pub element: Option<&'a ContinuousTransferFunction>,
@@ -32,7 +33,7 @@ pub struct FamilyReport<'a> {
 }
 
 impl FamilyReport<'_> {
-    /// The result; details with `verbose`.
+    /// Returns the page; `verbose` adds details.
     pub fn page(&self, verbose: bool) -> Result<String, CliError> {
         let mut page = self.answer(verbose)?;
         if !verbose {
@@ -49,7 +50,7 @@ impl FamilyReport<'_> {
         Ok(page)
     }
 
-    /// Verdict, parameters with their intervals, loop, fit, and the analysed records.
+    /// Returns verdict, parameters with their intervals, loop, fit, and the records that were analysed.
     fn answer(&self, verbose: bool) -> Result<String, CliError> {
         let fit = self.fit;
         let gain = self.records.first().map(GainUnit::of).unwrap_or_default();
@@ -82,7 +83,7 @@ impl FamilyReport<'_> {
             coherence.map_or_else(String::new, |share| format!(
                 "; coherence of u with the excitation {share:.2}"
             )),
-            // If they do not, a finding reports it.
+            // If the methods do not agree, the verdict contains a finding.
             match fit.agreement.is_some() && fit.verdict.findings().iter().all(|found| found.kind != "agreement") {
                 true => "; the methods agree",
                 false => "",
@@ -98,7 +99,7 @@ impl FamilyReport<'_> {
         Ok(page)
     }
 
-    /// The responses to inputs other than the error.
+    /// Returns the responses to inputs other than the error.
     fn channels(&self, gain: &GainUnit, verbose: bool) -> String {
         let mut page = String::new();
         for channel in &self.fit.channels {
@@ -131,8 +132,8 @@ impl FamilyReport<'_> {
         page
     }
 
-    /// The response to a target in series with the controlled element: equal to one if the target by itself makes the
-    /// output follow it.
+    /// Returns the response to a target in series with the controlled element. It equals one if the response to the
+    /// target alone makes the output follow the target.
     fn with_element(&self, channel: &ChannelFit) -> String {
         let Some(element) = self.element.filter(|_| channel.role == ChannelRole::Feedforward) else {
             return String::new();
@@ -159,14 +160,14 @@ impl FamilyReport<'_> {
         };
         let all: Vec<String> = points.iter().map(one).collect();
         format!(
-            "F·M of {}, 1 and 0 deg where the target is followed without an error: {}.\n",
+            "F·M of {} (1 and 0 deg if the target is followed without error): {}.\n",
             channel.name,
             all.join(", ")
         )
     }
 
-    /// Effect of the intersample behaviour of the error on tau_e: the alternative delay, if half a sample exceeds the
-    /// standard error.
+    /// Returns how tau_e depends on the behaviour of the error between samples: the alternative delay, if half a sample
+    /// is large compared with the standard error.
     fn between_samples(&self) -> String {
         let fit = self.fit;
         let named = fit.operator(0).parameters.iter().find(|p| p.name == "tau_e");
@@ -181,13 +182,13 @@ impl FamilyReport<'_> {
             return String::new();
         }
         format!(
-            "tau_e applies to an error that is held for a sample; for one that was logged from a faster or continuous \
-             signal it is {} s (--intersample foh).\n",
+            "tau_e applies to an error that is held for a sample; for an error logged from a faster or continuous \
+             signal, tau_e is {} s (--intersample foh).\n",
             text::significant(straight)
         )
     }
 
-    /// The errors of the person, if they are larger than those of the runs.
+    /// Returns the standard errors of the person, if they are larger than those of the runs.
     fn of_person(&self) -> String {
         let fit = self.fit;
         if fit.run_to_run == 0.0 || fit.operators.len() > 1 {
@@ -223,7 +224,7 @@ impl FamilyReport<'_> {
         }
     }
 
-    /// The results of the methods for comparison.
+    /// Returns the results of the other methods, for comparison.
     fn methods(&self) -> String {
         let fit = self.fit;
         let gain = self.records.first().map(GainUnit::of).unwrap_or_default();
@@ -356,8 +357,8 @@ fn named(p: &Parameter, gain: &GainUnit) -> String {
     }
 }
 
-/// Value and error with the digits that the error permits; no spurious digits if the error exceeds
-/// the value.
+/// Formats a value and its error with the digits that the error justifies; a value smaller than its error gets no
+/// spurious digits.
 fn with_error(value: f64, error: Option<f64>) -> String {
     match error {
         _ if value.is_infinite() => "infinite".to_owned(),
@@ -370,7 +371,7 @@ fn with_error(value: f64, error: Option<f64>) -> String {
     }
 }
 
-/// Parameters with interval and share of the prior, and whether they are determined.
+/// Formats parameters with their intervals, the share of the prior, and whether they are determined.
 fn parameters(of: &[Parameter], gain: &GainUnit) -> String {
     let mut rows = text::table(&["parameter", "value", "95 % from", "to", "of it prior"]);
     for p in of {

@@ -1,4 +1,4 @@
-//! `hoid identify`: from records to a model and the parameters of the operator.
+//! `hoid identify`: identification of a model and of the parameters of the operator from records.
 
 mod axes;
 mod family;

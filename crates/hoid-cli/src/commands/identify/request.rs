@@ -6,14 +6,14 @@ use hoid::analysis::{Request, ResolvedRequest};
 
 use crate::{args::IdentifyArgs, error::CliError, output};
 
-/// The option of inputs other than the error, and the role of the error.
+/// The option that gives the roles of inputs other than the error, and its value for the error.
 pub const ROLE: &str = "role";
 const FEEDBACK: &str = "feedback";
 
-/// Returns the request, with the options checked for consistency.
+/// Returns the request after checking that the options are consistent.
 ///
 /// # Errors
-/// [`CliError::Usage`].
+/// [`CliError::Usage`] if options are invalid or contradict each other.
 pub fn asked(args: &IdentifyArgs) -> Result<ResolvedRequest, CliError> {
     let request = Request {
         structure: args.structure.clone(),
@@ -27,15 +27,15 @@ pub fn asked(args: &IdentifyArgs) -> Result<ResolvedRequest, CliError> {
         output::notice("", format!("note: {note}"));
     }
     match misplaced(args, &asked) {
-        Some((option, with)) => Err(CliError::Usage(format!("{option} belongs to {with}"))),
+        Some((option, with)) => Err(CliError::Usage(format!("{option} applies only to {with}"))),
         None => Ok(asked),
     }
 }
 
-/// The options by their names; every input other than the first has a role.
+/// Returns the options by name. Each input other than the first has a role.
 ///
 /// # Errors
-/// [`CliError::Usage`] for a second feedback.
+/// [`CliError::Usage`] if an input other than the first has the role of the feedback.
 pub fn options(args: &IdentifyArgs) -> Result<BTreeMap<String, String>, CliError> {
     let given = args.options.given();
     let mut all: BTreeMap<String, String> = given.map(|(name, text)| (name.to_owned(), text.to_owned())).collect();
@@ -67,7 +67,8 @@ pub fn options(args: &IdentifyArgs) -> Result<BTreeMap<String, String>, CliError
     Ok(all)
 }
 
-/// The first option of reading and writing that does not apply to the request, and the analysis to which it belongs.
+/// Returns the first option of reading or writing that does not apply to the request, and the analysis to which the
+/// option belongs.
 fn misplaced(args: &IdentifyArgs, asked: &ResolvedRequest) -> Option<(&'static str, &'static str)> {
     let changing = matches!(asked, ResolvedRequest::Change(_));
     let steady = "a model that does not change";
@@ -75,7 +76,7 @@ fn misplaced(args: &IdentifyArgs, asked: &ResolvedRequest) -> Option<(&'static s
         (
             args.picture.figure.is_some() && (changing || !asked.has_input()),
             "--figure",
-            "a model that does not change, of a structure with an input",
+            "a model that has an input and does not change",
         ),
         (args.trace.is_some() && !changing, "--trace", "--change sigmoid"),
         (args.validate.is_some() && changing, "--validate", steady),

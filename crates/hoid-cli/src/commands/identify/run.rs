@@ -1,4 +1,4 @@
-//! From records to a model: reading, fit, verdict, writing.
+//! Execution of `hoid identify`: reading, fit, verdict, output.
 
 use std::path::{Path, PathBuf};
 
@@ -39,12 +39,12 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     }
     let first = args.read.with_one_input();
     let reading = reading::of(&first, Some(&args.mask), asked.has_input())?;
-    let read = reading.files(&args.records, reading::told)?;
+    let read = reading.files(&args.records, reading::report_problems)?;
     let (rate, counts) = (args.read.prepare.rate.decimate, asked.counts_samples());
-    reading::say_kept(read.kept_rate(rate, counts));
-    // Read before anything is written: an invalid validation file leaves no output.
+    reading::report_kept_rate(read.kept_rate(rate, counts));
+    // The validation file is read before anything is written, so that an invalid file leaves no output.
     let other = args.validate.as_deref();
-    let other = other.map(|path| reading.file(path, reading::told)).transpose()?;
+    let other = other.map(|path| reading.file(path, reading::report_problems)).transpose()?;
     match asked {
         ResolvedRequest::Operator(identification) => family::run(args, &identification, read, other),
         ResolvedRequest::Change(identification) => sigmoid::run(args, &identification, read),
@@ -123,14 +123,14 @@ fn show<F: BatchAnswer>(
     CliError::of_verdict(verdict)
 }
 
-/// The describing function of the records, if they have a recorded excitation.
+/// Returns the describing function of the records, if they contain a recorded excitation.
 fn description(args: &IdentifyArgs, data: &Recordings) -> Option<Description> {
     data.described(&Excitation::default(), None, args.faults.faults)
         .ok()
         .flatten()
 }
 
-/// Outputs must not overwrite inputs; `--prior` may name a file.
+/// Checks that outputs do not overwrite inputs, which may include the file of `--prior`.
 fn check_places(args: &IdentifyArgs) -> Result<(), CliError> {
     let mut inputs: Vec<&Path> = args.records.iter().map(PathBuf::as_path).collect();
     inputs.extend(args.validate.as_deref());
@@ -146,7 +146,7 @@ fn check_places(args: &IdentifyArgs) -> Result<(), CliError> {
     )
 }
 
-/// VAF and NRMSE of the prediction k samples ahead, over all records together.
+/// Returns VAF and NRMSE of the prediction k samples ahead, over all records together.
 fn prediction_ahead(fit: &Fit, records: &[Record], k: usize) -> Result<(usize, f64, f64), CliError> {
     let (mut measured, mut predicted) = (Vec::new(), Vec::new());
     for record in records {
@@ -157,7 +157,7 @@ fn prediction_ahead(fit: &Fit, records: &[Record], k: usize) -> Result<(usize, f
     Ok((k, vaf(&measured, &predicted), nrmse_fit(&measured, &predicted)))
 }
 
-/// The result as a sentence.
+/// Returns the result as a sentence.
 fn sentence(found: &PolynomialAnswer<'_>) -> Option<String> {
     let of = found.operator.as_ref().ok().filter(|_| found.has_operator());
     let named = of.iter().flat_map(|o| o.rows()).map(|(name, _, e)| (name, e.value));
@@ -169,7 +169,7 @@ fn sentence(found: &PolynomialAnswer<'_>) -> Option<String> {
     )
 }
 
-/// The result; details with `verbose`.
+/// Returns the page; `verbose` adds details.
 fn page(found: &PolynomialAnswer<'_>, verbose: bool) -> String {
     let mut page = answer(found);
     if verbose {
@@ -180,7 +180,7 @@ fn page(found: &PolynomialAnswer<'_>, verbose: bool) -> String {
     page
 }
 
-/// Verdict, parameters with their intervals, fit, and the analysed records.
+/// Returns verdict, parameters with their intervals, fit, and the records that were analysed.
 fn answer(found: &PolynomialAnswer<'_>) -> String {
     let fit = found.fit;
     let gain = found.records.first().map(GainUnit::of).unwrap_or_default();
@@ -194,7 +194,7 @@ fn answer(found: &PolynomialAnswer<'_>) -> String {
         Some(family) => Some(family_operator::to_text(family, &gain)),
         None => Some(text::operator(&found.operator, &gain)),
     };
-    // Without an operator the coefficients are the result.
+    // If there is no operator, the coefficients are the result.
     if !found.has_operator() {
         page.push_str(&text::coefficients(fit));
     }
@@ -235,7 +235,7 @@ fn answer(found: &PolynomialAnswer<'_>) -> String {
     page
 }
 
-/// The candidates tried, coefficients, roots, residual tests, settings.
+/// Returns the candidates tried, coefficients, roots, residual tests and settings.
 fn details(found: &PolynomialAnswer<'_>) -> String {
     let fit = found.fit;
     let mut page = "\n".to_owned();

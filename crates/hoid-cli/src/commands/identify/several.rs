@@ -1,4 +1,4 @@
-//! `hoid identify` of polynomials with several inputs.
+//! `hoid identify` for polynomial models with several inputs.
 
 use hoid::analysis::{Recordings, SeveralInputsResult, roles, several_inputs};
 use hoid::model::Structure;
@@ -12,10 +12,10 @@ use crate::{
     json, output, text,
 };
 
-/// Options that apply to several inputs.
+/// Options that apply to models with several inputs.
 const OPTIONS: [&str; 3] = ["orders", "nk", "role"];
 
-/// The structure, if a polynomial model with several inputs is requested.
+/// Returns the structure if a polynomial model with several inputs is requested.
 pub fn structure(args: &IdentifyArgs) -> Option<Structure> {
     let name = args.structure.as_deref()?.trim().to_ascii_lowercase();
     (args.read.inputs.len() > 1).then(|| name.parse().ok()).flatten()
@@ -51,7 +51,7 @@ pub fn run(args: &IdentifyArgs, structure: Structure) -> Result<(), CliError> {
     let roles = roles(&args.read.inputs[1..], of_further).map_err(CliError::of_options)?;
     paper_table::check(&args.show)?;
     let first = args.read.with_one_input();
-    let read: Recordings = reading::of(&first, Some(&args.mask), true)?.files(&args.records, reading::told)?;
+    let read: Recordings = reading::of(&first, Some(&args.mask), true)?.files(&args.records, reading::report_problems)?;
     let rate = args.read.prepare.rate.decimate;
     let found = output::watched("fitting", || {
         SeveralInputsResult::of(&model, roles, read, args.faults.faults, rate)

@@ -1,4 +1,4 @@
-//! `hoid identify --change sigmoid`: the operator whose gains change once.
+//! `hoid identify --change sigmoid`: an operator whose gains change once.
 
 use hoid::analysis::{Account, Identification, Identified, Recordings, Setting};
 use hoid::ident::{
@@ -47,7 +47,7 @@ pub fn run(
     CliError::of_verdict(verdict)
 }
 
-/// Parameters that change over a record, with standard errors if all are known.
+/// Returns the changing parameters over a record, with standard errors if all of them are known.
 fn trace(fit: &SigmoidFit, record: &Record) -> Result<Record, CliError> {
     let gains = fit.trace(record);
     let mut trace: Option<Record> = None;
@@ -64,11 +64,11 @@ fn trace(fit: &SigmoidFit, record: &Record) -> Result<Record, CliError> {
             });
         }
     }
-    // There is always a gain.
+    // Every form has at least one gain.
     Ok(trace.unwrap_or_else(|| record.clone()))
 }
 
-/// Names of the parameters of an operator, before and after the change.
+/// Returns the table of the operator's parameters before and after the change.
 fn before_and_after(fit: &SigmoidFit) -> String {
     let mut rows = text::table(&["parameter", "before the change", "", "after it", "", "unit"]);
     let (before, after) = (fit.initial_operator(), fit.last_operator());
@@ -83,20 +83,20 @@ fn before_and_after(fit: &SigmoidFit) -> String {
     rows.to_string()
 }
 
-/// All results.
+/// An identified change with everything that its page shows.
 struct SigmoidReport<'a> {
     fit: &'a SigmoidFit,
     verdict: &'a Verdict,
     files: &'a [String],
     records: &'a [Record],
     accounts: &'a [Account],
-    /// Whiteness of the residuals of each record.
+    /// Whiteness test of the residuals of each record.
     tests: &'a [Option<LjungBox>],
     settings: &'a [Setting],
 }
 
 impl SigmoidReport<'_> {
-    /// The result; details with `verbose`.
+    /// Returns the page; `verbose` adds details.
     fn page(&self, verbose: bool) -> String {
         let Self {
             fit,
@@ -156,7 +156,7 @@ impl SigmoidReport<'_> {
         }
         page.push_str(&text::records(files, records, accounts, false));
         if !verbose {
-            page.push_str(text::MORE);
+            page.push_str(text::MORE_CHANGE);
             return page;
         }
         let t = fit.termination();

@@ -1,43 +1,43 @@
-//! Comparison of the times of the lines with an even grid: missing samples and late lines.
+//! Comparison of the times of the lines with an evenly spaced grid, to find missing samples and late lines.
 //!
-//! Live times jitter, and their clock differs slightly from that of `--fs`. The grid therefore
-//! follows the times with a small gain; a line is late by whole samples if it deviates by more than
-//! half a sample from the expected time.
+//! Live times have jitter, and their rate differs slightly from `--fs`. The grid therefore follows the times with a
+//! small gain. Samples count as missing only if the time of a line deviates by more than half a sample from the
+//! expected time.
 
 /// Gain with which the grid follows the times.
 const GAIN: f64 = 0.1;
 /// Longest gap that is filled, s.
 pub const LONGEST_GAP_S: f64 = 10.0;
-/// Number of consecutive lines with increasing times after which a clock counts as set back.
-const SET_BACK: usize = 10;
-/// Number of samples by which the grid may lead the times before this is reported.
-const AHEAD: f64 = 2.0;
+/// Number of consecutive lines with earlier but increasing times after which the clock is assumed to have been set
+/// back.
+const SET_BACK_LINES: usize = 10;
+/// Number of samples by which the grid may be ahead of the times before this is reported.
+const LARGEST_LEAD: f64 = 2.0;
 
 /// Number of lines over which the rate of the times is checked.
-const JUDGED: usize = 128;
-/// Largest relative deviation of the rate from `--fs`.
-const OFF: f64 = 0.05;
+const RATE_LINES: usize = 128;
+/// Largest tolerated relative deviation of the rate from `--fs`.
+const RATE_TOLERANCE: f64 = 0.05;
 
-/// Result for the time of a line.
+/// Classification of a line by its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Arrival {
-    /// The next sample, after a number of missing ones to be filled; `left_out` if the gap was
-    /// longer than that.
+    /// The next sample, after `missing` samples that must be filled in; `left_out` if the gap was longer than this.
     Sample { missing: usize, left_out: bool },
-    /// Not later than the last line.
+    /// A line whose time is not later than that of the last line.
     Behind { last_s: f64 },
 }
 
-/// The grid.
+/// The evenly spaced grid that follows the times of a stream.
 #[derive(Debug)]
 pub struct Clock {
     sample_time_s: f64,
     /// Position of the last sample on the grid, and its time.
     last: Option<(f64, f64)>,
-    /// Last line with a decreasing time, and the number of consecutive ones.
+    /// Time of the last line that was not later than the last accepted line, and the number of such lines in succession.
     behind: Option<(f64, usize)>,
-    hurried: bool,
-    /// Differences of the times for the next check, s.
+    too_fast: bool,
+    /// Differences of successive times, collected for the next check of the rate, s.
     steps: Vec<f64>,
 }
 
@@ -47,8 +47,8 @@ impl Clock {
             sample_time_s,
             last: None,
             behind: None,
-            hurried: false,
-            steps: Vec::with_capacity(JUDGED),
+            too_fast: false,
+            steps: Vec::with_capacity(RATE_LINES),
         }
     }
 
@@ -69,7 +69,7 @@ impl Clock {
                 _ => 1,
             };
             self.behind = Some((t, row));
-            if row < SET_BACK {
+            if row < SET_BACK_LINES {
                 return Arrival::Behind { last_s };
             }
             self.behind = None;
@@ -91,7 +91,7 @@ impl Clock {
         }
         let expected = place + steps * ts;
         self.steps.push(t - last_s);
-        self.hurried |= expected - t > AHEAD * ts;
+        self.too_fast |= expected - t > LARGEST_LEAD * ts;
         self.last = Some((expected + GAIN * (t - expected), t));
         Arrival::Sample {
             missing: steps as usize - 1,
@@ -99,24 +99,24 @@ impl Clock {
         }
     }
 
-    /// The rate of the times in Hz, if it differs from `--fs`: called after each line, it returns a value at most once
-    /// in [`JUDGED`] lines. The median of the differences is insensitive to single gaps, their mean to rounded times;
-    /// both have to deviate.
+    /// Returns the rate of the times in Hz if it differs from `--fs`. Called after each line, it returns a value at
+    /// most once in [`RATE_LINES`] lines. The median of the differences is insensitive to single gaps, and their mean
+    /// to rounded times; both have to deviate.
     pub fn other_rate(&mut self) -> Option<f64> {
-        if self.steps.len() < JUDGED {
+        if self.steps.len() < RATE_LINES {
             return None;
         }
         let mut steps = std::mem::take(&mut self.steps);
         steps.sort_unstable_by(f64::total_cmp);
-        let median = steps[JUDGED / 2];
+        let median = steps[RATE_LINES / 2];
         let mean = steps.iter().sum::<f64>() / steps.len() as f64;
-        let is_off = |step: f64| (step / self.sample_time_s - 1.0).abs() > OFF;
+        let is_off = |step: f64| (step / self.sample_time_s - 1.0).abs() > RATE_TOLERANCE;
         (is_off(median) && is_off(mean)).then_some(1.0 / median)
     }
 
-    /// True once if the lines have arrived faster than the sampling frequency.
-    pub fn hurried(&mut self) -> bool {
-        std::mem::take(&mut self.hurried)
+    /// True, once, if the lines have arrived faster than the sampling frequency.
+    pub fn too_fast(&mut self) -> bool {
+        std::mem::take(&mut self.too_fast)
     }
 }
 
@@ -152,7 +152,7 @@ mod tests {
             }
         );
         assert_eq!(missing(&mut clock, 100.01), 0);
-        assert!(!clock.hurried());
+        assert!(!clock.too_fast());
     }
 
     #[test]
@@ -201,6 +201,6 @@ mod tests {
         for k in 0..200 {
             assert_eq!(missing(&mut clock, 0.005 * f64::from(k)), 0);
         }
-        assert!(clock.hurried() && !clock.hurried());
+        assert!(clock.too_fast() && !clock.too_fast());
     }
 }

@@ -1,5 +1,5 @@
-//! Samples and estimates as datagrams: lines of text as on standard input (cells, or JSON objects), or C structs,
-//! little-endian and packed.
+//! Samples and estimates as datagrams: lines of text in the same format as on standard input (cells or JSON objects),
+//! or packed little-endian C structs.
 //!
 //! ```c
 //! struct sample {             /* 40 bytes */
@@ -28,7 +28,7 @@ use hoid::track::{Change, Live};
 use super::lines::StreamSample;
 
 const MAGIC: &[u8; 4] = b"hoid";
-/// Size of a sample and of an estimate, bytes.
+/// Sizes of a sample and of an estimate, in bytes.
 const SAMPLE: usize = 40;
 const ESTIMATE: usize = 168;
 
@@ -56,7 +56,7 @@ impl<'b> Datagram<'b> {
             return match rest.first_chunk::<{ SAMPLE - 4 }>() {
                 Some(all) if rest.len() == SAMPLE - 4 => Self::Sample(SampleDatagram::of(all)),
                 _ => Self::Unreadable(format!(
-                    "a datagram of {} bytes that starts like a sample, which has {SAMPLE}",
+                    "a datagram of {} bytes that starts like a sample; a sample has {SAMPLE}",
                     bytes.len()
                 )),
             };
@@ -64,7 +64,7 @@ impl<'b> Datagram<'b> {
         match std::str::from_utf8(bytes) {
             Ok(text) => Self::Lines(text),
             Err(_) => Self::Unreadable(format!(
-                "a datagram of {} bytes that is neither sample nor text",
+                "a datagram of {} bytes that is neither a sample nor text",
                 bytes.len()
             )),
         }
@@ -86,7 +86,7 @@ impl SampleDatagram {
         }
     }
 
-    /// Converts it like a line: an invalid value is NaN.
+    /// Converts the sample to the form read from a line; an invalid value is NaN.
     pub fn read(&self, sample_time: SampleTime, largest: f64) -> StreamSample {
         let sound = |v: f64| v.abs() <= largest;
         let told = |name: &str, v: f64| (!sound(v)).then(|| format!("{name} is {v}"));

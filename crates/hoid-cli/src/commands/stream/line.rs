@@ -1,4 +1,4 @@
-//! One line of the output.
+//! One line of the output of `hoid stream`.
 
 use hoid::model::{Decimated, Finding, VerdictLevel, uncertainty::Estimate};
 use hoid::track::{Change, Live, Stage, TrackFault, Tracker};
@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::json;
 
-/// Counts since the start.
+/// Counts since the start of the stream.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Counts {
     /// Number of samples, including invalid and missing ones.
@@ -15,14 +15,14 @@ pub struct Counts {
     pub samples: u64,
     /// Number of samples with an invalid e or u, including missing ones.
     pub skipped: u64,
-    /// Number of samples held back by the guard, or during which it froze the estimate.
+    /// Number of samples that the guard held back, or during which it kept the estimate constant.
     pub held: u64,
     /// Number of restarts by the guard.
     pub restarts: u64,
-    /// Number of these samples that were missing according to the column t.
+    /// Number of samples that were missing according to the column t.
     #[serde(skip)]
     pub bridged: u64,
-    /// Number of steps shortened by stability or a bound.
+    /// Number of steps that were shortened to stay stable or within bounds.
     pub shortened: u64,
     /// Number of lines that are not samples.
     pub dropped: u64,
@@ -43,7 +43,7 @@ struct Line<'a> {
     change: Option<ChangeLine>,
     #[serde(flatten)]
     counts: Counts,
-    /// Last event of the guard since the last line.
+    /// Last event of the guard since the previous line of the output.
     #[serde(skip_serializing_if = "Option::is_none")]
     event: Option<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -56,7 +56,7 @@ struct Line<'a> {
     warm_up: Option<WarmUp<'a>>,
 }
 
-/// State of a change: the odds in every line, the rest in the first line after its declaration.
+/// State of a change: the odds are in every line, the declared change only in the first line after its declaration.
 #[derive(Serialize)]
 struct ChangeLine {
     log_odds: Option<f64>,
@@ -64,7 +64,7 @@ struct ChangeLine {
     declared: Option<Value>,
 }
 
-/// The rate at which a fast stream is tracked, and the lag of the estimate with respect to its line.
+/// The rate at which a fast stream is tracked, and the lag of the estimate relative to its line.
 #[derive(Serialize)]
 struct Rate {
     factor: usize,
@@ -127,19 +127,19 @@ pub struct StreamStatus<'a> {
     /// Names of the coefficients; empty during the warm-up.
     pub names: &'a [String],
     pub innovation: Option<f64>,
-    /// The last change since the last line, with the time at which it was declared, s.
+    /// Last change declared since the previous line of the output, with the time of its declaration, s.
     pub change: Option<(Option<f64>, Change)>,
     pub counts: Counts,
-    /// Last event of the guard since the last line.
+    /// Last event of the guard since the previous line of the output.
     pub event: Option<TrackFault>,
-    /// Faults since the last line.
+    /// Faults since the previous line of the output.
     pub fault: Option<String>,
-    /// Findings that make the whole stream doubtful.
+    /// Finding that makes the whole stream doubtful.
     pub finding: Option<&'a Finding>,
 }
 
 impl StreamStatus<'_> {
-    /// Writes the line to a buffer, including its end.
+    /// Writes the line, including its line feed, to a buffer.
     ///
     /// # Errors
     /// Errors of the serialiser, which do not occur for a buffer in memory.
@@ -160,7 +160,7 @@ impl StreamStatus<'_> {
                 names: self.names,
                 estimates: t.parameters(),
             }),
-            // Other orders cannot be converted to an operator.
+            // A model with other orders cannot be converted to an operator.
             operator: (operator.zip(tracker))
                 .map(|(o, t)| json::tracked_operator(&o, |o| t.determined(o)))
                 .filter(|o| !o.is_null()),
@@ -171,7 +171,7 @@ impl StreamStatus<'_> {
             open_loop: tracker.and_then(Tracker::open_loop).as_ref().map(json::open_loop),
             innovation: self.innovation,
             change: tracker.and_then(Tracker::change_odds).map(|odds| ChangeLine {
-                // There are no odds before the first hypothesis of a change.
+                // The odds are infinite until a change is first hypothesised.
                 log_odds: odds.is_finite().then_some(odds),
                 declared: self.change.as_ref().map(|(t, change)| json::change(*t, change)),
             }),

@@ -1,5 +1,5 @@
-//! Lines of a stream from untrusted sources: their meaning, or the reason why they have none. Only
-//! a header that lacks a column ends a stream.
+//! Parsing of the lines of a stream, which may come from untrusted sources. For a line that cannot be parsed, the reason
+//! is returned; only a header that lacks a column ends a stream.
 
 use std::io::{self, BufRead, ErrorKind};
 
@@ -9,13 +9,12 @@ use serde_json::{Map, Value};
 
 use crate::error::CliError;
 
-/// Maximum length of a line, bytes; the rest of a longer one is skipped, so that memory stays
-/// bounded.
+/// Maximum length of a line in bytes. The rest of a longer line is skipped, so that memory stays bounded.
 const LONGEST: usize = 1 << 16;
-/// Maximum number of characters of an invalid cell in messages.
+/// Maximum number of characters of an invalid cell shown in messages.
 const SHOWN: usize = 24;
 
-/// Lines of bounded length.
+/// Reader of lines of bounded length.
 pub struct Lines<R> {
     input: R,
     bytes: Vec<u8>,
@@ -29,7 +28,8 @@ impl<R: BufRead> Lines<R> {
         }
     }
 
-    /// The next line without its end; an inner `Err` for a line that is too long, `None` at the end.
+    /// Returns the next line without its line feed: an inner `Err` if the line is too long, `None` at the end of the
+    /// input.
     pub fn next(&mut self) -> io::Result<Option<Result<String, String>>> {
         self.bytes.clear();
         let mut length = 0;
@@ -82,7 +82,7 @@ pub struct StreamSample {
     pub u: f64,
     /// External signal, if there is a column f_t with a number.
     pub reference: Option<f64>,
-    /// Problems with e or u.
+    /// Problem with e or u.
     pub fault: Option<String>,
 }
 
@@ -96,8 +96,7 @@ struct ColumnPositions {
     reference: Option<usize>,
 }
 
-/// The columns of a stream: known from the header, or from the number of cells in the first line of
-/// numbers.
+/// The columns of a stream, known from the header or from the number of cells in the first line of numbers.
 pub struct Columns {
     input: String,
     output: String,
@@ -118,7 +117,7 @@ impl Columns {
     }
 
     /// True if the samples have a column t.
-    pub fn have_time(&self) -> bool {
+    pub fn has_time(&self) -> bool {
         self.places.is_some_and(|p| p.t.is_some())
     }
 
@@ -130,7 +129,7 @@ impl Columns {
     /// Parses a line.
     ///
     /// # Errors
-    /// [`CliError::Stream`] for a header that lacks a column.
+    /// [`CliError::Stream`] if a header lacks a column.
     pub fn read(&mut self, line: &str) -> Result<ParsedLine, CliError> {
         let line = line.trim_matches(['\r', ' ', '\u{feff}']);
         if line.trim().is_empty() && !line.contains('\t') || line.starts_with('#') {
@@ -175,7 +174,7 @@ impl Columns {
     fn object(&self, line: &str) -> ParsedLine {
         let object: Map<String, Value> = match serde_json::from_str(line) {
             Ok(object) => object,
-            Err(error) => return ParsedLine::Unreadable(format!("no object of JSON ({error}): {}", shown(line))),
+            Err(error) => return ParsedLine::Unreadable(format!("not a JSON object ({error}): {}", shown(line))),
         };
         let of = |name: &str| object.get(name).map(number_of_json);
         let e = of(&self.input).filter(|_| self.with_input);
@@ -185,7 +184,7 @@ impl Columns {
         }
     }
 
-    /// A sample from its numbers; missing ones are `None`.
+    /// Creates a sample from its numbers; missing numbers are `None`.
     fn sample(
         &self,
         t: Option<Result<f64, Fault>>,
@@ -226,7 +225,7 @@ impl Columns {
         })
     }
 
-    /// Names of the required channels.
+    /// Returns the names of the required channels.
     fn names(&self) -> String {
         let input = if self.with_input {
             format!("{} and ", self.input)
@@ -256,7 +255,7 @@ impl Columns {
         }
     }
 
-    /// ", as --input err --output stick" for columns that are missing and exist under another name.
+    /// Returns a hint such as ", as --input err --output stick" if the missing columns exist under other names.
     fn hint(&self, cells: &[&str], (no_input, no_output): (bool, bool)) -> String {
         let input = error_among(cells).filter(|_| no_input && self.with_input);
         let output = control_among(cells).filter(|_| no_output);
@@ -272,7 +271,7 @@ impl Columns {
         }
     }
 
-    /// `e,u`, `t,e,u` or `t,e,u,f_t`; without input `u` or `t,u`.
+    /// Returns the columns by their number: `e,u`, `t,e,u` or `t,e,u,f_t`; for a model without input `u` or `t,u`.
     fn by_position(&self, cells: &[&str]) -> Option<ColumnPositions> {
         let readable = |c: &str| matches!(number(c), Ok(_) | Err(Fault::Missing));
         let any = cells.iter().any(|c| number(c).is_ok_and(f64::is_finite));
@@ -327,7 +326,7 @@ fn number(cell: &str) -> Result<f64, Fault> {
     }
 }
 
-/// The number of a JSON value.
+/// Returns the number in a JSON value.
 fn number_of_json(value: &Value) -> Result<f64, Fault> {
     match value {
         Value::Null => Err(Fault::Missing),
@@ -336,19 +335,19 @@ fn number_of_json(value: &Value) -> Result<f64, Fault> {
     }
 }
 
-/// True for a single JSON object, possibly of several lines.
+/// True if a text is a single JSON object, possibly over several lines.
 pub fn is_object(text: &str) -> bool {
     text.trim_start().starts_with('{') && serde_json::from_str::<IgnoredAny>(text).is_ok()
 }
 
-/// A text in quotation marks, shortened to a readable length.
+/// Returns a text in quotation marks, shortened to a readable length.
 fn shown(text: &str) -> String {
     let cut: String = text.chars().take(SHOWN).collect();
     let rest = if text.chars().count() > SHOWN { "..." } else { "" };
     format!("\"{}{rest}\"", cut.escape_debug())
 }
 
-/// True for two or more names.
+/// True if all cells are names and there are at least two cells, or if the only cell is `u`.
 fn is_header(cells: &[&str]) -> bool {
     let is_name = |c: &&str| {
         let first = c.chars().next();
@@ -394,11 +393,11 @@ mod tests {
         let mut alone = Columns::new("e", "u", false, 1e6);
         assert_eq!(sample(&mut alone, r#"{"e": 4, "u": 1}"#).e, 0.0);
         for (line, reason) in [
-            ("{", "no object of JSON"),
+            ("{", "not a JSON object"),
             ("{\"t\": 1}", "without e and u"),
             ("{\"u\": 1}", "without e and u"),
             ("{\"t\": null, \"e\": 1, \"u\": 1}", "t is missing"),
-            ("{\"e\": 1e999, \"u\": 1}", "no object of JSON"),
+            ("{\"e\": 1e999, \"u\": 1}", "not a JSON object"),
         ] {
             match default_columns().read(line).unwrap() {
                 ParsedLine::Unreadable(said) => assert!(said.contains(reason), "{line}: {said}"),

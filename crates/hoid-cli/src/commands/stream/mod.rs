@@ -1,13 +1,12 @@
-//! `hoid stream`: a recursive estimate, online. Each line of standard input that is not a comment
-//! gives one line of JSON on standard output, flushed, whatever its content; or each datagram one
-//! datagram.
+//! `hoid stream`: an online recursive estimate. Each line of standard input, whatever it contains, gives one line of
+//! JSON on standard output, flushed at once; comments are ignored. With `--udp`, each datagram gives one datagram.
 //!
 //! | file | contents |
 //! |---|---|
-//! | `session` | the samples in their order, and the state of the recursion |
-//! | `lines`, `clock` | the meaning of a line, and its time |
+//! | `session` | samples in order of time, and the state of the recursion |
+//! | `lines`, `clock` | parsing of a line, and check of its time |
 //! | `line` | one line of the output |
-//! | `datagram`, `udp` | binary samples and estimates; the socket |
+//! | `datagram`, `udp` | binary samples and estimates; socket |
 
 mod clock;
 mod datagram;
@@ -33,13 +32,13 @@ use lines::Lines;
 use session::Session;
 use udp::Udp;
 
-/// Maximum time for which an interrupt waits for a line that is being written.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// Maximum time for which an interrupt waits until a line has been written.
+const INTERRUPT_WAIT: Duration = Duration::from_secs(1);
 
 pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     if args.lsl_in.is_some() || args.lsl_out.is_some() {
         return Err(CliError::Usage(
-            "--lsl-in, --lsl-out: this program does not include liblsl; streams of LabStreamingLayer are tracked in \
+            "--lsl-in, --lsl-out: this program does not include liblsl; LabStreamingLayer streams are tracked in \
              Python, with pyhoid.lsl.stream(IN, OUT, pyhoid.Tracker(sample_time=0.01)) (pip install \"pyhoid[lsl]\")"
                 .to_owned(),
         ));
@@ -54,8 +53,8 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     }
     if args.warm_up.is_some() && asked.method.starts_itself() {
         return Err(CliError::Usage(format!(
-            "--warm-up is for a start fit, and {} has none: it estimates from the start; drop it, or choose --method \
-             physical",
+            "--warm-up is for a start fit, and {} has none: it estimates from the start; drop --warm-up, or choose \
+             --method physical",
             asked.method
         )));
     }
@@ -64,8 +63,8 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     let plan = live.plan();
     if args.recursion.start.is_some() && !plan.is_settled() {
         return Err(CliError::Usage(
-            "--start leaves no warm-up to search nk and orders on; give --nk and --orders as single numbers, such as \
-             --nk 29 --orders nd=1"
+            "--start leaves no warm-up in which to search for nk and orders; give --nk and --orders as single numbers, \
+             such as --nk 29 --orders nd=1"
                 .to_owned(),
         ));
     }
@@ -78,7 +77,7 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     }
 }
 
-/// Lines in, lines out, until the input ends.
+/// Reads lines and writes lines until the input ends.
 fn over_pipes(session: &Mutex<Session>) -> Result<(), CliError> {
     let mut input = Lines::new(io::stdin().lock());
     let mut buffer = Vec::new();
@@ -102,10 +101,10 @@ fn over_pipes(session: &Mutex<Session>) -> Result<(), CliError> {
     session.end()
 }
 
-/// Datagrams in, datagrams out, until an interrupt.
+/// Receives datagrams and sends datagrams until an interrupt.
 fn over_udp(udp: &Udp, session: &Mutex<Session>) -> Result<(), CliError> {
     output::message(&format!("{udp}; an interrupt ends the stream."));
-    let mut bytes = udp::room();
+    let mut bytes = udp::datagram_buffer();
     let mut buffer = Vec::new();
     loop {
         let received = udp.receive(&mut bytes)?;
@@ -127,8 +126,8 @@ fn lock(session: &Mutex<Session>) -> MutexGuard<'_, Session> {
     session.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Ends with a summary at an interrupt, with exit code 0 if there is an estimate; a line that is being written is
-/// completed first.
+/// Ends the stream with a summary at an interrupt, with exit code 0 if there is an estimate. A line that is being
+/// written is completed first.
 fn end_on_interrupt(session: &Arc<Mutex<Session>>) {
     let session = Arc::clone(session);
     interrupt::on_interrupt(move |_| {
@@ -138,9 +137,9 @@ fn end_on_interrupt(session: &Arc<Mutex<Session>>) {
                 output::message(&session.summary());
                 process::exit(session.end().map_or_else(|error| i32::from(error.exit_code()), |()| 0));
             }
-            // A start fit in progress, or a blocked reader: lines are written completely, so that
-            // none is truncated.
-            if asked.elapsed() > PATIENCE {
+            // A start fit may be in progress, or the reader may be blocked. Lines are written in one piece, so no line
+            // is truncated.
+            if asked.elapsed() > INTERRUPT_WAIT {
                 process::exit(0);
             }
             thread::sleep(Duration::from_millis(1));

@@ -15,10 +15,10 @@ use super::{
 };
 use crate::{args::StreamArgs, commands::reading, error::CliError, output, recursion, text};
 
-/// Maximum number of faults kept for the next line.
-const FAULTS_TOLD: usize = 4;
+/// Maximum number of faults kept for the next line of the output.
+const MAX_FAULTS: usize = 4;
 
-/// The state of the stream, changed by each line.
+/// The state of the stream, which each line of the input updates.
 pub struct Session {
     asked: TrackRequest,
     columns: Columns,
@@ -26,26 +26,26 @@ pub struct Session {
     live: Live,
     /// Time between two samples of the stream.
     sample_time: SampleTime,
-    /// Factors of e and u.
+    /// Scale factors of e and u.
     scale: (f64, f64),
     every: u64,
-    /// Number of lines counted for `every`.
+    /// Number of lines processed, of which every `every`-th gives a line of the output.
     lines: u64,
     counts: Counts,
-    /// True once a sample had a time.
+    /// True after the first sample with a time.
     has_time: bool,
     /// Time of the last sample, s.
     t: Option<f64>,
     innovation: Option<f64>,
-    /// A change that has not been reported, and the time of its declaration, s.
+    /// Last change that has not been reported, with the time of its declaration, s.
     change: Option<(Option<f64>, Change)>,
-    /// Guard events that have not been reported.
+    /// Last guard event that has not been reported.
     event: Option<TrackFault>,
     names: Vec<String>,
     faults: VecDeque<String>,
     /// True if a deviating rate of the times has been reported.
-    rate_told: bool,
-    /// Rate of the time stamps.
+    rate_reported: bool,
+    /// Finding about the rate of the time stamps, if it differs from `--fs`.
     rate: Option<Finding>,
 }
 
@@ -71,18 +71,19 @@ impl Session {
             event: None,
             names: Vec::new(),
             faults: VecDeque::new(),
-            rate_told: false,
+            rate_reported: false,
             rate: None,
         };
         if session.live.tracker().is_some() {
             let options = session.live.plan().options().clone();
-            session.began("started at once", &options, None);
+            session.report_start("started at once", &options, None);
         }
         Ok(session)
     }
 
-    /// Reports the start of the tracker: its names, and all settings on standard error.
-    fn began(&mut self, when: &str, options: &TrackOptions, choice: Option<&Choice>) {
+    /// Reports the start of the tracker: stores the names of its coefficients, and prints all settings to standard
+    /// error.
+    fn report_start(&mut self, when: &str, options: &TrackOptions, choice: Option<&Choice>) {
         if let Some(tracker) = self.live.tracker() {
             self.names = tracker.parameter_names();
         }
@@ -101,7 +102,7 @@ impl Session {
         output::message(&format!("{when}; {}.", each.join("; ")));
     }
 
-    /// Processes a line; true if the output has a line for it.
+    /// Processes a line of the input; true if the output gets a line for it.
     pub fn take(&mut self, text: Result<String, String>) -> Result<bool, CliError> {
         let line = match text {
             Ok(text) => self.columns.read(&text)?,
@@ -110,14 +111,14 @@ impl Session {
         Ok(self.handle(line))
     }
 
-    /// Handles a parsed line; true if the output has a line for it.
+    /// Processes a parsed line; true if the output gets a line for it.
     fn handle(&mut self, line: ParsedLine) -> bool {
         self.forget_innovation();
         match line {
             ParsedLine::Nothing => return false,
             ParsedLine::Sample(read) => self.timed(read),
             // The time of the next line shows whether a sample is missing.
-            ParsedLine::Unreadable(reason) if self.columns.have_time() || !self.columns.are_known() => {
+            ParsedLine::Unreadable(reason) if self.columns.has_time() || !self.columns.are_known() => {
                 self.dropped(format!("{reason}: dropped"));
             }
             ParsedLine::Unreadable(reason) => {
@@ -129,11 +130,11 @@ impl Session {
         self.lines.is_multiple_of(self.every)
     }
 
-    /// Processes a datagram; each sample that requires an answer is reported individually. Anything
-    /// that is not a sample is dropped: it may come from any sender.
+    /// Processes a datagram; `answer` is called for each sample that requires an answer. Anything that is not a sample
+    /// is dropped, because it may come from any sender.
     ///
     /// # Errors
-    /// Errors of the answers.
+    /// Errors of `answer`.
     pub fn take_datagram(
         &mut self,
         bytes: &[u8],
@@ -171,7 +172,7 @@ impl Session {
         Ok(())
     }
 
-    /// State of the recursion, as the answer to a binary sample.
+    /// Returns the state of the recursion as the answer to a binary sample.
     pub fn estimate(&mut self, sequence: u32) -> EstimateDatagram {
         let answer = EstimateDatagram::new(sequence, self.t, &self.live, self.innovation, self.change.as_ref());
         self.change = None;
@@ -180,13 +181,15 @@ impl Session {
         answer
     }
 
-    /// Processes a sample at its position in time.
+    /// Processes a sample at its time, after filling in missing samples.
     fn timed(&mut self, read: StreamSample) {
         if let Some(t) = read.t {
             self.has_time = true;
             match self.clock.take(t) {
                 Arrival::Behind { last_s } => {
-                    return self.dropped(format!("t = {t} s is not later than the last, {last_s} s: dropped"));
+                    return self.dropped(format!(
+                        "t = {t} s is not later than the last time, {last_s} s: dropped"
+                    ));
                 }
                 Arrival::Sample { missing, left_out } => {
                     if left_out {
@@ -203,7 +206,7 @@ impl Session {
                     self.t = Some(t);
                 }
             }
-            self.judge_rate(t);
+            self.check_rate(t);
         }
         if let Some(fault) = read.fault {
             self.fault(fault);
@@ -213,18 +216,18 @@ impl Session {
 
     /// Reports once that the rate of the times differs from `--fs`; from then on every line
     /// contains the finding.
-    fn judge_rate(&mut self, t: f64) {
+    fn check_rate(&mut self, t: f64) {
         let fs = 1.0 / self.sample_time.s();
-        let (hurried, other) = (self.clock.hurried(), self.clock.other_rate());
+        let (hurried, other) = (self.clock.too_fast(), self.clock.other_rate());
         let mut warn = |words: &str| {
-            if !std::mem::replace(&mut self.rate_told, true) {
+            if !std::mem::replace(&mut self.rate_reported, true) {
                 output::message(&format!("warning: {words}"));
             }
         };
         if let Some(hz) = other.filter(|_| self.rate.is_none()) {
             let words = format!(
-                "up to t = {t} s the times run at {hz:.4} Hz, but --fs is {fs} Hz: delay, lead and frequency of the \
-                 estimate are scaled accordingly; give the rate of the times with --fs, or correct t"
+                "up to t = {t} s the rate of the times is {hz:.4} Hz, but --fs is {fs} Hz: delay, lead and frequency \
+                 of the estimate are scaled accordingly; give the rate of the times with --fs, or correct t"
             );
             warn(&words);
             self.rate = Some(Finding::doubt("sampling-rate", words));
@@ -236,7 +239,7 @@ impl Session {
         }
     }
 
-    /// Discards the innovation, which is that of a single sample: in a decimated stream the last one remains for
+    /// Discards the innovation, which belongs to a single sample. In a decimated stream the last innovation is kept for
     /// several lines.
     fn forget_innovation(&mut self) {
         if self.live.decimated().is_none() {
@@ -257,7 +260,7 @@ impl Session {
         self.innovation = taken.outcome.and_then(|outcome| outcome.innovation);
         self.counts.shortened += u64::from(taken.outcome.is_some_and(|outcome| outcome.shortened));
         if let Some(tracker) = self.live.tracker() {
-            // The time up to which the recursion has advanced.
+            // Time of the last sample that the recursion has processed.
             let t = self.t.map(|t| t - self.live.behind_s());
             (self.counts.held, self.counts.restarts) = (tracker.counts().held, tracker.counts().restarts);
             if let Some(event) = tracker.event() {
@@ -269,7 +272,7 @@ impl Session {
         }
         if let Some((options, choice)) = taken.started {
             let when = format!("started after {} samples", self.counts.samples);
-            self.began(&when, &options, choice.as_ref());
+            self.report_start(&when, &options, choice.as_ref());
         }
     }
 
@@ -278,9 +281,9 @@ impl Session {
         self.fault(reason);
     }
 
-    /// Keeps a fault for the next line of the output; only the last ones if there are many.
+    /// Keeps a fault for the next line of the output; of many faults, only the last few are kept.
     fn fault(&mut self, text: String) {
-        if self.faults.len() == FAULTS_TOLD {
+        if self.faults.len() == MAX_FAULTS {
             self.faults.pop_front();
         }
         self.faults.push_back(text);
@@ -304,25 +307,26 @@ impl Session {
         standing.write(buffer).map_err(unwritable)
     }
 
-    /// Error for a stream that ended without an estimate.
+    /// Returns an error if the stream ended without an estimate.
     pub fn end(&self) -> Result<(), CliError> {
         let c = self.counts;
         if c.samples == 0 && c.dropped > 0 {
             return Err(CliError::NotDetermined(format!(
-                "no line of the stream was a sample, {} dropped; expected e,u or t,e,u with decimal points, or an \
-                 object of JSON; the errors are in the lines of the output",
+                "no line of the stream was a sample, {} dropped; expected e,u or t,e,u with decimal points, or a JSON \
+                 object; the output lines contain the errors",
                 text::counted(c.dropped, "line")
             )));
         }
         match self.live.stage() {
             Stage::Tracking(_) => Ok(()),
             Stage::Collecting(_) => Err(CliError::NotDetermined(
-                "the stream ended within the warm-up, without an estimate; give it more samples, or a shorter --warm-up".to_owned(),
+                "the stream ended within the warm-up, without an estimate; send more samples, or shorten --warm-up"
+                    .to_owned(),
             )),
         }
     }
 
-    /// Summary for the end.
+    /// Returns a summary for the end of the stream.
     pub fn summary(&self) -> String {
         let c = self.counts;
         let mut text = format!(
@@ -352,7 +356,7 @@ impl Session {
     }
 }
 
-/// Factors of e and u.
+/// Returns the scale factors of e and u.
 fn scale(args: &StreamArgs) -> Result<(f64, f64), CliError> {
     let mut all = reading::by_channel("--scale", &args.scale)?;
     let mut take = |name: &str| all.remove(name).map_or(1.0, |scaling| scaling.factor());
@@ -360,7 +364,7 @@ fn scale(args: &StreamArgs) -> Result<(f64, f64), CliError> {
     match all.keys().next() {
         None => Ok(factors),
         Some(name) => Err(CliError::Usage(format!(
-            "--scale names {name}; in a stream it is e or u, the input or the output"
+            "--scale names {name}; in a stream, name e (the input) or u (the output)"
         ))),
     }
 }

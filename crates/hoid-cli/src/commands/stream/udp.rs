@@ -10,12 +10,12 @@ use crate::{args::UdpPlaces, error::CliError};
 /// Maximum size of a datagram, bytes.
 const LARGEST: usize = 1 << 16;
 
-/// Buffer for a datagram.
-pub fn room() -> Vec<u8> {
+/// Returns a buffer for a datagram.
+pub fn datagram_buffer() -> Vec<u8> {
     vec![0; LARGEST]
 }
 
-/// A socket that receives samples, and the address of its answers.
+/// A socket that receives samples, and the address to which answers are sent.
 pub struct Udp {
     socket: UdpSocket,
     output: SocketAddr,
@@ -32,7 +32,7 @@ impl fmt::Display for Udp {
 
 impl Udp {
     /// # Errors
-    /// [`CliError::Stream`] for an address that the system does not provide.
+    /// [`CliError::Stream`] if the system does not provide the address.
     pub fn bind(places: &UdpPlaces) -> Result<Self, CliError> {
         let socket = UdpSocket::bind(places.input).map_err(|error| {
             CliError::Stream(format!(
@@ -55,7 +55,7 @@ impl Udp {
         })
     }
 
-    /// The next datagram.
+    /// Receives the next datagram.
     ///
     /// # Errors
     /// [`CliError::Stream`] if the socket fails.
@@ -63,22 +63,22 @@ impl Udp {
         loop {
             match self.socket.recv(bytes) {
                 Ok(length) => return Ok(&bytes[..length]),
-                // An answer that could not be delivered is reported here.
-                Err(error) if is_passing(&error) => {}
+                // The system reports here that an earlier answer could not be delivered.
+                Err(error) if is_transient(&error) => {}
                 Err(error) => return Err(CliError::Stream(format!("the socket cannot be read: {error}"))),
             }
         }
     }
 
-    /// Sends an answer; one that cannot be sent is lost, as datagrams may be.
+    /// Sends an answer; like any datagram, it may be lost.
     pub fn send(&self, bytes: &[u8]) {
         let _ = self.socket.send_to(bytes, self.output);
     }
 }
 
-fn is_passing(error: &io::Error) -> bool {
+fn is_transient(error: &io::Error) -> bool {
     use io::ErrorKind::{ConnectionRefused, ConnectionReset, Interrupted, WouldBlock};
-    // On Windows a datagram larger than the buffer is also an error.
+    // On Windows, a datagram larger than the buffer is reported as an error, too.
     matches!(
         error.kind(),
         ConnectionRefused | ConnectionReset | Interrupted | WouldBlock

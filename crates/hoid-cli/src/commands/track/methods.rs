@@ -1,11 +1,11 @@
-//! `hoid track --methods`: the list of the recursive methods.
+//! `hoid track --methods`: list of the recursive methods.
 
 use hoid::survey::{ListedMethod, listed};
 use serde_json::{Value, json};
 
 use crate::{error::CliError, json, output};
 
-/// Prints the methods, one on a line, or as a list in JSON.
+/// Prints the methods, one per line, or as a JSON list.
 pub fn list(as_json: bool) -> Result<(), CliError> {
     let all = listed();
     if as_json {

@@ -1,4 +1,4 @@
-//! `hoid track`: a recursive estimate over a record, with its trace in a file.
+//! `hoid track`: a recursive estimate over a record, with the trace in a file.
 
 mod methods;
 mod page;

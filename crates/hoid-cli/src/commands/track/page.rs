@@ -1,4 +1,4 @@
-//! A summary of a trace as text.
+//! Text output for a trace.
 
 use hoid::analysis::Tracked;
 use hoid::model::{GainUnit, uncertainty::Estimate};
@@ -13,10 +13,10 @@ const ROWS_SHOWN: usize = 8;
 /// Number of coefficients printed if there is no operator.
 const COEFFICIENTS_SHOWN: usize = 6;
 
-/// A summary; details with `verbose`.
+/// Returns a summary of a trace; `verbose` adds details.
 ///
 /// # Errors
-/// The errors of the quality of the start fit.
+/// Errors in evaluating the quality of the start fit.
 pub fn page(tracked: &Tracked, out: Option<&str>, verbose: bool) -> Result<String, CliError> {
     let mut page = text::verdict(&tracked.verdict);
     page.push_str(&rows_shown(tracked));
@@ -57,7 +57,7 @@ pub fn page(tracked: &Tracked, out: Option<&str>, verbose: bool) -> Result<Strin
     Ok(page)
 }
 
-/// The candidates tried, the start fit, settings.
+/// Returns the candidates tried, the start fit and the settings.
 fn details(tracked: &Tracked) -> Result<String, CliError> {
     let mut page = String::new();
     if let Some(choice) = &tracked.choice {
@@ -79,7 +79,7 @@ fn details(tracked: &Tracked) -> Result<String, CliError> {
     Ok(page)
 }
 
-/// The start covariances tried on a second run, if one was given.
+/// Returns the start covariances tried on a second run, if a second run was given.
 fn covariance(tracked: &Tracked) -> String {
     let Some((file, choice)) = tracked.chosen_covariance() else {
         return String::new();
@@ -90,12 +90,12 @@ fn covariance(tracked: &Tracked) -> String {
         rows.add_row(vec![format!("{p} I"), format!("{vaf:.2}"), taken.to_owned()]);
     }
     format!(
-        "\nStart covariance by how much of {file} the trace explains ({:.2} to {:.2} s):\n{rows}\n",
+        "\nStart covariance, chosen by how much of {file} the trace explains ({:.2} to {:.2} s):\n{rows}\n",
         choice.span_s.0, choice.span_s.1
     )
 }
 
-/// The estimate at a few times.
+/// Returns a table of the estimate at a few times.
 fn rows_shown(tracked: &Tracked) -> String {
     let trace = &tracked.trace;
     if trace.is_empty() {
@@ -154,7 +154,7 @@ fn rows_shown(tracked: &Tracked) -> String {
     )
 }
 
-/// Crossover and phase margin at the end, with a controlled element.
+/// Returns crossover and phase margin at the end of the trace; empty without a controlled element.
 fn open_loop(tracked: &Tracked) -> String {
     let (Some(row), Some((rows, reason))) = (tracked.trace.len().checked_sub(1), tracked.without_crossover()) else {
         return String::new();
@@ -183,7 +183,7 @@ fn open_loop(tracked: &Tracked) -> String {
     words
 }
 
-/// The declared changes.
+/// Returns the list of the declared changes.
 fn changes(tracked: &Tracked) -> String {
     let trace = &tracked.trace;
     if trace.change_odds().is_empty() {

@@ -1,4 +1,4 @@
-//! The page about a trace.
+//! The report page and the figure of a trace.
 
 use std::path::PathBuf;
 
@@ -7,8 +7,8 @@ use hoid::report::{BatchFit, TrackReport, batch_fit, default_batch_fits, figures
 
 use crate::{args::TrackArgs, commands::figure, error::CliError, output};
 
-/// Writes the page to the directory of `--report` and the parameters over time to the file of
-/// `--figure`; nothing without them.
+/// Writes the report page if `--report` gives a directory, and the figure of the parameters over time if `--figure`
+/// gives a file.
 pub fn write(args: &TrackArgs, tracked: &Tracked, batch: &[BatchFit]) -> Result<Option<PathBuf>, CliError> {
     if args.report.is_none() && args.picture.figure.is_none() {
         return Ok(None);
@@ -28,8 +28,8 @@ pub fn write(args: &TrackArgs, tracked: &Tracked, batch: &[BatchFit]) -> Result<
     Ok(Some(write_report(directory, &report.to_html()?)?))
 }
 
-/// The batch fits for comparison on the page: those of the given spans, otherwise the start fit and
-/// that of the last third. A default span that cannot be fitted is omitted with a note.
+/// Returns the batch fits with which the page compares the trace: the fits of the given spans, otherwise the start fit
+/// and a fit of the last third. If a default span cannot be fitted, it is omitted with a note.
 pub fn batch_fits(args: &TrackArgs, tracked: &Tracked) -> Result<Vec<BatchFit>, CliError> {
     if args.report.is_none() {
         return Ok(Vec::new());

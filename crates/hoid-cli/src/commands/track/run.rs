@@ -1,4 +1,4 @@
-//! Execution of the command: read, track, write.
+//! Execution of `hoid track`: reading, tracking, output.
 
 use std::path::Path;
 
@@ -54,10 +54,10 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     )?;
     let tracking = recursion::tracking(args)?;
     let reading = reading::of(&args.read, None, tracking.recursion.structure().has_input())?;
-    let read = reading.file(record, reading::told)?;
-    reading::say_kept(read.kept_rate(tracking.rate, tracking.recursion.counts_samples()));
+    let read = reading.file(record, reading::report_problems)?;
+    reading::report_kept_rate(read.kept_rate(tracking.rate, tracking.recursion.counts_samples()));
     let other = args.validate.as_deref();
-    let other = other.map(|path| reading.file(path, reading::told)).transpose()?;
+    let other = other.map(|path| reading.file(path, reading::report_problems)).transpose()?;
     let plan = tracking.plan(&read)?;
     let tracked = recursion::searching(&plan, |each| tracking.run(read, other, each))?;
     let batch = report::batch_fits(args, &tracked)?;

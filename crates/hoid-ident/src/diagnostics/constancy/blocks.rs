@@ -1,8 +1,8 @@
 //! Scores `g_c = sum psi eps` and information `G_c = sum psi psi'` of blocks of records.
 //!
-//! Blocks have the length [`BLOCK_S`], or more if all records together would have more than [`MOST`]. A long record is
-//! processed in pieces of whole blocks, each with its own initial states, so that the memory for the columns of psi is
-//! not proportional to its length.
+//! Blocks have the length [`BLOCK_S`], or a greater length if this would give more than [`MOST`] blocks in all records.
+//! A long record is processed in pieces of whole blocks, each with its own initial states, so that the memory for the
+//! columns of psi does not grow with the length of the record.
 
 use std::ops::Range;
 
@@ -12,29 +12,29 @@ use crate::{
     linalg::least_squares::{add_scaled, dot},
 };
 
-/// Length of a block, s: longer than the memory of residuals.
+/// Length of a block, s: longer than the correlation time of the residuals.
 pub(super) const BLOCK_S: f64 = 2.0;
-/// Largest number of blocks of all records.
+/// Largest total number of blocks in all records.
 const MOST: usize = 96;
-/// Residuals of a piece.
+/// Number of residuals in a piece of a long record.
 const PIECE: usize = 1 << 15;
 
-/// A block of a record.
+/// Score and information of one block of a record.
 #[derive(Debug, Clone)]
 pub(crate) struct ScoreBlock {
     pub record: usize,
-    /// Its first sample in the record; 0 for the first block.
+    /// First sample of the block in the record; 0 for the first block.
     pub from: usize,
-    pub g: Vec<f64>,
-    /// The matrix by rows.
-    pub big: Vec<f64>,
+    pub score: Vec<f64>,
+    /// Information matrix of the block by rows.
+    pub information: Vec<f64>,
 }
 
-/// Residuals of a piece of a record, and the columns of psi with their places.
+/// Residuals of a piece of a record, and the columns of psi, each with the index of its parameter.
 pub(crate) type Scores = (Vec<f64>, Vec<(usize, Vec<f64>)>);
 
-/// Computes the blocks of records whose residuals start at sample `first`, with p places; `None` if there are no
-/// scores.
+/// Computes the blocks of all records for p parameters; the residuals start at sample `first`. `None` if the scores of
+/// a record are missing, too short or not finite.
 pub(crate) fn score_blocks(
     data: &[Data<'_>],
     first: usize,
@@ -69,34 +69,34 @@ pub(crate) fn score_blocks(
                 let mut block = ScoreBlock {
                     record,
                     from: if k == 0 { 0 } else { first + start },
-                    g: vec![0.0; p],
-                    big: vec![0.0; p * p],
+                    score: vec![0.0; p],
+                    information: vec![0.0; p * p],
                 };
                 for (i, (place, column)) in columns.iter().enumerate() {
                     let column = &column[part.clone()];
-                    block.g[*place] += dot(column, &eps[part.clone()]);
+                    block.score[*place] += dot(column, &eps[part.clone()]);
                     for (other, against) in &columns[..=i] {
                         let product = dot(column, &against[part.clone()]);
-                        block.big[place * p + other] = product;
-                        block.big[other * p + place] = product;
+                        block.information[place * p + other] = product;
+                        block.information[other * p + place] = product;
                     }
                 }
                 blocks.push(block);
             }
         }
     }
-    let finite = |block: &ScoreBlock| block.g.iter().chain(&block.big).all(|x| x.is_finite());
+    let finite = |block: &ScoreBlock| block.score.iter().chain(&block.information).all(|x| x.is_finite());
     blocks.iter().all(finite).then_some(blocks)
 }
 
-/// Groups of blocks of a record that are processed together.
+/// Splits the blocks of a record into groups that are processed together.
 fn pieces(number: usize, residuals: usize) -> Vec<Range<usize>> {
     let together = (PIECE * number / residuals.max(1)).max(1);
     let starts = (0..number).step_by(together);
     starts.map(|from| from..(from + together).min(number)).collect()
 }
 
-/// Computes the blocks of a fit in physical parameters, over the free elements of eta.
+/// Computes the blocks of a fit in physical parameters, for the free elements of eta.
 pub(crate) fn physical_blocks<P: Parametrisation>(
     criterion: &PhysicalCriterion<'_, P>,
     eta: &[f64],
@@ -105,7 +105,7 @@ pub(crate) fn physical_blocks<P: Parametrisation>(
 ) -> Option<Vec<ScoreBlock>> {
     let ts = criterion.layout.sample_time().s();
     let mut scores = |record: usize, data: Data<'_>| -> Option<Scores> {
-        // A piece of a long record does not contain the corresponding piece of the other inputs.
+        // Only e and u are cut into pieces, not the other inputs; a long record with other inputs has no scores.
         if !criterion.further.is_empty() && data.u.len() != criterion.data[record].u.len() {
             return None;
         }
@@ -146,8 +146,8 @@ mod tests {
                 Some((eps, vec![(0, ones)]))
             };
             let blocks = score_blocks(&data, 30, 1, 0.01, &mut scores).unwrap();
-            let count: f64 = blocks.iter().map(|b| b.big[0]).sum();
-            let sum: f64 = blocks.iter().map(|b| b.g[0]).sum();
+            let count: f64 = blocks.iter().map(|b| b.information[0]).sum();
+            let sum: f64 = blocks.iter().map(|b| b.score[0]).sum();
             assert_eq!(count, (n - 30) as f64);
             assert!((sum - u[30..].iter().sum::<f64>()).abs() < 1e-9);
             assert!(blocks.len() <= MOST && blocks.len() >= 4, "{}", blocks.len());

@@ -1,27 +1,27 @@
-//! p-values of the supremum of a statistic over instants of change.
+//! p-values of the supremum of a statistic over all instants of change.
 //!
-//! Under constancy `T^2` over the share pi of the information before the change is the square of a
-//! standardised tied-down Bessel process of one dimension. For its supremum over
-//! `pi_0 <= pi <= 1 - pi_0` and large c (D. M. De Long, *Comm. Statist. A* 10 (1981) 2197-2213; A.
-//! Estrella, *Econometric Theory* 19 (2003) 1128-1143, who gives D. W. K. Andrews' critical values by
-//! it)
+//! If the parameters are constant, `T^2` as a function of pi, the share of the information before the change, is the
+//! square of a one-dimensional standardised tied-down Bessel process. For large c its supremum over
+//! `pi_0 <= pi <= 1 - pi_0` has the tail (D. M. De Long, *Comm. Statist. A* 10 (1981) 2197-2213; A. Estrella,
+//! *Econometric Theory* 19 (2003) 1128-1143, who computes D. W. K. Andrews' critical values from it)
 //!
 //! `P(sup T^2 > c) = sqrt(c/2) e^(-c/2)/Gamma(1/2) [(1 - 1/c) ln lambda + 2/c]`,
 //! `lambda = ((1 - pi_0)/pi_0)^2`.
 //!
-//! For m instants the p-value of the supremum is at most m times that of one (Bonferroni's inequality); for few
-//! instants this is the smaller number.
+//! For m instants the p-value of the supremum is at most m times the smallest p-value of a single instant (Bonferroni's
+//! inequality). For few instants this bound is below De Long's tail.
 
 use std::f64::consts::PI;
 
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
-/// Two-sided p-value of a statistic of Student's distribution.
+/// Returns the two-sided p-value of a t statistic.
 pub(super) fn of_student(t: f64, freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |d| 2.0 * d.sf(t.abs()))
 }
 
-/// p-value of the supremum over `instants`, the smallest with the share pi_0, from the smallest p-value of one.
+/// Returns the p-value of the supremum over `instants` instants from the smallest p-value of a single instant;
+/// `smallest_share` is pi_0.
 pub(super) fn of_supremum(p_one: f64, instants: usize, smallest_share: f64) -> f64 {
     let bonferroni = p_one * instants as f64;
     let Ok(normal) = Normal::new(0.0, 1.0) else {
@@ -32,7 +32,7 @@ pub(super) fn of_supremum(p_one: f64, instants: usize, smallest_share: f64) -> f
     bonferroni.min(continuous).min(1.0)
 }
 
-/// De Long's tail of the supremum.
+/// Returns De Long's tail probability of the supremum.
 fn de_long(c: f64, pi_0: f64) -> f64 {
     let log_lambda = 2.0 * ((1.0 - pi_0) / pi_0).ln();
     (0.5 * c / PI).sqrt() * (-0.5 * c).exp() * ((1.0 - 1.0 / c) * log_lambda + 2.0 / c)

@@ -1,39 +1,40 @@
-//! Test of whether the parameters of a fit are constant: the scores over time.
+//! Test of whether the parameters of a fit are constant, based on the scores over time.
 //!
-//! At the minimum the scores `s(t) = psi(t) eps(t)` sum to zero. If a parameter changes within a record, or from one
-//! run to the next, they have one sign before the change and the other after it (J. Nyblom, *JASA* 84 (1989) 223-230;
-//! B. E. Hansen, *J. Policy Modeling* 14 (1992) 517-533). For a direction v in the space of the parameters and a set A
-//! of samples (those of a record after an instant, or a whole run among others) the regressor of a change is
-//! `z = psi'v` in A and 0 elsewhere. Its part that the constant parameters do not explain is
+//! At the minimum the scores `s(t) = psi(t) eps(t)` sum to zero. If a parameter changes within a record or from one run
+//! to the next, the scores have one sign before the change and the other sign after it (J. Nyblom, *JASA* 84 (1989)
+//! 223-230; B. E. Hansen, *J. Policy Modeling* 14 (1992) 517-533). For a direction v in the space of the parameters and
+//! a set A of samples (the samples of a record after an instant, or one of several runs), the regressor of a change is
+//! `z = psi'v` in A and 0 elsewhere. The part of z that the constant parameters do not explain is
 //!
 //! `r(t) = psi(t)' w(t)`, `w = v - a` in A and `-a` elsewhere, `a = G^-1 G_A v`
 //!
-//! and the statistic of the Lagrange multiplier (D. W. K. Andrews, *Econometrica* 61 (1993) 821-856) is
-//! `T = U / sqrt V`, `U = sum r eps`, whose supremum over all A is tested. With blocks c and their `g_c = sum psi eps`,
-//! `G_c = sum psi psi'` everything follows from `h_c = w_c' g_c` and `R_c = w_c' G_c w_c`: `U = sum h_c`,
-//! `R = sum R_c`, and the change itself is `delta = U/R`. The exact information in A is used instead of a share of
-//! time, since the excitation is not uniform in time.
+//! and the Lagrange multiplier statistic (D. W. K. Andrews, *Econometrica* 61 (1993) 821-856) is `T = U / sqrt V`,
+//! `U = sum r eps`. Its supremum over all A is tested. With blocks c, `g_c = sum psi eps`, `G_c = sum psi psi'`,
+//! `h_c = w_c' g_c` and `R_c = w_c' G_c w_c`, the sums are `U = sum h_c` and `R = sum R_c`, and the estimated change is
+//! `delta = U/R`. The exact information in A is used instead of a share of time, since the excitation is not uniform in
+//! time.
 //!
-//! **V is the largest** of three. The first is that of the model, `sigma^2 R`. The second is the scatter of blocks of 2
-//! s about the tested change, `sum (h_c - delta R_c)^2 n/(n-2)`, which holds whatever the residuals are within a block:
-//! the misfit of a person's remnant is correlated over some tenths of a second (K.-Y. Liang and S. L. Zeger,
-//! *Biometrika* 73 (1986) 13-22; about the change, since a change must not mask itself). The third is the median of
-//! this scatter over all A, since the scatter of a few blocks may be small by chance. Between runs people vary:
-//! `share^2 size^2 sum_runs (r'psi'v)^2` is added.
+//! **V is the largest** of three variances. The first is the variance of the model, `sigma^2 R`. The second is the
+//! scatter of blocks of 2 s about the tested change, `sum (h_c - delta R_c)^2 n/(n-2)`, which is valid for any
+//! correlation within a block: the part of a person's remnant that the model does not explain is correlated over some
+//! tenths of a second (K.-Y. Liang and S. L. Zeger, *Biometrika* 73 (1986) 13-22; the scatter is taken about the
+//! change, since a change must not mask itself). The third is the median of this scatter over all A, since the scatter
+//! of a few blocks may be small by chance. Since people vary from run to run, `share^2 size^2 sum_runs (r'psi'v)^2` is
+//! added, where `share` is the relative variation of the parameters and `size` the value of the parameter.
 //!
-//! **Level.** T is compared with Student's distribution with n - 2 degrees of freedom. The p-value of the sup is the
-//! smaller of Bonferroni's and of that of continuous time ([`critical`]); directions and records are counted. The delay
-//! and the other parameters are tested separately, each at the level [`LEVEL`]. If the operator is known the directions
-//! are its parameters, otherwise coefficients.
+//! **Level.** T is compared with Student's distribution with n - 2 degrees of freedom. The p-value of the supremum is
+//! the smaller of Bonferroni's bound and the value for continuous time ([`critical`]), corrected for the number of
+//! directions. The delay and the other parameters are tested separately, each at the level [`LEVEL`]. The directions
+//! are the parameters of the operator or, if the coefficients do not correspond to an operator, the coefficients.
 //!
 //! | file | contents |
 //! |---|---|
 //! | `blocks` | scores and information of blocks of records |
 //! | `critical` | p-values of a supremum |
-//! | `polynomials` | the scores of a fit of polynomials, with that of the delay |
-//! | `search` | all changes, and the one that is prominent |
-//! | `steadiness` | the same test for known columns: jumps, drifts and periodic changes |
-//! | `stretch` | the block with the most influence on the fit |
+//! | `polynomials` | scores of a polynomial fit, including the score of the delay |
+//! | `search` | search for the most significant change |
+//! | `steadiness` | test of a known response for jumps, drifts and periodic changes |
+//! | `stretch` | search for the block with the most influence on the fit |
 
 mod blocks;
 mod critical;
@@ -51,22 +52,22 @@ pub use search::Course;
 use search::{Change, strongest};
 pub(crate) use search::{Constancy, Direction};
 pub use steadiness::{Unsteady, unsteady};
-use stretch::carrying;
+use stretch::most_influential_block;
 
-/// p-value below which a parameter counts as changed, for the delay and for all others.
+/// p-value below which a parameter counts as changed; it applies to the delay and to all other parameters separately.
 const LEVEL: f64 = 5e-4;
-/// Variation of people's parameters from run to run, for estimators without an option for it.
+/// Relative variation of people's parameters from run to run, for estimators without an option for it.
 pub(crate) const DEFAULT_RUN_TO_RUN: f64 = 0.06;
 
 impl Constancy<'_> {
-    /// Returns the doubts: a change, and a stretch that dominates the fit (if the standard errors are those of the
-    /// model, and not those of the scatter of stretches).
+    /// Returns the warnings: a parameter that changes, and a stretch that dominates the fit. The second test assumes
+    /// that the standard errors were computed from the model, not from the scatter of blocks.
     pub fn findings(&self) -> Vec<Finding> {
         self.change().into_iter().chain(self.stretch()).collect()
     }
 
     fn stretch(&self) -> Option<Finding> {
-        let found = carrying(self)?;
+        let found = most_influential_block(self)?;
         let time = |sample: usize| sample as f64 * self.sample_time_s;
         let to = found.to.map_or("the end".to_owned(), |to| format!("{:.0} s", time(to)));
         let records = self.blocks.last().map_or(0, |block| block.record + 1);
@@ -91,7 +92,7 @@ impl Constancy<'_> {
         ))
     }
 
-    /// Returns a doubt that reports which parameter changes and about when.
+    /// Returns a warning that reports which parameter changes and about when.
     pub fn change(&self) -> Option<Finding> {
         let records = self.blocks.last().map_or(0, |block| block.record + 1);
         let of = |delay: bool| strongest(self, delay).filter(|change| change.p_value < LEVEL);
@@ -102,7 +103,8 @@ impl Constancy<'_> {
             Finding::doubt(
                 "not-constant",
                 format!(
-                    "the person is not constant: {}; fit the parts separately, or use --change sigmoid or a tracker",
+                    "the person's response is not constant: {}; fit the parts separately, or use --change sigmoid or a \
+                     tracker",
                     words.join(", and ")
                 ),
             )

@@ -1,8 +1,8 @@
-//! Scores of a fit of polynomials, with that of the delay.
+//! Scores of a polynomial fit, including the score of the delay.
 //!
 //! nk is an integer, but the residual also has a derivative with respect to the delay
-//! ([`searched_delay`](crate::searched_delay)). Its score need not sum to zero, as nk has no minimum between two
-//! samples; the step to the minimum is removed together with the others.
+//! ([`searched_delay`](crate::searched_delay)). The score of the delay need not sum to zero, because nk is not
+//! optimised between samples. One step to the minimum removes this sum together with those of the other parameters.
 
 use hoid_model::{
     Finding, Record,
@@ -18,15 +18,15 @@ use crate::{
     criterion::{Criterion, Data, Workspace, first_residual},
 };
 
-/// Residuals of a robust fit are limited to this number of its scales, as in its loss.
+/// Residuals of a robust fit are limited to this multiple of their scale, as in the robust loss.
 const CLIPPED: f64 = 1.345;
-/// Standard deviations of a sum of scores above which the fit is not a least squares minimum: for example a fit for
-/// simulation, or one with a prior that has more weight than the data.
-const MOST_OFF: f64 = 3.0;
+/// If the sum of the scores of a parameter exceeds this number of standard deviations, the fit is not a least-squares
+/// minimum, for example if it was made for simulation or if a prior has more weight than the data.
+const LARGEST_SCORE_SUM: f64 = 3.0;
 
 impl Fit {
-    /// Returns doubts if the operator is not constant over the records, or a stretch dominates the fit. Models without
-    /// an input or without noise, and fits whose scores are not those of least squares, have no such findings.
+    /// Returns warnings if the operator changes over the records or a stretch dominates the fit. Models without an
+    /// input or without noise, and fits that do not minimise a sum of squares, have no such findings.
     pub(in crate::diagnostics) fn constancy_findings(&self, records: &[Record]) -> Vec<Finding> {
         self.constancy(records).unwrap_or_default()
     }
@@ -50,17 +50,17 @@ impl Fit {
             let mut eps = criterion.residuals_of(theta, 0, &mut workspace);
             eps.iter_mut().for_each(|x| *x = x.clamp(-bound, bound));
             let psi = self.jacobian_with_delay(&criterion, &mut workspace);
-            let free = psi.into_iter().enumerate().filter(|(i, _)| *i == p || !self.held[*i]);
+            let free = psi.into_iter().enumerate().filter(|(i, _)| *i == p || !self.is_fixed_or_bounded[*i]);
             Some((eps, free.collect()))
         };
         let data = Data::of(records);
         let blocks = score_blocks(&data, first, p + 1, ts.s(), &mut scores)?;
         let over_all = |of: &dyn Fn(&ScoreBlock) -> f64| blocks.iter().map(of).sum::<f64>();
         let off = |i: usize| {
-            let information = over_all(&|block| block.big[i * (p + 1) + i]);
-            over_all(&|block| block.g[i]).powi(2) > MOST_OFF * MOST_OFF * self.innovation_variance * information
+            let information = over_all(&|block| block.information[i * (p + 1) + i]);
+            over_all(&|block| block.score[i]).powi(2) > LARGEST_SCORE_SUM * LARGEST_SCORE_SUM * self.innovation_variance * information
         };
-        if (0..p).any(|i| !self.held[i] && off(i)) {
+        if (0..p).any(|i| !self.is_fixed_or_bounded[i] && off(i)) {
             return None;
         }
         let constancy = Constancy {
@@ -73,7 +73,8 @@ impl Fit {
         Some(constancy.findings())
     }
 
-    /// Returns the directions: the delay, and the parameters of the operator or, without an operator, the coefficients.
+    /// Returns the tested directions: the delay, and the parameters of the operator or, without an operator, the
+    /// coefficients.
     fn directions(&self) -> Vec<Direction> {
         let (orders, p) = (self.orders(), self.model.theta().len());
         let unit_vector = |place: usize| {
@@ -92,7 +93,7 @@ impl Fit {
             Some(found) => all.extend(found),
             None => {
                 let names = orders.parameter_names().into_iter().enumerate();
-                let of_system = names.filter(|(i, name)| name.starts_with(['a', 'b', 'f']) && !self.held[*i]);
+                let of_system = names.filter(|(i, name)| name.starts_with(['a', 'b', 'f']) && !self.is_fixed_or_bounded[*i]);
                 all.extend(of_system.map(|(i, name)| Direction {
                     name,
                     unit: "",
@@ -108,12 +109,12 @@ impl Fit {
     fn operator_directions(&self) -> Option<Vec<Direction>> {
         let ts = self.model.sample_time();
         let whole = self.orders().nk.checked_sub(1)?;
-        if self.held.contains(&true) {
+        if self.is_fixed_or_bounded.contains(&true) {
             return None;
         }
         let mut parameters = delayed_parameters(&self.operator().ok()?.parameters());
         parameters[4] = whole as f64 * ts.s();
-        // Rows b0, b1, b2, f1, f2.
+        // The rows of the Jacobian are b0, b1, b2, f1, f2.
         let slopes = delayed_operator_jacobian_within(whole, parameters, ts).ok()?;
         let places = self.model.operator_positions();
         let named = [("K_e", ""), ("K_e_dot", " s"), ("omega_nm", " rad/s"), ("zeta_nm", "")];

@@ -10,23 +10,23 @@ use super::{
     critical::{of_student, of_supremum},
 };
 
-/// Least number of blocks on each side of a change.
+/// Minimum number of blocks on each side of a change.
 const FEWEST: usize = 2;
 /// Shortest period of a periodic change, in blocks.
 const SHORTEST: f64 = 5.0;
-/// Least share of the information of a change that the constant parameters may leave.
-const LEFT: f64 = 1e-3;
-/// Eigenvalue of the information, scaled to a unit diagonal, below which a combination of parameters
-/// is not determined.
+/// A change is tested only if the constant parameters leave at least this share of its information.
+const MIN_INFORMATION_LEFT: f64 = 1e-3;
+/// Combinations of parameters are not determined if their eigenvalue of the information, scaled to a unit diagonal, is
+/// below this limit.
 const SINGULAR: f64 = 1e-9;
 
-/// The data of the test.
+/// Input data of the test.
 pub(crate) struct Constancy<'a> {
     pub blocks: &'a [ScoreBlock],
     pub directions: &'a [Direction],
     /// Innovation variance sigma^2.
     pub variance: f64,
-    /// Variation of parameters between runs, as a part of them.
+    /// Relative variation of the parameters between runs.
     pub run_to_run: f64,
     pub sample_time_s: f64,
 }
@@ -39,8 +39,8 @@ pub(crate) struct Direction {
     pub unit: &'static str,
     pub vector: Vec<f64>,
     pub delay: bool,
-    /// The value of the parameter, of which people vary by a part between runs; 1 for a logarithm, 0 for a parameter
-    /// that is estimated for each run.
+    /// Value of the parameter, to which its variation between runs is proportional; 1 for a logarithm, 0 for a
+    /// parameter that is estimated for each run.
     pub size: f64,
 }
 
@@ -49,13 +49,13 @@ pub(crate) struct Direction {
 pub enum Course {
     /// A jump.
     Step,
-    /// A drift from one end to the other.
+    /// A linear drift over the whole record.
     Drift,
     /// A periodic change with this period in s.
     Sway(f64),
 }
 
-/// A change of a parameter.
+/// A significant change of a parameter.
 #[derive(Debug, Clone)]
 pub(super) struct Change {
     pub course: Course,
@@ -69,16 +69,16 @@ pub(super) struct Change {
     pub p_value: f64,
 }
 
-/// A change over the blocks: record, first sample, course, and its size in each block.
-pub(super) struct Set {
+/// A candidate change: record, first sample, course, and the size of the change in each block.
+pub(super) struct Candidate {
     record: usize,
     at: usize,
     course: Course,
     weights: Vec<f64>,
 }
 
-impl Set {
-    /// A change that is one in all blocks of a range and zero in the others.
+impl Candidate {
+    /// Returns a step with size one in a range of blocks and zero in all other blocks.
     fn of_blocks(record: usize, at: usize, blocks: std::ops::Range<usize>, all: usize) -> Self {
         let weights = (0..all).map(|c| f64::from(u8::from(blocks.contains(&c)))).collect();
         Self {
@@ -90,7 +90,7 @@ impl Set {
     }
 }
 
-/// A change that is tested.
+/// Test statistics of one candidate change.
 struct Tested {
     set: usize,
     share: f64,
@@ -107,25 +107,26 @@ pub(super) fn strongest(of: &Constancy<'_>, delay: bool) -> Option<Change> {
     strongest_among(of, &directions, &sets(of.blocks))
 }
 
-/// Returns the same among these directions and courses.
-pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], sets: &[Set]) -> Option<Change> {
+/// Returns the change with the smallest p-value among these directions and candidates.
+pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], sets: &[Candidate]) -> Option<Change> {
     let (blocks, n) = (of.blocks, of.blocks.len());
-    let p = blocks.first()?.g.len();
+    let p = blocks.first()?.score.len();
     if n < 2 * FEWEST || of.variance <= 0.0 || sets.is_empty() {
         return None;
     }
-    let matrices: Vec<DMatrix<f64>> = blocks.iter().map(|b| DMatrix::from_row_slice(p, p, &b.big)).collect();
+    let matrices: Vec<DMatrix<f64>> = blocks.iter().map(|b| DMatrix::from_row_slice(p, p, &b.information)).collect();
     let whole = matrices.iter().fold(DMatrix::zeros(p, p), |sum, m| sum + m);
     let inverse = pseudo_inverse(&whole)?;
-    // With a prior or a bound the sum of scores is not zero: one step to the minimum without it.
+    // With a prior or a bound the scores do not sum to zero; one step to the minimum without prior and bound removes
+    // the sum.
     let sum = blocks
         .iter()
-        .fold(DVector::zeros(p), |sum, b| sum + DVector::from_column_slice(&b.g));
+        .fold(DVector::zeros(p), |sum, b| sum + DVector::from_column_slice(&b.score));
     let step = &inverse * sum;
     let scores: Vec<DVector<f64>> = blocks
         .iter()
         .zip(&matrices)
-        .map(|(b, m)| DVector::from_column_slice(&b.g) - m * &step)
+        .map(|(b, m)| DVector::from_column_slice(&b.score) - m * &step)
         .collect();
     let mut best: Option<Change> = None;
     for direction in directions {
@@ -137,7 +138,8 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
         let typical = upper_median(&mut ratios).unwrap_or(1.0);
         let smallest = all.iter().map(|t| t.share.min(1.0 - t.share)).fold(0.5, f64::min);
         for t in &all {
-            // A drift and a periodic change act on all blocks, and the typical scatter is that of them all.
+            // A drift or a periodic change affects all blocks; its variance uses the median scatter over all
+            // candidates.
             let (scatter, freedom) = match sets[t.set].course {
                 Course::Step => (t.by_blocks, n - 2),
                 _ => (0.0, 4 * (n - 2)),
@@ -166,30 +168,31 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
     best
 }
 
-/// Returns whole records among others, and the part of a record after each boundary of blocks.
-pub(super) fn sets(blocks: &[ScoreBlock]) -> Vec<Set> {
+/// Returns the candidate steps: each whole record if there are several, and the part of a record after each block
+/// boundary.
+pub(super) fn sets(blocks: &[ScoreBlock]) -> Vec<Candidate> {
     let records = blocks.last().map_or(0, |b| b.record + 1);
     let mut all = Vec::new();
     for record in 0..records {
         let from = blocks.partition_point(|b| b.record < record);
         let to = blocks.partition_point(|b| b.record <= record);
         if records > 1 && to - from >= FEWEST {
-            all.push(Set::of_blocks(record, 0, from..to, blocks.len()));
+            all.push(Candidate::of_blocks(record, 0, from..to, blocks.len()));
         }
         for k in from + FEWEST..(to + 1).saturating_sub(FEWEST) {
-            all.push(Set::of_blocks(record, blocks[k].from, k..to, blocks.len()));
+            all.push(Candidate::of_blocks(record, blocks[k].from, k..to, blocks.len()));
         }
     }
     all
 }
 
-/// Returns drifts over the blocks of one record.
-pub(super) fn drifts(blocks: &[ScoreBlock]) -> Vec<Set> {
+/// Returns a linear drift over the blocks of one record, as the only candidate.
+pub(super) fn drifts(blocks: &[ScoreBlock]) -> Vec<Candidate> {
     let n = blocks.len();
     let weight = |c: usize| (c as f64 + 0.5) / n.max(1) as f64 - 0.5;
     let weights = (0..n).map(weight).collect();
     let course = Course::Drift;
-    vec![Set {
+    vec![Candidate {
         record: 0,
         at: 0,
         course,
@@ -197,14 +200,15 @@ pub(super) fn drifts(blocks: &[ScoreBlock]) -> Vec<Set> {
     }]
 }
 
-/// Returns sines over the blocks of one record, each block of a given duration in s: periods from [`SHORTEST`] blocks
-/// to two thirds of the record, spaced by half the frequency resolution, each in four phases.
-pub(super) fn sways(blocks: &[ScoreBlock], block_s: f64) -> Vec<Set> {
+/// Returns sinusoids over the blocks of one record, where `block_s` is the duration of a block: periods from
+/// [`SHORTEST`] blocks to two thirds of the record, with frequencies spaced by half the frequency resolution, each in
+/// four phases.
+pub(super) fn periodic_changes(blocks: &[ScoreBlock], block_s: f64) -> Vec<Candidate> {
     let n = blocks.len();
     let frequencies = (3..)
         .map(|k| f64::from(k) / (2.0 * n as f64))
         .take_while(|f| *f <= 1.0 / SHORTEST);
-    let of = |frequency: f64, phase: u32| Set {
+    let of = |frequency: f64, phase: u32| Candidate {
         record: 0,
         at: 0,
         course: Course::Sway(block_s / frequency),
@@ -222,7 +226,7 @@ fn tested(
     (matrices, scores): (&[DMatrix<f64>], &[DVector<f64>]),
     inverse: &DMatrix<f64>,
     (v, size): (&DVector<f64>, f64),
-    set: &Set,
+    set: &Candidate,
     index: usize,
 ) -> Option<Tested> {
     let p = v.len();
@@ -244,7 +248,7 @@ fn tested(
         of_runs[of.blocks[c].record] += v.dot(&moved);
     }
     let (u, r) = parts.iter().fold((0.0, 0.0), |(u, r), (h, rc)| (u + h, r + rc));
-    if r <= LEFT * of_set || of_set <= 0.0 {
+    if r <= MIN_INFORMATION_LEFT * of_set || of_set <= 0.0 {
         return None;
     }
     let (delta, n) = (u / r, parts.len() as f64);
@@ -265,7 +269,7 @@ fn tested(
     })
 }
 
-/// Inverse over the determined parameters, after scaling to a unit diagonal.
+/// Returns the pseudo-inverse over the determined combinations of parameters, after scaling to a unit diagonal.
 pub(super) fn pseudo_inverse(whole: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let p = whole.nrows();
     let scale = DVector::from_fn(p, |i, _| {

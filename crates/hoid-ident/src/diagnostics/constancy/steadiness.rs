@@ -1,41 +1,44 @@
 //! Test of whether a response is constant: jumps, drifts and periodic changes of its gain and of its delay.
 //!
-//! `u = sum b_i z_i + v` with columns `z_{i+1} = dz_i/dt`: the direction of the gain is b, that of the delay `-db/dt`,
-//! i.e. `-b_i` at `z_{i+1}`. To first order, an increase of the lead is a decrease of the delay by the same amount.
+//! The response is `u = sum b_i z_i + v` with columns `z_{i+1} = dz_i/dt`. A change of the gain has the direction b; a
+//! change of the delay has the direction `-db/dt`, i.e. `-b_i` at `z_{i+1}`. To first order, an increase of the lead is
+//! a decrease of the delay by the same amount.
 //!
-//! The scores are those of least squares with known columns ([`crate::diagnostics::whitened`]), and the test is that of
-//! fits. For a drift the regressor is `t/T - 1/2`, for a periodic change a sine of one of some periods in four phases;
-//! the p-value is corrected for all of them (Bonferroni).
+//! The scores come from least squares with known columns ([`crate::diagnostics::whitened`]); the test is the same as
+//! for fits. For a drift the regressor is multiplied by `t/T - 1/2`, for a periodic change by a sine with one of
+//! several periods in four phases. The p-value is corrected for the number of all these candidates (Bonferroni).
 
 use std::ops::Range;
 
 use super::{
     blocks::{BLOCK_S, ScoreBlock},
-    search::{Change, Constancy, Course, Direction, drifts, sets, strongest_among, sways},
+    search::{Change, Constancy, Course, Direction, drifts, sets, strongest_among, periodic_changes},
 };
 use crate::diagnostics::whitened::{LIMIT, NOISE, Whitened, thinning};
 
-/// Least number of blocks of 2 s.
+/// Minimum number of 2 s blocks for the test.
 const FEWEST: usize = 8;
 
 /// A response that is not constant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unsteady {
-    /// Its time course.
+    /// Time course of the change.
     pub course: Course,
-    /// Name of what changes: `gain` or `delay`, which may be a lead.
+    /// Name of the property that changes: `gain` or `delay`. A change of a lead is reported as `delay`.
     pub name: &'static str,
-    /// First sample after a jump.
+    /// First sample after a jump; 0 for a drift or a periodic change.
     pub at: usize,
-    /// Size of the change, for a periodic one its amplitude: of the gain as a share of it, of the delay in s; and the
-    /// standard error.
+    /// Size of the change (amplitude of a periodic change) and its standard error: for the gain as a share of the gain,
+    /// for the delay in s.
     pub by: [f64; 2],
-    /// Probability of such a size by chance, among all changes with its course.
+    /// Probability that chance alone gives a change as significant as this, among all candidates with the same kind of
+    /// time course.
     pub p_value: f64,
 }
 
-/// Returns the most significant jump, drift and periodic change of a response over samples: `columns` span it, each the
-/// derivative of the previous one. Empty if there are too few data, or a value is not a number.
+/// Returns the most significant jump, drift and periodic change of a response over `samples`. The `columns` span the
+/// response; each column is the derivative of the previous column. Empty if there are too few data or a value is not a
+/// number.
 pub fn unsteady(columns: &[Vec<f64>], u: &[f64], samples: Range<usize>, sample_time_s: f64) -> Vec<Unsteady> {
     found(columns, u, samples, sample_time_s).unwrap_or_default()
 }
@@ -58,12 +61,12 @@ fn found(columns: &[Vec<f64>], u: &[f64], samples: Range<usize>, sample_time_s: 
             ScoreBlock {
                 record: 0,
                 from: rows[from + NOISE],
-                g: (x.transpose() * eps).iter().copied().collect(),
-                big: (x.transpose() * x).iter().copied().collect(),
+                score: (x.transpose() * eps).iter().copied().collect(),
+                information: (x.transpose() * x).iter().copied().collect(),
             }
         })
         .collect();
-    // The level is not a response; the derivative of the last column is not among the columns.
+    // The level is not part of the response, and the derivative of the last column is not available.
     let gain = (0..p).map(|j| if j <= last { fit.b[j] } else { 0.0 }).collect();
     let delay = (0..p)
         .map(|j| if j > 0 && j <= last { -fit.b[j - 1] } else { 0.0 })
@@ -84,7 +87,7 @@ fn found(columns: &[Vec<f64>], u: &[f64], samples: Range<usize>, sample_time_s: 
         sample_time_s,
     };
     let all: Vec<&Direction> = directions.iter().collect();
-    let courses = [sets(&blocks), drifts(&blocks), sways(&blocks, BLOCK_S)];
+    let courses = [sets(&blocks), drifts(&blocks), periodic_changes(&blocks, BLOCK_S)];
     let told = |change: Change| {
         let name = NAMES.into_iter().find(|name| *name == change.name)?;
         Some(Unsteady {
@@ -142,9 +145,9 @@ mod tests {
             let found = jumps.iter().find(|found| found.course == Course::Step).unwrap();
             assert!((found.at as f64 * TS - 40.0).abs() <= 10.0, "{found:?}");
             assert!(p_value(&of(seed, |t| 1.0 - 0.5 * t / 80.0), drift) < 1e-4);
-            let sways = of(seed, |t| 1.0 + 0.3 * (TAU * t / 16.0).sin());
-            assert!(p_value(&sways, sway) < 1e-4);
-            let found = sways.iter().find(|found| sway(found.course)).unwrap();
+            let periodic_changes = of(seed, |t| 1.0 + 0.3 * (TAU * t / 16.0).sin());
+            assert!(p_value(&periodic_changes, sway) < 1e-4);
+            let found = periodic_changes.iter().find(|found| sway(found.course)).unwrap();
             let Course::Sway(period) = found.course else {
                 unreachable!()
             };

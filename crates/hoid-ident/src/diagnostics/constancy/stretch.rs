@@ -1,60 +1,62 @@
 //! Search for a stretch of the records that dominates the fit.
 //!
-//! A channel with a reversed sign for a second, or a pause, is not a lasting change. Without block c the parameters
-//! would differ by
+//! A short event, such as a pause or one second with the wrong sign of a channel, is not a lasting change. Without
+//! block c the parameters would differ by
 //!
 //! `delta_c = -(A - A_c)^-1 h_c`, `A = J' G J`, `h = J' g`
 //!
-//! with the columns of J the directions that are tested (the jackknife of a group, to first order: B. Efron, *The
-//! Jackknife, the Bootstrap and Other Resampling Plans*, 1982, chapter 3). By chance a block of n moves a parameter by
-//! about `1/sqrt n` of its standard error. A block is reported if it moves a parameter by [`MOVED`] standard errors,
-//! and by as much relative to all the other blocks together, `sqrt(sum delta^2)`: the sum of squares over all blocks is
-//! the variance of the estimate, and that block alone makes it several times the stated variance.
+//! where the columns of J are the tested directions (the jackknife of a group, to first order: B. Efron, *The
+//! Jackknife, the Bootstrap and Other Resampling Plans*, 1982, chapter 3). By chance one of n blocks changes a
+//! parameter by about `1/sqrt n` of its standard error. A block is reported if it changes a parameter by more than
+//! [`REPORTED_CHANGE`] standard errors and by more than [`REPORTED_CHANGE`] times the root sum of squares
+//! `sqrt(sum delta^2)` of all other blocks. The sum of squares over all blocks estimates the variance of the parameter;
+//! such a block alone makes it several times the stated variance.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::search::{Constancy, pseudo_inverse};
 
-/// Standard errors by which a block moves a parameter if it is reported.
-const MOVED: f64 = 2.0;
-/// The same relative to what a block moves by chance, for few blocks.
-const BY_CHANCE: f64 = 4.5;
-/// Least number of blocks.
+/// A block is reported if it changes a parameter by more than this number of standard errors.
+const REPORTED_CHANGE: f64 = 2.0;
+/// Minimum change for records with few blocks, as a multiple of the change that one block causes by chance.
+const MIN_RATIO_TO_CHANCE: f64 = 4.5;
+/// Minimum number of blocks for the test.
 const FEWEST: usize = 5;
 
-/// A block, and the parameters that change without it.
+/// A block with large influence, and the parameters that change without it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stretch {
     pub record: usize,
-    /// First sample; `None` for the end after the last block of a record.
+    /// First sample of the block, and first sample of the next block (`None` at the end of the record).
     pub from: usize,
     pub to: Option<usize>,
-    /// Name of each parameter that moves, and its change in standard errors.
+    /// Name of each parameter that the block changes, and the change in standard errors.
     pub moves: Vec<(String, f64)>,
 }
 
-/// Returns the block with the most influence, if it is too large.
-pub(super) fn carrying(of: &Constancy<'_>) -> Option<Stretch> {
+/// Returns the block with the most influence, if this influence exceeds the threshold.
+pub(super) fn most_influential_block(of: &Constancy<'_>) -> Option<Stretch> {
     let (n, m) = (of.blocks.len(), of.directions.len());
     if n < FEWEST || m == 0 || of.variance <= 0.0 {
         return None;
     }
-    let p = of.blocks[0].g.len();
+    let p = of.blocks[0].score.len();
     let j = DMatrix::from_fn(p, m, |row, column| of.directions[column].vector[row]);
     let mut parts: Vec<(DVector<f64>, DMatrix<f64>)> = of
         .blocks
         .iter()
         .map(|block| {
             let (g, big) = (
-                DVector::from_column_slice(&block.g),
-                DMatrix::from_row_slice(p, p, &block.big),
+                DVector::from_column_slice(&block.score),
+                DMatrix::from_row_slice(p, p, &block.information),
             );
             (j.transpose() * g, j.transpose() * big * &j)
         })
         .collect();
     let whole = parts.iter().fold(DMatrix::zeros(m, m), |sum, (_, a)| sum + a);
     let inverse = pseudo_inverse(&whole)?;
-    // With a prior, a bound or a delay on the grid the sum of scores is not zero.
+    // With a prior, a bound or a delay on the grid the scores do not sum to zero; one step to the minimum removes the
+    // sum.
     let step = &inverse * parts.iter().fold(DVector::zeros(m), |sum, (h, _)| sum + h);
     parts.iter_mut().for_each(|(h, a)| *h -= &*a * &step);
     let moved: Option<Vec<DVector<f64>>> = parts
@@ -73,7 +75,7 @@ pub(super) fn carrying(of: &Constancy<'_>) -> Option<Stretch> {
     };
     let largest = |c: usize| (0..m).map(|k| ratio(c, k)).fold(0.0, f64::max);
     let (c, most) = (0..n).map(|c| (c, largest(c))).max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let threshold = MOVED.max(BY_CHANCE / ((n - 1) as f64).sqrt());
+    let threshold = REPORTED_CHANGE.max(MIN_RATIO_TO_CHANCE / ((n - 1) as f64).sqrt());
     (most > threshold).then(|| Stretch {
         record: of.blocks[c].record,
         from: of.blocks[c].from,
@@ -109,8 +111,8 @@ mod tests {
             .map(|(c, mean)| ScoreBlock {
                 record: 0,
                 from: 10 * c,
-                g: vec![10.0 * mean],
-                big: vec![10.0],
+                score: vec![10.0 * mean],
+                information: vec![10.0],
             })
             .collect();
         let direction = Direction {
@@ -120,7 +122,7 @@ mod tests {
             delay: false,
             size: 1.0,
         };
-        carrying(&Constancy {
+        most_influential_block(&Constancy {
             blocks: &blocks,
             directions: &[direction],
             variance,

@@ -1,4 +1,4 @@
-//! Least squares of the equations of the loop, with the delay by a scan.
+//! Least-squares solution of the loop equations, with a scan over the delay.
 
 use hoid_model::Complex64;
 
@@ -7,12 +7,12 @@ use crate::linalg::least_squares::{LeastSquares, add_scaled, dot};
 
 /// Range of the delay of the element, s, and the step of the scan.
 const DELAYS_S: (f64, f64, f64) = (-0.05, 0.3, 0.01);
-/// Half width of the smoothing of the residual spectrum, as a logarithm of the frequency.
+/// Half width of the smoothing window of the residual spectrum, in natural logarithms of the frequency.
 const SMOOTHED: f64 = 0.35;
-/// Rounds of weights.
+/// Number of iterations of the weights.
 const ROUNDS: usize = 3;
 
-/// An element of `m` zeros and `n` poles by least squares; coefficients in descending powers of s.
+/// Least-squares fit of an element with `m` zeros and `n` poles; coefficients in descending powers of s.
 pub(super) struct Fitted {
     pub(super) num: Vec<f64>,
     pub(super) den: Vec<f64>,
@@ -56,15 +56,16 @@ impl Fitted {
     }
 }
 
-/// The equations of one record: real and imaginary parts of all frequencies, without their components along T.
+/// The equations of one record: real and imaginary parts at all frequencies, made orthogonal to the columns of T.
 struct Rows<'a> {
     spectra: &'a Spectra,
-    /// Factor of each frequency: weight over `B h`.
+    /// Factor of the equation at each frequency: its weight divided by `B h`.
     factor: Vec<Complex64>,
-    /// Orthonormal columns of T.
+    /// Orthonormal columns that span T.
     transient: Vec<Vec<f64>>,
     m: usize,
-    /// Columns that do not depend on the delay: of A, then of C; and the right-hand side `s^n E`.
+    /// Columns that do not depend on the delay: those of A (`of_e`), those of C (`of_targets`), and the right-hand side
+    /// `s^n E`.
     of_e: Vec<Vec<f64>>,
     of_targets: Vec<Vec<f64>>,
     right: Vec<f64>,
@@ -118,7 +119,7 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Columns of B and of `B kappa` at the delays of u and of the disturbances.
+    /// Returns the columns of B and of `B kappa`, with the delay of u and the delay of the disturbances.
     fn of_inputs(&self, delay_s: f64, of_disturbances_s: f64) -> Vec<Vec<f64>> {
         let disturbances = self.spectra.disturbances.iter().map(|d| (d, of_disturbances_s));
         let inputs = [(&self.spectra.u, delay_s)].into_iter().chain(disturbances);
@@ -138,12 +139,12 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Real parts, then imaginary parts.
+/// Returns the real parts, followed by the imaginary parts.
 fn stacked(values: impl Iterator<Item = Complex64> + Clone) -> Vec<f64> {
     values.clone().map(|v| v.re).chain(values.map(|v| v.im)).collect()
 }
 
-/// Removes the components along orthonormal columns.
+/// Removes the components of a column along orthonormal columns.
 fn remove(column: &mut [f64], orthonormal: &[Vec<f64>]) {
     for q in orthonormal {
         let along = dot(q, column);
@@ -151,19 +152,20 @@ fn remove(column: &mut [f64], orthonormal: &[Vec<f64>]) {
     }
 }
 
-/// The least-squares solution of all records at a delay.
+/// Least-squares solution of all records for one delay.
 struct Solved {
-    /// `a_0 .. a_{n-1}`, `b_0 .. b_m` of u, then the others.
+    /// Coefficients `a_0 .. a_{n-1}`, `b_0 .. b_m` of u, then those of the disturbances and of the targets.
     theta: Vec<f64>,
     delay_s: f64,
     sum_of_squares: f64,
-    /// Power of `B (U + kappa D)` and the residuals, of which the sum of squares is unexplained.
+    /// Power of `B (U + kappa D)` plus the residuals; the sum of squares is the unexplained part of this power.
     power: f64,
     residuals: Vec<f64>,
 }
 
 impl Solved {
-    /// The solutions with the disturbances as late as u, and on time.
+    /// Returns the solution with the disturbances as late as u and, if there are disturbances, the solution with the
+    /// disturbances on time.
     fn all(rows: &[Rows<'_>], delay_s: f64) -> impl Iterator<Item = Self> {
         let disturbed = rows.iter().any(|rows| !rows.spectra.disturbances.is_empty());
         let on_time = (disturbed && delay_s != 0.0).then_some(0.0);
@@ -213,8 +215,8 @@ fn least(all: impl Iterator<Item = Solved>) -> Option<Solved> {
     all.min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares))
 }
 
-/// Weights from the smoothed spectrum of the residuals, which contain the weights before. Rounding has a floor, so
-/// that exact data keep all frequencies.
+/// Updates the weights from the smoothed spectrum of the residuals, from which the previous weights are removed. A
+/// floor at the level of rounding errors retains all frequencies of exact data.
 fn smooth(weights: &mut [f64], residuals: &[f64], omega: &[f64], power: f64) {
     let n = omega.len();
     let own: Vec<f64> = (0..n)

@@ -1,4 +1,4 @@
-//! Fourier coefficients of the signals of a loop, and which of them enter it from outside.
+//! Fourier coefficients of the signals of a loop, and the selection of its exogenous channels.
 
 use std::f64::consts::PI;
 
@@ -11,19 +11,20 @@ use crate::{
 
 /// Names of channels that hold a disturbance at u.
 const DISTURBANCES: [&str; 3] = ["d", "f_d", "disturbance"];
-/// Frequencies of the test, rad/s: those at which people move u.
+/// Range of the tested frequencies, rad/s: the frequencies at which people move u.
 const BAND_RAD_S: (f64, f64) = (0.3, 12.0);
-/// Number of frequencies that suffices: further samples of a record, and further records, are not used.
+/// Sufficient number of frequencies; further samples of a record and further records are not used.
 pub(super) const MOST_FREQUENCIES: usize = 1000;
 
-/// Names of the channels that enter the loop from outside.
+/// Names of the exogenous channels of the loop.
 pub(super) struct Exogenous {
     targets: Vec<String>,
     disturbances: Vec<String>,
 }
 
 impl Exogenous {
-    /// The channels with names of targets and of disturbances that all records have. Other names may be either.
+    /// Selects the channels of all records that have the name of a target or a disturbance and vary in at least one
+    /// record. An excitation with another name counts as both.
     pub(super) fn of(records: &[Record], excitation: Option<&str>) -> Self {
         let moves = |name: &&str| {
             let is_signal = |record: &Record| record.channels().take(2).any(|channel| channel.name == *name);
@@ -55,7 +56,7 @@ pub(super) struct Spectra {
     pub(super) u: Vec<Complex64>,
     pub(super) targets: Vec<Vec<Complex64>>,
     pub(super) disturbances: Vec<Vec<Complex64>>,
-    /// The hold of u.
+    /// Frequency response of the hold of u.
     pub(super) hold: Vec<Complex64>,
 }
 

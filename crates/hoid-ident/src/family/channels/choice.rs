@@ -1,14 +1,13 @@
-//! The form of each further input: at the lines of the excitations of the loop (`channel_lines`), if there
-//! are lines, otherwise by prediction errors, in units of the inflation kappa.
+//! Selection of the form of each further input: at the lines of the excitations (`channel_lines`) if there are lines,
+//! otherwise by prediction error, with likelihood ratios divided by the inflation kappa.
 //!
-//! No response at all is one of the candidates: it is rejected if the likelihood ratio of the best form exceeds the
-//! value that chance gives in one of a hundred records without a response, divided by the number of forms that were
-//! tried (Bonferroni).
+//! The absence of a response is one of the candidates. It is rejected if the p-value of the likelihood ratio of the
+//! best form, times the number of forms tried (Bonferroni), is below 0.01.
 
 use hoid_model::Form;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::Seen;
+use super::FurtherInputs;
 use crate::{
     IdentError,
     criterion::Workspace,
@@ -20,34 +19,34 @@ use crate::{
     },
 };
 
-/// Probability of a response where there is none.
+/// Probability of a false response: the significance level of the test.
 pub(in crate::family) const BY_CHANCE: f64 = 0.01;
-/// Cost of a parameter of a form, in units of chi^2.
-const EACH_MORE: f64 = 4.0;
+/// Cost of each parameter of a form, in units of chi^2.
+const COST_PER_PARAMETER: f64 = 4.0;
 
-/// Probability of a likelihood ratio at least as large for this number of additional parameters, in the best of this
-/// number of forms.
+/// Returns the probability that the best of `forms` forms reaches at least this likelihood ratio by chance, with `more`
+/// additional parameters.
 fn by_chance(ratio: f64, more: usize, forms: usize) -> f64 {
     let chance = ChiSquared::new(more as f64).map_or(1.0, |chi| chi.sf(ratio.max(0.0)));
     (chance * forms as f64).min(1.0)
 }
 
-/// The forms of the further inputs at the lines.
+/// Result of the selection of forms at the lines.
 pub(in crate::family) struct Compared<'a> {
-    /// The forms that were compared.
+    /// Comparison of the forms for each input.
     pub fits: Vec<ChannelFit>,
-    /// The inputs with a response, with starts for the search.
+    /// Inputs with a response, with starting values for the prediction error search.
     pub channels: Vec<Channel<'a>>,
-    /// The same as fits at the lines have them.
+    /// The same inputs as required by fits at the lines.
     pub in_form: Vec<InForm>,
 }
 
-impl Seen<'_> {
-    /// Chooses the forms of the channels at the lines, for any of these forms of the operator: the comparison, and the
-    /// channels with a response in their forms.
+impl FurtherInputs<'_> {
+    /// Selects the form of each channel at the lines, combined with the best of these forms of the operator. Returns
+    /// the comparison, and the channels with a response in the selected forms.
     ///
     /// # Errors
-    /// [`IdentError::NoFiniteLoss`] if nothing could be fitted.
+    /// [`IdentError::NoFiniteLoss`] if no form of a channel could be fitted.
     pub fn choose_at_lines<'a>(
         &self,
         at: &AtChannelLines<'_>,
@@ -77,10 +76,10 @@ impl Seen<'_> {
             let fits: Vec<(Form, Option<(Form, ChannelMinimum)>)> =
                 begun[k].iter().map(|c| (c.form, best_of(&with(c.form)))).collect();
             let found = fits.iter().filter_map(|(form, fit)| Some((*form, fit.as_ref()?)));
-            // An additional parameter has to explain more than chance does in one of twenty records.
+            // At this cost a parameter without effect is included in fewer than one of twenty records.
             let excess =
                 (fits.iter().filter_map(|(_, fit)| Some(fit.as_ref()?.1.excess()))).fold(f64::INFINITY, f64::min);
-            let cost = |fit: &ChannelMinimum| fit.chi_squared / excess + EACH_MORE * fit.coordinates.len() as f64;
+            let cost = |fit: &ChannelMinimum| fit.chi_squared / excess + COST_PER_PARAMETER * fit.coordinates.len() as f64;
             let found = found.min_by(|a, b| cost(&a.1.1).total_cmp(&cost(&b.1.1)));
             let (form, fit) = found.ok_or(IdentError::NoFiniteLoss)?;
             let p_value = without.as_ref().map_or(0.0, |(_, without)| {
@@ -128,11 +127,11 @@ impl Seen<'_> {
         })
     }
 
-    /// Chooses the forms of the channels by prediction error, for this form of the operator from these coordinates:
-    /// only those with a response remain in the prediction. Returns the comparison.
+    /// Selects the form of each channel by prediction error, with the given form of the operator and its starting
+    /// coordinates. Only channels with a response remain in the prediction. Returns the comparison.
     ///
     /// # Errors
-    /// [`IdentError::NoFiniteLoss`] if nothing could be fitted.
+    /// [`IdentError::NoFiniteLoss`] if no form of a channel could be fitted.
     pub fn choose<'a>(
         &self,
         prediction: &mut Prediction<'a>,
@@ -167,7 +166,7 @@ impl Seen<'_> {
             let value = |fit: &PredictionFit<'a>| {
                 fit.residuals as f64 * fit.loss.ln() / inflation + 2.0 * fit.parameters() as f64
             };
-            let cost = |fit: &PredictionFit<'a>| value(fit) + (EACH_MORE - 2.0) * fit.parameters() as f64;
+            let cost = |fit: &PredictionFit<'a>| value(fit) + (COST_PER_PARAMETER - 2.0) * fit.parameters() as f64;
             let best = (fits.iter())
                 .filter_map(|(channel, fit)| Some((channel, fit.as_ref()?)))
                 .min_by(|a, b| cost(a.1).total_cmp(&cost(b.1)));

@@ -1,15 +1,15 @@
 //! The four-step instrumental variable method (L. Ljung, *System Identification*, 1999, section
 //! 15.3, eq. 15.21-15.26).
 //!
-//! 1. Least squares of `A u = B q^-nk e + v`.
-//! 2. Instruments simulated with that A and B; first IV estimate.
-//! 3. Autoregression `L v = eps` of the residual.
-//! 4. Instruments simulated with the second A and B; IV estimate of the equation filtered with L.
+//! 1. The equation `A u = B q^-nk e + v` is fitted by least squares.
+//! 2. Instruments are simulated with this A and B, for a first IV estimate.
+//! 3. An autoregression `L v = eps` is fitted to the residual.
+//! 4. Instruments are simulated with the A and B of step 2, for an IV estimate of the equation filtered with L.
 //!
-//! The estimate is consistent for any v, and has the smallest variance if L makes v white. In the closed-loop form the
-//! simulations start from the noise-free input. The book uses the order na + nb for L, as an example; here it is four
-//! times as high, because v of a process that is sampled fast (`A = F`, `v = F n` with noise n) has zeros near the unit
-//! circle, for which an autoregression needs many terms.
+//! The estimate is consistent for any v, and has the smallest variance if L whitens v. For a closed loop the
+//! simulations use the noise-free input. Ljung uses the order na + nb for L as an example; here the order is four times
+//! as high. If a process is sampled fast, v (`A = F`, `v = F n` with noise n) has zeros near the unit circle, for which
+//! an autoregression needs many terms.
 
 use hoid_model::Structure;
 
@@ -31,16 +31,17 @@ pub(super) const ALGORITHM: Algorithm = Algorithm {
 
 /// Order of the autoregression, as a multiple of na + nb.
 const ORDERS: usize = 4;
-/// Least number of rows per term of the autoregression.
+/// Minimum number of rows per term of the autoregression.
 const ROWS_EACH: usize = 10;
 
 fn solve(problem: &IvProblem<'_>, _: &Criterion<'_>, _: IterationLimits) -> Result<IvSolution, IdentError> {
-    // Step 1: biased by the coloured v, but correlated with the true output, which is all that instruments need.
+    // Step 1: the estimate is biased by the coloured v, but its simulated output is correlated with the true output,
+    // which is sufficient for instruments.
     let (start, _) = problem.stabilised(&problem.least_squares(Prefilter::default())?)?;
-    // Step 2.
+    // Step 2: IV estimate with simulated instruments.
     let second = problem.equation(Prefilter::default(), &start);
     let system = problem.solve(&second)?;
-    // Step 3: L whitens v, for the smallest variance (Ljung 1999, eq. 15.24).
+    // Step 3: L whitens v, which minimises the variance (Ljung 1999, eq. 15.24).
     let rows = problem.rows(0);
     let shortest = rows.iter().min().copied().unwrap_or(0);
     let order = (ORDERS * (problem.poles + problem.nb)).min(shortest / ROWS_EACH);
@@ -49,7 +50,7 @@ fn solve(problem: &IvProblem<'_>, _: &Criterion<'_>, _: IterationLimits) -> Resu
         d: &whitening,
         ..Prefilter::default()
     };
-    // Step 4.
+    // Step 4: IV estimate of the filtered equation.
     let (stable, _) = problem.stabilised(&system)?;
     let last = problem.equation(filter, &stable);
     let theta = problem.solve(&last)?;

@@ -1,5 +1,5 @@
-//! The methods of instrumental variables. A new method is a file in this folder with its [`Algorithm`], its `mod` line
-//! and its line in the list below.
+//! Instrumental variable methods. A new method needs a file in this folder with its [`Algorithm`], a `mod` line, and a
+//! line in the list below.
 
 mod iv4;
 mod rivbj;
@@ -11,10 +11,10 @@ use hoid_model::Structure;
 
 use super::algorithm::Algorithm;
 
-/// The list of the methods: variant, and module with its algorithm.
+/// Declares the methods: for each, the variant and the module with its algorithm.
 macro_rules! methods {
     ($($(#[$doc:meta])* $method:ident = $file:ident,)+) => {
-        /// A method of instrumental variables.
+        /// An instrumental variable method.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         #[non_exhaustive]
         pub enum IvMethod {
@@ -49,7 +49,7 @@ impl IvMethod {
         self.algorithm().name
     }
 
-    /// Returns the description, in a line without a full stop.
+    /// Returns a description in one line, without a full stop.
     pub fn help(self) -> &'static str {
         self.algorithm().help
     }
@@ -64,7 +64,7 @@ impl IvMethod {
         self.algorithm().structures[0]
     }
 
-    /// Returns the structure that the method fits, as a list.
+    /// Returns the structure that the method fits, as a list with one element.
     pub fn structures(self) -> &'static [Structure] {
         self.algorithm().structures
     }

@@ -1,15 +1,15 @@
 //! Refined instrumental variable for `u = (B/F) q^-nk e + (C/D) eps` (P. C. Young, *Recursive
 //! Estimation and Time-Series Analysis*, 2nd ed. 2011, ch. 7).
 //!
-//! The equation is filtered with `D/(C F)` of the previous iteration, so that its noise is eps; C and D are those of
-//! the ARMA model of `u - (B/F) q^-nk e`, fitted by the prediction error method (with nc = 0, by least squares) in each
-//! iteration.
+//! The equation is filtered with `D/(C F)` of the previous iteration, so that its noise is eps. In each iteration C and
+//! D are estimated from an ARMA model of `u - (B/F) q^-nk e`, by the prediction error method or, with nc = 0, by least
+//! squares.
 //!
-//! **Covariance.** B and F solve `Z' eps = 0`, C and D `psi' eps = 0` with psi their negative gradient. With both
-//! stacked, psi_theta the gradient for all parameters and `W = [Z, psi]`, the covariance is
-//! `sigma^2 (W' psi_theta)^-1 W' W (psi_theta' W)^-1`. In an open loop it separates into Young's `sigma^2 (Z'Z)^-1` and
-//! the covariance of the ARMA model; in a closed loop C and D inherit errors of the system. If the noise model is too
-//! small, the remaining colour of eps is taken into account for B and F.
+//! **Covariance.** B and F solve `Z' eps = 0`; C and D solve `psi' eps = 0`, where psi is the negative gradient of eps
+//! for C and D. With both conditions stacked, `W = [Z, psi]`, and with the gradient psi_theta for all parameters, the
+//! covariance is `sigma^2 (W' psi_theta)^-1 W' W (psi_theta' W)^-1`. In an open loop it separates into Young's
+//! `sigma^2 (Z'Z)^-1` and the covariance of the ARMA model; in a closed loop the errors of the system also affect C and
+//! D. If the noise model is too small, the remaining colour of eps is taken into account for B and F.
 
 use hoid_model::{Orders, Structure};
 
@@ -61,7 +61,7 @@ fn solve(
     })
 }
 
-/// Returns C and D for a system with stable F.
+/// Returns C and D of the noise model for a system with stable F.
 fn noise_of(
     system: &[f64],
     problem: &IvProblem<'_>,
@@ -75,7 +75,7 @@ fn noise_of(
     let (poles, b) = system.split_at(problem.poles);
     let left = simulation_error(&[b, poles].concat(), criterion);
     let (c, d) = noise_model(&left, nc, nd);
-    // An autoregression is linear least squares; with C the ARMA model needs a search.
+    // An autoregression is a linear least-squares problem; an ARMA model with C needs a search.
     if nc == 0 {
         return NoiseModel { c, d };
     }
@@ -92,8 +92,8 @@ fn noise_of(
         weights: None,
         further: Vec::new(),
     };
-    // From the noise model of the iteration before: the search then stays at the same minimum, without which the
-    // iteration would not settle.
+    // The search starts from the noise model of the previous iteration and thus stays at the same minimum; otherwise
+    // the iteration would not settle.
     let start = before.map_or_else(|| [d.as_slice(), &c].concat(), |n| [n.d.as_slice(), &n.c].concat());
     match minimise(
         &arma,
@@ -121,7 +121,7 @@ fn covariance(
 ) -> Option<Vec<f64>> {
     let o = criterion.orders;
     let noise = o.nb..o.nb + o.nc + o.nd;
-    // Rows that are in both the equation and the residuals.
+    // Only rows that are contained in both the equation and the residuals are used.
     let nd = o.nd;
     let first = (problem.first + nd).max(criterion.first);
     let mut workspace = Workspace::of_thread();

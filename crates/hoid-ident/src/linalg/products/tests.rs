@@ -16,7 +16,7 @@ fn waves(n: usize, count: usize) -> Vec<Vec<f64>> {
 
 fn leading(columns: &[Vec<f64>]) -> Vec<Lagged<'_>> {
     (columns.iter())
-        .map(|values| Lagged { values, follows: false })
+        .map(|values| Lagged { values, is_shift_of_previous: false })
         .collect()
 }
 
@@ -70,7 +70,7 @@ fn two_lags_of_each_signal_in_one_pass_have_the_bits_of_the_tiles() {
         let (u, e) = (wave(n + 2, 0.05), wave(n + 2, 0.11));
         let of = |x: &'static [f64], lag: usize| Lagged {
             values: &x[2 - lag..n + 2 - lag],
-            follows: lag > 0,
+            is_shift_of_previous: lag > 0,
         };
         let (u, e): (&'static [f64], &'static [f64]) = (u.leak(), e.leak());
         let columns = [of(u, 0), of(u, 1), of(u, 2), of(e, 0), of(e, 1)];
@@ -163,7 +163,7 @@ fn columns_that_follow_give_the_same_matrix() {
     let columns = |follow: bool| -> Vec<Lagged<'static>> {
         let of = |x, lag, follows| Lagged {
             values: lagged(x, lag),
-            follows: follows && follow,
+            is_shift_of_previous: follows && follow,
         };
         vec![
             of(u, 0, false),

@@ -1,7 +1,7 @@
 //! Products of eps and the columns of psi, for one record in each lane.
 //!
-//! A column that is the previous one delayed by one sample needs no separate pass: `sum x(t-1) y(t-1)` over a span is
-//! `sum x(t) y(t)` except for the samples at both ends, as in [`crate::linalg::products`].
+//! A column that is the previous column delayed by one sample needs no separate pass: `sum x(t-1) y(t-1)` over a span
+//! equals `sum x(t) y(t)` except for the samples at both ends, as in [`crate::linalg::products`].
 
 use hoid_lanes::Number;
 
@@ -10,7 +10,7 @@ use super::{
     signal_buffers::SignalBuffers,
 };
 
-/// The columns whose products are summed: `[eps, x_b(t).., v(t-1).., x_f(t-1)..]`.
+/// Columns for which products are summed: `[eps, x_b(t).., v(t-1).., x_f(t-1)..]`.
 pub(super) struct Columns {
     pub nb: usize,
     pub nd: usize,
@@ -22,8 +22,8 @@ impl Columns {
         1 + self.nb + self.nd + self.nf
     }
 
-    /// True for a column that is the previous one delayed by one sample.
-    fn follows(&self, column: usize) -> bool {
+    /// True if a column is the previous column delayed by one sample.
+    fn is_shift_of_previous(&self, column: usize) -> bool {
         column > 1 && column != 1 + self.nb && column != 1 + self.nb + self.nd
     }
 
@@ -49,8 +49,8 @@ impl Columns {
         &signal[(from - lag) * width..(to - lag) * width]
     }
 
-    /// Adds the products over these rows for which a pass is necessary: those of a column that does not follow another
-    /// with all others.
+    /// Adds the products over these rows that need a pass: the products of each column that does not follow another
+    /// with all columns.
     #[inline(always)]
     pub fn add_products<R: Number>(
         &self,
@@ -62,15 +62,15 @@ impl Columns {
     ) {
         let (p1, width) = (self.count(), zero.lanes());
         for i in 0..p1 {
-            if self.follows(i) {
+            if self.is_shift_of_previous(i) {
                 continue;
             }
             let x = self.rows(signals, i, from, to, width);
             let mut others = [0; 4];
             let mut count = 0;
             for j in 0..p1 {
-                // Previous leading columns have been multiplied with it already.
-                if j >= i || self.follows(j) {
+                // The products with previous columns that do not follow others are already known.
+                if j >= i || self.is_shift_of_previous(j) {
                     others[count] = j;
                     count += 1;
                 }
@@ -81,7 +81,7 @@ impl Columns {
                         let pair = [self.rows(signals, others[0], from, to, width), last];
                         [sums[0], sums[1]] = two_products(zero, x, pair);
                     } else {
-                        // Three: the last is multiplied twice.
+                        // If there are three columns, the last is multiplied twice.
                         let last = self.rows(signals, others[count - 1], from, to, width);
                         let a = self.rows(signals, others[0], from, to, width);
                         let b = self.rows(signals, others[1], from, to, width);
@@ -99,14 +99,14 @@ impl Columns {
         }
     }
 
-    /// Adds the products of the columns that both follow others: those of the previous columns over the same rows, plus
-    /// `sign` times their products in one more row.
+    /// Adds `sign` times the products in one row, for the columns that follow others. These rows at both ends
+    /// distinguish their products from the products of the previous columns.
     #[inline(always)]
     pub fn add_row<R: Number>(&self, zero: R, signals: &SignalBuffers, row: usize, sign: f64, products: &mut [f64]) {
         let (p1, width) = (self.count(), zero.lanes());
         for i in 0..p1 {
             for j in 0..=i {
-                if self.follows(i) && self.follows(j) {
+                if self.is_shift_of_previous(i) && self.is_shift_of_previous(j) {
                     let x = zero.load(self.rows(signals, i, row, row + 1, width));
                     let y = zero.load(self.rows(signals, j, row, row + 1, width));
                     let at = (i * p1 + j) * width;
@@ -117,18 +117,18 @@ impl Columns {
         }
     }
 
-    /// Computes all products from the summed ones, with the initial states projected out.
+    /// Completes the matrix of products from the summed products, and projects out the initial states.
     #[inline(always)]
     pub fn complete<R: Number>(&self, zero: R, inside: &[R], nf: usize, products: &mut [f64]) {
         let (p1, width) = (self.count(), zero.lanes());
         for i in 0..p1 {
             for j in 0..=i {
                 let at = (i * p1 + j) * width;
-                let value = if self.follows(i) && self.follows(j) {
+                let value = if self.is_shift_of_previous(i) && self.is_shift_of_previous(j) {
                     zero.load(&products[at..]) + zero.load(&products[((i - 1) * p1 + j - 1) * width..])
-                } else if self.follows(i) || !self.follows(j) {
-                    // The one that follows none was multiplied with all others, the earlier one of
-                    // two such.
+                } else if self.is_shift_of_previous(i) || !self.is_shift_of_previous(j) {
+                    // The product was computed for the column that is no shift of another or, if neither is one, for
+                    // the earlier column.
                     zero.load(&products[(j * p1 + i) * width..])
                 } else {
                     zero.load(&products[at..])

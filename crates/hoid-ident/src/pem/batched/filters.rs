@@ -1,12 +1,13 @@
-//! Filters of the signals of a span, for one record in each lane; every signal is preceded by its past.
+//! Filters for the signals of a span, with one record in each lane; the past samples of every signal are stored before
+//! the span.
 
 use hoid_lanes::Number;
 
 use super::{lane_products::add_scaled, signal_buffers::SignalBuffers};
 
-/// Computes all signals of a span with known past in one pass, for two poles and short B and D: the recursions of s and
-/// r run in parallel, and values that are not needed later are not stored. The operations are the same as one after the
-/// other. Returns false for other orders.
+/// Computes all signals of a span with a known past in one pass, for two poles and low orders of B and D. The
+/// recursions of s and r run in parallel, and values that are not needed later are not stored. The arithmetic
+/// operations are the same as in separate passes. Returns false for other orders.
 #[inline(always)]
 pub(super) fn all_at_once<R: Number>(
     zero: R,
@@ -31,13 +32,13 @@ pub(super) fn all_at_once<R: Number>(
     true
 }
 
-/// A row of numbers.
+/// Returns one row, i.e. one sample of all lanes.
 #[inline(always)]
 fn row<R: Number>(zero: R, rows: &[f64], index: usize) -> R {
     zero.load(&rows[index * zero.lanes()..])
 }
 
-/// The same, with zeros from row `end` on.
+/// Returns one row, with zeros from row `end` on.
 #[inline(always)]
 fn row_below<R: Number>(zero: R, rows: &[f64], index: usize, end: usize) -> R {
     if index < end { row(zero, rows, index) } else { zero }
@@ -93,7 +94,7 @@ fn all_of_orders<R: Number, const NB: usize, const ND: usize>(
     }
 }
 
-/// Computes `s = e/F`, `w = B s` (in place of r) and `v = u - w` from place `at` on.
+/// Computes `s = e/F`, `w = B s` (stored in r) and `v = u - w` from index `at` on.
 #[inline(always)]
 pub(super) fn respond<R: Number>(
     zero: R,
@@ -104,7 +105,7 @@ pub(super) fn respond<R: Number>(
 ) {
     let (width, end) = (zero.lanes(), at + e.len());
     if (b.len(), f.len()) == (2 * width, 2 * width) {
-        // The orders of the operator: in one pass.
+        // For the orders of the operator model, the response is computed in one pass.
         let (b0, b1) = (zero.load(b), zero.load(&b[width..]));
         let (f1, f2) = (zero.load(f), zero.load(&f[width..]));
         let (mut s1, mut s2) = (
@@ -135,7 +136,7 @@ pub(super) fn respond<R: Number>(
     }
 }
 
-/// Computes `r = w/F` in place of w from place `at` on, and `x_f = D r`.
+/// Computes `r = w/F` (in place of w) from index `at` on, and `x_f = D r`.
 #[inline(always)]
 pub(super) fn filter_response<R: Number>(zero: R, [d, f]: [&[f64]; 2], r: &mut [f64], x_f: &mut [f64], at: usize) {
     let width = zero.lanes();
@@ -154,7 +155,7 @@ pub(super) fn filter_response<R: Number>(zero: R, [d, f]: [&[f64]; 2], r: &mut [
     whiten(zero, d, r, x_f, at);
 }
 
-/// Computes `y = x/F` from place `at` on, continuing from the previous values of y.
+/// Computes `y = x/F` from index `at` on, continuing from the previous values of y.
 #[inline(always)]
 fn divide<R: Number>(zero: R, f: &[f64], x: &[f64], y: &mut [f64], at: usize) {
     y[at..at + x.len()].copy_from_slice(x);
@@ -162,7 +163,7 @@ fn divide<R: Number>(zero: R, f: &[f64], x: &[f64], y: &mut [f64], at: usize) {
     divide_again(zero, f, &mut y[..end], at);
 }
 
-/// Computes `y <- y/F` from place `at` on; the values before it have been filtered already.
+/// Computes `y <- y/F` from index `at` on; the previous values are already filtered.
 #[inline(always)]
 fn divide_again<R: Number>(zero: R, f: &[f64], y: &mut [f64], at: usize) {
     let width = zero.lanes();
@@ -186,7 +187,7 @@ fn divide_again<R: Number>(zero: R, f: &[f64], y: &mut [f64], at: usize) {
     }
 }
 
-/// Computes `y = D x`, x from place `at` on.
+/// Computes `y = D x` for x from index `at` on.
 #[inline(always)]
 pub(super) fn whiten<R: Number>(zero: R, d: &[f64], x: &[f64], y: &mut [f64], at: usize) {
     let width = zero.lanes();
@@ -228,7 +229,7 @@ fn whiten_by<R: Number, const N: usize>(zero: R, d: &[f64], x: &[f64], y: &mut [
     }
 }
 
-/// Computes `y = B x`, x from place `at` on.
+/// Computes `y = B x` for x from index `at` on.
 #[inline(always)]
 fn fir<R: Number>(zero: R, b: &[f64], x: &[f64], y: &mut [f64], at: usize) {
     let width = zero.lanes();

@@ -8,15 +8,15 @@ use crate::{
     Fit, IdentError, InitialState,
     criterion::{Criterion, Workspace},
     initial_guess::continuation::{AveragedRecords, Continuation, SlowPoles},
-    initial_guess::guesses::initial_guesses_beside,
+    initial_guess::guesses::initial_guesses_with_poles,
     pem::constraints::ConstrainedCriterion,
     pem::fit_problem::FitProblem,
     pem::fit_settings::FitSettings,
 };
 
-/// Fits each record; `None` for cases that are not searched in lanes: anything except Box-Jenkins models without C,
-/// with their initial states estimated, without constraints, priors or a robust loss; records of different lengths;
-/// registers that this processor does not have.
+/// Fits each record in a lane; `None` if the fits cannot run in lanes. Lanes require Box-Jenkins models without C,
+/// estimated initial states, no constraints, priors or robust loss, records of equal length, and a processor with
+/// suitable registers.
 pub(crate) fn fit_each(
     settings: &FitSettings,
     records: &[&Record],
@@ -54,7 +54,7 @@ pub(crate) fn fit_each(
         .map(|found| {
             let slow = slow.next().unwrap_or_default();
             let (constrained, sample_time) = found.as_ref().map_err(|error| (*error).clone())?;
-            let own_starts = || initial_guesses_beside(slow, constrained.criterion, *sample_time, &mut workspace);
+            let own_starts = || initial_guesses_with_poles(slow, constrained.criterion, *sample_time, &mut workspace);
             FitProblem::new(settings, constrained, *sample_time, own_starts)
         })
         .collect();
@@ -67,7 +67,7 @@ pub(crate) fn fit_each(
     )
 }
 
-/// Returns the poles proposed by the averages of each record.
+/// Returns the poles estimated from the averages of each record.
 fn poles_of_averages(
     constrained: &[Result<(ConstrainedCriterion<'_, '_>, SampleTime), &IdentError>],
     path: InstructionSet,

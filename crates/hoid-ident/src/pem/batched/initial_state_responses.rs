@@ -1,12 +1,13 @@
-//! The responses to the initial states of 1/F, for one record in each lane, and the least squares states.
+//! Responses to the initial states of 1/F, with one record in each lane, and the least-squares estimates of these
+//! states.
 //!
-//! With h the impulse response of 1/F and g that of D/F, a state that enters w k samples after its first value adds
+//! With the impulse responses h of 1/F and g of D/F, a state that enters w k samples after its first value adds
 //! `x_k h(t-k)` to w and subtracts `x_k g(t-k)` from the residuals. The columns `g(t-k)` over the residuals are
-//! orthogonalised by the Cholesky factor of their products, twice, as once leaves the rounding errors of nearly
-//! parallel columns (Y. Yamamoto et al., *Electronic Trans. Numerical Analysis* 44 (2015) 306-326). As they are shifts
-//! of one signal, the first matrix takes nf products. The unbatched criterion computes an orthonormal basis by
-//! Gram-Schmidt ([`crate::criterion::initial_state_responses`]), which is the same except for rounding; it is used for
-//! a lane with dependent columns.
+//! orthogonalised with the Cholesky factor of their products. This is done twice, because a single pass leaves the
+//! rounding errors of nearly parallel columns (Y. Yamamoto et al., *Electronic Trans. Numerical Analysis* 44 (2015)
+//! 306-326). Since the columns are shifts of one signal, the first matrix takes only nf products. The criterion for
+//! single records computes an orthonormal basis by Gram-Schmidt ([`crate::criterion::initial_state_responses`]), with
+//! the same result except for rounding; it is used for a lane with linearly dependent columns.
 
 use hoid_lanes::Number;
 
@@ -16,29 +17,30 @@ use super::{
     signal_buffers::SignalBuffers,
 };
 
-/// Number of samples of an impulse response between two tests of whether it has died away.
-const LOOK: usize = 128;
-/// Size of the last values of a response that has died away, relative to its first value of 1.
-const NOTHING: f64 = 1e-17;
-/// Least share of a column's square that is outside the space of the previous columns.
-const OWN: f64 = 1e-12;
+/// Number of samples of an impulse response between two tests of whether it has decayed.
+const TEST_INTERVAL: usize = 128;
+/// A response has decayed if its last values are below this limit; its first value is 1.
+const DECAYED: f64 = 1e-17;
+/// Minimum share of a column's sum of squares that must lie outside the space of the previous columns.
+const INDEPENDENT: f64 = 1e-12;
 
-/// The responses: h and g are in [`SignalBuffers::h`] and [`SignalBuffers::g`], preceded and followed by nf zeros, the
-/// orthogonal columns q in [`SignalBuffers::q`].
+/// The responses h and g are stored in [`SignalBuffers::h`] and [`SignalBuffers::g`], preceded and followed by nf
+/// zeros; the orthogonal columns q are stored in [`SignalBuffers::q`].
 pub(super) struct InitialStateResponses<R> {
-    /// Rows of a column, from the first residual on.
+    /// Number of rows of a column, counted from the first residual.
     pub rows: usize,
     nd: usize,
     nf: usize,
     /// Number of samples of h.
     length: usize,
-    /// Factors by rows: that of the columns, each row divided by the diagonal element of its column, and that of q.
+    /// Cholesky factors by rows: `first` belongs to the original columns, with each column of the factor divided by its
+    /// diagonal element; `second` belongs to q.
     first: Vec<R>,
     second: Vec<R>,
 }
 
 impl<R: Number> InitialStateResponses<R> {
-    /// Computes the responses of a given number of residuals.
+    /// Computes the responses for a given number of residuals.
     #[inline(always)]
     pub fn of(
         zero: R,
@@ -50,8 +52,8 @@ impl<R: Number> InitialStateResponses<R> {
         let width = zero.lanes();
         let (nd, nf) = (d.len() / width, f.len() / width);
         let longest = residuals + nd;
-        signals.h.make_room((longest + 2 * nf) * width);
-        signals.g.make_room((longest + nd + 2 * nf) * width);
+        signals.h.allocate((longest + 2 * nf) * width);
+        signals.g.allocate((longest + nd + 2 * nf) * width);
         let length = impulse_response(zero, f, longest, &mut signals.h);
         let (from, to) = (nf * width, (nf + length + nd + nf) * width);
         let g = &mut signals.g[..to];
@@ -87,7 +89,7 @@ impl<R: Number> InitialStateResponses<R> {
         }
         for k in 1..nf {
             for i in k..nf {
-                // The row that enters at the front, and the last that leaves, of the previous columns.
+                // For the delayed columns, a row of the previous columns enters at the front and their last row leaves.
                 let entering = self.at(zero, signals, k - 1, -1) * self.at(zero, signals, i - 1, -1);
                 let last = rows as isize - 1;
                 let leaving = self.at(zero, signals, k - 1, last) * self.at(zero, signals, i - 1, last);
@@ -103,7 +105,7 @@ impl<R: Number> InitialStateResponses<R> {
         }
         self.first = s;
 
-        signals.q.make_room(nf * rows * width);
+        signals.q.allocate(nf * rows * width);
         for k in 0..nf {
             let from = (nf + self.nd - k) * width;
             let (before, rest) = signals.q.split_at_mut(k * rows * width);
@@ -132,20 +134,20 @@ impl<R: Number> InitialStateResponses<R> {
         &signals.g[first * width..(first + self.rows) * width]
     }
 
-    /// Returns its element in a row, which may be the row before the first.
+    /// Returns an element of the original column k; `row` may be the row before the first.
     #[inline(always)]
     fn at(&self, zero: R, signals: &SignalBuffers, k: usize, row: isize) -> R {
         zero.load(&signals.g[(self.nf + self.nd - k).wrapping_add_signed(row) * zero.lanes()..])
     }
 
-    /// Returns column k, orthogonal to the previous ones.
+    /// Returns the orthogonal column k.
     #[inline(always)]
     fn column<'r>(&self, signals: &'r SignalBuffers, k: usize, width: usize) -> &'r [f64] {
         &signals.q[k * self.rows * width..(k + 1) * self.rows * width]
     }
 
-    /// Adds the best initial states to w (in place of r), v and eps: w starts in row `regressed` of the span, the
-    /// residuals in row `counted`.
+    /// Adds the effect of the least-squares initial states to w (stored in r), v and eps. w starts in row `regressed`
+    /// of the span, the residuals start in row `counted`.
     #[inline(always)]
     pub fn eliminate(&self, zero: R, signals: &mut SignalBuffers, regressed: usize, counted: usize) {
         let (width, nf) = (zero.lanes(), self.nf);
@@ -168,7 +170,7 @@ impl<R: Number> InitialStateResponses<R> {
             let q = &signals.q[k * self.rows * width..(k + 1) * self.rows * width];
             add_scaled(-x[k], q, &mut signals.eps[from..to]);
         }
-        // From the coefficients of each q to those of the original columns.
+        // Converts the coefficients of the orthogonal columns to coefficients of the original columns.
         for k in (0..nf).rev() {
             for j in 0..k {
                 x[j] = x[j] - self.first[k * nf + j] * x[k];
@@ -184,8 +186,8 @@ impl<R: Number> InitialStateResponses<R> {
         add_shifts(zero, &minus, &signals.h, nf, &mut signals.v[from..to]);
     }
 
-    /// Returns the components of each column of psi in the space of the responses, a row for each column. eps, the
-    /// first, has none left.
+    /// Returns the components of the columns of psi in the space of the responses, one row for each column. The row of
+    /// eps, the first column, is zero.
     #[inline(always)]
     pub fn components(&self, zero: R, columns: &Columns, signals: &SignalBuffers, counted: usize) -> Vec<R> {
         let (width, nf, count) = (zero.lanes(), self.nf, columns.count());
@@ -210,7 +212,7 @@ impl<R: Number> InitialStateResponses<R> {
         inside
     }
 
-    /// Computes `y <- L^-1 y` with the second factor.
+    /// Computes `y <- L^-1 y`, where L is the second factor.
     #[inline(always)]
     fn forward(&self, y: &mut [R]) {
         for k in 0..self.nf {
@@ -222,7 +224,7 @@ impl<R: Number> InitialStateResponses<R> {
     }
 }
 
-/// Computes the Cholesky factor in place of the lower triangle of s, and marks the lanes without one.
+/// Replaces the lower triangle of s by its Cholesky factor, and marks the lanes in which there is none.
 #[inline(always)]
 fn factor<R: Number>(zero: R, nf: usize, s: &mut [R], dependent: &mut [bool]) {
     for k in 0..nf {
@@ -238,7 +240,7 @@ fn factor<R: Number>(zero: R, nf: usize, s: &mut [R], dependent: &mut [bool]) {
             let square = s[k * nf + k];
             for lane in 0..zero.lanes() {
                 let own = rest.lane(lane);
-                let independent = own > OWN * square.lane(lane);
+                let independent = own > INDEPENDENT * square.lane(lane);
                 dependent[lane] |= !independent;
                 rest.set_lane(lane, own.sqrt());
             }
@@ -247,7 +249,7 @@ fn factor<R: Number>(zero: R, nf: usize, s: &mut [R], dependent: &mut [bool]) {
     }
 }
 
-/// Computes `y(t) += sum_k x_k s(t-k)`; row `at` of s is that of t = 0.
+/// Computes `y(t) += sum_k x_k s(t-k)`; row `at` of s belongs to t = 0.
 #[inline(always)]
 fn add_shifts<R: Number>(zero: R, x: &[R], s: &[f64], at: usize, y: &mut [f64]) {
     let width = zero.lanes();
@@ -267,8 +269,8 @@ fn add_shifts<R: Number>(zero: R, x: &[R], s: &[f64], at: usize, y: &mut [f64]) 
     }
 }
 
-/// Computes the impulse response of 1/F until it has died away in all lanes or its length is `longest`, preceded and
-/// followed by nf zeros; zero in a lane after it has died away there. Returns its length.
+/// Computes the impulse response of 1/F until it has decayed in all lanes or its length is `longest`; it is preceded
+/// and followed by nf zeros. In each lane it is set to zero after its decay. Returns the length of the response.
 #[inline(always)]
 fn impulse_response<R: Number>(zero: R, f: &[f64], longest: usize, h: &mut [f64]) -> usize {
     let (width, nf) = (zero.lanes(), f.len() / zero.lanes());
@@ -277,7 +279,7 @@ fn impulse_response<R: Number>(zero: R, f: &[f64], longest: usize, h: &mut [f64]
     let mut ends = vec![usize::MAX; width];
     let mut rows = nf;
     while rows < nf + longest && ends.contains(&usize::MAX) {
-        let to = (rows + LOOK).min(nf + longest);
+        let to = (rows + TEST_INTERVAL).min(nf + longest);
         for row in rows..to {
             let mut y = impulse;
             impulse = zero;
@@ -288,8 +290,8 @@ fn impulse_response<R: Number>(zero: R, f: &[f64], longest: usize, h: &mut [f64]
         }
         rows = to;
         for (lane, end) in ends.iter_mut().enumerate() {
-            // All that follows comes from the last nf values.
-            let gone = (rows - nf..rows).all(|row| h[row * width + lane].abs() < NOTHING);
+            // All subsequent values depend only on the last nf values.
+            let gone = (rows - nf..rows).all(|row| h[row * width + lane].abs() < DECAYED);
             if gone {
                 *end = rows.min(*end);
             }

@@ -2,7 +2,7 @@
 
 use hoid_lanes::Number;
 
-/// Computes `x' y` for four y.
+/// Returns `x' y` for four signals y.
 #[inline(always)]
 pub(super) fn four_products<R: Number>(zero: R, x: &[f64], [a, b, c, d]: [&[f64]; 4]) -> [R; 4] {
     let width = zero.lanes();
@@ -19,7 +19,7 @@ pub(super) fn four_products<R: Number>(zero: R, x: &[f64], [a, b, c, d]: [&[f64]
     [sums.0, sums.1, sums.2, sums.3]
 }
 
-/// Computes `x' y` for two y.
+/// Returns `x' y` for two signals y.
 #[inline(always)]
 pub(super) fn two_products<R: Number>(zero: R, x: &[f64], [a, b]: [&[f64]; 2]) -> [R; 2] {
     let width = zero.lanes();

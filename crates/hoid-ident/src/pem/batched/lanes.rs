@@ -1,4 +1,4 @@
-//! The searches in the lanes: each record has a lane until its search has ended, then the next record uses it.
+//! Searches in lanes: a record occupies a lane until its search has ended; the next record then takes over the lane.
 
 use std::cell::Cell;
 
@@ -12,7 +12,7 @@ use crate::{
     optimize::{Linearisation, Objective},
 };
 
-/// Runs all searches to their end in parallel lanes; the records have equal length and the same orders.
+/// Completes all searches in parallel lanes; all records have the same length and the same orders.
 pub(super) fn search(open: Vec<&mut impl LinearisationClient>, path: InstructionSet, workspace: &mut Workspace) {
     let first = open.first().map(|client| client.criterion());
     let lanes = first.and_then(|c| Some(Lanes::new(c.orders, c.first, c.data.first()?.u.len(), path.lanes()?)));
@@ -21,7 +21,7 @@ pub(super) fn search(open: Vec<&mut impl LinearisationClient>, path: Instruction
     }
 }
 
-/// The records in the lanes, and the data of a pass over them.
+/// The records in the lanes, and the memory for a pass over them.
 pub(super) struct Lanes {
     orders: Orders,
     first: usize,
@@ -30,7 +30,7 @@ pub(super) struct Lanes {
     pub memory: Memory,
 }
 
-/// Numbers of all lanes.
+/// Memory for the signals and results of all lanes.
 #[derive(Debug, Default)]
 pub(super) struct Memory {
     e: Rows,
@@ -41,30 +41,30 @@ pub(super) struct Memory {
 }
 
 thread_local! {
-    /// The memory of the last fits on this thread: new pages cost as much as a fit.
-    static LEFT: Cell<Option<Memory>> = const { Cell::new(None) };
+    /// The memory of the last fits on this thread, which is reused because allocating new pages takes as long as a fit.
+    static LAST_MEMORY: Cell<Option<Memory>> = const { Cell::new(None) };
 }
 
-/// Largest number of values of a signal that are kept.
-const KEPT: usize = 1 << 18;
+/// Largest number of values of a signal for which the memory is kept.
+const MAX_KEPT_SAMPLES: usize = 1 << 18;
 
 impl Drop for Lanes {
     fn drop(&mut self) {
-        if self.memory.e.len() <= KEPT {
-            LEFT.set(Some(std::mem::take(&mut self.memory)));
+        if self.memory.e.len() <= MAX_KEPT_SAMPLES {
+            LAST_MEMORY.set(Some(std::mem::take(&mut self.memory)));
         }
     }
 }
 
 impl Lanes {
     pub fn new(orders: Orders, first: usize, n: usize, width: usize) -> Self {
-        let mut memory = LEFT.take().unwrap_or_default();
+        let mut memory = LAST_MEMORY.take().unwrap_or_default();
         for (values, rows) in [
             (&mut memory.e, n),
             (&mut memory.u, n),
             (&mut memory.theta, orders.parameters()),
         ] {
-            values.make_room(rows * width);
+            values.allocate(rows * width);
             values.fill(0.0);
         }
         Self {
@@ -76,7 +76,7 @@ impl Lanes {
         }
     }
 
-    /// Runs all searches to their end, as many at a time as there are lanes.
+    /// Completes all searches; as many run at the same time as there are lanes.
     fn search<A: LinearisationClient>(&mut self, open: Vec<&mut A>, path: InstructionSet, workspace: &mut Workspace) {
         let mut open = open.into_iter();
         let mut searching: Vec<Option<&mut A>> = (0..self.width).map(|_| None).collect();
@@ -93,7 +93,7 @@ impl Lanes {
                     self.put(lane, next.criterion().data[0]);
                     searching[lane] = Some(next);
                 }
-                // A lane without a record keeps its last theta.
+                // A lane without a record keeps its previous theta.
                 let theta = searching[lane]
                     .iter()
                     .filter_map(|client| client.evaluation_point())
@@ -140,12 +140,12 @@ impl Lanes {
         }
     }
 
-    /// Returns the result of a pass in a lane.
+    /// Returns the linearisation in a lane after a pass.
     pub fn linearisation(&self, lane: usize) -> Linearisation {
         let o = &self.orders;
         let p = o.parameters();
         let product = |i: usize, j: usize| self.memory.sums.products[(i * (p + 1) + j) * self.width + lane];
-        // psi contains x_b, -v and -x_f.
+        // The columns of psi are x_b, -v and -x_f.
         let sign = |i: usize| if i < o.nb { 1.0 } else { -1.0 };
         Linearisation {
             sum_of_squares: product(0, 0),

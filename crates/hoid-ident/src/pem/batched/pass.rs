@@ -1,18 +1,20 @@
-//! The criterion and its derivatives for several records at once, each with its own theta.
+//! The criterion and its derivatives for several records at the same time, each record with its own theta.
 //!
-//! The criterion ([`crate::criterion`]) of one Box-Jenkins model without C, with its initial states
-//! eliminated, for a record in each lane:
+//! This is the criterion of a Box-Jenkins model without C ([`crate::criterion`]), with the initial states eliminated.
+//! For the record in each lane,
 //!
 //! `s = e(t-nk)/F`,  `w = B s`,  `v = u - w`,  `eps = D v`,  `x_b = D s`,  `r = w/F`,  `x_f = D r`
 //!
-//! The columns of psi are shifts of `x_b`, `-v` and `-x_f`. A recursion over t has a latency per sample, which eight
-//! records in parallel hide. All signals of a span of samples are computed and multiplied before the next span, so that
-//! they remain in the first-level cache; only the record itself is read from slower memory. The first of these spans
-//! extends as far as the free responses do, because the initial states must be known before w is filtered again.
+//! The columns of psi are shifts of `x_b`, `-v` and `-x_f`. A recursion over t has a latency per sample, which is
+//! hidden if eight records are processed in parallel. All signals of a span of samples are computed and multiplied
+//! before the next span, so that they remain in the first-level cache; only the record itself is read from slower
+//! memory. The first span covers the free responses, because the initial states must be known before w is filtered
+//! again.
 //!
-//! Every operation acts on each lane separately, and where one lane needs more samples than another, the shorter one is
-//! padded with zeros: the result of a lane is bitwise independent of the registers and of the other lanes. The sums
-//! over time are taken in a different order from the unbatched criterion and differ from it by rounding.
+//! Every operation acts on each lane separately, and if one lane needs more samples than another, the shorter signal is
+//! padded with zeros. The result of a lane is therefore bitwise independent of the type of registers and of the other
+//! lanes. The sums over time are taken in a different order from the criterion for single records and differ from it by
+//! rounding.
 
 use hoid_lanes::LaneTask;
 use hoid_lanes::Number;
@@ -29,17 +31,17 @@ use super::{
 /// Number of samples that are computed and multiplied at a time.
 const SPAN: usize = 64;
 
-/// One pass.
+/// Input and memory of one pass over the records in all lanes.
 pub(super) struct Pass<'a> {
     pub orders: Orders,
-    /// First residual.
+    /// Sample of the first residual.
     pub first: usize,
-    /// Samples.
+    /// Number of samples of each record.
     pub n: usize,
-    /// Input and output, by rows.
+    /// Input and output, with one row per sample.
     pub e: &'a [f64],
     pub u: &'a [f64],
-    /// theta, one row for each parameter.
+    /// Parameters theta, with one row per parameter.
     pub theta: &'a [f64],
     pub signals: &'a mut SignalBuffers,
     pub sums: &'a mut NormalEquations,
@@ -92,7 +94,7 @@ impl LaneTask for Pass<'_> {
             if from == begin || !all_at_once(zero, [b, d, f], [inputs, outputs], signals, at) {
                 respond(zero, [b, f], [inputs, outputs], signals, at);
                 if from == begin {
-                    // Nothing is known of w before all of its regressors lie inside the record.
+                    // w is unknown until all of its regressors are inside the record.
                     signals.r[at..at + (regressed - begin) * width].fill(0.0);
                     signals.v[at..at + (regressed - begin) * width].fill(0.0);
                 }
@@ -108,7 +110,7 @@ impl LaneTask for Pass<'_> {
                 inside = states.components(zero, &columns, signals, counted);
                 columns.add_row(zero, signals, counted, 1.0, products);
             }
-            // The later spans contain the same samples whatever the length of the first span, which is that of the
+            // The later spans contain the same samples regardless of the length of the first span, which depends on the
             // slowest lane.
             let mut done = counted;
             while done < history + count {
@@ -122,12 +124,12 @@ impl LaneTask for Pass<'_> {
                 done = next;
             }
             if to == n {
-                // One row later than the last, a column that follows is the one before it in the
-                // last.
+                // In the row after the last, a column that follows another has the value of the previous column in the
+                // last row.
                 columns.add_row(zero, signals, history + count, -1.0, products);
                 break;
             }
-            signals.carry(history, count, width);
+            signals.carry_over_tail(history, count, width);
             (from, to) = (to, (to + SPAN).min(n));
         }
         columns.complete(zero, &inside, o.nf, products);

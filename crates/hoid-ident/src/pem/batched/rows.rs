@@ -1,11 +1,11 @@
-//! Rows of numbers, one number for each lane, aligned to cache lines.
+//! Rows of values, with one value per lane, aligned to cache lines.
 
 use std::ops::{Deref, DerefMut};
 
-/// Bytes of a cache line.
+/// Size of a cache line in bytes.
 const LINE: usize = 64;
 
-/// A row for each sample. A row across two cache lines takes two reads.
+/// Memory with one row per sample. It is aligned, because a row that crosses a cache line takes two reads.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
     all: Vec<f64>,
@@ -14,8 +14,8 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// Allocates a given number of values, which are not initialised.
-    pub fn make_room(&mut self, count: usize) {
+    /// Allocates `count` values without initialising them.
+    pub fn allocate(&mut self, count: usize) {
         let spare = LINE / size_of::<f64>();
         if self.all.len() < count + spare {
             self.all.resize(count + spare, 0.0);

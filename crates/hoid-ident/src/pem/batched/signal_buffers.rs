@@ -1,9 +1,9 @@
-//! The signals of a span of samples, preceded by the end of the previous span.
+//! Signals of a span of samples, preceded by the end of the previous span.
 
 use super::rows::Rows;
 
-/// Signals of a span, a row for each sample with a number for each lane. The rows before the first contain the end of
-/// the previous span.
+/// Signals of a span, with one row per sample and one value per lane. The rows before the span contain the end of the
+/// previous span.
 #[derive(Debug, Default)]
 pub(super) struct SignalBuffers {
     pub s: Rows,
@@ -15,12 +15,12 @@ pub(super) struct SignalBuffers {
     /// Impulse responses of 1/F and of D/F.
     pub h: Rows,
     pub g: Rows,
-    /// Responses to the initial states, orthogonal, one after the other.
+    /// Orthogonalised responses to the initial states, one after the other.
     pub q: Rows,
 }
 
 impl SignalBuffers {
-    /// Allocates spans of a given number of samples, with zeros before the first.
+    /// Allocates memory for spans of up to `longest` samples, with zeros before the first span.
     pub fn begin(&mut self, history: usize, longest: usize, width: usize) {
         for signal in [
             &mut self.s,
@@ -30,13 +30,13 @@ impl SignalBuffers {
             &mut self.r,
             &mut self.x_f,
         ] {
-            signal.make_room((history + longest) * width);
+            signal.allocate((history + longest) * width);
             signal[..history * width].fill(0.0);
         }
     }
 
-    /// Copies the end of a span to the front for the next.
-    pub fn carry(&mut self, history: usize, count: usize, width: usize) {
+    /// Copies the end of a span to the front, as the past of the next span.
+    pub fn carry_over_tail(&mut self, history: usize, count: usize, width: usize) {
         for signal in [&mut self.s, &mut self.v, &mut self.x_b, &mut self.r, &mut self.x_f] {
             signal.copy_within(count * width..(count + history) * width, 0);
         }

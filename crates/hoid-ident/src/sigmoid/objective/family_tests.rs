@@ -19,7 +19,7 @@ fn theta(layout: &Layout) -> Vec<f64> {
     if let Some(place) = layout.lag {
         theta[place] = 0.4;
     }
-    if let Some([omega, zeta]) = layout.muscles {
+    if let Some([omega, zeta]) = layout.neuromuscular_indices {
         (theta[omega], theta[zeta]) = (11.25, 0.35);
     }
     theta[layout.delay] = 0.1234;

@@ -1,4 +1,4 @@
-//! An array of numbers, and the lines of a matrix.
+//! An array of numbers, and the rows and columns of a matrix.
 
 use super::numbers::Numbers;
 
@@ -8,12 +8,12 @@ pub(crate) struct Array {
     pub(crate) numbers: Numbers,
     /// Length of each dimension. Their product is the number of elements.
     pub(crate) dims: Vec<usize>,
-    /// True if the last index runs fastest, as in C; otherwise the first does, as in Fortran and MATLAB.
+    /// True if the last index varies fastest, as in C; false if the first does, as in Fortran and MATLAB.
     pub(crate) last_fastest: bool,
 }
 
 impl Array {
-    /// All numbers in file order.
+    /// Creates a one-dimensional array of all numbers in file order.
     pub(crate) fn vector(numbers: Numbers) -> Self {
         Self {
             dims: vec![numbers.len()],
@@ -22,13 +22,13 @@ impl Array {
         }
     }
 
-    /// Line `k` of a matrix.
+    /// Returns row or column `k` of a matrix.
     pub(super) fn line(&self, k: usize, along_first: bool) -> Numbers {
         let [rows, columns] = *self.dims.as_slice() else {
             return self.numbers.line(0, 1, 0);
         };
         let len = if along_first { rows } else { columns };
-        // Along the fastest index, neighbours are adjacent in the file.
+        // Elements along the fastest index are adjacent in the file.
         let (first, stride) = match (along_first, self.last_fastest) {
             (true, true) => (k, columns),
             (true, false) => (k.saturating_mul(rows), 1),

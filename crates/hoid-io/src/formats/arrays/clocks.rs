@@ -1,4 +1,4 @@
-//! Columns of one stream at the times of another, by linear interpolation.
+//! Linear interpolation of the columns of one stream to the times of another.
 
 use std::ops::Range;
 
@@ -7,15 +7,15 @@ use super::numbers::Numbers;
 use crate::IoError;
 use crate::wording::shown;
 
-/// A column at the times of another stream.
+/// A column interpolated to the times of another stream.
 pub(super) struct Aligned {
     pub(super) numbers: Numbers,
-    /// Rows that lie inside the stream of the column.
+    /// Rows whose time lies within the stream of the column.
     pub(super) rows: Range<usize>,
     pub(super) note: String,
 }
 
-/// The column `column_path` at the times of the structure `beside`.
+/// Interpolates the column `column_path` to the times of the structure `beside`.
 pub(super) fn aligned(
     column_paths: &[ColumnPath],
     column_path: &ColumnPath,
@@ -69,7 +69,7 @@ fn between(t: &[f64], values: &[f64], at: f64) -> f64 {
     match (t, values) {
         ([t0, t1, ..], [v0, v1, ..]) => {
             let part = (at - t0) / (t1 - t0);
-            // Exact at both ends.
+            // The result is exact at both points.
             if part == 1.0 { *v1 } else { v0 + part * (v1 - v0) }
         }
         ([_], [v0]) => *v0,
@@ -77,7 +77,7 @@ fn between(t: &[f64], values: &[f64], at: f64) -> f64 {
     }
 }
 
-/// Times of a structure, which must increase.
+/// Returns the times of a structure; they must increase.
 fn times(column_paths: &[ColumnPath], place: &str, file: &str) -> Result<Vec<f64>, IoError> {
     let time = column_paths
         .iter()

@@ -1,23 +1,22 @@
-//! Arrays as columns.
+//! Conversion of arrays to columns.
 //!
-//! An array with one long side is a column. In a matrix, time runs along the longer side, and each
-//! line along it is a column with its own path: `x(:,2)` or `x(2,:)` in MATLAB notation, counted
-//! from 1, `x[:,1]` or `x[1,:]` in Python notation, counted from 0. In a square matrix the first
-//! index is time.
+//! An array with one long side is a column. In a matrix, time runs along the longer side, and each row or column of the
+//! matrix in this direction is a column of data with its own path: `x(:,2)` or `x(2,:)` in MATLAB notation, counted
+//! from 1, `x[:,1]` or `x[1,:]` in Python notation, counted from 0. In a square matrix the first index is time.
 
 use super::contents::{Contents, Entry, Indexing, OBJECT, Value};
 use super::numbers::Numbers;
 use crate::IoError;
 use crate::wording::shown;
 
-/// A matrix with more lines is an image, not a set of channels.
+/// A matrix with more channels than this counts as an image.
 const MOST_LINES: usize = 256;
 
 /// One column.
 #[derive(Debug, Clone)]
 pub(crate) struct ColumnPath {
     pub(crate) path: String,
-    /// The enclosing structure; empty at top level.
+    /// Path of the enclosing structure; empty at top level.
     pub(crate) parent: String,
     pub(crate) unit: String,
     pub(crate) holds: Holds,
@@ -41,7 +40,7 @@ impl ColumnPath {
         }
     }
 
-    /// The numbers, if the column holds numbers.
+    /// Returns the numbers, if the column holds any.
     pub(crate) fn numbers(&self) -> Option<&Numbers> {
         match &self.holds {
             Holds::Numbers(numbers) => Some(numbers),
@@ -49,7 +48,7 @@ impl ColumnPath {
         }
     }
 
-    /// The last part of the path.
+    /// Returns the last part of the path.
     pub(crate) fn name(&self) -> &str {
         let name = self.path.strip_prefix(self.parent.as_str()).unwrap_or(&self.path);
         if self.parent.is_empty() {
@@ -59,7 +58,7 @@ impl ColumnPath {
         }
     }
 
-    /// Returns the error that states why this is not a numeric column.
+    /// Returns the error that explains why this column is not numeric.
     pub(super) fn refused(&self, file: &str) -> IoError {
         IoError::Unsupported {
             file: file.to_owned(),
@@ -73,7 +72,7 @@ impl ColumnPath {
         matches!(&self.holds, Holds::Unread(what) if what.starts_with(OBJECT))
     }
 
-    /// Describes the contents as text.
+    /// Describes the contents in words.
     pub(crate) fn what(&self) -> String {
         match &self.holds {
             Holds::Numbers(numbers) => numbers.kind().name().to_owned(),
@@ -83,7 +82,7 @@ impl ColumnPath {
     }
 }
 
-/// A path without its last part. A point inside brackets does not separate parts.
+/// Returns the path without its last part. A point inside brackets does not separate parts.
 pub(crate) fn parent(path: &str) -> &str {
     let mut depth = 0_usize;
     for (at, byte) in path.bytes().enumerate().rev() {
@@ -108,7 +107,7 @@ impl Contents {
 }
 
 impl Entry {
-    /// The columns of this entry.
+    /// Returns the columns of this entry.
     pub(super) fn column_paths(&self, indexing: Indexing) -> Vec<ColumnPath> {
         let column_path = |path: String, holds| ColumnPath {
             path,

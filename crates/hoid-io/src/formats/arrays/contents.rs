@@ -1,38 +1,38 @@
-//! Contents of a file of named arrays: paths with values.
+//! Contents of a file of named arrays: values and their paths.
 
 use super::array::Array;
 
-/// Notation of the lines of a matrix.
+/// Notation for the rows and columns of a matrix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Indexing {
     Matlab,
     Python,
 }
 
-/// Name under which comments are stored as text.
+/// Name of the array in which comments are stored as text.
 pub(crate) const COMMENTS: &str = "hoid_comments";
 
 /// First words of the description of a MATLAB object.
 pub(crate) const OBJECT: &str = "an object of the class";
 
-/// Value of a path.
+/// The value at a path.
 #[derive(Debug, Clone)]
 pub(crate) enum Value {
     Array(Array),
     Texts(Vec<String>),
-    /// Unsupported content, as text.
+    /// Unsupported content, described in words.
     Unread(String),
 }
 
 /// An entry of a file.
 #[derive(Debug, Clone)]
 pub(crate) struct Entry {
-    /// Path, such as `e`, `data.run(3).e` or `c{2}`.
+    /// Path of the entry, such as `e`, `data.run(3).e` or `c{2}`.
     pub(crate) path: String,
-    /// The enclosing structure, such as `data.run(3)`; empty at top level.
+    /// Path of the enclosing structure, such as `data.run(3)`; empty at top level.
     pub(crate) parent: String,
     pub(crate) value: Value,
-    /// Unit; empty when unknown.
+    /// Unit of the values; empty if unknown.
     pub(crate) unit: String,
 }
 
@@ -47,7 +47,7 @@ impl Entry {
         }
     }
 
-    /// Creates an entry in a structure, or at top level if the structure has no name.
+    /// Creates an entry in a structure, or at top level if the name of the structure is empty.
     pub(crate) fn field(parent: &str, name: &str, value: Value) -> Self {
         let path = if parent.is_empty() {
             name.to_owned()
@@ -69,16 +69,16 @@ pub(crate) struct Contents {
     pub(crate) comments: Vec<String>,
     /// Notes on reading.
     pub(crate) notes: Vec<String>,
-    /// Notation of the lines of a matrix.
+    /// Notation for the rows and columns of a matrix.
     pub(crate) indexing: Indexing,
-    /// True if each structure holds its own times on a common clock, so that its columns can be
-    /// aligned with those of another.
+    /// True if each structure has its own times on a common clock, so that columns of different structures can be
+    /// aligned.
     pub(crate) own_clocks: bool,
 }
 
 impl Contents {
     pub(crate) fn new(mut entries: Vec<Entry>, indexing: Indexing) -> Self {
-        // Names are printed: they must not contain terminal control characters.
+        // Names are printed and therefore must not contain terminal control characters.
         for text in entries
             .iter_mut()
             .flat_map(|entry| [&mut entry.path, &mut entry.parent])

@@ -1,15 +1,14 @@
-//! Files of named arrays: NPZ, MATLAB, XDF. Their contents are a list of paths, each with an array,
-//! a text or unsupported content; this module makes records and tables from the list, in the same
-//! way for all formats.
+//! Files of named arrays: NPZ, MATLAB, XDF. The contents of a file are a list of paths, each with an array, a text or
+//! unsupported content; this module builds records and tables from the list in the same way for all formats.
 //!
 //! | module | contents |
 //! |---|---|
 //! | `numbers` | [`Numbers`]: bytes with a type |
 //! | `array` | [`Array`]: numbers with dimensions |
 //! | `contents` | [`Contents`]: the contents of a file |
-//! | `column_path` | [`ColumnPath`]: arrays as columns, matrices line by line |
-//! | `selection` | [`table_of`]: the columns of a record, and those next to them |
-//! | `clocks` | columns at the times of another |
+//! | `column_path` | [`ColumnPath`]: arrays as columns; a matrix gives several columns |
+//! | `selection` | [`table_of`]: the columns of a record, and the other columns of the same structure |
+//! | `clocks` | interpolation of columns to the times of another stream |
 //! | `results` | [`output_table_of`]: all columns, as a table of results |
 
 mod array;

@@ -1,4 +1,4 @@
-//! Numbers as stored in a file: bytes, a type and a stride. They are converted to `f64` on request.
+//! Numbers as stored in a file: bytes, a type and a stride. The numbers are converted to `f64` on request.
 
 use std::rc::Rc;
 
@@ -41,7 +41,7 @@ impl Kind {
         matches!(self, Self::F16 | Self::F32)
     }
 
-    /// Name of the type in numpy and MATLAB.
+    /// Name of the type as in numpy and MATLAB.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::F16 => "half",
@@ -84,7 +84,7 @@ impl Numbers {
         }
     }
 
-    /// Takes one number from each item of `item` bytes, at `offset` bytes from its start.
+    /// Extracts a field: one number from each item of `item` bytes, at `offset` bytes from the start of the item.
     pub(crate) fn field(bytes: &Rc<Vec<u8>>, kind: Kind, big_endian: bool, offset: usize, item: usize) -> Self {
         let fits = offset.checked_add(kind.size()).is_some_and(|end| end <= item);
         Self {
@@ -101,7 +101,7 @@ impl Numbers {
         }
     }
 
-    /// Wraps numbers that are already `f64`.
+    /// Stores numbers that are already `f64`.
     pub(crate) fn from_f64(values: &[f64]) -> Self {
         Self::new(values.iter().flat_map(|v| v.to_le_bytes()).collect(), Kind::F64, false)
     }
@@ -114,8 +114,7 @@ impl Numbers {
         self.kind
     }
 
-    /// Takes each `stride`-th number from `first` on, `len` of them; numbers that do not exist are
-    /// omitted.
+    /// Selects every `stride`-th number, starting at `first`, `len` in total; numbers beyond the end are omitted.
     pub(crate) fn line(&self, first: usize, stride: usize, len: usize) -> Self {
         let there = self.len.saturating_sub(first).div_ceil(stride.max(1));
         Self {
@@ -126,7 +125,7 @@ impl Numbers {
         }
     }
 
-    /// The number at an index; NaN if there is none.
+    /// Returns the number at an index; NaN if the index is out of range.
     pub(crate) fn value(&self, at: usize) -> f64 {
         let Some(bytes) = self.bytes_of(at) else {
             return f64::NAN;
@@ -145,17 +144,17 @@ impl Numbers {
         }
     }
 
-    /// The 8-byte integer at an index.
+    /// Returns the 8-byte integer at an index.
     pub(crate) fn whole(&self, at: usize) -> Option<i64> {
         self.bytes_of(at).map(i64::from_le_bytes)
     }
 
-    /// All numbers as `f64`.
+    /// Returns all numbers as `f64`.
     pub(crate) fn values(&self) -> Vec<f64> {
         (0..self.len).map(|at| self.value(at)).collect()
     }
 
-    /// All numbers as counts, if each is one.
+    /// Returns all numbers as counts; `None` if any of them is not a count.
     pub(crate) fn counts(&self) -> Option<Vec<u64>> {
         let count = |at: usize| {
             let n = self.bytes_of(at).map(u64::from_le_bytes)?;
@@ -171,7 +170,7 @@ impl Numbers {
         (0..self.len).map(count).collect()
     }
 
-    /// The bytes of a number, little-endian, followed by zeros.
+    /// Returns the bytes of a number, little-endian, padded with zeros.
     fn bytes_of(&self, at: usize) -> Option<[u8; 8]> {
         let size = self.kind.size();
         let from = at.checked_mul(self.step)?.checked_add(self.start)?;

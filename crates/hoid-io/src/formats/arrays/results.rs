@@ -1,4 +1,4 @@
-//! All arrays of a file as a table of results.
+//! Conversion of all arrays of a file to a table of results.
 
 use super::column_path::Holds;
 use super::contents::Contents;
@@ -6,7 +6,7 @@ use crate::IoError;
 use crate::results::{ColumnValues, OutputColumn, OutputTable};
 use crate::wording::shown;
 
-/// All columns, for a table of results.
+/// Converts all columns to a table of results.
 pub(crate) fn output_table_of(contents: Contents, file: &str) -> Result<OutputTable, IoError> {
     let mut columns: Vec<OutputColumn> = Vec::new();
     for column_path in contents.column_paths() {

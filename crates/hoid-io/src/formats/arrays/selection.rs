@@ -1,9 +1,9 @@
-//! Selection of the columns of a record among all arrays of a file.
+//! Selection of the columns of a record from all arrays of a file.
 //!
-//! A name is a path (`data.run(3).e`), or its end if only one path has that end (`run(3).e`, or
-//! `e`); a path equal to the name takes precedence. `run(1).e` also matches the only element
-//! `run.e`. The time is `t`, or `time`, in the structure of the output or the nearest enclosing
-//! one. The other arrays in the structure of the output become channels if they have the same length.
+//! A name is a path (`data.run(3).e`), or the end of a path if only one path ends so (`run(3).e`, or `e`); a path equal
+//! to the name takes precedence. `run(1).e` also matches `run.e` if `run` has a single element. The time is `t`, or
+//! `time`, in the structure of the output or in the nearest enclosing structure. The other arrays in the structure of
+//! the output become channels if they have the same length.
 
 use std::ops::Range;
 
@@ -13,20 +13,20 @@ use super::contents::Contents;
 use super::numbers::Numbers;
 use crate::IoError;
 use crate::record::ReadOptions;
-use crate::table::{Column, ColumnExpression, Precision, Signal, Source, Table, asides};
+use crate::table::{Column, ColumnExpression, Precision, Signal, Source, Table, read_comments};
 use crate::time::is_time;
 use crate::wording::{list, shown};
 
 /// Names of the time column, in order of precedence.
 pub(crate) const TIMES: [&str; 2] = ["t", "time"];
 
-/// Unit of clock times, in s from the first.
+/// Unit of clock times, which are converted to s from the first one.
 pub(crate) const MOMENTS: &str = "s from the first";
 
-/// Maximum number of columns of a record; further ones are left out.
+/// Maximum number of columns of a record; further columns are left out.
 const MOST_COLUMNS: usize = 1024;
 
-/// Origin of the rows of a table.
+/// Source of the rows of a table.
 struct ArraySource<'a> {
     file: &'a str,
     columns: Vec<Numbers>,
@@ -53,11 +53,11 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
     let column_paths = contents.column_paths();
     let expressions: Vec<&ColumnExpression> = options.input.iter().chain([&options.output]).collect();
     let named = Named::of(&column_paths, &expressions, file)?;
-    // Input first, output last.
+    // The input comes first, the output last.
     let mut used: Vec<usize> = Vec::new();
     for expression in &expressions {
         let resolved = expression.resolve(&named.names(), file).map_err(|error| {
-            // If there is an object, it holds the signals.
+            // If the file contains a MATLAB object, the object is assumed to hold the signals.
             let object = column_paths.iter().find(|column_path| column_path.holds_object());
             object.map_or(error, |object| object.refused(file))
         });
@@ -129,7 +129,7 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
             list(&left_out)
         ));
     }
-    // Rows for which the other streams have samples as well.
+    // Only rows for which the other streams also have samples are kept.
     let rows = shared.unwrap_or(0..rows);
     if rows.is_empty() {
         return Err(IoError::NoOverlap { file: file.to_owned() });
@@ -141,7 +141,7 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
         .iter()
         .map(|(name, column_path, numbers)| column(name, column_path, numbers))
         .collect();
-    let sample_time_s = asides(contents.comments.iter().map(String::as_str), &mut read);
+    let sample_time_s = read_comments(contents.comments.iter().map(String::as_str), &mut read);
     let columns = columns.iter().map(|(.., numbers)| numbers.clone()).collect();
     Ok(Table {
         columns: read,
@@ -176,14 +176,14 @@ fn column(name: &str, column_path: &ColumnPath, numbers: &Numbers) -> Column {
         values,
         texts: Vec::new(),
         moments: column_path.unit == MOMENTS,
-        made: Vec::new(),
+        filled_rows: Vec::new(),
         is_held: false,
     }
 }
 
-/// Columns by the names that expressions may use.
+/// Columns with the names that expressions may use.
 struct Named<'a> {
-    /// The paths, followed by the names that match one path only.
+    /// All paths, followed by the shorter names that match exactly one path.
     columns: Vec<(String, &'a ColumnPath)>,
 }
 
@@ -230,7 +230,7 @@ impl<'a> Named<'a> {
     }
 }
 
-/// Those whose paths end in a name, compared part by part.
+/// Returns the columns whose paths end in a name, compared part by part.
 fn ends<'a>(column_paths: &'a [ColumnPath], name: &str) -> Vec<&'a ColumnPath> {
     let ending = |name: &str| -> Vec<&'a ColumnPath> {
         let ends = |column_path: &&ColumnPath| {
@@ -239,7 +239,7 @@ fn ends<'a>(column_paths: &'a [ColumnPath], name: &str) -> Vec<&'a ColumnPath> {
         column_paths.iter().filter(ends).collect()
     };
     let found = ending(name);
-    // The first of one.
+    // A structure with a single element has no index in its path.
     if found.is_empty() && name.contains("(1)") {
         ending(&name.replace("(1)", ""))
     } else {
@@ -247,7 +247,7 @@ fn ends<'a>(column_paths: &'a [ColumnPath], name: &str) -> Vec<&'a ColumnPath> {
     }
 }
 
-/// The time in the structure of the output, or the nearest enclosing one, with the same length.
+/// Returns the time of the given length in the structure of the output or in the nearest enclosing structure.
 fn time_beside<'a>(column_paths: &'a [ColumnPath], beside: &str, rows: usize) -> Option<&'a ColumnPath> {
     let mut place = beside;
     loop {

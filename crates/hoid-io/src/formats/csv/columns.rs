@@ -1,16 +1,16 @@
-//! Columns of results in CSV, written and read.
+//! Writing and reading of the columns of results in CSV.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use super::text::{as_meant, comments, harmless, is_aside, place, reader, row_start, separator, text};
+use super::text::{unescape_formula, comments, escape_formula, is_aside, place, reader, row_start, separator, text};
 use crate::IoError;
 use crate::formats::format::RowWriter;
 use crate::results::{ColumnKind, ColumnValues, OutputColumn, OutputTable, TableSchema, Values};
 use crate::table::{Cell, check_names};
 use crate::wording::shown;
 
-/// State of a file between its rows.
+/// State of a file between groups of rows.
 struct CsvColumns {
     separator: u8,
 }
@@ -33,19 +33,19 @@ impl RowWriter for CsvColumns {
             for column in columns {
                 cell.clear();
                 let written = match column {
-                    // The fewest digits, with a point or an exponent, which distinguishes them from
-                    // integers.
+                    // The fewest digits that reproduce the number, with a point or an exponent, which distinguishes
+                    // reals from integers.
                     Values::Real(values) => {
                         (values.get(row).filter(|value| !value.is_nan())).map(|value| write!(cell, "{value:?}"))
                     }
                     Values::Whole(values) => values.get(row).map(|value| write!(cell, "{value}")),
                     Values::Text(values) => {
                         let text = values.get(row).map_or("", String::as_str);
-                        csv.write_field(harmless(text).as_bytes())?;
+                        csv.write_field(escape_formula(text).as_bytes())?;
                         continue;
                     }
                 };
-                // Writing into a String does not fail.
+                // Writing to a String cannot fail.
                 debug_assert!(written.is_none_or(|written| written.is_ok()));
                 csv.write_field(&cell)?;
             }
@@ -67,7 +67,7 @@ impl CsvColumns {
         let this = Self { separator };
         let mut csv = this.writer(file);
         for column in &schema.columns {
-            csv.write_field(harmless(&column.name).as_bytes())?;
+            csv.write_field(escape_formula(&column.name).as_bytes())?;
         }
         csv.write_record(None::<&[u8]>)?;
         csv.flush()?;
@@ -78,7 +78,7 @@ impl CsvColumns {
     fn writer<'a>(&self, file: &'a mut dyn Write) -> csv::Writer<&'a mut dyn Write> {
         csv::WriterBuilder::new()
             .delimiter(self.separator)
-            // Texts that start with # are quoted.
+            // With this setting texts that start with # are quoted.
             .comment(Some(b'#'))
             .from_writer(file)
     }
@@ -115,7 +115,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<OutputTable, IoError> {
                     Cell::Missing | Cell::Text => f64::NAN,
                 }),
                 ColumnValues::Whole(values) => values.push(whole(cell).unwrap_or_default()),
-                ColumnValues::Text(values) => values.push(as_meant(cell).to_owned()),
+                ColumnValues::Text(values) => values.push(unescape_formula(cell).to_owned()),
             }
         }
     }
@@ -128,14 +128,14 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<OutputTable, IoError> {
     })
 }
 
-/// Names and kinds of the columns, and the number of rows.
+/// Determines the names and kinds of the columns, and the number of rows.
 fn survey(text: &str, file: &str, separator: u8) -> Result<(Vec<String>, Vec<ColumnKind>, usize), IoError> {
     let mut reader = reader(text.as_bytes(), separator);
     let mut record = csv::ByteRecord::new();
     let mut names: Vec<String> = Vec::new();
     let mut kinds = Vec::new();
     let mut rows = 0_usize;
-    // The reader fails only on I/O errors, which cannot occur here.
+    // The reader fails only on I/O errors, which cannot occur when reading from memory.
     while matches!(reader.read_byte_record(&mut record), Ok(true)) {
         let line = || {
             let at = record.position().map_or(0, |p| p.byte() as usize);
@@ -144,7 +144,7 @@ fn survey(text: &str, file: &str, separator: u8) -> Result<(Vec<String>, Vec<Col
         if names.is_empty() {
             names = record
                 .iter()
-                .map(|name| as_meant(utf8(name).trim()).to_owned())
+                .map(|name| unescape_formula(utf8(name).trim()).to_owned())
                 .collect();
             if names.iter().all(|name| !matches!(Cell::parse(name), Cell::Text)) {
                 return Err(IoError::NoHeader {
@@ -181,13 +181,13 @@ fn survey(text: &str, file: &str, separator: u8) -> Result<(Vec<String>, Vec<Col
     Ok((names, kinds, rows))
 }
 
-/// An integer as written: digits without leading zeros.
+/// Parses an integer as hoid writes it: digits without leading zeros.
 fn whole(cell: &str) -> Option<u64> {
     let digits = cell.bytes().all(|b| b.is_ascii_digit()) && (cell == "0" || !cell.starts_with('0'));
     digits.then(|| cell.parse().ok()).flatten()
 }
 
-/// The text is valid UTF-8 and the separators are ASCII, so that each cell is valid as well.
+/// The text is valid UTF-8 and the separators are ASCII, so each cell is valid UTF-8.
 fn utf8(cell: &[u8]) -> &str {
     std::str::from_utf8(cell).unwrap_or("\u{fffd}")
 }

@@ -1,18 +1,18 @@
-//! Text of other programs, converted to what the table reader accepts: UTF-16 and Latin 1, lines
-//! above the header, a line of units below it, columns separated by blanks.
+//! Conversion of text from other programs to text that the table reader accepts: UTF-16 and Latin 1, lines above the
+//! header, a line of units below the header, columns separated by blanks.
 //!
-//! The conversion works line by line on the bytes, so that messages still refer to the lines of the file.
+//! The conversion keeps the order of the lines, so that messages still refer to lines of the file.
 
 use super::text::{is_aside, is_unit, separator};
 use crate::table::{Cell, with_decimal_point};
 
-/// Number of lines in which the header is searched for.
+/// Number of lines at the start of a file in which the header is searched for.
 const LINES: usize = 60;
 
-/// Letters and signs of Latin 1 that occur in units and column names; other bytes are damage.
+/// Latin 1 letters and signs that occur in units and column names; other non-ASCII bytes count as damage.
 const LATIN: &[u8] = b"\xb0\xb2\xb3\xb5\xc4\xc9\xd6\xdc\xdf\xe0\xe4\xe7\xe8\xe9\xea\xf1\xf6\xfc";
 
-/// Rewrites the bytes of a table, and returns the changes made.
+/// Rewrites the bytes of a table and describes the changes made.
 pub(super) fn made_plain(bytes: &mut Vec<u8>) -> Vec<String> {
     let mut notes = Vec::new();
     if let Some(text) = utf16(bytes) {
@@ -46,7 +46,7 @@ pub(super) fn made_plain(bytes: &mut Vec<u8>) -> Vec<String> {
     notes
 }
 
-/// Decodes UTF-16 text, recognised by its byte order mark.
+/// Decodes UTF-16 text, which is recognised by its byte order mark.
 fn utf16(bytes: &[u8]) -> Option<String> {
     let (unit, rest): (fn([u8; 2]) -> u16, _) = match bytes {
         [0xff, 0xfe, rest @ ..] => (u16::from_le_bytes, rest),
@@ -70,7 +70,8 @@ fn is_number(cell: &str) -> bool {
     )
 }
 
-/// Replaces blanks by tabs in a table separated by blanks, if the header has as many words as each line has numbers.
+/// Replaces blanks by tabs in a table separated by blanks, if the header has as many words as each line below it has
+/// numbers.
 fn between_tabs(text: &str) -> Option<String> {
     let mut lines = text.lines().filter(|line| !is_aside(line));
     let header = lines.next()?;
@@ -93,20 +94,20 @@ fn between_tabs(text: &str) -> Option<String> {
     })
 }
 
-/// Units by which a line of units is recognised; its other entries may be any short words.
+/// Known units. A line of units must contain at least one of them; its other entries may be any short words.
 const UNITS: [&str; 24] = [
     "s", "sec", "ms", "us", "µs", "min", "deg", "°", "rad", "mrad", "deg/s", "rad/s", "m", "mm", "cm", "ft", "m/s",
     "v", "mv", "ma", "n", "nm", "%", "hz",
 ];
 
-/// The unit that a cell below the header names, without brackets; `None` if it names something else.
+/// Returns the unit in a cell below the header, without brackets; `None` if the cell contains no unit.
 fn unit(cell: &str) -> Option<&str> {
     let cell = unquoted(cell);
     let inside = [('[', ']'), ('(', ')')]
         .into_iter()
         .find_map(|(open, close)| cell.strip_prefix(open)?.strip_suffix(close));
     let unit = inside.unwrap_or(cell).trim();
-    // Commas divide the units of a comment.
+    // In the comment commas separate the units.
     let names_one = unit.is_empty() || is_unit(unit) && !unit.contains(',') && !is_number(unit);
     names_one.then_some(unit)
 }
@@ -115,7 +116,8 @@ fn unquoted(cell: &str) -> &str {
     cell.trim().trim_matches('"').trim()
 }
 
-/// A line of units between the header and the first numbers becomes the comment `# units: t s, e deg` above the header.
+/// Converts a line of units between the header and the first numbers to the comment `# units: t s, e deg` above the
+/// header.
 fn units_above(text: &str) -> Option<String> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let lines = text.lines().take(LINES).enumerate();
@@ -147,7 +149,7 @@ fn units_above(text: &str) -> Option<String> {
     Some(lines.iter().enumerate().map(placed).collect())
 }
 
-/// The cells of a line, divided by a mark or else by blanks.
+/// Splits a line into cells at a separator, or at blanks if there is none.
 fn cells(line: &str, mark: Option<char>) -> Vec<&str> {
     match mark {
         Some(mark) => line.split(mark).collect(),
@@ -155,7 +157,8 @@ fn cells(line: &str, mark: Option<char>) -> Vec<&str> {
     }
 }
 
-/// True if `names` can be the header of `row`: as many cells, most cells of the row numeric, and no name a number.
+/// True if `names` can be the header of `row`: it has as many cells as `row`, more than half of these are numbers, and
+/// no name is a number.
 fn is_header(names: &[&str], row: &[&str]) -> bool {
     let numbers = row.iter().filter(|cell| is_number(cell)).count();
     names.len() > 1
@@ -164,8 +167,8 @@ fn is_header(names: &[&str], row: &[&str]) -> bool {
         && !names.iter().any(|name| is_number(name))
 }
 
-/// Marks the lines above the header as comments, and returns their number. The header is the first
-/// line of words over a line of as many cells, most of them numbers.
+/// Marks the lines above the header as comments and returns their number. The header is the first line of words
+/// directly above a line with the same number of cells, most of them numbers.
 fn without_preamble(text: &str) -> Option<(usize, String)> {
     let lines = text.lines().take(LINES).enumerate();
     let filled: Vec<(usize, &str)> = lines.filter(|(_, line)| !is_aside(line)).collect();
@@ -180,11 +183,11 @@ fn without_preamble(text: &str) -> Option<(usize, String)> {
     };
     let mark = Some(char::from(separator(header)));
     let count = |line: &str| cells(line, mark).len();
-    // A line of as many cells is the header; the units are below it.
+    // A line above with the same number of cells is the header, and the line found is its line of units.
     if above.is_empty() || above.iter().any(|(_, line)| count(line) == count(header)) {
         return None;
     }
-    // Line breaks are kept.
+    // Line ends are kept.
     let marked = |(at, line): (usize, &str)| {
         if above.iter().any(|(above, _)| *above == at) {
             format!("#{line}")

@@ -1,10 +1,10 @@
-//! A long text of plain numbers, read block by block: neither its bytes nor the columns that were not requested are
-//! kept in memory, and reading ends after the requested span.
+//! Reading of a long text of plain numbers, block by block: neither the whole text nor the columns that were not
+//! requested are kept in memory.
 //!
-//! The first lines are read as any table is, with their names, units and notes. All rows after them must be plain
+//! The first lines, with their names, units and notes, are read as in any other table. All further rows must be plain
 //! ([`super::plain`]); if a row is not, no table is returned, and the whole text is read by [`super::table`].
 //!
-//! Reading ends early, after the requested span ([`super::span_end`]).
+//! Reading stops after the requested span ([`super::span_end`]).
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
@@ -19,27 +19,27 @@ use crate::table::{Cell, Source, Table, check_selected, selected};
 use crate::time::{is_time, may_be_time};
 use crate::wording::shown;
 
-/// Shorter files are read as a whole, bytes.
+/// Minimum size in bytes of a file that is read block by block.
 const LONG: u64 = 16 << 20;
-/// Bytes that contain the header and the first rows.
+/// Number of bytes read to obtain the header and the first rows.
 const HEAD: usize = 256 << 10;
-/// Bytes of the first block; each next one is twice as long, up to [`LARGEST`].
+/// Size of the first block in bytes; each further block is twice as long as the previous one, up to [`LARGEST`].
 const BLOCK: usize = 1 << 20;
 const LARGEST: usize = 32 << 20;
-/// Number of positions in the rest of a file at which the time is examined.
+/// Number of positions in the unread part of a file at which the time is probed.
 const PROBES: u32 = 64;
-/// Bytes read at such a position: more than a line has.
+/// Number of bytes read at such a position; it exceeds the length of a line.
 const PROBE: usize = 64 << 10;
 
-/// The table of a long text; `None` if it is short, or something in it is more than plain numbers.
+/// Reads the table of a long text; `None` if the text is short, or if it contains anything other than plain numbers.
 ///
 /// # Errors
-/// The file cannot be read.
+/// An error of the operating system if the file cannot be read.
 pub(crate) fn table<'a>(path: &Path, file: &'a str, options: &ReadOptions) -> io::Result<Option<Table<'a>>> {
     of_length(path, file, options, LONG)
 }
 
-/// The table of a text of at least `long` bytes.
+/// Reads the table of a text of at least `long` bytes.
 fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -> io::Result<Option<Table<'a>>> {
     let Ok(about) = std::fs::metadata(path) else {
         return Ok(None);
@@ -60,7 +60,7 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
     };
     let separator = parsed.separator;
     let names: Vec<String> = parsed.columns.iter().map(|column| column.name.clone()).collect();
-    // Missing columns are reported by the reader of whole texts, together with all existing columns.
+    // The reader of whole texts reports missing columns, with a list of all columns that exist.
     let known: Vec<&str> = names.iter().map(String::as_str).collect();
     if check_selected(&known, options, file).is_err() {
         return Ok(None);
@@ -75,11 +75,12 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
         wanted: &wanted,
     };
     let end = SpanEnd::of(&parsed, file, options);
-    // Room for all rows, from the length of the first ones: unfilled room takes no memory.
+    // Capacity for all rows, estimated from the length of the first rows: unused capacity takes no physical memory.
     let parts = text.length as f64 / text.at as f64;
     let rows = if end.is_some() { 0.0 } else { parsed.rows as f64 * parts };
     for (column, _) in parsed.columns.iter_mut().zip(&wanted).filter(|(_, wanted)| **wanted) {
-        // A sparse file may be longer than any memory; its rows are not.
+        // The size of a sparse file may exceed any memory although it contains few rows; a failed reservation is
+        // ignored.
         let _ = column.values.try_reserve((rows as usize).saturating_sub(parsed.rows));
     }
     let mut may_end = end.is_some();
@@ -125,18 +126,19 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
 /// A file that is read from start to end.
 struct Text {
     file: File,
-    /// Position of the next byte.
+    /// Position of the next unread byte.
     at: usize,
-    /// Bytes that were read, and how many of them are whole lines.
+    /// Bytes in memory; the first `lines` of them form complete lines.
     buffer: Vec<u8>,
     lines: usize,
     length: usize,
-    /// Bytes of the next block.
+    /// Size of the next block in bytes.
     next: usize,
 }
 
 impl Text {
-    /// The first lines, read as any table; `None` if they are not those of a table of numbers with a decimal point.
+    /// Reads the first lines as those of any other table; `None` unless the table contains only numbers with decimal
+    /// points.
     fn head(&mut self, file: &str) -> io::Result<Option<Parsed>> {
         let mut bytes = self.bytes(0, HEAD)?;
         let Some(line) = bytes.iter().rposition(|byte| *byte == b'\n') else {
@@ -160,14 +162,14 @@ impl Text {
         Ok(parsed.filter(is_plain))
     }
 
-    /// The lines that were read last.
+    /// Returns the lines that were read last.
     fn lines(&self) -> &[u8] {
         self.buffer.get(..self.lines).unwrap_or(&self.buffer)
     }
 
-    /// Reads the next lines; returns the position of the first, `None` at the end.
+    /// Reads the next lines and returns the position of the first of them; `None` at the end of the file.
     fn advance(&mut self) -> io::Result<Option<usize>> {
-        // One buffer for all blocks.
+        // The same buffer is used for all blocks.
         self.buffer.drain(..self.lines);
         let base = self.at.saturating_sub(self.buffer.len());
         loop {
@@ -184,7 +186,7 @@ impl Text {
         }
     }
 
-    /// Some bytes of the file, independent of the reading position.
+    /// Reads bytes at a given position of the file, regardless of the current reading position.
     fn bytes(&mut self, from: usize, most: usize) -> io::Result<Vec<u8>> {
         self.file.seek(SeekFrom::Start(from as u64))?;
         let mut bytes = Vec::with_capacity(most);
@@ -192,15 +194,16 @@ impl Text {
         Ok(bytes)
     }
 
-    /// Values of a column at positions from here to the end, in order; NaN where there is none.
+    /// Returns the values of a column at positions from here to the end of the file, in order; NaN where no value was
+    /// found.
     fn probed(&mut self, column: usize, separator: u8) -> io::Result<Vec<f64>> {
         let here = self.at;
         let from = here.saturating_sub(self.buffer.len().saturating_sub(self.lines));
-        // A file that grows while it is read may be beyond its length already.
+        // If the file grows while it is read, the position may exceed the original length.
         let rest = self.length.saturating_sub(from) as f64;
         let value = |text: &mut Self, part: f64| -> io::Result<f64> {
             let bytes = text.bytes(from.saturating_add((rest * part) as usize), PROBE)?;
-            // A position is in the middle of a line; the next line is complete.
+            // The position may be in the middle of a line; the next line is complete.
             let line = bytes.split(|byte| *byte == b'\n').nth(1).unwrap_or_default();
             let row = nth_row(line, 0, separator);
             let cell = row.as_ref().and_then(|(_, row)| row.get(column)).unwrap_or_default();
@@ -209,7 +212,7 @@ impl Text {
                 Cell::Missing | Cell::Text => f64::NAN,
             })
         };
-        // Multiples of the golden section are never in step with trials of one length.
+        // The fractional parts of multiples of the golden ratio are not periodic, unlike trials of equal length.
         let mut parts: Vec<f64> = (1..=PROBES)
             .map(|k| (f64::from(k) * 0.618_033_988_749_895).fract())
             .collect();
@@ -223,7 +226,7 @@ impl Text {
     }
 }
 
-/// The file, read again if a message needs a line or a cell.
+/// The file, which is read again if a message needs a line or a cell.
 struct LongSource<'a> {
     file: &'a str,
     path: PathBuf,
@@ -232,12 +235,12 @@ struct LongSource<'a> {
 }
 
 impl LongSource<'_> {
-    /// Position of a row, and its cells.
+    /// Returns the position and the cells of a row.
     fn row(&self, row: usize) -> Option<(usize, csv::ByteRecord)> {
         let (from, behind) = self.starts.before(row)?;
         let mut file = File::open(&self.path).ok()?;
         file.seek(SeekFrom::Start(from as u64)).ok()?;
-        // The rows up to the next one whose position is known, or up to the last.
+        // The text from this row to the next row with a known position, or to the last row.
         let end = self
             .starts
             .before(row.saturating_add(RowStarts::KEPT))

@@ -2,13 +2,13 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | `foreign` | files from other programs, converted to plain CSV |
+//! | `foreign` | conversion of files from other programs to plain CSV |
 //! | `text` | encoding, comments, separator, lines |
-//! | `table`, `plain` | the columns of a record; its rows of plain numbers, fast |
-//! | `long` | a long text of plain numbers, block by block |
-//! | `span_end` | the row at which reading stops if only a span is needed |
-//! | `record` | a record into CSV |
-//! | `columns` | tables of results, out and in |
+//! | `table`, `plain` | the columns of a record; fast reading of rows of plain numbers |
+//! | `long` | reading of a long text of plain numbers, block by block |
+//! | `span_end` | the row at which reading stops if only a span is requested |
+//! | `record` | writing of a record |
+//! | `columns` | writing and reading of tables of results |
 
 mod columns;
 mod foreign;
@@ -27,7 +27,7 @@ use crate::formats::format::{Format, Reading, Writing};
 /// Written with commas; read with any separator.
 pub(super) const CSV: Format = Format {
     name: "CSV",
-    endings: &["csv", "txt"],
+    extensions: &["csv", "txt"],
     reading: READING,
     writing: Writing::Rows(columns::start_with_commas),
     record: Some(record::write_with_commas),
@@ -36,7 +36,7 @@ pub(super) const CSV: Format = Format {
 /// Written with tabs.
 pub(super) const TSV: Format = Format {
     name: "CSV",
-    endings: &["tsv"],
+    extensions: &["tsv"],
     reading: READING,
     writing: Writing::Rows(columns::start_with_tabs),
     record: Some(record::write_with_tabs),

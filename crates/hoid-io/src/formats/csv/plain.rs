@@ -1,26 +1,26 @@
-//! Fast reader for rows of plain numbers, as nearly all rows of a recording are.
+//! Fast reader for rows of plain numbers; nearly all rows of a recording are plain.
 //!
-//! A row is plain if each of its cells is empty or a number with a decimal point, with at most
-//! blanks around it, and cells of columns that were not requested contain any text without quotes. Any other row
-//! (texts, quotes, comments, too many or too few cells) ends the run, and is read by the full CSV reader
-//! ([`super::table`]). The numbers are the same, correctly rounded by both (D. Lemire, *Software: Practice and
-//! Experience* 51 (2021) 1700-1727).
+//! A row is plain if each cell of a requested column is empty or a number with a decimal point, with only blanks around
+//! it; cells of other columns may contain any text without quotes. Any other row (texts, quotes, comments, too many or
+//! too few cells) ends the run and is read by the full CSV reader ([`super::table`]). Both readers round correctly and
+//! return the same numbers (D. Lemire, *Software: Practice and Experience* 51 (2021) 1700-1727).
 //!
-//! A long text is read in parallel in parts that end at a line break. Each part reports how far it
-//! was plain; everything after the first row that was not is discarded.
+//! A long text is divided at line ends into parts that are read in parallel. For each part the reader reports the
+//! position of the first row that is not plain; parts after this row are discarded.
 
 use std::ops::Range;
 use std::thread;
 
 use crate::table::Precision;
 
-/// Bytes of a part: enough rows to justify a thread, and small compared with the columns.
+/// Size of a part in bytes: large enough to justify a thread, and small compared with the columns.
 const PART: usize = 4 << 20;
-/// Bytes of the first part, which is read without a thread: if rows that are not plain are frequent, it contains one.
+/// Size in bytes of the first part, which is read without a thread: if rows that are not plain are frequent, this part
+/// contains one.
 const FIRST: usize = 64 << 10;
 /// Maximum number of threads.
 const THREADS: usize = 8;
-/// Positions of the rows of a table in its text: every [`KEPT`](RowStarts::KEPT)-th, and the last.
+/// Positions of rows in the text of a table: of every [`KEPT`](RowStarts::KEPT)-th row and of the last row.
 #[derive(Debug, Default)]
 pub(super) struct RowStarts {
     kept: Vec<usize>,
@@ -29,10 +29,10 @@ pub(super) struct RowStarts {
 }
 
 impl RowStarts {
-    /// Interval of the rows whose position is kept.
+    /// Interval between rows whose position is kept.
     pub(super) const KEPT: usize = 1024;
 
-    /// Adds a row.
+    /// Adds the position of a row.
     pub(super) fn push(&mut self, start: usize) {
         if self.rows.is_multiple_of(Self::KEPT) {
             self.kept.push(start);
@@ -51,7 +51,7 @@ impl RowStarts {
         (self.rows > 0).then_some(self.last)
     }
 
-    /// The position of the nearest row at or before `row` that is kept, and the number of rows from there to `row`.
+    /// Returns the kept position of the nearest row at or before `row`, and the number of rows from that row to `row`.
     pub(super) fn before(&self, row: usize) -> Option<(usize, usize)> {
         Some((*self.kept.get(row / Self::KEPT)?, row % Self::KEPT))
     }
@@ -60,7 +60,7 @@ impl RowStarts {
 /// Consecutive plain rows.
 #[derive(Debug, Default)]
 pub(super) struct Plain {
-    /// Values by column.
+    /// Values, one vector per column.
     pub(super) values: Vec<Vec<f64>>,
     /// Precision of the columns for which it was requested.
     pub(super) precision: Vec<Precision>,
@@ -70,7 +70,8 @@ pub(super) struct Plain {
     pub(super) end: usize,
 }
 
-/// Layout of the rows: the separator, the columns whose precision is requested, and those whose values are.
+/// Layout of the rows: the separator, the columns whose precision is requested, and the columns whose values are
+/// requested.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layout<'a> {
     pub(super) separator: u8,
@@ -79,7 +80,8 @@ pub(super) struct Layout<'a> {
     pub(super) wanted: &'a [bool],
 }
 
-/// Passes on the plain rows from `from` on, in runs, in their order.
+/// Reads plain rows starting at position `from` and passes them to `take`, run by run; returns the position of the
+/// first row that is not plain.
 pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take: impl FnMut(Plain)) -> usize {
     let threads = thread::available_parallelism().map_or(1, |n| n.get().min(THREADS));
     let mut at = from;
@@ -109,7 +111,7 @@ pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take
                     scope.spawn(move || run(bytes, part, layout))
                 };
                 let running: Vec<_> = parts.iter().map(each).collect();
-                // If a thread panicked, its part is left to the full CSV reader.
+                // If a thread panicked, the full CSV reader reads its part.
                 let joined = running.into_iter().zip(&parts);
                 joined
                     .map(|(thread, part)| thread.join().unwrap_or_else(|_| Plain::nothing(layout, part.start)))
@@ -127,7 +129,7 @@ pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take
     at
 }
 
-/// End of the part that starts at `start`: the first line end after `length` bytes.
+/// Returns the end of the part that starts at `start`: the first line end after `length` bytes.
 fn end_of_part(bytes: &[u8], start: usize, length: usize) -> usize {
     let mut behind = bytes.iter().enumerate().skip(start.saturating_add(length));
     let line = behind.find(|(_, byte)| **byte == b'\n');
@@ -146,13 +148,13 @@ impl Plain {
     }
 }
 
-/// The plain rows of a part.
+/// Reads the plain rows of a part.
 fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
     let columns = layout.with_precision.len();
     let mut found = Plain::nothing(layout, part.start);
     let mut rest = bytes.get(part.clone()).unwrap_or_default();
     let at = |rest: &[u8]| part.end.saturating_sub(rest.len());
-    // Rows are about as long as the first one.
+    // The other rows are assumed to be about as long as the first one.
     let line = rest
         .split_inclusive(|byte| *byte == b'\n')
         .next()
@@ -193,7 +195,7 @@ fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
     found
 }
 
-/// The numbers of a row with their texts, and the rest from the end of the row on; `None` if it is not plain.
+/// Reads the numbers of a row, and returns the text after the row; `None` if the row is not plain.
 #[inline]
 fn plain_row<'a>(
     mut rest: &'a [u8],
@@ -229,7 +231,7 @@ fn plain_row<'a>(
             _ => return None,
         }
     }
-    // Rows without values may be left over by a spreadsheet after its table.
+    // A row without values may be left by a spreadsheet after the end of a table; the full CSV reader handles it.
     (!empty).then_some(rest)
 }
 

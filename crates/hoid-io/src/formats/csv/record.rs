@@ -1,11 +1,11 @@
-//! Records as CSV.
+//! Writing of records as CSV.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use hoid_model::Record;
 
-use super::text::harmless;
+use super::text::escape_formula;
 use crate::record::{channels, comments};
 
 /// Writes the record, separated by commas.
@@ -18,7 +18,7 @@ pub(super) fn write_with_tabs(file: &mut dyn Write, record: &Record) -> io::Resu
     write(file, record, b'\t')
 }
 
-/// Writes the record with digits that reproduce the same numbers.
+/// Writes the record with enough digits to reproduce the numbers exactly.
 fn write(file: &mut dyn Write, record: &Record, separator: u8) -> io::Result<()> {
     let channels = channels(record);
     for comment in comments(record, &channels) {
@@ -27,7 +27,7 @@ fn write(file: &mut dyn Write, record: &Record, separator: u8) -> io::Result<()>
     let mut csv = csv::WriterBuilder::new().delimiter(separator).from_writer(file);
     csv.write_field("t")?;
     for channel in &channels {
-        csv.write_field(harmless(&channel.name).as_bytes())?;
+        csv.write_field(escape_formula(&channel.name).as_bytes())?;
     }
     csv.write_record(None::<&[u8]>)?;
     let mut text = String::new();
@@ -44,7 +44,7 @@ fn write(file: &mut dyn Write, record: &Record, separator: u8) -> io::Result<()>
     csv.flush()
 }
 
-/// Writes the fewest digits that reproduce the number, with an exponent if that is shorter.
+/// Writes the fewest digits that reproduce the number exactly, with an exponent if that is shorter.
 fn shortest(text: &mut String, value: f64) {
     let size = value.abs();
     let written = if size == 0.0 || (1e-5..1e16).contains(&size) {
@@ -52,7 +52,7 @@ fn shortest(text: &mut String, value: f64) {
     } else {
         write!(text, "{value:e}")
     };
-    // Writing into a String does not fail.
+    // Writing to a String cannot fail.
     debug_assert!(written.is_ok());
 }
 

@@ -1,26 +1,26 @@
-//! The end of a span in a long text, after which no row is read.
+//! The end of the requested span in a long text, after which no row is read.
 //!
-//! A time after the span is not enough: in a file of trials the time starts again, and the span may be in a later
-//! one. The times of the rest are therefore probed at some positions; unless they increase up to the end of the file,
-//! all of it is read.
+//! A time after the span does not suffice to stop reading: in a file of several trials the time restarts, and the span
+//! may lie in a later trial. The time is therefore probed at several positions in the unread part; unless the probed
+//! times increase to the end of the file, the whole file is read.
 
 use super::table::Parsed;
 use crate::record::ReadOptions;
 use crate::table::{Source, Table};
 use crate::time::with_time;
 
-/// The end of the span.
+/// End of the requested span.
 pub(super) enum SpanEnd {
-    /// Samples are counted: the number of rows to the end.
+    /// Samples are counted: number of rows up to the end of the span.
     Row(usize),
-    /// The column of the time, and the bounds of the span as it is written there.
+    /// Time column, and the bounds of the span in the unit and with the origin of that column.
     Time { column: usize, from: f64, to: f64 },
 }
 
-/// No message is created from the first rows.
-struct Nowhere<'a>(&'a str);
+/// Placeholder source of a table from whose rows no message is created.
+struct PlaceholderSource<'a>(&'a str);
 
-impl Source for Nowhere<'_> {
+impl Source for PlaceholderSource<'_> {
     fn file(&self) -> &str {
         self.0
     }
@@ -35,10 +35,10 @@ impl Source for Nowhere<'_> {
 }
 
 impl SpanEnd {
-    /// The end of the requested span, from the first rows; `None` if all rows are needed.
+    /// Determines the end of the requested span from the first rows; `None` if all rows are needed.
     pub(super) fn of(head: &Parsed, file: &str, options: &ReadOptions) -> Option<Self> {
         let to_s = options.span_s.1?;
-        // A value between two values of a sparse column, and a trial, may need rows after the span.
+        // Interpolation of a sparse column, or a search for trials, may need rows after the span.
         if !options.sparse.is_empty() || options.trial.is_some() {
             return None;
         }
@@ -52,7 +52,7 @@ impl SpanEnd {
             columns: head.columns.iter().map(copy).collect(),
             rows: head.rows,
             sample_time_s: None,
-            source: Box::new(Nowhere(file)),
+            source: Box::new(PlaceholderSource(file)),
             notes: Vec::new(),
         };
         let table = with_time(first_rows, options.time.as_ref()).ok()?;
@@ -67,7 +67,7 @@ impl SpanEnd {
             }
             (_, None) => None,
             (_, Some((column, (t, written)))) => {
-                // t is the written time, shifted and in another unit.
+                // The time t is the time in the file after a shift and a conversion of its unit.
                 let (&[first, .., last], &[written, .., last_written]) = (&*t.values, &*written.values) else {
                     return None;
                 };
@@ -82,7 +82,7 @@ impl SpanEnd {
         }
     }
 
-    /// True if the rows read so far reach into the span and beyond its end.
+    /// True if the rows read so far include rows of the span and extend beyond its end.
     pub(super) fn is_reached(&self, read: &Parsed) -> bool {
         match *self {
             Self::Row(rows) => read.starts.len() >= rows,
@@ -93,7 +93,7 @@ impl SpanEnd {
         }
     }
 
-    /// The column of the time, if rows are not counted.
+    /// Returns the time column; `None` if rows are counted.
     pub(super) fn time_column(&self) -> Option<usize> {
         match *self {
             Self::Row(_) => None,
@@ -101,8 +101,8 @@ impl SpanEnd {
         }
     }
 
-    /// True if no row after those read so far is in the span: the time increases in them and on to the times that were
-    /// probed in the rest, NaN where there is none.
+    /// True if no unread row lies in the span: the times increase through the rows read so far and on through the times
+    /// probed in the unread part. A probed time is NaN if none was found.
     pub(super) fn is_last(&self, read: &Parsed, probed: &[f64]) -> bool {
         let Some(column) = self.time_column() else {
             return true;

@@ -1,4 +1,4 @@
-//! CSV as a table.
+//! Reading of CSV as a table.
 //!
 //! ```text
 //! # units: t s, e deg, u deg          comment lines start with #; these two are understood
@@ -7,38 +7,37 @@
 //! 0,0.125,-0.5                        one line a sample, decimal points
 //! ```
 //!
-//! If the separator is a semicolon or a tab, as in spreadsheets of many European locales, the
-//! numbers may have decimal commas.
+//! If the separator is a semicolon or a tab, as in spreadsheets in many European locales, the numbers may have decimal
+//! commas.
 //!
-//! Blank lines are skipped; a byte order mark and CRLF are accepted. The stated sample time gives
-//! without rounding the value that t gives only up to its last digit; it is used if t agrees with
-//! it.
+//! Blank lines are skipped; a byte order mark and CRLF are accepted. The sample time stated in the comment is exact,
+//! whereas t is rounded to its last digit; the stated value is used if t agrees with it.
 
 use std::collections::HashSet;
 use std::ops::Range;
 
 use super::plain::{Layout, RowStarts, plain_rows};
 use super::text::{
-    as_meant, comments, has_decimal_commas, is_aside, is_unit, open_line, place, reader, refuse_blanks, row_start,
+    unescape_formula, comments, has_decimal_commas, is_aside, is_unit, open_line, place, reader, refuse_blanks, row_start,
     separator, text,
 };
 use crate::IoError;
-use crate::table::{Cell, Column, Source, Table, asides, check_names, check_number, with_decimal_point};
+use crate::table::{Cell, Column, Source, Table, read_comments, check_names, check_number, with_decimal_point};
 use crate::time::{Moments, is_time};
 use crate::wording::{list, shown};
 
-/// The text of the file, read again when an error message needs a line or a cell.
+/// The text of the file, which is read again if an error message needs a line or a cell.
 struct CsvSource<'a> {
     file: &'a str,
     text: &'a str,
     separator: u8,
     starts: RowStarts,
-    /// Position of the last line, if it has no line end.
+    /// Position of the last line if this line has no line end.
     open: Option<usize>,
 }
 
 impl CsvSource<'_> {
-    /// Position of a row, and its cells.
+    /// Returns the position and the cells of a row.
     fn row(&self, row: usize) -> Option<(usize, csv::ByteRecord)> {
         let (from, behind) = self.starts.before(row)?;
         let (start, record) = nth_row(self.text.as_bytes().get(from..)?, behind, self.separator)?;
@@ -46,19 +45,19 @@ impl CsvSource<'_> {
     }
 }
 
-/// Position and cells of the n-th row of a text that starts with a row.
+/// Returns the position and the cells of the n-th row of a text that starts with a row.
 pub(super) fn nth_row(bytes: &[u8], n: usize, separator: u8) -> Option<(usize, csv::ByteRecord)> {
     let records = reader(bytes, separator).into_byte_records().map_while(Result::ok);
     let record = records.filter(|record| !is_blank_line(record)).nth(n)?;
     Some((row_start(bytes, position(&record)), record))
 }
 
-/// Position of a record, including the bytes that the reader skips before it.
+/// Returns the position of a record, including the bytes that the reader skips before the record.
 fn position(record: &csv::ByteRecord) -> usize {
     record.position().map_or(0, |p| p.byte() as usize)
 }
 
-/// True if a record is a blank line, which is not a row.
+/// True if a record is a blank line, which does not count as a row.
 fn is_blank_line(record: &csv::ByteRecord) -> bool {
     record.len() == 1 && record[0].trim_ascii().is_empty()
 }
@@ -90,7 +89,7 @@ pub(super) struct Parsed {
     pub(super) columns: Vec<Column>,
     pub(super) rows: usize,
     pub(super) separator: u8,
-    /// True if its numbers have decimal commas.
+    /// True if the numbers of the text have decimal commas.
     pub(super) commas: bool,
     pub(super) starts: RowStarts,
     pub(super) sample_time_s: Option<f64>,
@@ -154,7 +153,7 @@ pub(super) fn parsed(text: &str, file: &str) -> Result<Parsed, IoError> {
     let Rows {
         starts, empty_at_end, ..
     } = rows;
-    // Spreadsheets leave rows of separators only after the table.
+    // Rows that contain only separators are ignored at the end of the table, where spreadsheets leave them.
     let count = starts.len().saturating_sub(empty_at_end);
     for column in &mut columns {
         column.values.truncate(count);
@@ -166,7 +165,7 @@ pub(super) fn parsed(text: &str, file: &str) -> Result<Parsed, IoError> {
         notes.push(String::from("the commas in its numbers are taken as decimal commas"));
     }
     Ok(Parsed {
-        sample_time_s: asides(comments(text), &mut columns),
+        sample_time_s: read_comments(comments(text), &mut columns),
         columns,
         rows: count,
         separator,
@@ -176,11 +175,11 @@ pub(super) fn parsed(text: &str, file: &str) -> Result<Parsed, IoError> {
     })
 }
 
-/// The first record that is not a blank line, and its byte range.
+/// Returns the first record that is not a blank line, and its byte range.
 fn first_record(bytes: &[u8], separator: u8) -> Option<(csv::ByteRecord, Range<usize>)> {
     let mut reader = reader(bytes, separator);
     let mut record = csv::ByteRecord::new();
-    // The reader fails only on I/O errors, which cannot occur here.
+    // The reader fails only on I/O errors, which cannot occur when reading from memory.
     while matches!(reader.read_byte_record(&mut record), Ok(true)) {
         if !is_blank_line(&record) {
             let start = row_start(bytes, position(&record));
@@ -190,7 +189,7 @@ fn first_record(bytes: &[u8], separator: u8) -> Option<(csv::ByteRecord, Range<u
     None
 }
 
-/// Rows read by the full CSV reader before the fast one is tried again.
+/// Number of rows read by the full CSV reader before the fast reader is tried again.
 const WHOLE: usize = 256;
 
 /// Rows to be added to the columns of a table.
@@ -200,7 +199,7 @@ struct Rows<'a> {
     separator: u8,
     commas: bool,
     open: Option<usize>,
-    /// True for columns that may be the time.
+    /// True for each column that may be the time.
     times: Vec<bool>,
     wanted: Vec<bool>,
     moments: Vec<Moments>,
@@ -209,7 +208,7 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// Reads the plain rows from `from` on; returns the position of the first line that is not plain.
+    /// Reads plain rows starting at position `from`; returns the position of the first line that is not plain.
     fn plain(&mut self, from: usize, columns: &mut [Column]) -> usize {
         if self.commas {
             return from;
@@ -237,7 +236,8 @@ impl Rows<'_> {
         })
     }
 
-    /// Reads at most [`WHOLE`] rows from `from` on as full CSV; returns the position of the next row.
+    /// Reads at most [`WHOLE`] rows starting at position `from` with the full CSV reader; returns the position of the
+    /// next row.
     fn whole(&mut self, from: usize, columns: &mut [Column]) -> Result<usize, IoError> {
         let mut reader = reader(self.bytes.get(from..).unwrap_or_default(), self.separator);
         let mut record = csv::ByteRecord::new();
@@ -276,8 +276,7 @@ impl Rows<'_> {
         self.starts.push(start);
         let each = columns.iter_mut().zip(&self.times).zip(&mut self.moments).zip(record);
         for (((column, is_time), moments), cell) in each {
-            // The text is valid UTF-8 and the separators are ASCII, so that each cell is valid as
-            // well.
+            // The text is valid UTF-8 and the separators are ASCII, so each cell is valid UTF-8.
             let cell = std::str::from_utf8(cell).unwrap_or("\u{fffd}");
             let cell = &*with_decimal_point(cell, self.commas);
             match Cell::parse(cell) {
@@ -296,12 +295,11 @@ impl Rows<'_> {
     }
 }
 
-/// Number of lines before the last with which the length of its last number is compared.
+/// Number of preceding lines with which the length of the last number in the file is compared.
 const COMPARED: usize = 8;
 
-/// Detects a truncated last number: the last line has no line end, and its last cell is at least
-/// two characters shorter than that of each of the [`COMPARED`] lines before, which have digits
-/// after a point.
+/// Detects a truncated last number: the last line has no line end, and its last cell is at least two characters shorter
+/// than the last cell of each of the [`COMPARED`] lines before, all of which have a decimal point.
 fn cut_number(source: &CsvSource<'_>, last: usize) -> Option<String> {
     let last_cell = |row: usize| {
         let (start, _) = source.row(row)?;
@@ -336,7 +334,7 @@ fn header(
     check_number(record.len(), file)?;
     let names: Vec<String> = record
         .iter()
-        .map(|name| as_meant(String::from_utf8_lossy(name).trim()).to_owned())
+        .map(|name| unescape_formula(String::from_utf8_lossy(name).trim()).to_owned())
         .collect();
     let is_number = |name: &String| !matches!(Cell::parse(&with_decimal_point(name, commas)), Cell::Text);
     if names.iter().all(is_number) {
@@ -346,7 +344,7 @@ fn header(
             found: shown(&names.join(", ")),
         });
     }
-    let names = told_apart(names, notes);
+    let names = with_unique_names(names, notes);
     check_names(&names, file, notes)?;
     let column = |name: String| Column {
         unit: unit_in(&name).unwrap_or_default().to_owned(),
@@ -356,9 +354,9 @@ fn header(
     Ok(names.into_iter().map(column).collect())
 }
 
-/// Makes names unique: columns with the same name are numbered by their position, so that a signal can be selected
-/// among them and the others do no harm.
-fn told_apart(names: Vec<String>, notes: &mut Vec<String>) -> Vec<String> {
+/// Makes names unique: columns with the same name are numbered by their position, so that each of them can be selected
+/// as a signal.
+fn with_unique_names(names: Vec<String>, notes: &mut Vec<String>) -> Vec<String> {
     let mut known: HashSet<&str> = HashSet::new();
     let named = names.iter().map(String::as_str).filter(|name| !name.is_empty());
     let several: HashSet<&str> = named.filter(|name| !known.insert(name)).collect();
@@ -382,7 +380,8 @@ fn told_apart(names: Vec<String>, notes: &mut Vec<String>) -> Vec<String> {
     found
 }
 
-/// The unit at the end of a name: `Stick [V]`, `e (deg)`. Numbers are an index or part of the name.
+/// Returns the unit at the end of a name such as `Stick [V]` or `e (deg)`. A number in brackets is an index or part of
+/// the name.
 fn unit_in(name: &str) -> Option<&str> {
     let (before, unit) = match name.strip_suffix(']') {
         Some(inside) => inside.rsplit_once('[')?,

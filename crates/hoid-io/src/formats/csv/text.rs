@@ -21,17 +21,17 @@ pub(crate) fn text<'a>(bytes: &'a [u8], file: &str) -> Result<&'a str, IoError> 
     })
 }
 
-/// Characters that make a spreadsheet execute the cell that starts with them.
+/// First characters at which a spreadsheet executes a cell.
 const RUN: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
 
-/// True if a spreadsheet may execute a cell: numbers and a lone sign are safe.
+/// True if a spreadsheet may execute a cell; it does not execute numbers and a single sign.
 fn is_run(cell: &str) -> bool {
     cell.starts_with(RUN) && !["-", "+"].contains(&cell) && !matches!(Cell::parse(cell), Cell::Number(_))
 }
 
-/// A text as written: one that a spreadsheet would execute is prefixed by an apostrophe, which
-/// marks it as text and which [`as_meant`] removes.
-pub(crate) fn harmless(cell: &str) -> Cow<'_, str> {
+/// Returns a text as it is written to the file: a text that a spreadsheet would execute gets an apostrophe in front,
+/// which marks it as text and which [`unescape_formula`] removes.
+pub(crate) fn escape_formula(cell: &str) -> Cow<'_, str> {
     if is_run(cell.trim_start_matches('\'')) {
         Cow::Owned(format!("'{cell}"))
     } else {
@@ -39,15 +39,15 @@ pub(crate) fn harmless(cell: &str) -> Cow<'_, str> {
     }
 }
 
-/// Restores the original text from [`harmless`].
-pub(crate) fn as_meant(cell: &str) -> &str {
+/// Restores the original text from the result of [`escape_formula`].
+pub(crate) fn unescape_formula(cell: &str) -> &str {
     match cell.strip_prefix('\'') {
         Some(meant) if is_run(meant.trim_start_matches('\'')) => meant,
         _ => cell,
     }
 }
 
-/// Position of the last line, if it has no line end.
+/// Returns the position of the last line if this line has no line end.
 pub(crate) fn open_line(text: &str) -> Option<usize> {
     let ends = ['\n', '\r'];
     (!text.ends_with(ends)).then(|| text.trim_end_matches(|c| !ends.contains(&c)).len())
@@ -66,14 +66,14 @@ pub(crate) fn is_aside(line: &str) -> bool {
     line.trim().is_empty() || line.starts_with('#')
 }
 
-/// True for the name of a unit: a short word that is not an index or a number.
+/// True if the text can be a unit: a short word that is neither an index nor a number.
 pub(super) fn is_unit(text: &str) -> bool {
     (1..=12).contains(&text.chars().count())
         && !text.contains(' ')
         && !text.starts_with(|c: char| c.is_ascii_digit() || c == ':')
 }
 
-/// The most frequent separator in the header; the comma if there is none.
+/// Returns the most frequent separator in the header; the comma if the header contains no separator.
 pub(crate) fn separator(header: &str) -> u8 {
     let mut quoted = false;
     let is_plain = |byte: &u8| {
@@ -82,12 +82,12 @@ pub(crate) fn separator(header: &str) -> u8 {
     };
     let plain: Vec<u8> = header.bytes().filter(is_plain).collect();
     let count = |separator: &u8| plain.iter().filter(|byte| *byte == separator).count();
-    // Of equally frequent separators the last is used.
+    // If separators are equally frequent, the last of them is used.
     [b'\t', b';', b','].into_iter().max_by_key(count).unwrap_or(b',')
 }
 
-/// Refuses a table separated by blanks, which would be read as one column: a header without
-/// separator, over a line of several numbers between blanks.
+/// Refuses a table separated by blanks, which would be read as one column: a header without separator above a line of
+/// several numbers between blanks.
 pub(crate) fn refuse_blanks(header: &str, first: Option<&str>, file: &str) -> Result<(), IoError> {
     let is_number = |word: &str| matches!(Cell::parse(word), Cell::Number(_));
     let cells = first.map_or(0, |line| line.split_whitespace().count());
@@ -101,11 +101,11 @@ pub(crate) fn refuse_blanks(header: &str, first: Option<&str>, file: &str) -> Re
     })
 }
 
-/// True if the numbers of a table have decimal commas: some cell is a number with a comma, and none
-/// has a point, with which a comma may separate thousands.
+/// True if the numbers of a table have decimal commas: some cell is a number with a comma, and no number has a point
+/// (otherwise the comma may separate thousands).
 ///
-/// Where commas separate cells, numbers with commas are quoted, `"0,02"`. A comma before three digits may then separate thousands,
-/// as spreadsheets write them, so that at least one comma must be followed by a different number of digits.
+/// If commas separate cells, numbers with commas are quoted, `"0,02"`. A comma before three digits may then separate
+/// thousands, as in spreadsheets; at least one comma must therefore be followed by a different number of digits.
 pub(crate) fn has_decimal_commas(text: &str, separator: u8) -> bool {
     let quoted = separator == b',';
     if quoted
@@ -139,13 +139,13 @@ fn may_be_thousands(cell: &str) -> bool {
         .is_some_and(|digits| digits.len() == 3 && digits.bytes().all(|b| b.is_ascii_digit()))
 }
 
-/// The comment lines above the header, without their marks.
+/// Returns the comment lines above the header without the leading `#`.
 pub(crate) fn comments(text: &str) -> impl Iterator<Item = &str> {
     let lines = text.lines().take_while(|line| is_aside(line));
     lines.filter_map(|line| line.strip_prefix('#'))
 }
 
-/// Position of a row after the comments and blank lines that the reader skips with it.
+/// Returns the position of a row after the comments and blank lines that the reader skips before it.
 pub(crate) fn row_start(bytes: &[u8], at: usize) -> usize {
     let mut rest = bytes.get(at..).unwrap_or_default();
     loop {
@@ -162,7 +162,7 @@ pub(crate) fn row_start(bytes: &[u8], at: usize) -> usize {
 
 pub(crate) fn place(bytes: &[u8], at: usize) -> String {
     let before = bytes.get(..at).unwrap_or(bytes);
-    // A file with bare carriage returns has lines too.
+    // A file may have bare carriage returns as line ends.
     let end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
     format!("line {}", before.split(|b| *b == end).count())
 }
@@ -183,14 +183,14 @@ mod tests {
             ("\r=1", "'\r=1"),
             ("'=1", "''=1"),
         ] {
-            assert_eq!(harmless(cell), written);
-            assert_eq!(as_meant(&harmless(cell)), cell);
+            assert_eq!(escape_formula(cell), written);
+            assert_eq!(unescape_formula(&escape_formula(cell)), cell);
         }
         for cell in [
             "", "-", "+", "-1.5e3", "+0.5", "-inf", "a=b", "'", "'a", "''", "x-y", " =1",
         ] {
-            assert_eq!(harmless(cell), cell);
-            assert_eq!(as_meant(cell), cell);
+            assert_eq!(escape_formula(cell), cell);
+            assert_eq!(unescape_formula(cell), cell);
         }
     }
 

@@ -1,10 +1,10 @@
-//! Data elements of version 5: a tag of type and length, then the data, padded to a multiple of 8
-//! bytes. Data of up to 4 bytes may be in the tag.
+//! Data elements of version 5: a tag with type and length, followed by the data, padded to a multiple of 8 bytes. Data
+//! of up to 4 bytes may be stored in the tag.
 
-/// Length of the header of version 5.
+/// Length of the file header of version 5.
 pub(super) const HEADER: usize = 128;
 
-/// Data types, by MathWorks' numbers.
+/// Data types with the numbers assigned by MathWorks.
 pub(super) mod data {
     pub(crate) const INT8: u32 = 1;
     pub(crate) const UINT8: u32 = 2;
@@ -49,7 +49,7 @@ impl<'a> Elements<'a> {
         self.rest.is_empty()
     }
 
-    /// The next element, or the violation of the format.
+    /// Returns the next element, or a description of the violation of the format.
     pub(super) fn next(&mut self) -> Result<Element<'a>, String> {
         let ends = |left: usize| format!("an element ends {left} bytes into its tag");
         let first = self
@@ -62,7 +62,7 @@ impl<'a> Elements<'a> {
             let bytes = self.rest.get(4..8).ok_or_else(|| ends(self.rest.len()))?;
             let bytes = bytes
                 .get(..length)
-                .ok_or_else(|| format!("{length} bytes in a tag, where 4 fit"))?;
+                .ok_or_else(|| format!("{length} bytes in a tag that holds at most 4"))?;
             self.rest = self.rest.get(8..).unwrap_or_default();
             return Ok(Element {
                 kind: first & 0xffff,
@@ -78,7 +78,7 @@ impl<'a> Elements<'a> {
         let Some(bytes) = data.get(..length) else {
             return Err(format!("an element of {length} bytes ends after {}", data.len()));
         };
-        // Compressed elements are not padded; the last one of a file may be truncated there.
+        // Compressed elements are not padded, and the last element of a file may lack its padding.
         let padded = if first == data::COMPRESSED {
             length
         } else {
@@ -88,7 +88,7 @@ impl<'a> Elements<'a> {
         Ok(Element { kind: first, bytes })
     }
 
-    /// The next element, which must be of the given type.
+    /// Returns the next element, which must be of the given type.
     pub(super) fn of(&mut self, kind: u32, what: &str) -> Result<&'a [u8], String> {
         match self.next()? {
             element if element.kind == kind => Ok(element.bytes),
@@ -96,7 +96,7 @@ impl<'a> Elements<'a> {
         }
     }
 
-    /// 32-bit unsigned integers.
+    /// Interprets bytes as 32-bit unsigned integers.
     pub(super) fn u32s(&self, bytes: &[u8]) -> Vec<u32> {
         bytes.chunks_exact(4).filter_map(|bytes| self.u32(bytes)).collect()
     }

@@ -1,13 +1,13 @@
-//! Names of columns and of variables.
+//! Conversion between column names and names of MATLAB variables.
 //!
-//! A name that is invalid in MATLAB, such as `K e` or `f-y`, is replaced by the nearest valid one,
-//! and the original is stored as well.
+//! A name that is invalid in MATLAB, such as `K e` or `f-y`, is replaced by a similar valid name, and the original name
+//! is also stored.
 
 use crate::formats::arrays::{COMMENTS, Entry, Value};
 
-/// The variable that stores the original names, each line a variable and its column name.
+/// Variable that stores the original names; each line holds a variable name and its column name.
 pub(super) const NAMES: &str = "hoid_names";
-/// MATLAB truncates longer names.
+/// Maximum length of a variable name; MATLAB truncates longer names.
 const LONGEST_NAME: usize = 63;
 const KEYWORDS: [&str; 20] = [
     "break",
@@ -32,7 +32,7 @@ const KEYWORDS: [&str; 20] = [
     "while",
 ];
 
-/// A distinct variable name for each column.
+/// Returns a distinct variable name for each column.
 pub(super) fn variables(names: &[&str]) -> Vec<String> {
     let mut variables: Vec<String> = Vec::with_capacity(names.len());
     for name in names {
@@ -46,7 +46,7 @@ pub(super) fn variables(names: &[&str]) -> Vec<String> {
             _ => format!("x{plain}"),
         };
         let mut variable: String = plain.chars().take(LONGEST_NAME).collect();
-        // A column that already has the name keeps it.
+        // A column whose own name is the variable name keeps it.
         let taken = |variable: &str| {
             variables.iter().any(|v| v == variable)
                 || [COMMENTS, NAMES].contains(&variable)

@@ -1,9 +1,9 @@
-//! Objects of MATLAB: only MATLAB can read their contents, and one line of MATLAB extracts their numbers.
+//! MATLAB objects: only MATLAB can read their contents, and one line of MATLAB code extracts their numbers.
 
 use crate::formats::arrays::OBJECT;
 use crate::wording::shown;
 
-/// Description of an object of a class, with the line of MATLAB that saves its numbers.
+/// Describes an object of a class, and gives the line of MATLAB code that extracts its numbers.
 pub(super) fn object(class: &str) -> String {
     let line = match class {
         "timetable" => "t = seconds(x.Properties.RowTimes - x.Properties.RowTimes(1)); e = x.e; u = x.u;",

@@ -1,4 +1,4 @@
-//! The variables of a file of any version, which its first bytes determine.
+//! Reading of the variables of a file of any version; the first bytes determine the version.
 
 use super::elements::HEADER;
 use super::names::named;
@@ -16,7 +16,7 @@ pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Contents, IoError> {
         file: file.to_owned(),
         format: "MATLAB",
         found,
-        expected: "variables as MATLAB, Octave or scipy save them",
+        expected: "variables saved by MATLAB, Octave or scipy",
     };
     if bytes.is_empty() {
         return Err(wrong(String::from("it is empty")));
@@ -30,7 +30,7 @@ pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Contents, IoError> {
     let entries = match bytes.get(HEADER - 4..HEADER) {
         Some([.., b'I', b'M']) => version5::read(bytes, false, &mut budget, file)?,
         Some([.., b'M', b'I']) => version5::read(bytes, true, &mut budget, file)?,
-        // Version 4 starts with a number below 5000, the later ones with text.
+        // Version 4 starts with a number below 5000, the later versions start with text.
         _ if bytes.iter().take(4).any(|byte| *byte == 0) => version4::read(bytes, &mut budget, file)?,
         _ => {
             return Err(wrong(start_of(bytes)));

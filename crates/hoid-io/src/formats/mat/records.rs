@@ -1,5 +1,5 @@
-//! Tables of records in HDF5, as PyTables, pandas and h5py write them: a compound datatype, whose numbers are columns
-//! `table.field`.
+//! Tables of records in HDF5, as written by PyTables, pandas and h5py: datasets with a compound datatype, whose numeric
+//! fields are columns `table.field`.
 
 use std::rc::Rc;
 
@@ -7,7 +7,7 @@ use hdf5_pure::{CompoundMember, Datatype, DatatypeByteOrder};
 
 use crate::formats::arrays::{Kind, Numbers};
 
-/// Returns the numbers of a field in all records of `size` bytes; `None` if it holds something else.
+/// Returns the numbers of a field in all records of `size` bytes; `None` if the field is not numeric.
 pub(super) fn field(records: &Rc<Vec<u8>>, size: usize, member: &CompoundMember) -> Option<Numbers> {
     let (kind, order) = match &member.datatype {
         Datatype::FloatingPoint { size, byte_order, .. } => match size {

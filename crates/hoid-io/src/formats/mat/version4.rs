@@ -1,11 +1,10 @@
-//! Version 4 (MathWorks, "MAT-File Format", 2019, chapter 2): matrices after a header of five
-//! numbers each.
+//! Version 4 (MathWorks, "MAT-File Format", 2019, chapter 2): matrices, each after a header of five numbers.
 
 use crate::IoError;
 use crate::formats::arrays::{Array, Entry, Kind, Numbers, Value};
 use crate::formats::budget::Budget;
 
-/// Size of the five numbers, bytes.
+/// Size of the five numbers in bytes.
 const HEADER: usize = 20;
 const LONGEST_NAME: usize = 256;
 
@@ -41,8 +40,8 @@ fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
             u32::from_le_bytes(bytes)
         }
     };
-    // Thousands: byte order and machine type; hundreds: unused; tens: the type; ones: the kind of
-    // matrix.
+    // Thousands digit: byte order and machine type; hundreds digit: unused; tens digit: number type; ones digit: kind
+    // of matrix.
     let big_endian = number(0, false) > 4999;
     let kinds = number(0, big_endian);
     if kinds > 1999 || !kinds.is_multiple_of(1000) && kinds % 1000 / 100 != 0 {
@@ -83,7 +82,7 @@ fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
         _ if imaginary != 0 => Value::Unread(String::from("complex numbers")),
         0 => {
             let numbers = numbers();
-            // Integers may be any numbers: version 4 has one class.
+            // An integer storage type does not imply an integer class: version 4 has only one numeric class.
             let numbers = if kind.is_whole() {
                 Numbers::from_f64(&numbers.values())
             } else {

@@ -1,5 +1,4 @@
-//! Versions 5 to 7 (MathWorks, "MAT-File Format", 2019, chapter 1): from version 7 on each variable
-//! may be deflated.
+//! Versions 5 to 7 (MathWorks, "MAT-File Format", 2019, chapter 1); from version 7 on each variable may be compressed.
 
 use std::io::Read;
 
@@ -10,7 +9,7 @@ use super::objects::object;
 use crate::IoError;
 use crate::formats::arrays::{Array, Entry, Kind, Numbers, Value};
 use crate::formats::budget::{Budget, MOST_NESTED};
-use crate::wording::{shown, told};
+use crate::wording::{shown, short_error};
 
 const CELL: u32 = 1;
 const STRUCT: u32 = 2;
@@ -24,12 +23,12 @@ const FUNCTION: u32 = 16;
 const OPAQUE: u32 = 17;
 /// Flag of complex numbers.
 const COMPLEX: u32 = 0x800;
-/// MATLAB allows 63 characters.
+/// Longest name accepted, in characters; MATLAB allows 63.
 const LONGEST_NAME: usize = 256;
-/// Approximate memory of an entry in addition to its path and its values, bytes.
+/// Approximate memory of an entry in bytes, in addition to its path and its values.
 const ENTRY_BYTES: u64 = 256;
 
-/// Reason why a variable is not read: a violation of the format, or another error.
+/// Reason why a variable cannot be read: a violation of the format, or another error.
 enum Stop {
     Damaged(String),
     Other(IoError),
@@ -75,19 +74,19 @@ struct Reader<'a> {
     file: &'a str,
 }
 
-/// Position of a variable.
+/// Path and nesting depth of a variable.
 #[derive(Clone, Copy)]
 struct VariablePath<'a> {
-    /// The enclosing structure; empty at top level.
+    /// Path of the enclosing structure; empty at top level.
     parent: &'a str,
-    /// Its path; at top level the name of the variable.
+    /// Path of the variable; at top level its name.
     path: &'a str,
     depth: usize,
 }
 
 impl Reader<'_> {
     fn variable(&mut self, elements: &mut Elements<'_>) -> Result<(), Stop> {
-        // At top level an element that extends beyond the file is the result of truncation.
+        // At top level an element that extends beyond the end of the file indicates truncation.
         let cut = |found: String| format!("the file is truncated, or a length is wrong: {found}");
         let element = elements.next().map_err(cut)?;
         let top = VariablePath {
@@ -101,15 +100,15 @@ impl Reader<'_> {
                 let bytes = self.inflated(element.bytes, elements.big_endian)?;
                 self.matrix(&bytes, elements.big_endian, top)
             }
-            // Data that programs put between the variables.
+            // Programs may store other data between the variables.
             _ => Ok(()),
         }
     }
 
-    /// Inflates the data of a matrix. Its tag gives an upper bound of its length: Octave counts the
-    /// data in a tag twice.
+    /// Decompresses the data of a matrix. The tag gives an upper bound of their length, since Octave counts the data in
+    /// a tag twice.
     fn inflated(&mut self, bytes: &[u8], big_endian: bool) -> Result<Vec<u8>, Stop> {
-        let failed = |error: std::io::Error| Stop::Damaged(told(&error.to_string()));
+        let failed = |error: std::io::Error| Stop::Damaged(short_error(&error.to_string()));
         let mut decoder = ZlibDecoder::new(bytes);
         let mut tag = [0; 8];
         decoder.read_exact(&mut tag).map_err(failed)?;
@@ -133,7 +132,7 @@ impl Reader<'_> {
 
     /// Reads an array of any class, part by part.
     fn matrix(&mut self, bytes: &[u8], big_endian: bool, place: VariablePath<'_>) -> Result<(), Stop> {
-        // An unset field.
+        // The field is not set.
         if bytes.is_empty() {
             return self.push(place, place.path, Value::Array(Array::vector(Numbers::from_f64(&[]))));
         }
@@ -165,7 +164,7 @@ impl Reader<'_> {
             return Err(format!("an array of {} dimensions", dims.len()).into());
         }
         let name = name(parts.next()?.bytes)?;
-        // An element without a name is not a variable: MATLAB stores the parts of objects there.
+        // An element without a name is not a variable: MATLAB stores the parts of objects in such elements.
         if place.depth == 0 && name.is_empty() {
             return Ok(());
         }
@@ -182,7 +181,7 @@ impl Reader<'_> {
             }
             CHAR => {
                 let bytes = parts.clone().next().map_or(0, |element| element.bytes.len());
-                // They are expanded to characters of four bytes.
+                // The characters are expanded to four bytes each.
                 let rows = dims.first().map_or(1, |rows| (*rows).min(bytes));
                 self.budget.take_texts(rows, bytes.saturating_mul(5), self.file)?;
                 let texts = texts(&mut parts, &dims, count)?;
@@ -204,7 +203,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Numbers, which may be stored in a shorter type than that of their class.
+    /// Reads numbers, which may be stored in a shorter type than the type of their class.
     fn numbers(&mut self, parts: &mut Elements<'_>, class: u32, count: usize) -> Result<Numbers, Stop> {
         let element = parts.next()?;
         let kind = match element.kind {
@@ -265,7 +264,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Reads the cells, each with its own path; cells that hold only texts are one column.
+    /// Reads a cell array, in which each cell has its own path; if all cells hold text, they form one column.
     fn cell(&mut self, mut parts: Elements<'_>, count: usize, place: VariablePath<'_>) -> Result<(), Stop> {
         let depth = deeper(place)?;
         let before = self.entries.len();
@@ -311,12 +310,12 @@ impl Reader<'_> {
 
 fn deeper(place: VariablePath<'_>) -> Result<usize, Stop> {
     if place.depth == MOST_NESTED {
-        return Err(format!("structures more than {MOST_NESTED} deep").into());
+        return Err(format!("structures nested more than {MOST_NESTED} deep").into());
     }
     Ok(place.depth.saturating_add(1))
 }
 
-/// Reads a name, which may be padded with zeros.
+/// Reads a name, which may be padded with null bytes.
 fn name(bytes: &[u8]) -> Result<String, String> {
     let name = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
     if name.len() > LONGEST_NAME {
@@ -325,9 +324,9 @@ fn name(bytes: &[u8]) -> Result<String, String> {
     Ok(String::from_utf8_lossy(name).into_owned())
 }
 
-/// The rows of an array of characters.
+/// Returns the rows of a character array.
 fn texts(parts: &mut Elements<'_>, dims: &[usize], count: usize) -> Result<Vec<String>, String> {
-    // Octave writes no characters for an empty text.
+    // For an empty text Octave writes no character data.
     if parts.is_empty() || count == 0 {
         return Ok(vec![String::new()]);
     }

@@ -1,8 +1,7 @@
-//! Version 7.3: HDF5 with MATLAB's conventions, and HDF5 files from other programs. Structures are groups, arrays of
-//! structures and cells are references to objects under `/#refs#`, dimensions are in the order of C and therefore
-//! reversed, `MATLAB_class` gives the class of a dataset and `MATLAB_object_decode` marks an object. Datasets without
-//! these attributes, as other programs write them, are numbers; in files that are not from MATLAB, dimensions remain in
-//! the order of C.
+//! Version 7.3: HDF5 with MATLAB's conventions, and HDF5 files from other programs. Structures are groups. Arrays of
+//! structures and cell arrays are references to objects under `/#refs#`. Dimensions are in the order of C and therefore
+//! reversed. `MATLAB_class` gives the class of a dataset, and `MATLAB_object_decode` marks an object. Datasets without
+//! these attributes, as in files from other programs, are numbers; in such files dimensions remain in the order of C.
 
 use std::rc::Rc;
 
@@ -13,11 +12,11 @@ use crate::IoError;
 use crate::formats::arrays::{Array, Entry, Indexing, Kind, Numbers, Value};
 use crate::formats::budget::{Budget, MOST_NESTED};
 use crate::formats::guarded::guarded;
-use crate::wording::told;
+use crate::wording::short_error;
 
-/// Memory charged for each visit of a group or dataset, bytes: links may be circular.
+/// Memory in bytes charged for each visit to a group or dataset, because links may be circular.
 const VISIT: u64 = 1 << 13;
-/// Arrays of structures and cells with more elements are not columns.
+/// Maximum number of elements at which an array of structures or a cell array is converted to columns.
 const MOST_REFERENCES: u64 = 1 << 16;
 
 /// Reads the variables of a file, with dimensions in the order of MATLAB or numpy.
@@ -43,7 +42,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// Converts an error of the crate: damage, or an unsupported feature.
+    /// Converts an error of the HDF5 crate to damage or an unsupported feature.
     fn damaged(&self, place: &str, error: &Error) -> IoError {
         let what = error.to_string();
         let cut = if what.contains("unexpected EOF") {
@@ -51,7 +50,7 @@ impl Reader<'_> {
         } else {
             ""
         };
-        let (file, found) = (self.file.to_owned(), format!("{}: {cut}{}", told(place), told(&what)));
+        let (file, found) = (self.file.to_owned(), format!("{}: {cut}{}", short_error(place), short_error(&what)));
         match ["version", "filter", "unsupported"]
             .iter()
             .any(|word| what.to_lowercase().contains(word))
@@ -65,13 +64,13 @@ impl Reader<'_> {
         }
     }
 
-    /// Reads a group, which is a structure or the whole file.
+    /// Reads a group, which is a structure or the root of the file.
     fn group(&mut self, group: &Group, path: &str, depth: usize) -> Result<(), IoError> {
         self.budget.take(VISIT, self.file)?;
         if depth > MOST_NESTED {
             return Err(IoError::Damaged {
                 file: self.file.to_owned(),
-                found: format!("structures more than {MOST_NESTED} deep"),
+                found: format!("structures nested more than {MOST_NESTED} deep"),
             });
         }
         let inside = |name: &str| {
@@ -87,7 +86,7 @@ impl Reader<'_> {
         }
         let groups = group.iter_groups().map_err(|error| self.damaged(path, &error))?;
         for (name, group) in groups {
-            // Data that MATLAB stores for itself.
+            // MATLAB stores internal data in groups whose name starts with #.
             if !(depth == 0 && name.starts_with('#')) {
                 self.group(&group, &inside(&name), depth.saturating_add(1))?;
             }
@@ -95,7 +94,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Reads a dataset. The parent of one in an array of structures is the element, and its path
+    /// Reads a dataset. For a dataset in an array of structures, `parent` is the element of the array, and `path`
     /// starts with it.
     fn dataset(&mut self, dataset: &Dataset, parent: &str, path: &str, depth: usize) -> Result<(), IoError> {
         self.budget.take(VISIT, self.file)?;
@@ -166,7 +165,7 @@ impl Reader<'_> {
         self.push(parent, path, value)
     }
 
-    /// Reads a table of records, each field `path.field`.
+    /// Reads a table of records; each field gets the path `path.field`.
     fn table(&mut self, dataset: &Dataset, (parent, path): (&str, &str)) -> Result<(), IoError> {
         let kind = dataset.datatype().map_err(|error| self.damaged(path, &error))?;
         let Datatype::Compound { size, members } = kind else {
@@ -184,7 +183,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Reads cells, each `path{k}`, or one field of an array of structures, each `parent(k).field`.
+    /// Reads a cell array, whose cells get the paths `path{k}`, or one field of an array of structures, with the paths
+    /// `parent(k).field`.
     fn references(
         &mut self,
         dataset: &Dataset,
@@ -195,14 +195,14 @@ impl Reader<'_> {
         if depth == MOST_NESTED {
             return Err(IoError::Damaged {
                 file: self.file.to_owned(),
-                found: format!("structures more than {MOST_NESTED} deep"),
+                found: format!("structures nested more than {MOST_NESTED} deep"),
             });
         }
         let objects = match dataset.dereference() {
             Ok(objects) => objects,
-            // A null reference is not damage.
+            // A null reference is valid and does not count as damage.
             Err(error) => {
-                let what = format!("references that lead nowhere ({})", told(&error.to_string()));
+                let what = format!("references without a target ({})", short_error(&error.to_string()));
                 return self.push(parent, path, Value::Unread(what));
             }
         };
@@ -224,7 +224,7 @@ impl Reader<'_> {
                 _ => {}
             }
         }
-        // Cells that hold only texts are one column.
+        // If all cells hold text, they form one column.
         let text = |entry: &Entry| matches!(&entry.value, Value::Texts(texts) if texts.len() == 1);
         let new = self.entries.get(before..).unwrap_or_default();
         if cells && new.len() == count && new.iter().all(text) {
@@ -266,7 +266,7 @@ impl Reader<'_> {
         if expected != Some(numbers.len()) {
             return Err(IoError::Damaged {
                 file: self.file.to_owned(),
-                found: format!("{}: {} numbers in an array of {dims:?}", told(path), numbers.len()),
+                found: format!("{}: {} numbers in an array of {dims:?}", short_error(path), numbers.len()),
             });
         }
         Ok(Value::Array(Array {
@@ -277,7 +277,7 @@ impl Reader<'_> {
     }
 }
 
-/// The rows of an array of characters.
+/// Returns the rows of a character array.
 fn texts(units: &[u16], dims: &[usize]) -> Vec<String> {
     let rows = dims.first().copied().unwrap_or(1).clamp(1, units.len().max(1));
     let row = |at: usize| units.iter().skip(at).step_by(rows).copied().collect::<Vec<u16>>();
@@ -288,7 +288,7 @@ fn texts(units: &[u16], dims: &[usize]) -> Vec<String> {
     }
 }
 
-/// A number as little-endian bytes.
+/// Conversion of a number to little-endian bytes.
 trait Bytes {
     fn append(&self, bytes: &mut Vec<u8>);
 }

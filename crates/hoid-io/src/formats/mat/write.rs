@@ -1,5 +1,5 @@
-//! Version 7, each variable deflated: a numeric column is a variable with one column, a column of
-//! texts is a cell array.
+//! Writing of version 7 with each variable compressed: a numeric column becomes a column vector, and a text column
+//! becomes a cell array.
 
 use std::io::{self, Write};
 
@@ -16,9 +16,9 @@ const CHAR: u32 = 4;
 const DOUBLE: u32 = 6;
 const UINT64: u32 = 15;
 
-/// Writes columns, and the comments as a cell array of texts.
+/// Writes the columns, and the comments as a cell array of texts.
 pub(super) fn write(file: &mut dyn Write, schema: &TableSchema, columns: &[Values<'_>]) -> io::Result<()> {
-    // No time or place is written: the same columns give the same bytes.
+    // Neither the time of writing nor a path is written, so that the same columns give the same bytes.
     let mut header = format!("MATLAB 5.0 MAT-file, written by hoid {}", env!("CARGO_PKG_VERSION")).into_bytes();
     header.resize(HEADER - 12, b' ');
     header.extend([0; 8]);
@@ -76,7 +76,7 @@ fn column(name: &str, values: Values<'_>) -> io::Result<Vec<u8>> {
     Ok(element.bytes)
 }
 
-/// Parts of an array in sequence.
+/// Writes the parts of an array in sequence.
 #[derive(Default)]
 struct Matrix {
     bytes: Vec<u8>,

@@ -1,7 +1,7 @@
 //! The zip archive around the arrays: each member `name.npy` is the array `name`.
 //!
-//! Reading accepts stored and deflated members. Writing stores them, as `numpy.savez` does, without
-//! times, so that the same columns give the same bytes; trailing zeros of texts are lost, since
+//! Reading accepts stored and deflated members. Writing stores the members without times, so that the same columns give
+//! the same bytes; `numpy.savez` also stores them uncompressed. Trailing null characters of texts are lost, since
 //! numpy's text type cannot hold them.
 
 use std::io::{self, Cursor, Read, Write};
@@ -16,7 +16,7 @@ use crate::formats::arrays::{COMMENTS, Contents, Entry, Indexing};
 use crate::formats::budget::Budget;
 use crate::formats::guarded::guarded;
 use crate::results::{TableSchema, Values};
-use crate::wording::{shown, start_of, told};
+use crate::wording::{shown, start_of, short_error};
 
 /// Reads the arrays from the bytes of a file.
 pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
@@ -60,10 +60,10 @@ fn members(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
         };
         let size = member.size();
         budget.take(size, file)?;
-        // The stated length is not reserved: memory grows with the existing data.
+        // The stated length is not allocated in advance: memory grows only with the data that are present.
         let mut data = Vec::new();
         let read = (&mut member).take(size.saturating_add(1)).read_to_end(&mut data);
-        read.map_err(|error| damaged(&told(&error.to_string())))?;
+        read.map_err(|error| damaged(&short_error(&error.to_string())))?;
         if data.len() as u64 != size {
             return Err(damaged(&format!("{} bytes or more, expected {size}", data.len())));
         }
@@ -84,7 +84,7 @@ fn members(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
 }
 
 fn refused(error: &ZipError, place: &str, file: &str) -> IoError {
-    let found = format!("{place}: {}", told(&error.to_string()));
+    let found = format!("{place}: {}", short_error(&error.to_string()));
     let file = file.to_owned();
     match error {
         ZipError::UnsupportedArchive(_) | ZipError::CompressionMethodNotSupported(_) => IoError::Unsupported {
@@ -96,7 +96,7 @@ fn refused(error: &ZipError, place: &str, file: &str) -> IoError {
     }
 }
 
-/// Writes columns, and the comments as an array of texts.
+/// Writes the columns, and the comments as an array of texts.
 pub(super) fn write(file: &mut dyn Write, schema: &TableSchema, columns: &[Values<'_>]) -> io::Result<()> {
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     let options = SimpleFileOptions::default()

@@ -1,8 +1,7 @@
-//! The header of NPY: a Python dictionary of `descr`, `fortran_order` and `shape` (NEP 1, versions
-//! 1 to 3).
+//! The header of NPY: a Python dictionary with the keys `descr`, `fortran_order` and `shape` (NEP 1, versions 1 to 3).
 //!
-//! The literal is parsed here because it is small, and because a general parser of Python literals
-//! recurses as deep as a hostile header demands.
+//! hoid parses this literal itself because its grammar is small, and because a general parser of Python literals
+//! recurses as deeply as a malicious header demands.
 
 /// Content of a header.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,16 +11,16 @@ pub(super) struct Header {
     pub(super) shape: Vec<usize>,
 }
 
-/// The type of an item.
+/// Type of an array item.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Descr {
     /// A plain type, such as `<f8`.
     Plain(String),
-    /// The fields of a structured array, each with its type if it is plain.
+    /// The fields of a structured array: each name, with the type if it is plain.
     Fields(Vec<(String, Option<String>)>),
 }
 
-/// A Python literal, as far as a header needs it.
+/// The Python literals that occur in headers.
 #[derive(Debug, Clone, PartialEq)]
 enum Literal {
     Text(String),
@@ -30,10 +29,10 @@ enum Literal {
     Sequence(Vec<Literal>),
 }
 
-/// Maximum nesting of sequences: a shape in a field in a list.
+/// Maximum nesting of sequences; a shape in a field in a list needs three levels.
 const DEEPEST: usize = 6;
 
-/// Parses the text between the length and the numbers.
+/// Parses the header text, which lies between the length and the data.
 pub(super) fn parse(text: &str) -> Option<Header> {
     let mut reader = Reader { rest: text };
     reader.token('{')?;
@@ -70,7 +69,7 @@ pub(super) fn parse(text: &str) -> Option<Header> {
     })
 }
 
-/// Parses a field: name and type, or name, type and shape. The name may be a pair of title and name.
+/// Parses a field (name and type, or name, type and shape). The name may be a pair of title and name.
 fn field(field: &Literal) -> Option<(String, Option<String>)> {
     let Literal::Sequence(parts) = field else { return None };
     let name = match parts.first()? {
@@ -111,7 +110,7 @@ impl Reader<'_> {
                 }
                 (_, '\\') => match characters.next()?.1 {
                     c @ ('\\' | '\'' | '"') => text.push(c),
-                    // Other Python escapes do not occur in names that hoid can display.
+                    // Other Python escapes do not occur in names that hoid can display, so they are kept unchanged.
                     c => text.extend(['\\', c]),
                 },
                 (_, c) => text.push(c),
@@ -160,7 +159,7 @@ impl Reader<'_> {
     }
 }
 
-/// Writes a Python string literal.
+/// Formats text as a Python string literal.
 pub(super) fn quoted(text: &str) -> String {
     format!("'{}'", text.replace('\\', "\\\\").replace('\'', "\\'"))
 }

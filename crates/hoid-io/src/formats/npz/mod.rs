@@ -1,11 +1,11 @@
-//! NPZ, numpy's archive of arrays, and NPY, a single array of it.
+//! NPZ, the archive format of numpy for several arrays, and NPY, its format for a single array.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `header` | header that numpy writes before the numbers, a Python literal |
-//! | `npy` | one array, in and out |
-//! | `archive` | NPZ: the zip around them |
-//! | `single` | NPY: one array in a file of its own |
+//! | `header` | the header before the data of an array, a Python literal |
+//! | `npy` | reading and writing of one array |
+//! | `archive` | NPZ: the zip archive that contains the arrays |
+//! | `single` | NPY: a file that contains one array |
 
 mod archive;
 mod header;
@@ -16,7 +16,7 @@ use crate::formats::format::{Format, Reading, Writing};
 
 pub(super) const NPZ: Format = Format {
     name: "NPZ",
-    endings: &["npz"],
+    extensions: &["npz"],
     reading: Reading::Arrays(|bytes, file| archive::read(&bytes, file)),
     writing: Writing::Columns(archive::write),
     record: None,
@@ -24,7 +24,7 @@ pub(super) const NPZ: Format = Format {
 
 pub(super) const NPY: Format = Format {
     name: "NPY",
-    endings: &["npy"],
+    extensions: &["npy"],
     reading: Reading::Arrays(single::read),
     writing: Writing::ReadOnly("a single array without names"),
     record: None,

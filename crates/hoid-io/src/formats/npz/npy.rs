@@ -10,12 +10,13 @@ use crate::results::Values;
 use crate::wording::{shown, start_of};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
-/// Bytes before a header: the magic bytes, the version, and the length in two bytes, or in four since version 2.
+/// Number of bytes before a header: the magic bytes, the version, and the header length in two bytes (version 1) or
+/// four bytes (versions 2 and 3).
 const BEFORE_SHORT: usize = MAGIC.len() + 4;
 const BEFORE_LONG: usize = MAGIC.len() + 6;
-/// A longer header is damage, bytes.
+/// Longest valid header in bytes; a longer one counts as damage.
 const LONGEST_HEADER: usize = 1 << 20;
-/// The numbers start at a multiple of this, bytes.
+/// Alignment of the start of the data in bytes.
 const ALIGNMENT: usize = 64;
 
 /// Problems with an array.
@@ -32,22 +33,22 @@ impl From<IoError> for NpyError {
     }
 }
 
-/// Type of an item: `<f8` and so on.
+/// Type of an array item, such as `<f8`.
 enum Item {
     Numbers {
         kind: Kind,
         big_endian: bool,
     },
-    /// Characters of four bytes.
+    /// Text with four bytes per character.
     Unicode {
         length: usize,
         big_endian: bool,
     },
-    /// Characters of one byte.
+    /// Text with one byte per character.
     Bytes {
         length: usize,
     },
-    /// Integer counts of a unit, which is a power of ten of s: clock times, or time differences.
+    /// Clock times or time differences, as integer multiples of a unit from ns to days.
     Clock {
         big_endian: bool,
         unit_s: f64,
@@ -100,7 +101,7 @@ impl Item {
         Self::Numbers { kind, big_endian }
     }
 
-    /// Unit stated by the type.
+    /// Returns the unit implied by the type.
     fn unit(&self) -> String {
         String::from(match self {
             Self::Clock { moments: true, .. } => MOMENTS,
@@ -120,7 +121,8 @@ impl Item {
     }
 }
 
-/// Contents of an array: one entry, or one for each field, at top level if there is no other array.
+/// Returns the contents of an array as one entry, or as one entry per field; the fields are at top level if the file
+/// has no other array.
 pub(super) fn entries(
     bytes: Vec<u8>,
     name: &str,
@@ -128,7 +130,7 @@ pub(super) fn entries(
     (budget, file): (&mut Budget, &str),
 ) -> Result<Vec<Entry>, NpyError> {
     let (header, at) = header_of(&bytes)?;
-    unpacked(&header, budget, file)?;
+    reserve_memory(&header, budget, file)?;
     let data = || bytes.get(at..).unwrap_or_default().to_vec();
     let entries = match &header.descr {
         Descr::Plain(descr) => {
@@ -146,8 +148,8 @@ pub(super) fn entries(
     Ok(entries)
 }
 
-/// Reserves the memory of the items when read, in addition to their bytes.
-fn unpacked(header: &Header, budget: &mut Budget, file: &str) -> Result<(), IoError> {
+/// Reserves the memory that the items need when read, in addition to their bytes in the file.
+fn reserve_memory(header: &Header, budget: &mut Budget, file: &str) -> Result<(), IoError> {
     let count = header
         .shape
         .iter()
@@ -189,14 +191,14 @@ fn header_of(bytes: &[u8]) -> Result<(Header, usize), NpyError> {
     let text = bytes
         .get(before..end)
         .ok_or_else(|| damaged("the array ends in its header"))?;
-    // Latin 1 before version 3; all that hoid needs is ASCII in both, except for names.
+    // The text is Latin 1 before version 3, UTF-8 in version 3; everything that hoid needs, except names, is ASCII.
     let text = String::from_utf8_lossy(text);
     let header = header::parse(&text)
         .ok_or_else(|| NpyError::Damaged(format!("the header of an array reads {}", shown(&text))))?;
     Ok((header, end))
 }
 
-/// Number of items, if they fill the bytes.
+/// Returns the number of items; an error if their total size is not `bytes`.
 fn count(header: &Header, size: usize, bytes: usize) -> Result<usize, NpyError> {
     let count = header
         .shape
@@ -223,7 +225,7 @@ fn plain(item: &Item, header: &Header, data: Vec<u8>) -> Result<Value, NpyError>
             dims: header.shape.clone(),
             last_fastest: !header.fortran_order,
         }),
-        // Items of length zero may be any number.
+        // Items of length zero take no bytes, so that the data do not limit their number.
         Item::Unicode { length: 0, .. } | Item::Bytes { length: 0 } => Value::Texts(vec![String::new(); count]),
         Item::Unicode { big_endian, .. } => {
             Value::Texts(data.chunks_exact(size).map(|text| unicode(text, *big_endian)).collect())
@@ -242,7 +244,8 @@ fn plain(item: &Item, header: &Header, data: Vec<u8>) -> Result<Value, NpyError>
     })
 }
 
-/// The unit in `M8[ns]` and `m8[10us]`, s. Months and years have no fixed duration.
+/// Returns the time unit in s of a type such as `M8[ns]` or `m8[10us]`; `None` for months and years, which have no
+/// fixed duration.
 fn clock_unit(descr: &str) -> Option<f64> {
     let unit = descr.strip_prefix(['M', 'm'])?.strip_prefix("8[")?.strip_suffix(']')?;
     let from = unit.find(|c: char| !c.is_ascii_digit())?;
@@ -260,13 +263,13 @@ fn clock_unit(descr: &str) -> Option<f64> {
     Some(count * unit_s)
 }
 
-/// The counts of a clock in s, clock times relative to the first; invalid ones (NaT) are NaN.
+/// Converts the counts of a clock to s, for clock times relative to the first one; an invalid count (NaT) becomes NaN.
 fn clock(counts: &Numbers, unit_s: f64, moments: bool) -> Numbers {
     let known: Vec<Option<i64>> = (0..counts.len())
         .map(|at| counts.whole(at).filter(|n| *n != i64::MIN))
         .collect();
     let first = known.iter().flatten().next().copied().filter(|_| moments).unwrap_or(0);
-    // A quotient keeps the digits that a product with 1e-9 would lose.
+    // Dividing by 1e9 keeps digits that multiplying by 1e-9 would lose.
     let seconds = |count: i64| {
         let count = i128::from(count).saturating_sub(i128::from(first)) as f64;
         if unit_s < 1.0 {
@@ -357,7 +360,7 @@ fn latin(bytes: &[u8]) -> String {
     String::from_utf8_lossy(text.unwrap_or_default()).into_owned()
 }
 
-/// A one-dimensional array, as numpy writes it.
+/// Returns a one-dimensional array in the format written by numpy.
 pub(super) fn written(values: Values<'_>) -> Vec<u8> {
     let (descr, data): (String, Vec<u8>) = match values {
         Values::Real(values) => (
@@ -389,7 +392,7 @@ pub(super) fn written(values: Values<'_>) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(BEFORE_SHORT.saturating_add(header.len()).saturating_add(data.len()));
     bytes.extend_from_slice(MAGIC);
     bytes.extend_from_slice(&[1, 0]);
-    // A plain header is far shorter than 2^16.
+    // The header of a one-dimensional array is far shorter than 2^16 bytes.
     bytes.extend_from_slice(&(header.len() as u16).to_le_bytes());
     bytes.extend_from_slice(header.as_bytes());
     bytes.extend_from_slice(&data);

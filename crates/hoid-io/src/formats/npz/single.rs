@@ -1,12 +1,12 @@
-//! NPY: one array in a file of its own.
+//! NPY: a file that contains one array.
 
 use super::npy::{NpyError, entries};
 use crate::IoError;
 use crate::formats::arrays::{Contents, Indexing};
 use crate::formats::budget::Budget;
 
-/// Reads the array of an NPY file; it is named as `numpy.savez` names an unnamed array. The fields
-/// of a structured array are separate columns.
+/// Reads the array of an NPY file; it gets the name that `numpy.savez` gives an unnamed array. The fields of a
+/// structured array are separate columns.
 pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Contents, IoError> {
     let mut budget = Budget::of(bytes.len());
     let entries = entries(bytes, "arr_0", true, (&mut budget, file)).map_err(|error| match error {

@@ -1,6 +1,6 @@
 //! Columns as read, before conversion.
 
-/// The key of the comments, one per line.
+/// Metadata key of the comments, one comment per line.
 pub(super) const COMMENTS: &str = "hoid.comments";
 
 /// The values of a column.
@@ -10,20 +10,20 @@ pub(super) enum Data {
     Signed(Vec<i64>),
     Unsigned(Vec<u64>),
     Text(Vec<String>),
-    /// Clock times, or times of day, ns.
+    /// Clock times or times of day, in ns.
     Moments(Vec<i64>),
-    /// Unsupported content, as text.
+    /// Unsupported content, described in words.
     Unread(&'static str),
 }
 
 /// A column as read.
 #[derive(Debug)]
 pub(super) struct ReadColumn {
-    /// Its name; the parts of a path are joined by points.
+    /// Name of the column; the parts of a path are joined by points.
     pub(super) name: String,
-    /// Values of single precision.
+    /// True if the values have single precision.
     pub(super) single: bool,
-    /// One value per row, undefined where it is missing.
+    /// One value per row; undefined in rows without a value.
     pub(super) data: Data,
     /// Rows without a value, in increasing order.
     pub(super) nulls: Vec<usize>,

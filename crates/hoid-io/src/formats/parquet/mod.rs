@@ -1,14 +1,13 @@
-//! Apache Parquet (<https://parquet.apache.org/docs/file-format/>) by the crate `parquet`, for flat
-//! tables.
+//! Apache Parquet (<https://parquet.apache.org/docs/file-format/>) for flat tables, with the crate `parquet`.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `columns` | columns as they were read |
-//! | `pages` | decoded pages of a column |
-//! | `read` | the columns of a file of any program |
-//! | `record` | the table that a record is made of |
-//! | `results` | a table of results |
-//! | `write` | row groups as they come |
+//! | `columns` | columns as read |
+//! | `pages` | size of the decompressed pages of a column |
+//! | `read` | reading of the columns of a file written by any program |
+//! | `record` | the table from which a record is made |
+//! | `results` | reading of a table of results |
+//! | `write` | writing in row groups |
 
 mod columns;
 mod pages;
@@ -21,7 +20,7 @@ use crate::formats::format::{Format, Reading, Writing};
 
 pub(super) const PARQUET: Format = Format {
     name: "Parquet",
-    endings: &["parquet", "pq"],
+    extensions: &["parquet", "pq"],
     reading: Reading::Table {
         record: |bytes, file| record::parse(std::mem::take(bytes), file),
         results: results::read,

@@ -1,27 +1,27 @@
-//! Unpacked size of the pages of a column, before unpacking.
+//! Decompressed size of the pages of a column, determined before decompression.
 //!
-//! The footer states the unpacked size of a column, each page states its own in its header, and neither has to be
-//! right: a page of a few kB may state 2 GB, which Snappy and LZ4 then fill with zeros, and gzip unpacks to its end
-//! regardless of the stated size. So the headers are read here first, in the compact protocol of Thrift
-//! (<https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>): a field is a byte
-//! `delta << 4 | type`, numbers are zigzag varints, and a struct ends with a 0. From `PageHeader`
-//! (<https://github.com/apache/parquet-format>, `parquet.thrift`) are read
+//! The footer states the decompressed size of a column, and each page states its own in its header. Neither need be
+//! correct: a page of a few kB may state 2 GB, which Snappy and LZ4 then fill with zeros, and gzip decompresses to its
+//! end regardless of the stated size. The headers are therefore read here first, in the compact protocol of Thrift
+//! (<https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>): a field starts with a byte
+//! `delta << 4 | type`, numbers are zigzag varints, and a struct ends with a 0. These fields of `PageHeader`
+//! (<https://github.com/apache/parquet-format>, `parquet.thrift`) are read:
 //!
 //! | field | contents |
 //! |---|---|
-//! | 2, 3 | bytes unpacked and packed |
-//! | 5.1, 8.1 | values of a data page |
-//! | 8.5, 8.6, 8.7 | bytes of levels in front of the values, and whether these are packed |
+//! | 2, 3 | decompressed and compressed size in bytes |
+//! | 5.1, 8.1 | number of values of a data page |
+//! | 8.5, 8.6, 8.7 | sizes of the levels before the values in bytes, and whether the values are compressed |
 //!
-//! Pages without compression, or with Snappy and LZ4, have the stated length or are refused by the crate. A gzip page
-//! is unpacked here without storing it, up to one byte beyond the stated size.
+//! Pages without compression, or with Snappy or LZ4, have the stated length or are refused by the crate `parquet`. A
+//! gzip page is decompressed here without storing the result, up to one byte beyond the stated size.
 
 use std::io::{self, Read as _};
 
 use flate2::read::MultiGzDecoder;
 use parquet::basic::Compression;
 
-/// Maximum nesting of structures in a header; the format has three levels.
+/// Maximum nesting of structures in a header; the format needs three levels.
 const MOST_NESTED: usize = 8;
 /// Types of the compact protocol.
 const STOP: u8 = 0;
@@ -35,34 +35,34 @@ const SET: u8 = 10;
 const MAP: u8 = 11;
 const STRUCT: u8 = 12;
 
-/// Content of the header of a page.
+/// Contents of a page header.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct PageHeader {
-    unpacked: u64,
-    packed: u64,
+    decompressed: u64,
+    compressed: u64,
     values: u64,
-    /// Bytes of levels that precede the packed data.
+    /// Number of bytes of levels that precede the compressed data.
     levels: u64,
-    is_packed: bool,
+    is_compressed: bool,
 }
 
-/// Stated unpacked size of the pages of a column, bytes; `None` if a header is invalid, or a gzip page is longer than
-/// stated. `column` holds the pages, which contain `values` values in all.
-pub(super) fn unpacked(column: &[u8], compression: Compression, values: u64) -> Option<u64> {
+/// Returns the stated decompressed size of the pages of a column in bytes; `None` if a header is invalid, or if a gzip
+/// page is longer than stated. `column` holds the pages, which contain `values` values in total.
+pub(super) fn decompressed_size(column: &[u8], compression: Compression, values: u64) -> Option<u64> {
     let (mut rest, mut all, mut seen) = (column, 0_u64, 0_u64);
     while !rest.is_empty() && seen < values {
         let header = PageHeader::read(&mut rest)?;
-        let page = rest.get(..usize::try_from(header.packed).ok()?)?;
-        if matches!(compression, Compression::GZIP(_)) && header.is_packed {
+        let page = rest.get(..usize::try_from(header.compressed).ok()?)?;
+        if matches!(compression, Compression::GZIP(_)) && header.is_compressed {
             let packed = page.get(usize::try_from(header.levels).ok()?..)?;
-            let stated = header.unpacked.checked_sub(header.levels)?;
-            // Other damage is reported by the reader.
+            let stated = header.decompressed.checked_sub(header.levels)?;
+            // Other damage is reported when the page is read.
             let mut limited = MultiGzDecoder::new(packed).take(stated.saturating_add(1));
             if io::copy(&mut limited, &mut io::sink()).is_ok_and(|bytes| bytes > stated) {
                 return None;
             }
         }
-        all = all.saturating_add(header.unpacked);
+        all = all.saturating_add(header.decompressed);
         seen = seen.saturating_add(header.values);
         rest = rest.get(page.len()..)?;
     }
@@ -72,17 +72,17 @@ pub(super) fn unpacked(column: &[u8], compression: Compression, values: u64) -> 
 impl PageHeader {
     fn read(bytes: &mut &[u8]) -> Option<Self> {
         let mut header = Self {
-            unpacked: 0,
-            packed: 0,
+            decompressed: 0,
+            compressed: 0,
             values: 0,
             levels: 0,
-            is_packed: true,
+            is_compressed: true,
         };
         header.structure(bytes, None, 0)?;
         Some(header)
     }
 
-    /// Reads the fields of a structure, which is field `inside` of the header.
+    /// Reads the fields of a structure; `inside` is the number of the field of the header that holds it.
     fn structure(&mut self, bytes: &mut &[u8], inside: Option<i64>, depth: usize) -> Option<()> {
         if depth > MOST_NESTED {
             return None;
@@ -101,7 +101,7 @@ impl PageHeader {
             match kind {
                 TRUE | FALSE => {
                     if (inside, field) == (Some(8), 7) {
-                        self.is_packed = kind == TRUE;
+                        self.is_compressed = kind == TRUE;
                     }
                 }
                 BYTE => drop(byte(bytes)?),
@@ -118,8 +118,8 @@ impl PageHeader {
 
     fn number(&mut self, inside: Option<i64>, field: i64, value: i64) -> Option<()> {
         let place = match (inside, field) {
-            (None, 2) => &mut self.unpacked,
-            (None, 3) => &mut self.packed,
+            (None, 2) => &mut self.decompressed,
+            (None, 3) => &mut self.compressed,
             (Some(5 | 8), 1) => &mut self.values,
             (Some(8), 5 | 6) => {
                 self.levels = self.levels.checked_add(u64::try_from(value).ok()?)?;
@@ -163,7 +163,7 @@ impl PageHeader {
     }
 
     fn each(&mut self, bytes: &mut &[u8], count: u64, kinds: &[u8], depth: usize) -> Option<()> {
-        // Each takes at least one byte.
+        // Each element takes at least one byte.
         if depth > MOST_NESTED || count > bytes.len() as u64 {
             return None;
         }
@@ -244,28 +244,28 @@ mod tests {
     #[test]
     fn pages_say_what_they_unpack_to_and_gzip_is_held_to_it() {
         let honest = page(800, 100, &zipped(&[0; 800]));
-        assert_eq!(unpacked(&honest, GZIP(), 100), Some(800));
+        assert_eq!(decompressed_size(&honest, GZIP(), 100), Some(800));
         // Of two pages, the second lies after the last value and is not examined.
         let two = [honest.clone(), vec![0xff; 40]].concat();
-        assert_eq!(unpacked(&two, GZIP(), 100), Some(800));
-        assert_eq!(unpacked(&two, GZIP(), 101), None);
+        assert_eq!(decompressed_size(&two, GZIP(), 100), Some(800));
+        assert_eq!(decompressed_size(&two, GZIP(), 101), None);
         let two = [honest, page(2_000_000_000, 100, &[1, 2, 3])].concat();
-        assert_eq!(unpacked(&two, Compression::SNAPPY, 200), Some(2_000_000_800));
+        assert_eq!(decompressed_size(&two, Compression::SNAPPY, 200), Some(2_000_000_800));
         let lying = page(800, 100, &zipped(&[0; 900]));
-        assert_eq!(unpacked(&lying, GZIP(), 100), None);
-        assert_eq!(unpacked(&lying, Compression::SNAPPY, 100), Some(800));
+        assert_eq!(decompressed_size(&lying, GZIP(), 100), None);
+        assert_eq!(decompressed_size(&lying, Compression::SNAPPY, 100), Some(800));
     }
 
     #[test]
     fn headers_that_are_cut_or_make_no_sense_are_none() {
         let whole = page(800, 100, &zipped(&[0; 800]));
-        assert_eq!(unpacked(&[], GZIP(), 100), Some(0));
+        assert_eq!(decompressed_size(&[], GZIP(), 100), Some(0));
         for cut in 1..whole.len() {
-            assert_eq!(unpacked(&whole[..cut], GZIP(), 100), None, "{cut}");
+            assert_eq!(decompressed_size(&whole[..cut], GZIP(), 100), None, "{cut}");
         }
-        assert_eq!(unpacked(&page(-1, 100, &[]), Compression::SNAPPY, 100), None);
+        assert_eq!(decompressed_size(&page(-1, 100, &[]), Compression::SNAPPY, 100), None);
         // Structures without an end, and a list longer than its data.
-        assert_eq!(unpacked(&[0x1c; 100], GZIP(), 1), None);
-        assert_eq!(unpacked(&[0x19, 0xf5, 0xff, 0xff, 0xff, 0x7f, 0, 0], GZIP(), 1), None);
+        assert_eq!(decompressed_size(&[0x1c; 100], GZIP(), 1), None);
+        assert_eq!(decompressed_size(&[0x19, 0xf5, 0xff, 0xff, 0xff, 0x7f, 0, 0], GZIP(), 1), None);
     }
 }

@@ -1,7 +1,7 @@
-//! Parquet tables of any program.
+//! Reading of Parquet tables written by any program.
 //!
-//! A file is not trusted: values are read in parts, so that memory grows with the decoded data and
-//! not with the stated size, and a panic of the crate becomes an error.
+//! The file is not trusted: values are read in parts, so that memory grows with the decoded data and not with the
+//! stated size, and a panic of the crate `parquet` is reported as an error.
 
 use bytes::Bytes;
 use half::f16;
@@ -23,21 +23,21 @@ use crate::IoError;
 use crate::formats::budget::Budget;
 use crate::formats::guarded::guarded;
 use crate::table::check_number;
-use crate::wording::{shown, start_of, told};
+use crate::wording::{shown, start_of, short_error};
 
-/// The magic bytes at both ends.
+/// Magic bytes at the start and the end of a file.
 const MAGIC: &[u8; 4] = b"PAR1";
-/// A month at 100 samples/s; more rows are treated as damage, before they exhaust the memory.
+/// Maximum number of rows (a month at 100 samples/s); files with more rows are refused before they exhaust the memory.
 const MOST_ROWS: usize = 1 << 28;
 const TIME: &str = "a date or time";
-/// ns in a µs and in a ms.
+/// Number of ns in a µs and in a ms.
 const MICRO: i64 = 1_000;
 const MILLI: i64 = 1_000_000;
-/// Memory of a value as a number and as an index of a missing one, and of a text in addition to its
-/// characters, bytes.
+/// Memory in bytes of a value (as a number and as the index of a missing value), and of a text in addition to its
+/// characters.
 const VALUE: u64 = 16;
 const TEXT: u64 = 24;
-/// Values read at a time.
+/// Number of values read at a time.
 const PART: usize = 1 << 16;
 
 /// Reads the columns from the bytes of a file.
@@ -46,7 +46,7 @@ pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<ReadFile, IoError> {
     guarded(file, || columns(bytes.into(), file))
 }
 
-/// Checks that the file is Parquet; the error describes the actual content.
+/// Checks that the file is a Parquet file; the error describes the actual contents.
 fn check_ends(bytes: &[u8], file: &str) -> Result<(), IoError> {
     let file = || file.to_owned();
     let found = if bytes.is_empty() {
@@ -78,7 +78,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
         file: file.to_owned(),
         found,
     };
-    let reader = SerializedFileReader::new(bytes.clone()).map_err(|error| damaged(told(&error.to_string())))?;
+    let reader = SerializedFileReader::new(bytes.clone()).map_err(|error| damaged(short_error(&error.to_string())))?;
     let footer = reader.metadata().file_metadata();
     let count = |rows: i64| usize::try_from(rows).map_err(|_| damaged(format!("{rows} rows")));
     let rows = count(footer.num_rows())?;
@@ -97,14 +97,14 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
             budget.take(u64::try_from(chunk.uncompressed_size()).unwrap_or(u64::MAX), file)?;
         }
     }
-    // Every column becomes numbers, even if it is not used.
+    // Every column is converted to numbers, even if it is not used.
     budget.take((rows as u64).saturating_mul(VALUE).saturating_mul(leaves as u64), file)?;
     let mut grouped = 0_usize;
     for group in reader.metadata().row_groups() {
         grouped = grouped.saturating_add(count(group.num_rows())?);
     }
     if grouped != rows {
-        return Err(damaged(format!("{rows} rows in all, {grouped} in the row groups")));
+        return Err(damaged(format!("{rows} rows in total, {grouped} in the row groups")));
     }
     for (number, group) in reader.metadata().row_groups().iter().enumerate() {
         for chunk in group.columns() {
@@ -120,13 +120,13 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
             let place_of = |at: i64| usize::try_from(at).map_or(0, |at| at.min(size));
             let pages = bytes.get(place_of(start)..place_of(end)).unwrap_or_default();
             let values = u64::try_from(chunk.num_values()).unwrap_or(0);
-            let Some(stated) = pages::unpacked(pages, chunk.compression(), values) else {
+            let Some(stated) = pages::decompressed_size(pages, chunk.compression(), values) else {
                 return Err(damaged(format!(
                     "{}: a page is longer than it states, or does not state its length",
                     place()
                 )));
             };
-            // The footer has already been counted.
+            // The size stated in the footer has already been counted.
             let counted = u64::try_from(chunk.uncompressed_size()).unwrap_or(0);
             budget.take(stated.saturating_sub(counted), file)?;
         }
@@ -172,8 +172,8 @@ struct ColumnPath<'a> {
 }
 
 impl ColumnPath<'_> {
-    /// Reads the values by their converted type, which the crate also derives from a logical type where there is an
-    /// equivalent, and otherwise by their logical type.
+    /// Reads the values by their converted type, which the crate `parquet` derives from the logical type where the two
+    /// are equivalent, and otherwise by their logical type.
     fn data(&mut self, column: &ColumnDescriptor) -> Result<Data, IoError> {
         use ConvertedType as C;
         let unit = 10_f64.powi(column.type_scale());
@@ -217,7 +217,7 @@ impl ColumnPath<'_> {
         })
     }
 
-    /// One value per row; missing ones are noted.
+    /// Returns one value per row; the rows of missing values are recorded.
     fn values<T: DataType, V: Default + Weight>(&mut self, of: impl Fn(&T::T) -> V) -> Result<Vec<V>, IoError> {
         let mut values = Vec::new();
         for group in 0..self.reader.num_row_groups() {
@@ -238,7 +238,7 @@ impl ColumnPath<'_> {
         match chunk.compression() {
             Compression::ZSTD(_) => return Err(refused("is compressed with Zstandard")),
             Compression::BROTLI(_) => return Err(refused("is compressed with Brotli")),
-            Compression::LZO => return Err(refused("is compressed by LZO")),
+            Compression::LZO => return Err(refused("is compressed with LZO")),
             _ if chunk.file_path().is_some() => return Err(refused("keeps its values in another file")),
             _ => {}
         }
@@ -279,14 +279,14 @@ impl ColumnPath<'_> {
         Ok(())
     }
 
-    /// Reserves the memory that values own.
+    /// Reserves the memory that values own in addition to their size.
     fn weigh<V: Weight>(&mut self, values: &[V]) -> Result<(), ParquetError> {
         let bytes = values.iter().map(Weight::bytes).sum();
         let taken = self.budget.take(bytes, self.file);
         taken.map_err(|error| ParquetError::External(Box::new(error)))
     }
 
-    /// Converts an error of the crate, with its place.
+    /// Converts an error of the crate `parquet` and adds its place.
     fn error(&self, group: usize, error: ParquetError) -> IoError {
         let file = self.file.to_owned();
         let place = format!("column {}, row group {}", shown(&self.name), group.saturating_add(1));
@@ -300,18 +300,18 @@ impl ColumnPath<'_> {
                 Ok(own) => *own,
                 Err(error) => IoError::Damaged {
                     file,
-                    found: format!("{place}: {}", told(&error.to_string())),
+                    found: format!("{place}: {}", short_error(&error.to_string())),
                 },
             },
             error => IoError::Damaged {
                 file,
-                found: format!("{place}: {}", told(&error.to_string())),
+                found: format!("{place}: {}", short_error(&error.to_string())),
             },
         }
     }
 }
 
-/// Memory owned by a value in addition to its own size.
+/// Memory that a value owns in addition to its own size.
 trait Weight {
     /// Number of bytes.
     fn bytes(&self) -> u64 {
@@ -329,7 +329,7 @@ impl Weight for String {
     }
 }
 
-/// Unit of a column of clock times, ns.
+/// Returns the unit of a column of clock times in ns.
 fn clock_ns(column: &ColumnDescriptor) -> Option<i64> {
     let unit = match column.logical_type_ref() {
         Some(LogicalType::Timestamp(clock)) => &clock.unit,
@@ -349,17 +349,17 @@ fn clock_ns(column: &ColumnDescriptor) -> Option<i64> {
     })
 }
 
-/// Error for valid content that is not supported here.
+/// Creates the error for valid but unsupported content.
 fn refused(what: &str) -> ParquetError {
     ParquetError::NYI(what.to_owned())
 }
 
-/// IEEE 754 binary16, little-endian.
+/// Converts an IEEE 754 binary16 number, little-endian.
 fn half(bytes: &[u8]) -> f64 {
     <[u8; 2]>::try_from(bytes).map_or(f64::NAN, |bytes| f16::from_le_bytes(bytes).to_f64())
 }
 
-/// An integer of up to 16 bytes, big-endian.
+/// Converts a big-endian integer of up to 16 bytes.
 fn signed(bytes: &[u8]) -> i128 {
     let negative = bytes.first().is_some_and(|first| *first >= 0x80);
     let sign = if negative { -1 } else { 0_i128 };

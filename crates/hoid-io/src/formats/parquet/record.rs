@@ -1,22 +1,22 @@
 //! Records in Parquet.
 //!
-//! Numeric columns of any type are read as numbers, a null is a missing value, and text is handled
-//! as in CSV. Units and sample time are in the comments, in the format of CSV.
+//! Numeric columns of any type are read as numbers, a null is a missing value, and text columns are treated as in CSV.
+//! Units and sample time are in the comments, in the same format as in CSV.
 
 use super::columns::{Data, ReadColumn};
 use super::read::read;
 use crate::IoError;
-use crate::table::{Cell, Column, Precision, Source, Table, asides, check_names};
+use crate::table::{Cell, Column, Precision, Source, Table, read_comments, check_names};
 use crate::time::{Moments, is_time, seconds};
 use crate::wording::shown;
 
-/// Contents of the cells that are not finite numbers.
+/// Original cells of a file, for messages about values that are not finite numbers.
 struct ParquetSource<'a> {
     file: &'a str,
     columns: Vec<Cells>,
 }
 
-/// Cells of a column, as far as its values do not give them.
+/// Cells of a column that its values do not represent.
 enum Cells {
     Numbers {
         nulls: Vec<usize>,
@@ -73,7 +73,7 @@ pub(super) fn parse<'a>(bytes: Vec<u8>, file: &'a str) -> Result<Table<'a>, IoEr
     check_names(&names, file, &mut notes)?;
     let (mut columns, cells): (Vec<Column>, Vec<Cells>) =
         read.columns.into_iter().map(|column| column_of(column, rows)).unzip();
-    let sample_time_s = asides(read.comments.iter().map(String::as_str), &mut columns);
+    let sample_time_s = read_comments(read.comments.iter().map(String::as_str), &mut columns);
     Ok(Table {
         columns,
         rows,
@@ -138,7 +138,7 @@ fn column_of(read: ReadColumn, rows: usize) -> (Column, Cells) {
     (column, Cells::Numbers { nulls, infinite })
 }
 
-/// Makes the values of these rows missing.
+/// Marks the values of the given rows as missing.
 pub(super) fn without(values: &mut [f64], nulls: &[usize]) {
     for row in nulls {
         if let Some(value) = values.get_mut(*row) {

@@ -1,6 +1,6 @@
-//! A file of row groups, plain encoding and Snappy, which every reader supports.
+//! Writing of a Parquet file in row groups, with plain encoding and Snappy compression, which every reader supports.
 //!
-//! The same columns give the same bytes: no time or place is written.
+//! The same columns give the same bytes: the file contains no time of writing and no path.
 
 use std::io::{self, Write};
 use std::mem;
@@ -20,10 +20,10 @@ use crate::results::{ColumnKind, ColumnSchema, TableSchema, Values};
 
 const CREATED_BY: &str = concat!("hoid version ", env!("CARGO_PKG_VERSION"));
 
-/// State of a file between its row groups.
+/// State of a Parquet file between its row groups.
 struct Writer {
-    /// Writes to memory, from which each row group is copied to the file: the file is borrowed for
-    /// one call at a time.
+    /// Writes to memory, from which each row group is copied to the file, since the file is borrowed only during each
+    /// call.
     inner: SerializedFileWriter<Vec<u8>>,
 }
 

@@ -1,8 +1,6 @@
-//! The chunks of XDF (github.com/sccn/xdf/wiki/Specifications, version 1.0): a length, a tag, the
-//! content.
+//! The chunks of XDF (github.com/sccn/xdf/wiki/Specifications, version 1.0), each with a length, a tag and contents.
 //!
-//! Each sample may have a time stamp; one without follows the sample before by the nominal sample
-//! time.
+//! Each sample may have a time stamp; a sample without one follows the previous sample by the nominal sample time.
 
 use std::collections::HashMap;
 
@@ -23,22 +21,22 @@ pub(super) struct Stream {
     /// Time stamps on the clock of the stream, s.
     pub(super) stamps: Vec<f64>,
     pub(super) samples: Samples,
-    /// Times of the measurements of the offset to the recorder's clock, and the offsets, s.
+    /// Measured offsets to the clock of the recorder: time of the measurement and offset, s.
     pub(super) offsets: Vec<(f64, f64)>,
-    /// None if the recorder did not close the file, or its end is lost.
+    /// `None` if the recorder did not close the file, or if the end of the file is lost.
     pub(super) footer: Option<Footer>,
     /// Reason why an existing footer cannot be read.
     pub(super) unread_footer: Option<String>,
 }
 
-/// The values of all channels, sample by sample.
+/// Values of all channels, sample by sample.
 #[derive(Debug)]
 pub(super) enum Samples {
     Numbers { kind: Kind, bytes: Vec<u8> },
     Texts(Vec<String>),
 }
 
-/// A reader of bytes from the front.
+/// Reads bytes from front to back.
 struct Bytes<'a> {
     rest: &'a [u8],
 }
@@ -54,7 +52,7 @@ impl<'a> Bytes<'a> {
         self.take(N)?.try_into().ok()
     }
 
-    /// Reads a length of 1, 4 or 8 bytes after its size.
+    /// Reads a length of 1, 4 or 8 bytes, which is preceded by its number of bytes.
     fn length(&mut self) -> Option<usize> {
         match self.array::<1>()? {
             [1] => self.array().map(|[n]| usize::from(n)),
@@ -69,8 +67,8 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// Reads the streams of a file, which starts with its magic bytes, in the order of their headers;
-/// and the position of a truncated last chunk, if there is one. Everything before it is complete.
+/// Reads the streams of a file, which starts with the magic bytes. Returns the streams in the order of their headers
+/// and the position of the last chunk if it is truncated; all chunks before it are complete.
 pub(super) fn streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), String> {
     let mut rest = Bytes {
         rest: bytes.get(4..).unwrap_or_default(),
@@ -115,7 +113,7 @@ pub(super) fn streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), Stri
         let stream = known.get(&id).and_then(|at| streams.get_mut(*at));
         let stream = stream.ok_or_else(|| damaged(String::from("its header is missing")))?;
         if tag == STREAM_FOOTER {
-            // The samples do not need it; it is only compared with them.
+            // The footer is not needed to read the samples; it is only compared with them.
             match header::footer(content.rest) {
                 Ok(footer) => stream.footer = Some(footer),
                 Err(why) => stream.unread_footer = Some(why),
@@ -153,7 +151,7 @@ impl Stream {
     /// Compares the footer with the data.
     ///
     /// # Errors
-    /// Returns the missing part.
+    /// A description of the missing part.
     pub(super) fn check_footer(&self) -> Result<(), String> {
         let Some(footer) = self.footer else { return Ok(()) };
         let read = self.stamps.len();
@@ -172,7 +170,7 @@ impl Stream {
             .into_iter()
             .flat_map(|((from, to), (first, last))| [("first", from, *first), ("last", to, *last)])
         {
-            // Recorders print them with six digits, and may omit those that the sample time implies.
+            // Recorders print times with six digits, and may omit time stamps that follow from the sample time.
             let slack_s = self.nominal_step_s().max(1e-5 * stated.abs()).max(1e-6);
             if (stated - found).abs() > slack_s {
                 return Err(format!(
@@ -187,7 +185,7 @@ impl Stream {
     }
 
     fn samples(&mut self, content: &mut Bytes<'_>) -> Option<()> {
-        // No memory is reserved for the stated count; each sample takes at least one byte.
+        // No memory is reserved for the stated number of samples; each sample takes at least one byte.
         for _ in 0..content.length()? {
             let stamp = match content.array::<1>()? {
                 [0] => self.stamps.last().copied().unwrap_or(0.0) + self.nominal_step_s(),
@@ -214,7 +212,7 @@ impl Stream {
         Some(())
     }
 
-    /// The nominal sample time; 0 where there is none.
+    /// Returns the nominal sample time; 0 for a stream without a nominal rate.
     pub(super) fn nominal_step_s(&self) -> f64 {
         if self.header.nominal_hz > 0.0 {
             1.0 / self.header.nominal_hz

@@ -1,40 +1,40 @@
-//! Time stamps of a stream on the clock of the recorder, without jitter, as pyxdf computes them
-//! (Kothe et al., "The Lab Streaming Layer for synchronized multimodal recording", 2024; pyxdf
-//! 1.17).
+//! Conversion of the time stamps of a stream to the clock of the recorder, and removal of jitter, by the method of
+//! pyxdf (Kothe et al., "The Lab Streaming Layer for synchronized multimodal recording", 2024; pyxdf 1.17).
 //!
-//! The offset `o_k` of the recorder's clock was measured at the times `c_k`. A line `o = b_0 + b_1 c` is fitted under
+//! The offset `o_k` to the recorder's clock was measured at times `c_k`. A line `o = b_0 + b_1 c` is fitted with
 //! Huber's loss by the alternating direction method of multipliers (Boyd et al., 2011, section 6.1.1), in units of 1e-4
 //! s, so that measurements over a busy network have little weight. Then `t <- t + b_0 + b_1 t`. If the clock was reset,
-//! each part has its own line. Finally, in a stream with a nominal rate, the time stamps between two breaks are
-//! replaced by their least-squares line over the sample index.
+//! each part between resets has its own line. Finally, in a stream with a nominal rate, the time stamps between two
+//! breaks are replaced by their least-squares line over the sample index.
 //!
-//! Unlike in pyxdf, lost samples are a break as well: a step of more than [`LOST_SAMPLES`] nominal sample times `T`
-//! after which the time stamps stay late, even after as many samples as are late, by the medians of `t_k - k T` on both
-//! sides. Late samples that catch up are jitter. Otherwise a lost second would be spread over the recording as a lower
-//! rate without a gap.
+//! Unlike in pyxdf, lost samples also count as a break: a step of more than [`LOST_SAMPLES`] nominal sample times `T`
+//! after which the time stamps remain late. The lateness is the difference between the medians of `t_k - k T` before
+//! the step and after it, where as many samples after the step are skipped as would have been lost. Samples that arrive
+//! late and catch up count as jitter. Without this rule a loss of one second would be spread over the recording and
+//! appear as a lower rate without a gap.
 
 use super::chunks::Stream;
 use crate::wording::shown;
 
-/// Unit of the fit, s: the loss of larger deviations is linear.
+/// Unit of the fit, s; the loss is linear for deviations above one unit.
 const UNIT_S: f64 = 1e-4;
 const ITERATIONS: usize = 1000;
-/// A reset: the time between offsets deviates from its median by more than this number of
-/// deviations and s, and so do the offsets.
+/// Limits for a reset of the clock (multiple of the median absolute deviation, and s). The time between two offset
+/// measurements must differ from its median by more than both limits, and the offset step by more than [`RESET_VALUE`].
 const RESET_TIME: (f64, f64) = (5.0, 5.0);
 const RESET_VALUE: (f64, f64) = (10.0, 1.0);
-/// A break: the longer of this time, s, and this number of samples.
+/// A break is a step longer than this time in s and longer than [`BREAK_SAMPLES`] nominal sample times.
 const BREAK_S: f64 = 1.0;
 const BREAK_SAMPLES: f64 = 500.0;
 
-/// Lost samples: a step, followed by a lateness, of this number of sample times.
+/// Step, and subsequent lateness, above which samples count as lost, in nominal sample times.
 const LOST_SAMPLES: f64 = 4.0;
-/// Samples on each side whose median gives their lateness.
-const BESIDE: usize = 25;
-/// Relative deviation of the rate from the stated one above which it is reported.
+/// Number of samples on each side of a step whose median gives the lateness.
+const SAMPLES_PER_SIDE: usize = 25;
+/// Relative deviation of the rate from the stated one above which the deviation is reported.
 const OFF: f64 = 0.02;
 
-/// The times of the samples, s.
+/// Returns the times of the samples, s.
 pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
     let mut times = stream.stamps.clone();
     if times.is_empty() {
@@ -44,9 +44,9 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
     let name = shown(&stream.header.name);
     let resets = match parts {
         0 => String::from("no clock offsets were recorded: its time stamps are taken as those of the recorder"),
-        1 => format!("clock aligned by a line through {} offsets", stream.offsets.len()),
+        1 => format!("clock aligned by a line fitted to {} offsets", stream.offsets.len()),
         parts => format!(
-            "clock aligned by {parts} lines through {} offsets, because it was reset",
+            "clock aligned by {parts} lines fitted to {} offsets, because the clock was reset",
             stream.offsets.len()
         ),
     };
@@ -61,8 +61,8 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
     let (parts, effective_hz) = straighten(&mut times, longest, stream.nominal_step_s());
     if let Some(hz) = effective_hz.filter(|hz| (hz / nominal_hz - 1.0).abs() > OFF) {
         notes.push(format!(
-            "stream {name}: its time stamps run at {hz:.4} Hz, but {nominal_hz} Hz is stated: samples are lost evenly, \
-             or the stated rate is wrong"
+            "stream {name}: its time stamps run at {hz:.4} Hz, but {nominal_hz} Hz is stated: samples are lost at \
+             regular intervals, or the stated rate is wrong"
         ));
     }
     let found = effective_hz.map_or_else(String::new, |hz| format!(", {hz:.4} Hz found"));
@@ -83,7 +83,7 @@ fn synchronise(times: &mut [f64], offsets: &[(f64, f64)]) -> usize {
     let mut from = 0;
     for &(first, last) in &parts {
         let (b0, b1) = line(&offsets[first..=last]);
-        // Up to the first time stamp that is closer to the next part.
+        // The part ends before the first time stamp that is closer to the next part.
         let to = match offsets.get(last + 1) {
             Some((next, _)) => {
                 let end = offsets[last].0;
@@ -98,7 +98,7 @@ fn synchronise(times: &mut [f64], offsets: &[(f64, f64)]) -> usize {
     parts.len()
 }
 
-/// First and last offset of each part between resets of the clock.
+/// Returns the first and the last offset of each part between resets of the clock.
 fn resets(offsets: &[(f64, f64)]) -> Vec<(usize, usize)> {
     if offsets.is_empty() {
         return Vec::new();
@@ -112,8 +112,8 @@ fn resets(offsets: &[(f64, f64)]) -> Vec<(usize, usize)> {
     parts(breaks, offsets.len())
 }
 
-/// True where a step differs from the median by more than the given number of median absolute
-/// deviations, and by more than `least`.
+/// True for each step that differs from the median by more than `deviations` median absolute deviations and by more
+/// than `least`.
 fn glitches(steps: &[f64], (deviations, least): (f64, f64)) -> Vec<bool> {
     let middle = median(steps);
     let off: Vec<f64> = steps.iter().map(|step| (step - middle).abs()).collect();
@@ -133,7 +133,7 @@ fn median(values: &[f64]) -> f64 {
     }
 }
 
-/// First and last index of each of the parts into which breaks divide `count` items.
+/// Divides `count` items into parts at the breaks; returns the first and the last index of each part.
 fn parts(breaks: impl Iterator<Item = usize>, count: usize) -> Vec<(usize, usize)> {
     let mut parts = Vec::new();
     let mut first = 0;
@@ -145,7 +145,7 @@ fn parts(breaks: impl Iterator<Item = usize>, count: usize) -> Vec<(usize, usize
     parts
 }
 
-/// The line `b_0 + b_1 c` through offsets under Huber's loss; zero if they carry no information.
+/// Fits the line `b_0 + b_1 c` to offsets with Huber's loss; returns zeros if the offsets do not determine a line.
 fn line(offsets: &[(f64, f64)]) -> (f64, f64) {
     if let [(_, offset)] = offsets {
         return (*offset, 0.0);
@@ -182,7 +182,7 @@ fn line(offsets: &[(f64, f64)]) -> (f64, f64) {
     (UNIT_S * (x.0 - x.1 * start), x.1)
 }
 
-/// True if samples were lost before the k-th: a long step, after which all are late by it.
+/// True if samples were lost before the k-th sample: after a long step the time stamps remain late.
 fn lost(times: &[f64], k: usize, nominal_s: f64) -> bool {
     let late_s = times[k] - times[k - 1] - nominal_s;
     if nominal_s.is_nan() || nominal_s <= 0.0 || late_s.is_nan() || late_s <= LOST_SAMPLES * nominal_s {
@@ -194,15 +194,15 @@ fn lost(times: &[f64], k: usize, nominal_s: f64) -> bool {
             .collect();
         median(&of)
     };
-    // After all samples that arrive late together.
+    // Samples that would have arrived late together are skipped.
     let come = k.saturating_add((late_s / nominal_s).ceil() as usize);
-    let from = come.min(times.len().saturating_sub(BESIDE)).max(k);
-    let shift_s = lateness(from, (from + BESIDE).min(times.len())) - lateness(k.saturating_sub(BESIDE), k);
+    let from = come.min(times.len().saturating_sub(SAMPLES_PER_SIDE)).max(k);
+    let shift_s = lateness(from, (from + SAMPLES_PER_SIDE).min(times.len())) - lateness(k.saturating_sub(SAMPLES_PER_SIDE), k);
     shift_s > LOST_SAMPLES * nominal_s && shift_s > 0.5 * late_s
 }
 
-/// Replaces the time stamps between two breaks by their line; returns the number of parts, and the
-/// mean rate in Hz.
+/// Replaces the time stamps between two breaks by their least-squares line; returns the number of parts and the mean
+/// rate in Hz.
 fn straighten(times: &mut [f64], longest_s: f64, nominal_s: f64) -> (usize, Option<f64>) {
     let breaks: Vec<usize> = (1..times.len())
         .filter(|k| (times[*k] - times[k - 1]).abs() > longest_s || lost(times, *k, nominal_s))
@@ -212,7 +212,7 @@ fn straighten(times: &mut [f64], longest_s: f64, nominal_s: f64) -> (usize, Opti
     let (mut steps, mut duration_s) = (0_usize, 0.0);
     for &(first, last) in &parts {
         let part = &mut times[first..=last];
-        // Relative to the middle, where the numbers are small and the sums uncorrelated.
+        // Indices relative to the middle keep the numbers small and the sums uncorrelated.
         let middle = (part.len() - 1) as f64 / 2.0;
         let mean = part.iter().sum::<f64>() / part.len() as f64;
         let (mut products, mut squares) = (0.0, 0.0);

@@ -1,14 +1,14 @@
-//! The header of a stream, in XML: `info` with `name`, `channel_count`, `nominal_srate`,
-//! `channel_format`, and in `desc` the labels and units of the channels.
+//! The header of a stream in XML: `info` with `name`, `channel_count`, `nominal_srate` and `channel_format`, and in
+//! `desc` the labels and units of the channels.
 
 use roxmltree::{Document, Node};
 
-use crate::wording::told;
+use crate::wording::short_error;
 
-/// A stream with more channels is damage.
+/// Maximum number of channels of a stream; a larger number counts as damage.
 const MOST_CHANNELS: usize = 1 << 12;
 
-/// Properties of a stream stated before its samples.
+/// Properties of a stream that the file gives before the samples.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Header {
     pub(super) name: String,
@@ -19,15 +19,15 @@ pub(super) struct Header {
     pub(super) format: String,
     /// Label and unit of each channel, if stated.
     pub(super) labels: Vec<(String, String)>,
-    /// True if the stream drops samples rather than delaying them, so that its time stamps are kept.
+    /// True if the stream drops samples instead of delaying them; its time stamps are then kept.
     pub(super) can_drop: bool,
 }
 
-/// The header in the bytes of a chunk.
+/// Parses the header in the bytes of a chunk.
 pub(super) fn parse(bytes: &[u8]) -> Result<Header, String> {
     let text = String::from_utf8_lossy(bytes);
     let document = Document::parse(text.trim_start_matches('\u{feff}'))
-        .map_err(|error| format!("its header: {}", told(&error.to_string())))?;
+        .map_err(|error| format!("its header: {}", short_error(&error.to_string())))?;
     let info = document.root_element();
     let text = |name: &str| {
         child(info, name)
@@ -37,7 +37,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, String> {
     let needed = |name: &str| text(name).ok_or_else(|| format!("its header holds no {name}"));
     let number = |name: &str, text: String| {
         text.parse::<f64>()
-            .map_err(|_| format!("its {name} is \"{}\"", told(&text)))
+            .map_err(|_| format!("its {name} is \"{}\"", short_error(&text)))
     };
     let count = number("channel_count", needed("channel_count")?)?;
     if !(0.0..=MOST_CHANNELS as f64).contains(&count) {
@@ -79,11 +79,11 @@ pub(super) struct Footer {
     pub(super) span_s: Option<(f64, f64)>,
 }
 
-/// The footer in the bytes of a chunk.
+/// Parses the footer in the bytes of a chunk.
 pub(super) fn footer(bytes: &[u8]) -> Result<Footer, String> {
     let text = String::from_utf8_lossy(bytes);
     let document = Document::parse(text.trim_start_matches('\u{feff}'))
-        .map_err(|error| format!("its footer: {}", told(&error.to_string())))?;
+        .map_err(|error| format!("its footer: {}", short_error(&error.to_string())))?;
     let info = document.root_element();
     let number = |name: &str| {
         child(info, name)?

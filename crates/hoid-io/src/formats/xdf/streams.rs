@@ -1,4 +1,4 @@
-//! The streams of a file as arrays: one path for each channel and for the times of each stream.
+//! Conversion of the streams of a file to arrays: one path per channel, and one for the times of each stream.
 
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
@@ -10,7 +10,7 @@ use crate::formats::arrays::{Array, Contents, Entry, Indexing, Numbers, Value};
 use crate::formats::budget::Budget;
 use crate::wording::{shown, start_of};
 
-/// Approximate memory of an entry, bytes.
+/// Approximate memory of an entry in bytes.
 const ENTRY: u64 = 512;
 
 /// Reads the streams from the bytes of a file.
@@ -44,7 +44,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
         })?;
         if let Some(why) = &stream.unread_footer {
             notes.push(format!(
-                "stream {}: {why}; its {} samples are read, but it is not known whether they are all",
+                "stream {}: {why}; its {} samples are read, but it is not known whether samples are missing",
                 shown(&stream.header.name),
                 stream.stamps.len()
             ));
@@ -94,7 +94,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
     Ok(contents)
 }
 
-/// The time stamps and the channels of a stream.
+/// Returns the time stamps and the channels of a stream as entries.
 fn entries_of(stream: Stream, parent: &str, times: &[f64]) -> Vec<Entry> {
     let mut names = Names::default();
     let times = Value::Array(Array::vector(Numbers::from_f64(times)));
@@ -134,11 +134,11 @@ fn entries_of(stream: Stream, parent: &str, times: &[f64]) -> Vec<Entry> {
     entries
 }
 
-/// Unique names: the second of the same name has a number.
+/// Makes names unique: a number is appended to the second and each further use of a name.
 #[derive(Default)]
 struct Names {
     known: HashSet<String>,
-    /// Number to be tried next for a name.
+    /// Number to try next for a name.
     next: HashMap<String, usize>,
 }
 

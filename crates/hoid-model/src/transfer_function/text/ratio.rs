@@ -2,7 +2,7 @@
 
 use crate::polynomial;
 
-/// `num/den e^{-s tau}` during parsing: not yet proper, and its delay not yet positive.
+/// `num/den e^{-s tau}` during parsing: it may be improper, and its delay may be negative.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Ratio {
     pub num: Vec<f64>,

@@ -1,8 +1,8 @@
-//! Recursive descent parser of an expression in s ([`super`]).
+//! Recursive descent parser for an expression in s ([`super`]).
 
 use super::{coefficients::EXAMPLES, ratio::Ratio};
 
-/// Degree above which a denominator is a typing error, and its roots are dominated by rounding.
+/// Degree above which a polynomial is probably a typing error, and its roots are dominated by rounding.
 const HIGHEST_DEGREE: usize = 50;
 /// Largest depth of nested parentheses.
 const DEEPEST: usize = 50;
@@ -16,7 +16,7 @@ pub(super) struct Reader {
 
 impl Reader {
     pub fn new(text: &str) -> Self {
-        // Text copied from papers contains typographic signs.
+        // Text copied from papers may contain typographic characters.
         let plain = |sign| match sign {
             '\u{2212}' | '\u{2013}' => '-',
             '\u{b7}' | '\u{d7}' | '\u{22c5}' => '*',
@@ -253,7 +253,7 @@ impl Reader {
         }
     }
 
-    /// Checks that the result of a step is finite and of a reasonable degree.
+    /// Checks that an intermediate result is finite and of a reasonable degree.
     fn checked(&mut self, ratio: Ratio, at: usize) -> Result<Ratio, String> {
         if ratio.num.len().max(ratio.den.len()) > HIGHEST_DEGREE + 1 {
             self.at = at;

@@ -1,13 +1,13 @@
-//! Evidence from the files of a group for lines of its manifest.
+//! Evidence, found in the files of a group, for single lines of its manifest.
 
 /// Evidence for the line of the manifest that starts with `key`, in the table `table`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
-    /// Table of the manifest, such as `[read]`; empty for its head.
+    /// Table of the manifest, such as `[read]`; empty for the keys above the first table.
     pub table: String,
-    /// Key in that table; empty for the table itself.
+    /// Key in that table; empty if the evidence concerns the table as a whole.
     pub key: &'static str,
-    /// The evidence as text.
+    /// Text of the evidence.
     pub words: String,
 }
 

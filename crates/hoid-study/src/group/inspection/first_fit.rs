@@ -1,4 +1,5 @@
-//! Form and order of the noise model of the first run: evidence for the settings of the analysis, not its result.
+//! Form and noise-model order found for the first run. They are evidence for the settings of the analysis, not its
+//! result.
 
 use hoid_ident::{
     Estimator,
@@ -11,16 +12,16 @@ use super::evidence::Evidence;
 
 /// Orders of the noise model to try.
 const ORDERS: std::ops::RangeInclusive<usize> = 1..=6;
-/// Number of orders above the selected one that the analysis may use for other runs.
-const ROOM: usize = 2;
+/// Number of orders above the selected one that the analysis may use for the other runs.
+const EXTRA_ORDERS: usize = 2;
 
-/// Results of the first run.
+/// Evidence from the first run.
 pub struct FirstFit {
     pub nd: Option<(usize, usize)>,
     pub evidence: Vec<Evidence>,
 }
 
-/// Fits Box-Jenkins models of the operator over orders of the noise model, and the forms of the family.
+/// Fits Box-Jenkins models with several orders of the noise model, and the forms of the family.
 pub fn evidence(record: &Record) -> FirstFit {
     let mut evidence = Vec::new();
     let mut nd = None;
@@ -37,7 +38,7 @@ pub fn evidence(record: &Record) -> FirstFit {
         ) {
             Ok((fit, _)) => {
                 let chosen = fit.orders().nd;
-                nd = Some((1, (chosen + ROOM).min(*ORDERS.end())));
+                nd = Some((1, (chosen + EXTRA_ORDERS).min(*ORDERS.end())));
                 let dead_time = (fit.orders().nk as f64 - 1.0) * record.sample_time().s();
                 evidence.push(Evidence::new(
                     "[analysis]",

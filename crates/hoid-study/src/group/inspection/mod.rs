@@ -1,5 +1,5 @@
-//! Inspection of the files of a group before the analysis ([`Look`]): results are written to the manifest with their
-//! evidence, to be checked by the user; settings given by the user are not searched for.
+//! Inspection of the files of a group before the analysis ([`Look`]). The results are written to the manifest together
+//! with their evidence, for the user to check. Settings given by the user are kept.
 //!
 //! | file | contents |
 //! |---|---|
@@ -18,11 +18,11 @@ pub use evidence::Evidence;
 use super::{condition_settings::ConditionSettings, manifest::Manifest};
 use crate::StudyError;
 
-/// Completes a manifest from its files: the first run of each condition is examined.
+/// Completes a manifest by inspecting the first run of each condition.
 ///
 /// # Errors
-/// [`StudyError::Io`] if the first file cannot be read at all; anything that cannot be determined
-/// is reported in the evidence.
+/// [`StudyError::Io`] if the first file cannot be read. Properties that cannot be determined are reported in the
+/// evidence.
 pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -> Result<Vec<Evidence>, StudyError> {
     let mut evidence = Vec::new();
     let first = Look::at(&directory.join(&manifest.runs[0].file), known)?;
@@ -50,7 +50,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
     let (input, output) = (first.roles.input.clone(), first.roles.output.clone());
     evidence.push(Evidence::new("[read]", "input", input.why));
     evidence.push(Evidence::new("[read]", "output", output.why));
-    // All files are read with the columns of the first.
+    // All files are read with the columns found in the first file.
     let of_all = LookOptions {
         input: Some(input.column.clone()),
         output: Some(output.column.clone()),
@@ -75,7 +75,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
         let Some(run) = manifest.runs.iter().find(|run| run.condition == *condition) else {
             continue;
         };
-        // The first run is the first of its condition.
+        // The first run of the manifest is also the first run of its condition.
         let look = first
             .take()
             .map_or_else(|| Look::at(&directory.join(&run.file), &of_all), Ok);
@@ -87,13 +87,13 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
             }
         };
         let table = format!("[conditions.{}]", key_of(condition));
-        let settings = look_at(&seen, condition, &table, known, &mut evidence, &mut spans);
+        let settings = inspect_condition(&seen, condition, &table, known, &mut evidence, &mut spans);
         // A run without a condition name has no table in the manifest.
         if !condition.is_empty() && settings != ConditionSettings::default() {
             manifest.conditions.insert(condition.clone(), settings);
         }
     }
-    // A common span, complete in each condition.
+    // The span is entered only if it is the same in all conditions.
     if let (None, None, Some(first)) = (known.from_s, known.to_s, spans.first())
         && spans.iter().all(|span| span == first)
     {
@@ -123,8 +123,8 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
     Ok(evidence)
 }
 
-/// Examines the first run of a condition.
-fn look_at(
+/// Examines the first run of a condition and returns the settings found.
+fn inspect_condition(
     seen: &RecordSummary,
     condition: &str,
     table: &str,
@@ -158,7 +158,7 @@ fn look_at(
     settings
 }
 
-/// A name as a TOML key in a table heading.
+/// Writes a name as a TOML key of a table heading.
 fn key_of(name: &str) -> String {
     let bare = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if !name.is_empty() && name.chars().all(bare) {
@@ -168,7 +168,7 @@ fn key_of(name: &str) -> String {
     }
 }
 
-/// The text of a manifest with the evidence as comments above the corresponding lines.
+/// Returns the text of a manifest with the evidence as comments above the lines concerned.
 #[must_use]
 pub fn commented(text: &str, evidence: &[Evidence]) -> String {
     let mut written = String::from(

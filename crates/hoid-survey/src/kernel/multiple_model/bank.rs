@@ -1,19 +1,19 @@
-//! The hypotheses with their probabilities, for output and signals after the whitening filter.
+//! The hypotheses with their probabilities, updated with output and signals after the whitening filter.
 //!
-//! At each sample the probability of a hypothesis is multiplied by its predictive density of the innovation, and all
-//! are normalised. At every birth the likeliest is the parent of new ones:
+//! At each sample the probability of a hypothesis is multiplied by its predictive density of the innovation, and the
+//! probabilities are normalised. At every birth the likeliest hypothesis is the parent of new hypotheses:
 //!
-//! - **a change of the gains**, and at every few births one of omega_nm and zeta_nm too, with the
-//!   prior probability of such a change since the last birth;
-//! - **a neighbouring delay**, as an alternative that may have been true throughout: as old as its
-//!   parent, each parameter opened by the error that the difference of the delays makes in it; the
-//!   first of them when the bank starts;
-//! - **a change of the delay**: delays spread over all candidates, with gains that are opened as in
-//!   any change, and probabilities in proportion to the normal density of the step. The proposed
-//!   delays move on by one each time, so that each candidate has its turn, and the number of
-//!   hypotheses is bounded however many delays there are.
+//! - **a change of the gains**, and at every few births a change of omega_nm and zeta_nm as well, with the prior
+//!   probability of such a change since the last birth;
+//! - **a neighbouring delay**, as an alternative that may have been true throughout: the hypothesis is as old as its
+//!   parent, and the variance of each parameter is increased by the error that the difference in delay causes in it;
+//!   the first such hypotheses are created when the bank starts;
+//! - **a change of the delay**: delays spread over all candidates, with the variances of the gains increased as in any
+//!   change, and probabilities proportional to the normal density of the step. The set of proposed delays is shifted by
+//!   one each time, so that each candidate has its turn, and the number of hypotheses is bounded for any number of
+//!   delays.
 //!
-//! A new hypothesis replaces the least likely one that is old enough to be pruned.
+//! A new hypothesis replaces the least likely hypothesis that is old enough to be pruned.
 
 use hoid_core::state::{State, visit_all};
 
@@ -24,7 +24,7 @@ use super::{
     signal_ring::DelayedSignals,
 };
 
-/// The hypotheses, at most M.
+/// A bank of at most M hypotheses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bank<const M: usize> {
     prior: ChangePrior,
@@ -33,7 +33,7 @@ pub struct Bank<const M: usize> {
     /// Number of samples until the next birth.
     until_birth: u32,
     births: u32,
-    /// Sample from which hypotheses of a change of omega_nm and zeta_nm are born.
+    /// First sample at which hypotheses of a change of omega_nm and zeta_nm may be created.
     neuromuscular_from: u64,
     detector: ChangeDetector,
 }
@@ -55,19 +55,19 @@ impl<const M: usize> State for Bank<M> {
     }
 }
 
-/// Mean of the mixture.
+/// Mean of the mixture of hypotheses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mixture {
-    /// `[K_e, K_e_dot, omega_nm, zeta_nm]`.
+    /// Mean of `[K_e, K_e_dot, omega_nm, zeta_nm]`.
     pub eta: [f64; OPERATOR],
-    /// Innovation variance.
+    /// Mean innovation variance.
     pub variance: f64,
 }
 
-/// Number of delays on either side of the likeliest that are proposed as alternatives that may have been true
+/// Number of delays on either side of the likeliest delay that are proposed as alternatives that may have been true
 /// throughout.
 const NEIGHBOURS: usize = 3;
-/// Least probability of a hypothesis, relative to the likeliest, so that no hypothesis is lost permanently.
+/// Smallest probability of a hypothesis relative to the likeliest, so that no hypothesis is lost permanently.
 const LEAST_PROBABILITY: f64 = 1e-12;
 
 impl<const M: usize> Bank<M> {
@@ -80,7 +80,7 @@ impl<const M: usize> Bank<M> {
     }
 
     /// Starts from one hypothesis. `None` if M is below two, the start is not finite or not within the bounds, the
-    /// bounds allow omega_nm or zeta_nm to become zero, or a number of the prior is outside its range.
+    /// bounds allow omega_nm or zeta_nm to become zero, or a value of the prior is out of range.
     pub fn new(first: Hypothesis, prior: ChangePrior) -> Option<Self> {
         let within_bounds = first
             .eta
@@ -106,7 +106,7 @@ impl<const M: usize> Bank<M> {
         Some(bank)
     }
 
-    /// Updates the bank by a sample: output and signals after the whitening filter, `None` if they are unknown.
+    /// Updates the bank with one sample: output and signals after the whitening filter, or `None` if they are unknown.
     /// Returns the innovation.
     pub fn update(&mut self, sample: Option<(f64, DelayedSignals<'_>)>, point: [f64; 2]) -> f64 {
         let innovation = self.update_hypotheses(sample, point);
@@ -116,11 +116,11 @@ impl<const M: usize> Bank<M> {
         innovation
     }
 
-    /// Drops the young hypotheses of a change of omega_nm and zeta_nm, and allows new ones only after the settling
+    /// Discards the recent hypotheses of a change of omega_nm and zeta_nm, and allows new ones only after the settling
     /// time.
     ///
-    /// The change of the gains itself passes through the neuromuscular system, and until it has settled the response
-    /// is that of neither set of gains: it would be taken for a change of omega_nm and zeta_nm.
+    /// A change of the gains passes through the neuromuscular system. Until the transient has settled, the response
+    /// corresponds neither to the old nor to the new gains and could be mistaken for a change of omega_nm and zeta_nm.
     fn suspend_neuromuscular(&mut self) {
         self.neuromuscular_from = self.samples + self.prior.settling_time;
         let mut rest = 0.0;
@@ -141,12 +141,12 @@ impl<const M: usize> Bank<M> {
         }
     }
 
-    /// True for a hypothesis that omega_nm and zeta_nm changed within the change window.
+    /// True if the hypothesis assumes that omega_nm and zeta_nm changed within the change window.
     fn is_recent_neuromuscular(&self, h: &Hypothesis) -> bool {
         h.neuromuscular_changed && self.samples - h.born < self.prior.change_window
     }
 
-    /// As [`Bank::update`], without the detection of changes.
+    /// As [`Bank::update`], but without detection of changes.
     pub fn update_hypotheses(&mut self, sample: Option<(f64, DelayedSignals<'_>)>, point: [f64; 2]) -> f64 {
         self.samples += 1;
         let mut innovation = 0.0;
@@ -167,7 +167,7 @@ impl<const M: usize> Bank<M> {
         innovation
     }
 
-    /// Creates the hypotheses that are due.
+    /// Creates the hypotheses that are due at this birth.
     fn give_birth(&mut self) {
         self.births = self.births.wrapping_add(1);
         let probability = self.prior.hazard * f64::from(self.prior.birth_interval);
@@ -183,12 +183,12 @@ impl<const M: usize> Bank<M> {
         }
     }
 
-    /// Counts a sample; the estimate stays constant.
+    /// Counts a sample without changing the estimate.
     pub fn skip(&mut self) {
         self.samples += 1;
     }
 
-    /// Normalises the sum of the probabilities to one. Those that are too small, or not finite, become
+    /// Scales the probabilities to a sum of one. Probabilities that are too small or not finite are replaced by
     /// [`LEAST_PROBABILITY`].
     fn normalise(&mut self) {
         let mut most = 0.0;
@@ -215,14 +215,15 @@ impl<const M: usize> Bank<M> {
         }
     }
 
-    /// Creates the hypothesis that the gains change now, and with `neuromuscular` omega_nm and zeta_nm too.
+    /// Creates the hypothesis that the gains change now; if `neuromuscular` is true, omega_nm and zeta_nm change as
+    /// well.
     fn spawn_changed(&mut self, probability: f64, neuromuscular: bool) {
         if let Some((slot, parent)) = self.parent() {
             self.spawn(self.with_change(&parent, neuromuscular), probability, slot);
         }
     }
 
-    /// Creates hypotheses of the delays adjacent to the likeliest, if there are none.
+    /// Creates hypotheses with delays close to the likeliest, unless they exist already.
     fn spawn_neighbouring_delays(&mut self) {
         let Some((slot, parent)) = self.parent() else { return };
         let delay = self.prior.delay;
@@ -271,8 +272,8 @@ impl<const M: usize> Bank<M> {
         }
     }
 
-    /// Returns the likeliest hypothesis, and its slot. A hypothesis of a recent change of omega_nm and zeta_nm has no
-    /// children, so that the transient effect of a change of the gains on these parameters is not inherited.
+    /// Returns the likeliest hypothesis and its slot. Hypotheses of a recent change of omega_nm and zeta_nm are
+    /// excluded, so that the transient effect of a change of the gains on these parameters is not inherited.
     fn parent(&self) -> Option<(usize, Hypothesis)> {
         let (mut likeliest, mut highest) = (None, 0.0);
         for (slot, h) in self.hypotheses.iter().enumerate() {
@@ -286,15 +287,15 @@ impl<const M: usize> Bank<M> {
         likeliest
     }
 
-    /// A child, which assumes that the operator changes now.
+    /// Returns a child of the hypothesis that assumes that the operator changes now.
     fn with_change(&self, parent: &Hypothesis, neuromuscular: bool) -> Hypothesis {
         let mut child = parent.with_change(self.samples, neuromuscular, &self.prior);
         child.before.delay = self.delay();
         child
     }
 
-    /// Puts a child into the slot of the least likely hypothesis that is old enough to be pruned; there is no child if
-    /// that is its parent.
+    /// Puts a child into an empty slot, or into that of the least likely hypothesis that is old enough to be pruned. If
+    /// that hypothesis is the parent, the child is discarded.
     fn spawn(&mut self, mut child: Hypothesis, probability: f64, parent: usize) {
         let (mut slot, mut lowest) = (None, f64::INFINITY);
         for (i, h) in self.hypotheses.iter().enumerate() {
@@ -333,7 +334,7 @@ impl<const M: usize> Bank<M> {
         mixture
     }
 
-    /// Returns the covariance of eta.
+    /// Returns the covariance of eta in the mixture.
     pub fn covariance(&self) -> [[f64; OPERATOR]; OPERATOR] {
         let mean = self.mixture().eta;
         let mut covariance = [[0.0; OPERATOR]; OPERATOR];
@@ -350,7 +351,7 @@ impl<const M: usize> Bank<M> {
         covariance
     }
 
-    /// Returns T_L in s and its variance, `E[K_e K_e_dot]/E[K_e^2]`: the T that minimises
+    /// Returns T_L in s and its variance. T_L is `E[K_e K_e_dot]/E[K_e^2]`, the T that minimises
     /// `E (K_e_dot - T K_e)^2`.
     pub fn lead_time(&self, covariance: &[[f64; OPERATOR]; OPERATOR]) -> [f64; 2] {
         let [k_e, k_e_dot, ..] = self.mixture().eta;
@@ -366,12 +367,12 @@ impl<const M: usize> Bank<M> {
         self.prior.delay.count
     }
 
-    /// Returns mean and variance of the delay, in samples beyond the shortest.
+    /// Returns the mean and the variance of the delay, in samples beyond the shortest delay.
     pub fn delay(&self) -> [f64; 2] {
         delay_of(self.hypotheses())
     }
 
-    /// Returns the delay of the likeliest hypothesis.
+    /// Returns the delay of the likeliest hypothesis, in samples beyond the shortest delay.
     pub fn likeliest_delay(&self) -> usize {
         let likeliest = self.hypotheses().max_by(|a, b| a.probability.total_cmp(&b.probability));
         likeliest.map_or(0, |h| h.extra_delay)
@@ -387,7 +388,7 @@ impl<const M: usize> Bank<M> {
         self.detector.log_odds()
     }
 
-    /// Returns the change that was declared at the last sample, if there was one.
+    /// Returns the change declared at the last sample; `None` if there was none.
     pub fn change(&self) -> Option<Change> {
         self.detector.change()
     }

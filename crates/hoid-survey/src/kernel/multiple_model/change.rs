@@ -1,17 +1,18 @@
-//! Time of a change of the operator, and the parameters that changed.
+//! Detection of a change of the operator: its time, and the parameters that changed.
 //!
-//! `Lambda = ln(sum of P(h) over those born within the last T)/(sum of P(h) over those that are older))`: the
-//! logarithm of the posterior odds of a change. It is the likelihood ratio of Willsky and Jones (A. S. Willsky and H.
-//! L. Jones, *IEEE Transactions on Automatic Control* 21 (1976) 108-112), with the size of the change and its time
-//! averaged out instead of maximised, so that its expectation does not grow with the number of times that are tried. A
-//! change is declared if Lambda exceeds the threshold and the likeliest of the recent hypotheses is old enough to
-//! identify the changed parameters. The next is declared only after Lambda has been below zero, when the new values
-//! have become the established ones, or if further parameters prove to have changed: the neuromuscular system, by the
-//! same odds of such hypotheses against all others, or the delay, by three standard errors.
+//! `Lambda = ln((sum of P(h) over hypotheses born within the last T)/(sum of P(h) over older hypotheses))` is the
+//! logarithm of the posterior odds of a change. It corresponds to the likelihood ratio of Willsky and Jones (A. S.
+//! Willsky and H. L. Jones, *IEEE Transactions on Automatic Control* 21 (1976) 108-112), but the size and the time of
+//! the change are averaged out instead of maximised, so that its expectation does not grow with the number of times
+//! that are tried. A change is declared if Lambda exceeds the threshold and the likeliest recent hypothesis is old
+//! enough to identify the changed parameters. The next change is declared only after Lambda has been below zero, when
+//! the new values have become the established ones, or if further parameters prove to have changed: the neuromuscular
+//! system, by the same odds of hypotheses in which it changed against all others, or the delay, by three standard
+//! errors.
 //!
-//! The likeliest of the recent hypotheses has a time of the change and an estimate before it: the change of each
-//! parameter over its standard error shows which parameters changed. For the innovation variance that is
-//! `ln(s2/s1)/sqrt(2/n)` with the n samples since then.
+//! The likeliest recent hypothesis gives the time of the change and the estimate before it. The change of each
+//! parameter divided by its standard error shows which parameters changed. For the innovation variance this ratio is
+//! `ln(s2/s1)/sqrt(2/n)`, where n is the number of samples since the change.
 
 use super::{
     hypothesis::{Hypothesis, Snapshot},
@@ -19,27 +20,28 @@ use super::{
 };
 use hoid_core::state::{State, visit_all};
 
-/// A change that was declared.
+/// A declared change.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Change {
-    /// Number of samples since the change, for the likeliest hypothesis.
+    /// Number of samples since the change according to the likeliest recent hypothesis.
     pub samples_ago: u64,
-    /// Lambda.
+    /// Logarithm of the posterior odds, Lambda.
     pub log_odds: f64,
     /// The operator before the change.
     pub before: Snapshot,
     /// The operator after the change.
     pub after: Snapshot,
-    /// Changes of K_e, K_e_dot, omega_nm, zeta_nm, of the innovation variance and of the delay, each over its standard
+    /// Changes of K_e, K_e_dot, omega_nm, zeta_nm, the innovation variance and the delay, each divided by its standard
     /// error.
     pub z: [f64; OPERATOR + 2],
 }
 
-/// Lambda, and the declarations since it rose above zero.
+/// Lambda, and the changes declared since it rose above zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChangeDetector {
     log_odds: f64,
-    /// Whether a change was declared, and whether one of the neuromuscular system or of the delay.
+    /// True if a change was declared; the next two fields are true if it included the neuromuscular system or the
+    /// delay.
     declared: bool,
     declared_neuromuscular: bool,
     declared_delay: bool,
@@ -80,13 +82,14 @@ impl Default for ChangeDetector {
     }
 }
 
-/// Change of the delay over its standard error from which it is declared.
+/// Threshold for declaring a change of the delay, in standard errors.
 const DELAY_THRESHOLD: f64 = 3.0;
-/// Number added to both sides of the odds, so that Lambda stays finite.
+/// Number added to numerator and denominator of the odds, so that Lambda stays finite.
 const REGULARISATION: f64 = 1e-12;
 
 impl ChangeDetector {
-    /// Updates the detector by the hypotheses after a sample. True if Lambda rises above zero: a change starts.
+    /// Updates the detector with the hypotheses after a sample. Returns true if Lambda rises above zero, which marks
+    /// the start of a change.
     pub fn update(&mut self, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) -> bool {
         let sums = Sums::over(hypotheses, now, prior);
         let before = self.log_odds;
@@ -100,7 +103,7 @@ impl ChangeDetector {
         self.log_odds > 0.0 && before <= 0.0
     }
 
-    /// Declares the change of the likeliest of the recent hypotheses, once it has settled and if it has something new.
+    /// Declares the change of the likeliest recent hypothesis, once it is old enough and if something new has changed.
     fn declare(&mut self, sums: &Sums<'_>, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) {
         let Some(h) = sums.likeliest.filter(|h| now - h.born >= prior.settling_time) else {
             return;
@@ -110,7 +113,7 @@ impl ChangeDetector {
             h.neuromuscular_changed && log_odds(sums.neuromuscular, others.max(0.0)) > prior.log_odds_threshold;
         let new_neuromuscular = neuromuscular_changed && !self.declared_neuromuscular;
         let delay_may_be_new = prior.delay.count > 1 && !self.declared_delay;
-        // Most samples after a change have nothing more to declare and end here.
+        // At most samples after a change there is nothing further to declare, and the function returns here.
         if self.declared && !new_neuromuscular && !delay_may_be_new {
             return;
         }
@@ -131,17 +134,17 @@ impl ChangeDetector {
         self.log_odds
     }
 
-    /// Returns the change that was declared at the last sample.
+    /// Returns the change declared at the last sample; `None` if there was none.
     pub fn change(&self) -> Option<Change> {
         self.change
     }
 }
 
-/// Sums of probabilities, and the likeliest of the recent hypotheses.
+/// Sums of probabilities, and the likeliest recent hypothesis.
 struct Sums<'a> {
     recent: f64,
     older: f64,
-    /// Sum for the recent ones in which omega_nm and zeta_nm changed too.
+    /// Sum over the recent hypotheses in which omega_nm and zeta_nm changed as well.
     neuromuscular: f64,
     likeliest: Option<&'a Hypothesis>,
 }
@@ -173,13 +176,14 @@ fn log_odds(probability: f64, of_others: f64) -> f64 {
     libm::log((probability + REGULARISATION) / (of_others + REGULARISATION))
 }
 
-/// True for a hypothesis within the change window. The first, born at sample 0, does not correspond to any change.
+/// True if the hypothesis was born within the change window. The first hypothesis, born at sample 0, does not represent
+/// a change.
 fn is_recent(h: &Hypothesis, now: u64, prior: &ChangePrior) -> bool {
     h.born > 0 && now - h.born < prior.change_window
 }
 
-/// Mean and variance of the delay over hypotheses, in samples beyond the shortest. The variance includes that of
-/// rounding to whole samples, 1/12.
+/// Mean and variance of the delay over hypotheses, in samples beyond the shortest delay. The variance includes 1/12 for
+/// rounding to whole samples.
 pub(super) fn delay_of<'a>(hypotheses: impl Iterator<Item = &'a Hypothesis>) -> [f64; 2] {
     let (mut sum, mut first, mut second) = (0.0, 0.0, 0.0);
     for h in hypotheses {
@@ -192,7 +196,7 @@ pub(super) fn delay_of<'a>(hypotheses: impl Iterator<Item = &'a Hypothesis>) -> 
     [mean, (second / sum - mean * mean).max(0.0) + 1.0 / 12.0]
 }
 
-/// Returns the change of a hypothesis, with the delay after it.
+/// Returns the change that a hypothesis represents; `delay` is the delay after the change.
 fn change_of(h: &Hypothesis, delay: [f64; 2], now: u64, log_odds: f64) -> Change {
     let (before, after) = (h.before, Snapshot { delay, ..h.snapshot() });
     let samples_ago = now - h.born;

@@ -1,7 +1,7 @@
-//! The recursion: the filters of the signals, followed by the bank of hypotheses.
+//! The recursion: filters for the signals, followed by the bank of hypotheses.
 //!
-//! A sample passes the [`Response`] to the held error, the whitening filter D and the ring of delayed signals, and
-//! reaches the [`Bank`]. The linearisation point of the response follows the estimate at intervals.
+//! A sample passes the [`Response`] to the held error, the whitening filter D and the ring buffer of delayed signals,
+//! and reaches the [`Bank`]. At regular intervals the linearisation point of the response is moved toward the estimate.
 
 use super::{
     bank::Bank,
@@ -14,20 +14,20 @@ use hoid_core::{bounds::within, recursion::Step};
 
 /// Number of samples between two moves of the linearisation point.
 const RELINEARISE_EVERY: u64 = 64;
-/// Largest relative move of the point: the states of the filters move along their first derivative.
+/// Largest relative move of the linearisation point; the states of the filters are moved to first order only.
 const LARGEST_MOVE: f64 = 0.1;
 
-/// The recursion. M is the largest number of hypotheses, D the largest order of the noise model, B
-/// the memory for the signals of every delay.
+/// The recursion. M is the largest number of hypotheses, D the largest order of the noise model, and B the memory for
+/// the signals of all delays.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MultipleModelFilter<const M: usize, const D: usize, B = [Signals; 1]> {
     bank: Bank<M>,
     response: Response,
     ring: SignalRing<B>,
-    /// Coefficients of D after the 1, and their number.
+    /// Coefficients of D without the leading 1; `order` is their number.
     d: [f64; D],
     order: usize,
-    /// The past of u and of the signals, newest first.
+    /// Past values of u and of the signals, with the newest first.
     u: [f64; D],
     past: [Signals; D],
     restarts: u64,
@@ -44,15 +44,15 @@ impl<const M: usize, const D: usize, B> MultipleModelFilter<M, D, B> {
 }
 
 impl<const M: usize, const D: usize> MultipleModelFilter<M, D> {
-    /// Starts from one hypothesis with filters at rest, for a known delay. `None` if the order of the noise model is
-    /// above D, and as [`Bank::new`].
+    /// Starts from one hypothesis with filters at rest, for a known delay. `None` if the order of the noise model
+    /// exceeds D or if [`Bank::new`] returns `None`.
     pub fn new(first: Hypothesis, d: &[f64], prior: ChangePrior) -> Option<Self> {
         Self::with_delays(first, d, prior, [[0.0; 6]; 1])
     }
 }
 
 impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> MultipleModelFilter<M, D, B> {
-    /// As [`MultipleModelFilter::new`] with several candidate delays. Also `None` if the memory is not of
+    /// As [`MultipleModelFilter::new`], with several candidate delays. It also returns `None` if the memory is not for
     /// [`DelayPrior::count`](super::prior::DelayPrior::count) signals.
     pub fn with_delays(first: Hypothesis, d: &[f64], prior: ChangePrior, memory: B) -> Option<Self> {
         let ring = SignalRing::new(memory);
@@ -74,7 +74,7 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
         })
     }
 
-    /// Takes a sample `x(t) = e(t - nk)`, `u(t)`, with nk of the shortest delay. Both must be finite.
+    /// Processes a sample `x(t) = e(t - nk)`, `u(t)`, where nk is the shortest delay. Both values must be finite.
     pub fn step(&mut self, x: f64, u: f64) -> Step {
         let signals = self.response.step(x);
         let (y, r) = self.whitened(u, &signals);
@@ -82,21 +82,21 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
         self.ring.push(if finite { r } else { [0.0; 6] });
         let sample = finite.then_some((y, self.ring.newest()));
         let innovation = self.bank.update(sample, self.response.point());
-        self.remember(u, signals);
+        self.store(u, signals);
         Step {
             innovation,
             shortened: !finite,
         }
     }
 
-    /// As [`MultipleModelFilter::step`], but the estimate stays constant: only the filters move on.
+    /// As [`MultipleModelFilter::step`], but only the filters are updated; the estimate stays constant.
     pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         self.bank.skip();
         let signals = self.response.step(x);
         let (y, r) = self.whitened(u, &signals);
         self.ring.push(r);
         let innovation = y - self.predicted(self.ring.newest());
-        self.remember(u, signals);
+        self.store(u, signals);
         Step {
             innovation,
             shortened: false,
@@ -110,10 +110,10 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
         let (y, r) = self.whitened(0.0, &signals);
         self.ring.push(r);
         let u = self.predicted(self.ring.newest()) - y;
-        self.remember(u, signals);
+        self.store(u, signals);
     }
 
-    /// `D u` and D times the signals.
+    /// Returns `D u` and the signals filtered by D.
     #[inline(always)]
     fn whitened(&self, u: f64, signals: &Signals) -> (f64, Signals) {
         let (mut y, mut r) = (u, *signals);
@@ -127,7 +127,7 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
         (y, r)
     }
 
-    /// `D w` of the mixture, with the likeliest delay.
+    /// Returns the prediction of `D u`, with the mean parameters of the mixture and the likeliest delay.
     fn predicted(&self, signals: DelayedSignals<'_>) -> f64 {
         let eta = self.bank.mixture().eta;
         let r = signals.at(self.bank.likeliest_delay());
@@ -135,8 +135,8 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
         eta[0] * psi[0] + eta[1] * psi[1]
     }
 
-    /// Puts a sample into the histories, and moves the linearisation point toward the estimate if it is due.
-    fn remember(&mut self, u: f64, signals: Signals) {
+    /// Stores a sample in the histories, and at regular intervals moves the linearisation point toward the estimate.
+    fn store(&mut self, u: f64, signals: Signals) {
         if !(u.abs() < LARGEST && signals.iter().all(|s| s.abs() < LARGEST)) {
             self.response.reset();
             self.u = [0.0; D];
@@ -166,7 +166,7 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
         &self.bank
     }
 
-    /// Returns the coefficients of D after the 1.
+    /// Returns the coefficients of D without the leading 1.
     pub fn d(&self) -> &[f64] {
         &self.d[..self.order]
     }

@@ -1,20 +1,19 @@
 //! One hypothesis: a Kalman filter of the operator's parameters, given that they last changed at its birth.
 //!
-//! With `y = D u` and `r` the whitened signals, the innovation and its negative gradient at eta are
+//! With `y = D u` and the whitened signals `r`, the innovation and its negative gradient at eta are
 //!
 //! `eps = y - K_e psi_1 - K_e_dot psi_2`, `psi_1 = r_1 + d_omega r_3 + d_zeta r_5`,
 //! `psi_2 = r_2 + d_omega r_4 + d_zeta r_6`, `psi_3 = K_e r_3 + K_e_dot r_4`,
 //! `psi_4 = K_e r_5 + K_e_dot r_6`,
 //!
-//! with `d_omega`, `d_zeta` the distances from the linearisation point of the filters. The predictive distribution of
-//! eps is Student's with the variance `v = sigma^2 + psi' P psi` and n degrees of freedom, the number of residuals of
-//! sigma^2; its density is
-//! `v^{-1/2} exp(-(n + 1)/2 ln(1 + eps^2/(n v)) - 1/(4 n))` up to a factor (the Gamma functions
-//! give `-1/(4 n) + O(n^{-3})`).
+//! where `d_omega`, `d_zeta` are the distances from the linearisation point of the filters. The predictive distribution
+//! of eps is Student's t with the variance `v = sigma^2 + psi' P psi` and n degrees of freedom, the number of residuals
+//! in sigma^2. Its density is `v^{-1/2} exp(-(n + 1)/2 ln(1 + eps^2/(n v)) - 1/(4 n))` up to a factor (the Gamma
+//! functions give `-1/(4 n) + O(n^{-3})`).
 //!
-//! An innovation beyond the limit counts as one at the limit, in the density and in sigma^2, and as a measurement with
-//! a variance so large that it is at the limit (P. J. Huber, *Robust Statistics*, 1981, section 7.3): an outlier
-//! carries no information about which hypothesis predicts better.
+//! An innovation beyond the limit is replaced by the limit, both in the density and in sigma^2, and the variance of the
+//! measurement is increased until the innovation lies at the limit (P. J. Huber, *Robust Statistics*, 1981, section
+//! 7.3): an outlier carries no information about which hypothesis predicts better.
 
 use super::{
     elementary::{exp, log1p},
@@ -23,68 +22,67 @@ use super::{
 };
 use hoid_core::{innovation_variance::InnovationVariance, state::State, ud_covariance::UdCovariance};
 
-/// Limit of variances and signals, beyond which their products would overflow.
+/// Limit of variances and signals beyond which their products would overflow.
 pub(super) const LARGEST: f64 = 1e60;
-/// Largest square of an innovation over its variance that enters sigma^2.
+/// Largest ratio of a squared innovation to its variance that enters sigma^2.
 const LARGEST_SQUARE: f64 = 9.0;
-/// Largest relative distance of omega_nm and zeta_nm from the linearisation point, up to which the first derivatives
-/// are valid.
+/// Largest relative distance of omega_nm and zeta_nm from the linearisation point for which the linearisation is valid.
 const LARGEST_DISTANCE: f64 = 0.5;
-/// Least innovation variance relative to that at the start, for a span without any signal.
+/// Smallest innovation variance relative to the initial value, for spans without any signal.
 const LEAST_VARIANCE: f64 = 1e-9;
 
-/// The filter.
+/// One hypothesis: a Kalman filter of the operator's parameters since its birth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hypothesis {
-    /// `[K_e, K_e_dot, omega_nm, zeta_nm]`.
+    /// Estimate of `[K_e, K_e_dot, omega_nm, zeta_nm]`.
     pub eta: [f64; OPERATOR],
-    /// Its covariance.
+    /// Covariance of `eta`.
     pub covariance: UdCovariance<OPERATOR>,
     /// Innovation variance.
     pub innovation_variance: InnovationVariance,
-    /// Probability.
+    /// Probability of the hypothesis.
     pub probability: f64,
-    /// Sample of its birth.
+    /// Sample at which the hypothesis was born.
     pub born: u64,
-    /// Whether the neuromuscular system changed too at its birth.
+    /// True if the hypothesis assumes that the neuromuscular system also changed at its birth.
     pub neuromuscular_changed: bool,
-    /// Its delay, in samples beyond the shortest.
+    /// Delay of the hypothesis, in samples beyond the shortest delay.
     pub extra_delay: usize,
-    /// The estimate before its birth.
+    /// Estimate before the birth of the hypothesis.
     pub before: Snapshot,
     least_variance: f64,
 }
 
-/// The estimate of a hypothesis at one time.
+/// Estimate of a hypothesis at a given time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Snapshot {
-    /// `[K_e, K_e_dot, omega_nm, zeta_nm]`.
+    /// Estimate of `[K_e, K_e_dot, omega_nm, zeta_nm]`.
     pub eta: [f64; OPERATOR],
-    /// Covariance of K_e and K_e_dot: variances, then the covariance.
+    /// Variance of K_e, variance of K_e_dot, and their covariance.
     pub gain_covariance: [f64; 3],
     /// Variances of omega_nm and zeta_nm.
     pub neuromuscular_variance: [f64; 2],
     /// Innovation variance.
     pub innovation_variance: f64,
-    /// Mean and variance of the delay, in samples beyond the shortest.
+    /// Mean and variance of the delay, in samples beyond the shortest delay.
     pub delay: [f64; 2],
 }
 
 hoid_core::state!([] Hypothesis { eta, covariance, innovation_variance, probability, born, neuromuscular_changed, extra_delay, before, least_variance });
 hoid_core::state!([] Snapshot { eta, gain_covariance, neuromuscular_variance, innovation_variance, delay });
 
-/// Visits the numbers of a slot of the bank: whether it is occupied, and those of its hypothesis.
+/// Visits the numbers of a slot of the bank: whether it is occupied, and the numbers of its hypothesis.
 pub(super) fn visit_slot(slot: &mut Option<Hypothesis>, each: &mut dyn FnMut(&mut f64)) {
     let mut is_there = slot.is_some();
     is_there.visit(each);
-    // A hypothesis that is restored into an empty slot replaces all of these numbers.
+    // A hypothesis restored into an empty slot overwrites all of these numbers.
     *slot = is_there.then(|| slot.take().unwrap_or_else(Hypothesis::empty));
     if let Some(hypothesis) = slot {
         hypothesis.visit(each);
     }
 }
 
-/// psi at eta, from the whitened signals of filters that are linearised about a point
+/// Returns psi at eta, computed from the whitened signals of filters that are linearised about the point
 /// `[omega_nm, zeta_nm]`.
 #[inline(always)]
 pub fn gradient(eta: &[f64; OPERATOR], r: &Signals, point: [f64; 2]) -> [f64; OPERATOR] {
@@ -97,7 +95,8 @@ pub fn gradient(eta: &[f64; OPERATOR], r: &Signals, point: [f64; 2]) -> [f64; OP
     ]
 }
 
-/// Limits a value to `low` and `high`. Not `f64::clamp`, which panics unless the bounds are ordered numbers.
+/// Limits a value to the range from `low` to `high`. Unlike `f64::clamp`, it does not panic if the bounds are NaN or
+/// not ordered.
 #[inline(always)]
 fn bounded(value: f64, low: f64, high: f64) -> f64 {
     if value < low {
@@ -124,7 +123,8 @@ impl Hypothesis {
         }
     }
 
-    /// Starts from an estimate, its covariance and the innovation variance. `None` unless the covariance is positive.
+    /// Starts from an estimate, its covariance and the innovation variance. `None` unless the covariance is positive
+    /// definite.
     pub fn new(
         eta: [f64; OPERATOR],
         covariance: &[[f64; OPERATOR]; OPERATOR],
@@ -146,7 +146,7 @@ impl Hypothesis {
         Some(first)
     }
 
-    /// Updates the hypothesis by a sample: returns the innovation, and its predictive density.
+    /// Updates the hypothesis with one sample. Returns the innovation and its predictive density.
     #[inline(always)]
     pub fn step(&mut self, y: f64, r: &Signals, point: [f64; 2], prior: &ChangePrior) -> (f64, f64) {
         let psi = gradient(&self.eta, r, point);
@@ -181,18 +181,18 @@ impl Hypothesis {
         (eps, density)
     }
 
-    /// `g^2` and `g^2/omega_c^2`, the units of the variances of K_e and K_e_dot.
+    /// Returns `g^2` and `g^2/omega_c^2`, the units of the variances of K_e and K_e_dot.
     fn gain_scales(&self, prior: &ChangePrior) -> [f64; 2] {
         let square = prior.crossover * prior.crossover;
         let g = self.eta[0] * self.eta[0] + square * self.eta[1] * self.eta[1];
         [g, g / square]
     }
 
-    /// Adds the drift of the parameters between two births, which is faster just after a change. It ends when their
-    /// uncertainty is that after a change.
+    /// Adds the drift of the parameters between two births, which is faster just after a change. A parameter stops
+    /// drifting when its variance reaches that of a change.
     pub fn drift(&mut self, now: u64, prior: &ChangePrior) {
         let scales = self.gain_scales(prior);
-        // The first, born at sample 0, does not correspond to any change.
+        // The first hypothesis, born at sample 0, does not represent a change.
         let transient = match self.born {
             0 => 0.0,
             born => exp(-((now - born) as f64) / prior.transient_time_constant),
@@ -220,12 +220,13 @@ impl Hypothesis {
         }
     }
 
-    /// Returns the hypothesis with a delay `extra_delay` samples beyond the shortest.
+    /// Returns the same hypothesis with a delay that is `extra_delay` samples longer than the shortest.
     pub fn with_extra_delay(self, extra_delay: usize) -> Self {
         Self { extra_delay, ..self }
     }
 
-    /// Returns the hypothesis that the delay is, and was, another one near its own.
+    /// Returns the hypothesis that the delay is, and has always been, another one close to the delay of this
+    /// hypothesis.
     pub fn with_neighbouring_delay(&self, extra_delay: usize, prior: &ChangePrior) -> Self {
         let mut other = self.with_extra_delay(extra_delay);
         let (scales, away) = (self.gain_scales(prior), extra_delay.abs_diff(self.extra_delay) as f64);
@@ -237,7 +238,8 @@ impl Hypothesis {
         other
     }
 
-    /// Returns the hypothesis that the gains change now, and with `neuromuscular` omega_nm and zeta_nm too.
+    /// Returns the hypothesis that the gains change now; if `neuromuscular` is true, omega_nm and zeta_nm change as
+    /// well.
     pub fn with_change(&self, now: u64, neuromuscular: bool, prior: &ChangePrior) -> Self {
         let mut child = *self;
         let scales = self.gain_scales(prior);
@@ -257,7 +259,7 @@ impl Hypothesis {
         child
     }
 
-    /// Adds to the variance of parameter i.
+    /// Adds `variance` to the variance of parameter i.
     fn inflate(&mut self, i: usize, variance: f64) {
         let mut unit = [0.0; OPERATOR];
         unit[i] = 1.0;

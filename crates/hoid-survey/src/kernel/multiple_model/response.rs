@@ -1,27 +1,28 @@
 //! Response of the neuromuscular system to a held error and to its rate, with derivatives with respect to omega_nm and
 //! zeta_nm.
 //!
-//! With the exact hold of [`hoid_core::held_operator`] for the gains `[1, 0]` and `[0, 1]`,
+//! With the coefficients of the exact hold of [`hoid_core::held_operator`] for the gains `[1, 0]` and `[0, 1]`,
 //!
 //! `x(t) = b0 e(t) + b1 e(t-1) - f1 x(t-1) - f2 x(t-2)`,
 //! `x'(t) = b0' e(t) + b1' e(t-1) - f1' x(t-1) - f2' x(t-2) - f1 x'(t-1) - f2 x'(t-2)`,
 //!
 //! where `'` is the derivative with respect to omega_nm or zeta_nm. The filters are linearised about a point
-//! `[omega, zeta]`. When it moves, their states move along its derivative: a filter with the past of another point
-//! would have a kink there, which the whitening filter, a difference of high order, amplifies above the noise.
+//! `[omega, zeta]`. When this point moves, the states of the filters are moved along their derivatives. A filter with
+//! states that belong to another point would have a kink there, which the whitening filter, a difference of high order,
+//! amplifies above the noise.
 
 use hoid_core::held_operator::held_operator;
 
-/// x1, x2, their derivatives with respect to omega_nm and to zeta_nm.
+/// The signals x1 and x2, their derivatives with respect to omega_nm, and their derivatives with respect to zeta_nm.
 pub type Signals = [f64; 6];
 
-/// The filters.
+/// The filters of the neuromuscular system and their past signals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Response {
-    /// `[omega_nm, zeta_nm]`.
+    /// Linearisation point `[omega_nm, zeta_nm]`.
     point: [f64; 2],
     sample_time: f64,
-    /// `b[gain][lag]` and `f[lag - 1]`, each with its derivatives.
+    /// Coefficients `b[gain][lag]` and `f[lag - 1]`, each with its derivatives with respect to omega_nm and zeta_nm.
     b: [[[f64; 3]; 2]; 2],
     f: [[f64; 3]; 2],
     input: f64,
@@ -31,7 +32,8 @@ pub struct Response {
 hoid_core::state!([] Response { point, b, f, input, past });
 
 impl Response {
-    /// Builds the filters at rest at the point `[omega_nm, zeta_nm]` (rad/s, 1). Ts in s.
+    /// Creates filters at rest that are linearised about the point `[omega_nm, zeta_nm]` (rad/s, 1). The sample time is
+    /// in s.
     pub fn new(point: [f64; 2], sample_time: f64) -> Self {
         let mut response = Self {
             point,
@@ -56,7 +58,7 @@ impl Response {
         }
     }
 
-    /// Returns the signals of a sample, from its delayed error.
+    /// Returns the signals at one sample for its delayed error.
     #[inline(always)]
     pub fn step(&mut self, e: f64) -> Signals {
         let ([f1, f2], [x1, x2]) = (&self.f, &self.past);
@@ -78,7 +80,8 @@ impl Response {
         x
     }
 
-    /// Moves the point, and the past signals here and in `elsewhere`, along their first derivative.
+    /// Moves the linearisation point. The past signals of these filters and of `elsewhere` are moved along their first
+    /// derivatives.
     pub fn move_to<'a>(&mut self, point: [f64; 2], elsewhere: impl IntoIterator<Item = &'a mut Signals>) {
         let by = [point[0] - self.point[0], point[1] - self.point[1]];
         if by == [0.0; 2] || !point.iter().all(|a| a.is_finite()) {
@@ -94,7 +97,7 @@ impl Response {
         self.set(point);
     }
 
-    /// Resets the filters.
+    /// Resets the filters to rest.
     pub fn reset(&mut self) {
         self.input = 0.0;
         self.past = [[0.0; 6]; 2];

@@ -1,12 +1,12 @@
-//! The signals of the last samples, from which those for every delay are read.
+//! Ring buffer of the signals of the last samples, which contains the signals for every delay.
 //!
-//! The response to an error that arrives k samples later is the response k samples ago. One filter therefore gives the
-//! signals for all delays between the shortest and the longest, and a ring buffer keeps those of the last samples,
-//! after the whitening filter.
+//! The response to an error that is delayed by k more samples equals the response k samples earlier. One filter
+//! therefore gives the signals for all delays between the shortest and the longest; a ring buffer stores its last
+//! signals after the whitening filter.
 
 use super::response::Signals;
 
-/// The signals of one sample for every delay.
+/// The signals at one sample for every delay.
 #[derive(Debug, Clone, Copy)]
 pub struct DelayedSignals<'a> {
     ring: &'a [Signals],
@@ -22,10 +22,10 @@ impl<'a> DelayedSignals<'a> {
         }
     }
 
-    /// Returns the signals for a delay `extra_delay` samples longer than the shortest.
+    /// Returns the signals for a delay that is `extra_delay` samples longer than the shortest.
     ///
     /// # Panics
-    /// Beyond the longest.
+    /// May panic if the delay exceeds the longest delay; if it does not, the signals of another delay are returned.
     #[inline(always)]
     pub fn at(&self, extra_delay: usize) -> &'a Signals {
         let place = if extra_delay > self.newest {
@@ -37,7 +37,7 @@ impl<'a> DelayedSignals<'a> {
     }
 }
 
-/// The signals of the last samples, as many as there are delays.
+/// Ring buffer of the signals of the last samples; its length is the number of delays.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SignalRing<B> {
     memory: B,
@@ -53,7 +53,7 @@ impl<B: AsMut<[Signals]>> hoid_core::state::State for SignalRing<B> {
 }
 
 impl<B: AsRef<[Signals]> + AsMut<[Signals]>> SignalRing<B> {
-    /// A ring of zeros, of the size of the memory.
+    /// Creates a ring buffer of zeros with the size of the memory.
     pub fn new(mut memory: B) -> Self {
         memory.as_mut().fill([0.0; 6]);
         Self { memory, newest: 0 }
@@ -64,7 +64,7 @@ impl<B: AsRef<[Signals]> + AsMut<[Signals]>> SignalRing<B> {
         self.memory.as_ref().len()
     }
 
-    /// Adds the signals of a sample for the shortest delay, in place of the oldest.
+    /// Adds the signals of a sample for the shortest delay; they replace the oldest signals.
     #[inline(always)]
     pub fn push(&mut self, signals: Signals) {
         let memory = self.memory.as_mut();
@@ -76,7 +76,7 @@ impl<B: AsRef<[Signals]> + AsMut<[Signals]>> SignalRing<B> {
         memory[self.newest] = signals;
     }
 
-    /// Returns the signals of the newest sample.
+    /// Returns the signals at the newest sample.
     #[inline(always)]
     pub fn newest(&self) -> DelayedSignals<'_> {
         DelayedSignals {
@@ -85,7 +85,7 @@ impl<B: AsRef<[Signals]> + AsMut<[Signals]>> SignalRing<B> {
         }
     }
 
-    /// Returns all signals in memory.
+    /// Returns a mutable iterator over all signals in the buffer.
     pub fn iter_mut(&mut self) -> std::slice::IterMut<'_, Signals> {
         self.memory.as_mut().iter_mut()
     }

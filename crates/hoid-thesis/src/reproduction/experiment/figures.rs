@@ -1,4 +1,4 @@
-//! Figs. 13, 14 and I.1 to I.18: quantities over time, a column a subject.
+//! Figs. 13, 14 and I.1 to I.18: quantities over time, with one column for each subject.
 
 use hoid_model::scenario::{Condition, Scenario};
 use hoid_report::figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, trace_panels};
@@ -7,7 +7,7 @@ use super::of_runs::{middle, of, subjects};
 use crate::{
     experiment::{
         EvaluatedRun,
-        procedure::{Course, State},
+        procedure::{RecursiveTrace, State},
     },
     reproduction::{
         item::{Item, ItemOutput},
@@ -15,7 +15,7 @@ use crate::{
     },
 };
 
-/// Quantities of a panel.
+/// Quantity shown in a panel.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Shown {
     Discrete(usize),
@@ -63,8 +63,8 @@ impl Shown {
         }
     }
 
-    /// Its value in a row; not a number beyond the end.
-    fn of_course(self, course: &Course, row: usize) -> f64 {
+    /// Value of the quantity in a row; NaN beyond the end.
+    fn of_course(self, course: &RecursiveTrace, row: usize) -> f64 {
         let found = match self {
             Self::Variance(i) => course.variances.get(row).map(|variances| variances[i]),
             _ => course.states.get(row).map(|state| self.of_state(state)),
@@ -73,7 +73,7 @@ impl Shown {
     }
 }
 
-/// Draws quantities of the people in a condition.
+/// Draws quantities over time for the people in a condition.
 pub(super) fn draw(
     item: &Item,
     runs: &[EvaluatedRun],
@@ -104,7 +104,7 @@ pub(super) fn draw(
             }
             panels.push(TracePanel {
                 name: (*name).to_owned(),
-                // Gains of recorded people are in units of their recordings.
+                // The gains of recorded people are in the units of their recordings.
                 unit: if simulated || !matches!(shown, Shown::Operator(0 | 2)) {
                     (*unit).to_owned()
                 } else {
@@ -136,7 +136,7 @@ pub(super) fn draw(
     item.drawn(trace_panels, &grid, data)
 }
 
-/// Median and mean of a recursion.
+/// Curves of the median and the mean over the runs of a recursive estimate.
 fn over_time(
     shown: Shown,
     own: &[&EvaluatedRun],
@@ -152,7 +152,7 @@ fn over_time(
     for (t, [mean, median]) in times_s.iter().zip(&both) {
         data.row(&[name, RECURSIONS[method], subject], &[*t, *mean, *median]);
     }
-    // Higher levels are darker: the median first, the mean over it.
+    // Higher levels are darker: the median is drawn first, and the mean over it.
     [1, 0]
         .into_iter()
         .enumerate()
@@ -163,7 +163,7 @@ fn over_time(
         .collect()
 }
 
-/// Means of the batch fits of the two spans.
+/// Curves of the means over the runs of the batch fits to the two spans.
 fn batch(
     shown: Shown,
     own: &[&EvaluatedRun],
@@ -202,7 +202,8 @@ fn curve(kind: CurveKind, method: usize, level: usize, times_s: Vec<f64>, values
     }
 }
 
-/// The mean of the simulated operators: the value at the start, then that at the end; none of recorded people.
+/// Curve of the mean over the simulated operators, which changes from its value at the start to its value at the end;
+/// `None` for recorded people.
 fn truth(shown: Shown, own: &[&EvaluatedRun], condition: Condition) -> Option<TraceCurve> {
     let states: Vec<[State; 2]> = (own.iter()).filter_map(|run| Some(run.outcome.truth?.states)).collect();
     if states.is_empty() {

@@ -1,14 +1,14 @@
 //! The experiment with virtual or recorded people: Table 3, Figs. 13, 14 and I.1 to I.18.
 //!
-//! All of them show the same runs, which are made once, before the first is drawn. A figure of recorded people has the
-//! number of the figure of the text for the same course of the controlled element, followed by the name of the
-//! condition if that is another.
+//! All these items show the same runs, which are made once, before the first item is drawn. A figure of recorded people
+//! has the number of the figure in the text in which the controlled element changes in the same way, followed by the
+//! name of the condition if it differs from that in the text.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `figures` | quantities over time, mean and median of the runs |
+//! | `figures` | quantities over time: mean and median over the runs |
 //! | `of_runs` | the runs of a subject, their mean and median |
-//! | `tables` | Table 3; for recorded people of all conditions, and operators before and after |
+//! | `tables` | Table 3 (for recorded people also with all conditions), and the operators before and after the change |
 
 mod figures;
 mod of_runs;
@@ -18,7 +18,7 @@ use std::sync::{Arc, OnceLock};
 
 use hoid_model::scenario::Condition;
 
-use super::item::{Item, ItemOutput, SharedRuns, Watch};
+use super::item::{Item, ItemOutput, SharedRuns, ProgressCallbacks};
 use crate::{
     ThesisError,
     experiment::{
@@ -31,7 +31,7 @@ use figures::{DISCRETE, OPERATOR, Row, VARIANCES};
 /// Name of the experiment.
 pub(super) const NAME: &str = "experiment";
 
-/// Runs of the experiment, made once.
+/// The runs of the experiment, which are made only once.
 #[derive(Clone)]
 struct Runs {
     people: Arc<dyn Experiment>,
@@ -46,13 +46,13 @@ impl Runs {
         }
     }
 
-    fn get(&self, watch: &Watch<'_>) -> &Evaluation {
+    fn get(&self, watch: &ProgressCallbacks<'_>) -> &Evaluation {
         let estimates = self.people.estimates_of_run();
         self.made
-            .get_or_init(|| experiment(self.people.as_ref(), &|| (watch.done)(estimates), watch.goes_on))
+            .get_or_init(|| experiment(self.people.as_ref(), &|| (watch.done)(estimates), watch.keep_running))
     }
 
-    /// Makes the runs that the items share.
+    /// Returns the runs in the form in which items share them.
     fn shared(&self, title: &'static str) -> SharedRuns {
         let runs = self.clone();
         SharedRuns {
@@ -63,19 +63,19 @@ impl Runs {
         }
     }
 
-    /// Makes an item from the runs.
+    /// Creates an item that is made from the runs.
     fn item(
         &self,
         (name, title, caption): (String, String, &str),
         make: impl Fn(&Item, &[EvaluatedRun]) -> ItemOutput + Send + Sync + 'static,
     ) -> Item {
         let runs = self.clone();
-        let made = move |item: &Item, _: Option<&hoid_study::Results>| make(item, &runs.get(&Watch::NONE).runs);
+        let made = move |item: &Item, _: Option<&hoid_study::Results>| make(item, &runs.get(&ProgressCallbacks::NONE).runs);
         Item::new(name, title, caption, None, made)
     }
 }
 
-/// Reasons of the runs that could not be evaluated; an error if there is no other.
+/// Returns the reasons why runs could not be evaluated; an error if no run could be evaluated.
 fn notes(found: &Evaluation) -> Result<Vec<String>, ThesisError> {
     let note = |(key, reason): &(crate::experiment::RunKey, String)| {
         format!("run {} of {} in {}: {reason}", key.run, key.subject, key.condition)
@@ -89,7 +89,7 @@ fn notes(found: &Evaluation) -> Result<Vec<String>, ThesisError> {
     }
 }
 
-/// Items of the virtual people.
+/// Items for the virtual people.
 pub(super) fn items() -> Vec<Item> {
     let Ok(plan) = ExperimentPlan::parse(EXPERIMENT) else {
         return Vec::new();
@@ -114,7 +114,7 @@ pub(super) fn items() -> Vec<Item> {
     all.into_iter().map(|item| item.sharing(&shared)).collect()
 }
 
-/// Items of recorded people.
+/// Items for recorded people.
 pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
     const DELAYS: &str = "Mean of the values of the best fits of the first and the last three eighths of a run; \
                           those of each alongside.";
@@ -162,7 +162,7 @@ pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
     all.into_iter().map(|item| item.sharing(&shared)).collect()
 }
 
-/// Figs. 13, 14 and I.1 to I.18 of the conditions there are.
+/// Figs. 13, 14 and I.1 to I.18 for the available conditions.
 fn figures_of(runs: &Runs, people: &str, caption: &str) -> Vec<Item> {
     let [discrete, operator, variances] = [
         (

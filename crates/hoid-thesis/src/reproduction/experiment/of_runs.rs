@@ -1,11 +1,11 @@
-//! The runs of a subject in a condition, their mean and median.
+//! The runs of a subject in a condition, and their mean and median.
 
 use hoid_numerics::statistics::mean;
 use hoid_study::statistics::median;
 
 use crate::experiment::EvaluatedRun;
 
-/// Runs of a subject in a condition.
+/// Returns the runs of a subject in a condition.
 pub(super) fn of<'a>(runs: &'a [EvaluatedRun], subject: &str, condition: &str) -> Vec<&'a EvaluatedRun> {
     let own = runs
         .iter()
@@ -13,7 +13,7 @@ pub(super) fn of<'a>(runs: &'a [EvaluatedRun], subject: &str, condition: &str) -
     own.collect()
 }
 
-/// The subjects of a condition, in their order.
+/// Returns the subjects with runs in a condition, in the order of the runs.
 pub(super) fn subjects<'a>(runs: &'a [EvaluatedRun], condition: &str) -> Vec<&'a str> {
     let mut all: Vec<&str> = Vec::new();
     for run in runs.iter().filter(|run| run.key.condition == condition) {

@@ -1,4 +1,4 @@
-//! Table 3 of the text, and operators before and after the change.
+//! Table 3 of the text, and the operators before and after the change.
 
 use super::of_runs::{middle, of, subjects};
 use crate::{
@@ -9,7 +9,7 @@ use crate::{
     },
 };
 
-/// Delays and time constants of the remnant, a row a run: Table 3.
+/// Table 3: delays and time constants of the remnant, one row for each run.
 pub(super) fn delays(item: &Item, runs: &[EvaluatedRun], conditions: &[String]) -> ItemOutput {
     let simulated = runs.iter().any(|run| run.outcome.truth.is_some());
     let (texts, numbers) = if simulated {
@@ -50,7 +50,7 @@ pub(super) fn delays(item: &Item, runs: &[EvaluatedRun], conditions: &[String]) 
     data.table(&item.title).into()
 }
 
-/// Operators of the people in each condition, by estimator and span.
+/// Table of the operators of the people in each condition, by estimator and span.
 pub(super) fn operators(item: &Item, runs: &[EvaluatedRun], conditions: &[String]) -> ItemOutput {
     let mut data = TableBuilder::new(
         &["condition", "subject", "estimator", "span"],
@@ -88,7 +88,7 @@ pub(super) fn operators(item: &Item, runs: &[EvaluatedRun], conditions: &[String
     data.table(&item.title).into()
 }
 
-/// Medians of a recursion over the second half of a span.
+/// Returns the medians of a recursive estimate over the second half of a span.
 fn at_the_end(outcome: &RunOutcome, method: usize, span: usize) -> [f64; 5] {
     let (from_s, to_s) = outcome.spans_s[span];
     let course = &outcome.courses[method];

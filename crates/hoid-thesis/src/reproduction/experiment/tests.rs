@@ -3,7 +3,7 @@
 use super::{of_runs::middle, *};
 use crate::experiment::{
     RunKey,
-    procedure::{Course, RunOutcome, State, Truth},
+    procedure::{RecursiveTrace, RunOutcome, State, Truth},
 };
 
 fn run(subject: &str, number: u64, value: f64) -> EvaluatedRun {
@@ -11,7 +11,7 @@ fn run(subject: &str, number: u64, value: f64) -> EvaluatedRun {
         discrete: [value; 4],
         operator: [value; 5],
     };
-    let course = Course {
+    let course = RecursiveTrace {
         times_s: vec![0.0, 20.0, 80.0],
         states: vec![state; 3],
         variances: vec![[value * value; 5]; 3],

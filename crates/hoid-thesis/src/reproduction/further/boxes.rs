@@ -1,4 +1,4 @@
-//! Box plots of some quantities by remnant order, group and series.
+//! Box plots of quantities by remnant order, group and series.
 
 use hoid_report::figures::{BoxGrid, BoxPanel, BoxRange, BoxSeries, BoxStatistics, box_plots};
 use hoid_study::{Query, Results};
@@ -20,7 +20,7 @@ pub(super) struct Layout<'a> {
     pub with_zero: bool,
 }
 
-/// Box plots of some quantities by remnant order, group and series.
+/// Draws box plots of quantities by remnant order, group and series.
 pub(super) fn boxes(
     item: &Item,
     results: &Results,

@@ -1,4 +1,4 @@
-//! The error of the frequency response by sample time, with whole, fractional and Pade delays.
+//! Error of the frequency response over the sample time, with whole, fractional and Padé delays.
 
 use hoid_report::figures::{CurveGrid, CurvePanel, Shade, curves};
 use hoid_study::{Query, Results};
@@ -58,8 +58,8 @@ fn decimation(item: &Item, results: &Results) -> ItemOutput {
                     points.push((0.01 * k as f64, row));
                 }
             }
-            // Blue for ARX, vermillion and orange for Box-Jenkins with a whole and a fractional
-            // delay, shades of purple for Pade delays, green for the grey box.
+            // Colours: blue for ARX, vermillion and orange for Box-Jenkins with a whole and a fractional delay, shades
+            // of purple for Padé delays, green for the grey box.
             let of = |method, level, levels| Shade { method, level, levels };
             let shade = match i {
                 0 => of(0, 0, 1),

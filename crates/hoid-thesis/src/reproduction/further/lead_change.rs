@@ -1,4 +1,4 @@
-//! Visibility of a change of the lead within 5 s.
+//! Detectability of a change of the lead within 5 s.
 
 use hoid_report::figures::{Curve, CurveGrid, CurvePanel, LineKind, Shade, curves};
 use hoid_study::Results;
@@ -22,7 +22,7 @@ pub(super) fn items() -> Vec<Item> {
     )]
 }
 
-/// Median and spread of T_L at the nearest stored time before the given one.
+/// Returns the median and the spread of T_L at the last stored time that is not after the given time.
 fn at_time(results: &Results, cell: u64, estimator: &str, time_s: f64) -> Option<(f64, f64)> {
     let trace = results.traces(cell, estimator)?;
     let bands = trace.parameters.get("T_L")?;

@@ -1,5 +1,5 @@
-//! Extensions beyond the thesis: decimation, T_n = 0.2 s, the second definition of the noise level,
-//! memories, forgetting matrix; and the example of a custom study.
+//! Extensions beyond the thesis: decimation, T_n = 0.2 s, the second definition of the noise level, memory lengths,
+//! forgetting matrix; and an example of a user-defined study.
 
 mod boxes;
 mod decimation;

@@ -1,9 +1,9 @@
-//! Curves of medians with bars from quartile to quartile.
+//! Curves of medians with bars from the lower to the upper quartile.
 
 use hoid_report::figures::{Curve, LineKind, Shade};
 use hoid_study::SummaryRow;
 
-/// A curve of medians with bars from quartile to quartile.
+/// Creates a curve of medians with bars from the lower to the upper quartile.
 pub(super) fn with_quartiles(name: &str, shade: Shade, points: &[(f64, &SummaryRow)]) -> Curve {
     Curve {
         name: name.to_owned(),

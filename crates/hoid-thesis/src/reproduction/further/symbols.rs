@@ -1,6 +1,6 @@
 //! Symbols of the operator's parameters, and the noise level of a cell.
 
-/// Columns of the operator's parameters and their symbols.
+/// Columns with the operator's parameters, and the symbols of these parameters.
 pub(super) const OPERATOR: [(&str, &str); 5] = [
     ("K_e", "K_e"),
     ("T_L", "T_L"),
@@ -9,7 +9,7 @@ pub(super) const OPERATOR: [(&str, &str); 5] = [
     ("zeta_nm", "\u{3b6}_{nm}"),
 ];
 
-/// Noise level of a cell by its axes.
+/// Returns the noise level of a cell from its axes; `None` if there is none.
 pub(super) fn noise_level_of(axes: &[hoid_study::plan::Axis]) -> Option<f64> {
     axes.iter()
         .find(|axis| axis.key == "remnant_noise_level")?

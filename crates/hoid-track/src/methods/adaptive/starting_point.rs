@@ -1,17 +1,17 @@
 //! Start of the recursion: the basis, its uncertainty, and the estimate of an earlier fit.
 //!
-//! **A fit** has coordinates x of an operator Y(x) with covariance C. The recursion has gains theta of
-//! the responses x_i of a basis made at the fit's delay, neuromuscular system and lag, and corrections
-//! of the first two. The gains are those whose response is nearest to Y at [`FREQUENCIES`] rad/s,
+//! **A fit** has coordinates x of an operator Y(x) with covariance C. The recursion has gains theta of the responses
+//! h_i of a basis, which is computed for the delay, the neuromuscular system and the lag of the fit, and corrections of
+//! delay and neuromuscular system. The gains are those whose response is nearest to Y at [`FREQUENCIES`] rad/s,
 //!
 //! `theta = argmin sum_k |(sum_i theta_i h_i(w_k) - Y(w_k))/Y(w_k)|^2`,
 //!
-//! and the derivatives of the state s = (theta, level, corrections) along x follow from the same problem for dY/dx,
-//! except for the corrections themselves: `S = J C J'`. For the forms with a lag, and for a gain with a lead, the
-//! nearest operator is the operator itself.
+//! and the derivatives J of the state s = (theta, level, corrections) with respect to x follow from the same problem
+//! for dY/dx, except for the corrections themselves: `S = J C J'`. For the forms with a lag, and for a gain with a
+//! lead, the nearest operator is the operator itself.
 //!
-//! The remnant of the fit is `v = (C/D) eps` with the impulse response g, whose autocovariances over
-//! the variance of eps are `r_k = sum_j g_j g_{j+k}`.
+//! The remnant of the fit is `v = (C/D) eps` with the impulse response g; its autocovariances divided by the variance
+//! of eps are `r_k = sum_j g_j g_{j+k}`.
 
 use hoid_core::adaptive::{
     DYNAMICS, GAINS, LARGEST_ORDER, LINEAR, STATES,
@@ -25,17 +25,17 @@ use hoid_model::{Complex64, FittedOperator, SampleTime, operator_family::Coordin
 
 use crate::person_prior::PersonPrior;
 
-/// Prior spread of the fixed dynamics without prior knowledge: shares of omega and zeta, and s for the delay.
+/// Standard deviations of the dynamics without prior knowledge: relative for omega and zeta, in s for the delay.
 const WIDE: [f64; DYNAMICS] = [0.45, 0.75, 0.15];
 /// Frequencies at which the gains of a fit are computed, rad/s: range and number.
 const FREQUENCIES: ([f64; 2], usize) = ([0.3, 8.0], 24);
-/// Range of the lag of a basis, s: beyond the longest a lag cannot be distinguished from an integration.
+/// Range of the lag of a basis, s. A lag beyond its upper end cannot be distinguished from an integration.
 const LAGS_S: [f64; 2] = [0.05, 10.0];
-/// Root mean square of the relative misfit beyond which the basis does not represent a form.
+/// Root mean square of the relative misfit beyond which the basis is not considered to represent a form.
 const MISFIT: f64 = 0.1;
-/// Time that the remnant of a fit counts as, s.
+/// Length of data, in s, that has the same weight as the remnant of a fit.
 const REMNANT_S: f64 = 20.0;
-/// Longest remnant that is summed, s, and its largest remainder.
+/// Longest impulse response of the remnant that is summed, s, and the largest share of its power in the second half.
 const LONGEST_S: f64 = 60.0;
 const LEFT: f64 = 1e-6;
 /// Prior standard deviation of the level of u, in standard deviations of the remnant.
@@ -44,13 +44,13 @@ const LEVEL: f64 = 3.0;
 /// The basis at the start, and the prior spread of a person about it.
 pub(super) struct StartingPoint {
     pub point: Point,
-    /// Shares of omega and zeta, and s for the delay.
+    /// Prior standard deviations: relative for omega and zeta, in s for the delay.
     pub spread: [f64; DYNAMICS],
 }
 
 impl StartingPoint {
-    /// Computes the starting point from the prior; `tau_s` is the delay for an error that is linear between samples,
-    /// and `is_given` whether it was given.
+    /// Computes the starting point from the prior. `tau_s` is the delay for an error that is linear between samples;
+    /// `is_given` is true if the user gave this delay.
     pub fn of(prior: &PersonPrior, tau_s: f64, is_given: bool, sample_time: SampleTime) -> Result<Self, IdentError> {
         let DefaultOperator {
             mut point, mut spread, ..
@@ -89,7 +89,7 @@ impl StartingPoint {
                 let lag = match rate.map(|i| fit.operator.coordinates()[i]) {
                     Some(rate) => 1.0 / rate.max(1.0 / LAGS_S[1]),
                     None if fit.operator.form().has_pole() => LAGS_S[1],
-                    // The square of a lead without a lag is nearest to one with a short lag.
+                    // A squared lead without a lag is best approximated with a short lag.
                     None if fit.operator.form().degree() == 2 => LAGS_S[0],
                     None => LAG_S,
                 };
@@ -111,10 +111,10 @@ fn no_place(fit: &FittedOperator, why: &str) -> IdentError {
     }
 }
 
-/// Returns the estimate of a fit in a basis that `StartingPoint::of` has made for it.
+/// Returns the estimate of a fit in the basis that `StartingPoint::of` selected for this fit.
 ///
 /// # Errors
-/// [`IdentError::BadStart`] for a form that no gains approximate.
+/// [`IdentError::BadStart`] for a form that the basis cannot approximate.
 pub(super) fn initial_estimate(
     fit: &FittedOperator,
     basis: &Basis,
@@ -180,7 +180,7 @@ fn symmetric(c: &[[f64; STATES]; STATES]) -> [[f64; STATES]; STATES] {
     std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (c[i][j] + c[j][i])))
 }
 
-/// Autocovariances of `C/D` over the variance of eps; `None` if the impulse response does not decay.
+/// Autocovariances of `(C/D) eps` divided by the variance of eps; `None` if the impulse response does not decay.
 fn remnant(fit: &FittedOperator, sample_time: SampleTime) -> Option<Lags> {
     let (c, d) = &fit.noise;
     let longest = (LONGEST_S / sample_time.s()) as usize;
@@ -207,15 +207,16 @@ fn remnant(fit: &FittedOperator, sample_time: SampleTime) -> Option<Lags> {
 
 /// The least-squares problem of the nearest gains.
 struct Nearest {
-    /// Responses of the operator, held.
+    /// Responses of the operator after a zero-order hold.
     responses: Vec<hoid_model::operator_family::FamilyResponse>,
-    /// Responses of the basis, over those of the operator.
+    /// Responses of the basis, divided by those of the operator.
     basis: Vec<[Complex64; GAINS]>,
 }
 
 impl Nearest {
-    /// Increase of the covariance of the state such that the response is at no frequency better known than from the
-    /// fit: gains of one lag cannot represent how an unknown lag varies with frequency.
+    /// Factor by which the covariance of the state must be increased so that the response is at no frequency better
+    /// known than from the fit. It exceeds one because gains with a fixed lag cannot represent how an unknown lag
+    /// varies with frequency.
     fn lost(&self, fit: &FittedOperator, coordinates: &[Coordinate], columns: &[[f64; STATES]]) -> f64 {
         let p = coordinates.len();
         let sizes = |g: &[Complex64]| -> [f64; 2] {

@@ -108,7 +108,7 @@ fn run_with_gain(person: &Person, run: u64) -> Result<Record, SimError> {
             Err(error) => refusal = Some(error),
         }
     }
-    Err(refusal.unwrap_or(SimError::NobodyFound {
+    Err(refusal.unwrap_or(SimError::NoAcceptablePerson {
         form: person.state.operator.form().to_string(),
         plant: person.plant.to_string(),
         draws: MOST_DRAWS,

@@ -1,18 +1,19 @@
-//! Samples.
+//! Functions that pass samples to a tracker.
 
 use hoid_track::Sample;
 
 use crate::{
-    boundary::{HoidTracker, move_tracker, put},
+    boundary::{HoidTracker, with_tracker_mut, put},
     session::Session,
     status::HoidStatus,
     types::HoidOutcome,
 };
 
-/// Takes a sample: error e and control u. NaN represents missing values. `outcome` may be NULL.
+/// Updates the tracker with one sample: error `e` and control `u`, where NaN marks a missing value. `outcome` may be
+/// NULL.
 ///
 /// # Safety
-/// `tracker` was made here; `outcome` is NULL or has room for one.
+/// `tracker` is a tracker of this library; `outcome` is NULL or points to memory for a hoid_outcome.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hoid_tracker_step(
     tracker: *mut HoidTracker,
@@ -20,15 +21,15 @@ pub unsafe extern "C" fn hoid_tracker_step(
     u: f64,
     outcome: *mut HoidOutcome,
 ) -> HoidStatus {
-    // SAFETY: by the contract of this function.
+    // SAFETY: guaranteed by the caller of this function.
     unsafe { hoid_tracker_update(tracker, e, u, f64::NAN, 1, outcome) }
 }
 
-/// As hoid_tracker_step, with the external signal f_t (NaN: not known). With `moves` 0 the filters
-/// are updated, but not the estimate.
+/// As hoid_tracker_step, with the external signal `f_t` (NaN if it is unknown). With `moves` 0 the filters are updated,
+/// but not the estimate.
 ///
 /// # Safety
-/// As hoid_tracker_step.
+/// As for hoid_tracker_step.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hoid_tracker_update(
     tracker: *mut HoidTracker,
@@ -48,9 +49,9 @@ pub unsafe extern "C" fn hoid_tracker_update(
         if outcome.is_null() {
             return Ok(());
         }
-        // SAFETY: by the contract of this function.
+        // SAFETY: guaranteed by the caller of this function.
         unsafe { put(outcome, told, "the outcome") }
     };
-    // SAFETY: by the contract of this function.
-    unsafe { move_tracker(tracker, take) }
+    // SAFETY: guaranteed by the caller of this function.
+    unsafe { with_tracker_mut(tracker, take) }
 }

@@ -1,13 +1,15 @@
-//! The response of people to a target that they see, without a fit to their data.
+//! The typical response of people to a displayed target, without a fit to their data.
 //!
-//! **Inverse of the machine.** People who see the target move the hand so that the machine follows it: `F P = g` near 3 rad/s,
-//! with g somewhat below one (R. J. Wasicko, D. T. McRuer and R. E. Magdaleno, *Human Pilot Dynamic Response in Single-Loop Systems
-//! with Compensatory and Pursuit Displays*, AFFDL-TR-66-137, 1966; M. Mulder et al., *IEEE Trans. Human-Machine Systems* 48 (2018)
-//! 457-469). With `s = d ln|P|/d ln omega` at 3 rad/s F has to rise by -s: a gain, the rate (`K_d s`), or the rate with a lead that
-//! adds the rest. g is .7: .4 to 1 are the values of the virtual people of `cargo xtask slow inputs-coverage`.
+//! **Inverse of the machine.** People who see the target move the hand so that the machine follows it: `F P = g` near 3
+//! rad/s, with g somewhat below one (R. J. Wasicko, D. T. McRuer and R. E. Magdaleno, *Human Pilot Dynamic Response in
+//! Single-Loop Systems with Compensatory and Pursuit Displays*, AFFDL-TR-66-137, 1966; M. Mulder et al., *IEEE Trans.
+//! Human-Machine Systems* 48 (2018) 457-469). With `s = d ln|P|/d ln omega` at 3 rad/s, F must have the slope -s: it is
+//! a gain, the rate (`K_d s`), or the rate with a lead that adds the remaining slope. g is .7; the virtual people of
+//! `cargo xtask slow inputs-coverage` have values of .4 to 1.
 //!
-//! **Delay.** Without preview that of the response to the error. With preview people respond to the future target: the
-//! delay is `-2 zeta_nm/omega_nm`, which compensates the lag of the neuromuscular system at low frequencies.
+//! **Delay.** Without preview, the delay is the same as in the response to the error. With preview, people respond to
+//! the future target, and the delay is `-2 zeta_nm/omega_nm`, which compensates the lag of the neuromuscular system at
+//! low frequencies.
 
 use hoid_model::{
     FamilyOperator, FamilyState, Form,
@@ -21,13 +23,13 @@ use super::{
 };
 
 /// Fraction of the target that the machine follows.
-const PART: f64 = 0.7;
-/// Preview in s: that of a condition of `hoid lab` without another.
+const FOLLOWED_FRACTION: f64 = 0.7;
+/// Preview in s, the default of a condition of `hoid lab`.
 pub(super) const PREVIEW_S: f64 = 1.0;
-/// Slopes at which the form changes to the next one.
+/// Largest absolute slope for which the form is a gain.
 const HALF: f64 = 0.5;
 
-/// The response to the target of a person who responds to the error as in this state.
+/// Returns the typical response to the target for a person with this response to the error.
 pub(super) fn typical(state: &FamilyState, display: Display) -> Result<Feedforward, DesignError> {
     let unknown = || DesignError::NoFeedforward {
         element: state.controlled_element.to_string(),
@@ -60,11 +62,11 @@ pub(super) fn typical(state: &FamilyState, display: Display) -> Result<Feedforwa
     let neuromuscular = operator.has_neuromuscular();
     let coordinates: Option<Vec<f64>> = form.coordinates(neuromuscular).iter().map(value).collect();
     let mut coordinates = coordinates.ok_or_else(unknown)?;
-    // For the intended motion of the hand: without the neuromuscular system.
+    // The gain is set for the intended motion of the hand, which excludes the neuromuscular system.
     let omega = NEAR_CROSSOVER_RAD_S;
     let ([a, b, c], _) = form.shape(&lead_s.into_iter().collect::<Vec<_>>());
     let shape = (a - c * omega * omega).hypot(b * omega);
-    coordinates[0] = PART / (shape * element.response(omega).norm());
+    coordinates[0] = FOLLOWED_FRACTION / (shape * element.response(omega).norm());
     Ok(Feedforward {
         operator: FamilyOperator::new(form, neuromuscular, &coordinates)?,
         preview_s,
@@ -96,7 +98,7 @@ mod tests {
                 let z = omega / nm;
                 let arm = hoid_model::Complex64::new(1.0 - z * z, 2.0 * zeta * z).inv();
                 let moved = seen.operator.response(omega) * state.controlled_element.response(omega);
-                assert!((moved.norm() / arm.norm() - PART).abs() < 1e-9, "{element}: {moved}");
+                assert!((moved.norm() / arm.norm() - FOLLOWED_FRACTION).abs() < 1e-9, "{element}: {moved}");
                 let shown = super::super::information::ahead(seen.preview_s, omega);
                 let phase = (moved * shown).arg();
                 if display == Display::Preview {
