@@ -44,6 +44,11 @@ pub trait BatchEstimator: Sized + 'static {
         false
     }
 
+    /// Names of its inputs besides the error.
+    fn further_inputs(&self) -> Vec<&str> {
+        Vec::new()
+    }
+
     /// Method and limits of its search.
     fn search(&self) -> &SearchOptions;
 

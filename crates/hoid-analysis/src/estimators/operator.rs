@@ -42,6 +42,10 @@ impl BatchEstimator for FamilyEstimator {
     }
 
     /// A first-order hold applies between the samples as recorded.
+    fn further_inputs(&self) -> Vec<&str> {
+        self.channels.iter().map(|channel| channel.name.as_str()).collect()
+    }
+
     fn counts_samples(&self) -> bool {
         self.intersample == Intersample::Foh
     }

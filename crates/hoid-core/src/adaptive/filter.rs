@@ -235,9 +235,9 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.saturation.remember(u);
         self.detector.pass_over();
         if let Some(end) = end {
-            // The previous sample was at the limit as well, which is known only now. The next
+            // A previous sample with the same output was at the limit as well, which is known only now. The next
             // replay uses it.
-            self.history.revise_previous(end);
+            self.history.revise_previous(u, end);
             return self.pass(u, end);
         }
         if self.is_stationary(u) {

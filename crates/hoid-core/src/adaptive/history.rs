@@ -107,10 +107,10 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
         self.put(USES, newest, use_of_it.number());
     }
 
-    /// Changes the use of the sample before the newest, which had updated the estimate.
-    pub fn revise_previous(&mut self, use_of_it: Use) {
+    /// Changes the use of the sample before the newest if it had the same output `u` and updated the estimate.
+    pub fn revise_previous(&mut self, u: f64, use_of_it: Use) {
         if let Some(previous) = self.samples.checked_sub(2)
-            && self.output(previous).1 == Use::Update
+            && self.output(previous) == (u, Use::Update)
         {
             self.put(USES, previous, use_of_it.number());
         }
@@ -138,6 +138,18 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_the_same_output_is_revised() {
+        let mut history = History::new([0.0; 30]);
+        for u in [1.0, 2.0, 2.0, 1.0] {
+            history.push(0.5);
+            history.complete(u, Use::Update);
+            history.revise_previous(u, Use::AtUpperLimit);
+        }
+        let uses: Vec<Use> = (0..4).map(|k| history.output(k).1).collect();
+        assert_eq!(uses, [Use::Update, Use::AtUpperLimit, Use::Update, Use::Update]);
+    }
 
     #[test]
     fn the_last_samples_are_there_and_nothing_before_the_record() {

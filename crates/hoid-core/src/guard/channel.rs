@@ -279,8 +279,11 @@ impl ChannelGuard {
         let weight = 1.0 / f64::from(self.averaged);
         for ((heavy, q), p) in self.heavy.iter_mut().zip(&self.quantiles).zip(&self.inner) {
             let quotient = q / p;
-            // A tail without prior knowledge (0/0) is Gaussian.
-            let square = (quotient * quotient).clamp(LIMIT, HEAVIEST);
+            // A tail without prior knowledge (0/0) is Gaussian; `clamp` would return NaN, which no later block removes.
+            let square = match quotient.is_nan() {
+                true => LIMIT,
+                false => (quotient * quotient).clamp(LIMIT, HEAVIEST),
+            };
             *heavy += weight * (square - *heavy);
         }
     }
@@ -528,6 +531,16 @@ mod tests {
         assert!(!channel.is_outlier(&channel.errors(1e9)));
         channel.watch();
         assert!(channel.is_known() && channel.is_outlier(&channel.errors(1e9)));
+    }
+
+    #[test]
+    fn a_heavy_tail_is_learnt_after_blocks_without_knowledge() {
+        let mut channel = ChannelGuard::new(0.01);
+        channel.end_block();
+        assert_eq!(channel.heavy, [LIMIT; ORDERS]);
+        channel.set_tails([3.0; ORDERS], [1.0; ORDERS]);
+        let expected = 9.0_f64.clamp(LIMIT, HEAVIEST);
+        assert!(channel.heavy.iter().all(|heavy| (heavy - expected).abs() < 1e-12));
     }
 
     #[test]

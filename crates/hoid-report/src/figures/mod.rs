@@ -10,6 +10,7 @@
 //! | [`maps`] | a value over two orders as coloured cells |
 //! | [`bode_grid`] | several responses in each of several Bode pairs |
 //! | [`describing`] | a describing function with its errors and coherence, models through it |
+//! | [`responses`] | frequency responses to several inputs, with 95 % bands |
 //! | [`people_by_condition`] | estimates of people by condition, with the mean and its interval |
 //! | [`curves`] | any other curves, with bands, error bars, markers and stems |
 //! | [`FigureFormat`], [`with_width_mm`] | such a text as SVG, PDF or PNG, in its width on paper |
@@ -41,6 +42,7 @@ mod maps;
 mod palette;
 mod panel;
 mod people;
+mod responses;
 mod scale;
 mod series;
 mod style;
@@ -62,6 +64,7 @@ pub use maps::{MapGrid, MapPanel, maps};
 pub use palette::{Shade, shade};
 pub use panel::{Beyond, CurveKind, Ordinate, TraceCurve, TracePanel};
 pub use people::{PeopleGrid, PeoplePanel, PersonAt, people_by_condition};
+pub use responses::{InputResponse, responses};
 pub(crate) use time_response::has_close_up;
 pub use time_response::time_response;
 pub use trace::{TraceGrid, trace_panels};
