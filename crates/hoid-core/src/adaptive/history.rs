@@ -147,7 +147,7 @@ mod tests {
             history.complete(u, Use::Update);
             history.revise_previous(u, Use::AtUpperLimit);
         }
-        let uses: Vec<Use> = (0..4).map(|k| history.output(k).1).collect();
+        let uses: [Use; 4] = core::array::from_fn(|k| history.output(k as u64).1);
         assert_eq!(uses, [Use::Update, Use::AtUpperLimit, Use::Update, Use::Update]);
     }
 
