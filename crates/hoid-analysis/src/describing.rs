@@ -62,7 +62,8 @@ impl Describing {
         let mut found = describe_runs(&data.records, &options)?;
         let (element, channel) = (options.controlled_element.as_ref(), options.excitation.as_deref());
         let verdict = data.judged(found.verdict);
-        found.verdict = verdict.append(data.element_finding(element, channel));
+        let verdict = verdict.append(data.element_finding(element, channel));
+        found.verdict = verdict.append(data.display_finding(&[]));
         let settings = self.settings(&data, late, &found);
         Ok(Described { found, data, settings })
     }

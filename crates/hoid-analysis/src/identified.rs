@@ -73,6 +73,7 @@ impl<E: BatchEstimator> Identification<E> {
             .at_rate(self.rate, counts_samples)?;
         // The controlled element is checked before the fit, which removes the response to further inputs from u.
         let element = data.element_finding(self.controlled_element.as_ref(), self.excitation.named());
+        let displayed = data.display_finding(&self.estimator.further_inputs());
         let Fitted {
             mut fit,
             verdict,
@@ -84,7 +85,7 @@ impl<E: BatchEstimator> Identification<E> {
         let verdict = data.judged(verdict);
         let response = (E::OF == Of::Person).then(|| response(&data.records)).flatten();
         let verdict = verdict.prepend(response.and_then(|found| found.finding()));
-        let verdict = verdict.append(element);
+        let verdict = verdict.append(element).append(displayed);
         let verdict = answers::with_answers(verdict, &fit.answers(self.controlled_element.as_ref()), &self.answers);
         E::judged(&mut fit, &verdict);
         let reading = data.source.as_ref().map(|source| &source.reading);

@@ -2,7 +2,7 @@
 
 use hoid_ident::diagnostics::recorded_element;
 use hoid_io::{QualityIssue, Step, quality_of_record};
-use hoid_model::{ContinuousTransferFunction, Fault, Finding, Record, Verdict, uncertainty::Estimate};
+use hoid_model::{Channel, ContinuousTransferFunction, Fault, Finding, Record, Verdict, uncertainty::Estimate};
 
 use crate::reading::Source;
 
@@ -119,6 +119,28 @@ impl Recordings {
     ) -> Option<Finding> {
         let given = given?;
         recorded_element(&self.records, given, excitation)?.finding(given)
+    }
+
+    /// Returns a doubt if the display showed a channel that is not an input of the model. `inputs` are the inputs besides
+    /// the error.
+    pub(crate) fn display_finding(&self, inputs: &[&str]) -> Option<Finding> {
+        let first = self.records.first()?;
+        let own = [first.input_channel(), Some(first.output_channel())];
+        let is_missing = |channel: &&Channel| {
+            let used = own.into_iter().flatten().any(|signal| signal.name == channel.name);
+            !(channel.role.is_empty() || used || inputs.contains(&channel.name.as_str()))
+        };
+        let all = self.records.iter().flat_map(Record::channels);
+        let Channel { name, role, .. } = all.into_iter().find(is_missing)?;
+        let error = first.input_channel().map_or("e", |error| error.name.as_str());
+        Some(Finding::doubt(
+            "displayed",
+            format!(
+                "the display showed {name} ({role}), and the model does not have it as an input: the response to the \
+                 error, crossover and margins are not those of the person; use hoid identify --input {error} --input \
+                 {name} --role {name}={role}"
+            ),
+        ))
     }
 
     /// Adds the findings of the recordings to a verdict. They come first, since faults of a recording may explain a

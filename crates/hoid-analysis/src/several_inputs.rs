@@ -207,6 +207,8 @@ impl SeveralInputsResult {
                 ));
             }
         }
+        let inputs: Vec<&str> = model.inputs.iter().map(|(name, _)| name.as_str()).collect();
+        findings.extend(data.display_finding(&inputs));
         let verdict = data.judged(Verdict::of(findings));
         Ok(Self {
             fit,

@@ -237,3 +237,79 @@ fn polynomials_with_two_inputs() {
         assert!(message.contains(expected), "{options:?}: {message}");
     }
 }
+
+#[test]
+fn a_group_has_the_responses_to_further_inputs_of_each_person() {
+    let at = TempDir::new().unwrap();
+    let data = at.path().join("data");
+    fs::create_dir(&data).unwrap();
+    for (n, name) in runs(&data, PURSUIT, 3).iter().enumerate() {
+        fs::rename(data.join(name), data.join(format!("P_seen_{n}.csv"))).unwrap();
+    }
+    let look = ["--excitation", "d", "--controlled-element", "1/s"];
+    let role = ["--role", "f_t=feedforward:0.25"];
+    let (_, said) = bad(
+        at.path(),
+        &[&["group", "init", "data"][..], &look, &["--role", "f_t=guess"]].concat(),
+    );
+    assert!(
+        said.contains("--role: roles: found \"f_t=guess\"") && said.contains("feedforward"),
+        "{said}"
+    );
+    good(at.path(), &[&["group", "init", "data"][..], &look, &role].concat());
+    let manifest = fs::read_to_string(data.join("group.toml")).unwrap();
+    assert!(manifest.contains("roles = [\"f_t=feedforward:0.25\"]"), "{manifest}");
+    let group = json(at.path(), &["group", "data", "--out", "results", "--json"]);
+    let person = &group["people"][0];
+    let channel = &person["channels"][0];
+    assert_eq!(
+        (&channel["input"], &channel["role"], &channel["form"]),
+        (&"f_t".into(), &"feedforward".into(), &"derivative".into())
+    );
+    for (name, truth) in [("K_d", 0.7), ("tau_f", -0.05)] {
+        assert!(
+            off(&channel["parameters"][name], truth).abs() < 3.0,
+            "{name}: {channel}"
+        );
+    }
+    let crossover = &person["open_loop"]["crossover_rad_s"];
+    assert!(off(crossover, 2.2).abs() < 3.0, "{person}");
+    // One input would be wrong: its models are omitted, which is no failure.
+    let kinds = kinds(&group);
+    assert!(kinds.contains(&"one-input-models".to_owned()), "{kinds:?}");
+    assert!(!kinds.contains(&"fits-failed".to_owned()), "{kinds:?}");
+    let page = fs::read_to_string(at.path().join("results/report.html")).unwrap();
+    assert!(page.contains("response to f_t") && page.contains("f_t: tau_f (s)"));
+}
+
+#[test]
+fn a_displayed_target_is_never_left_out_without_a_word() {
+    let at = TempDir::new().unwrap();
+    let run = runs(at.path(), PURSUIT, 1).remove(0);
+    let text = fs::read_to_string(at.path().join(&run)).unwrap();
+    fs::write(
+        at.path().join("seen.csv"),
+        format!("# roles: f_t feedforward:0.25\n{text}"),
+    )
+    .unwrap();
+    let role = "--input e --input f_t --role f_t=feedforward:0.25";
+    for command in ["identify", "describe", "track"] {
+        let mut call = vec![command, "seen.csv", "--json"];
+        if command == "track" {
+            call.extend(["--out", "trace.csv"]);
+        }
+        let found = json(at.path(), &call);
+        assert!(kinds(&found).contains(&"displayed".to_owned()), "{command}");
+        assert_ne!(found["verdict"]["level"], "trustworthy", "{command}");
+        assert!(
+            found["verdict"].to_string().contains(role),
+            "{command}: {}",
+            found["verdict"]
+        );
+    }
+    let two: Vec<&str> = ["identify", "seen.csv", "--json"]
+        .into_iter()
+        .chain(role.split(' '))
+        .collect();
+    assert!(!kinds(&json(at.path(), &two)).contains(&"displayed".to_owned()));
+}

@@ -103,6 +103,23 @@ fn columns_are_written_in_the_order_of_the_task() {
 }
 
 #[test]
+fn roles_of_channels_are_read_back() {
+    let desk = Desk::new();
+    let seen = Channel::new("seen", "deg", vec![1.0, 2.0, 3.0]).with_role("feedforward:0.5");
+    let written = record(3, 0.01, 0.0).with_channel(seen).unwrap();
+    for name in ["run.csv", "run.parquet", "run.npz", "run.mat"] {
+        let path = desk.path(name);
+        write_record(&path, &written).unwrap();
+        let read = read_record(&path, &defaults()).unwrap().record;
+        let roles = read.channels().filter(|c| !c.role.is_empty());
+        let roles: Vec<(&str, &str)> = roles.map(|c| (c.name.as_str(), c.role.as_str())).collect();
+        assert_eq!(roles, [("seen", "feedforward:0.5")], "{name}");
+        let part = read.span(0.01, 1.0).unwrap();
+        assert!(part.channels().any(|c| c.role == "feedforward:0.5"), "{name}");
+    }
+}
+
+#[test]
 fn channels_that_could_not_be_read_back_are_not_written() {
     let desk = Desk::new();
     for name in ["t", "", " x"] {

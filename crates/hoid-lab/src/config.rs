@@ -18,8 +18,9 @@
 
 use std::path::Path;
 
+use hoid_ident::family::ChannelRole;
 use hoid_model::{
-    family_scenario::{Display, MultiSine},
+    family_scenario::{Display, Interleaved, MultiSine},
     scenario::Condition as Reference,
 };
 use serde::{Deserialize, Serialize};
@@ -155,6 +156,14 @@ pub struct Signal {
     pub largest: u32,
     /// Root mean square of the signal.
     pub rms: f64,
+    /// Which of the prime multiples it has. Where the display shows the target, target and disturbance need lines of
+    /// their own: `even` for one of them and `odd` for the other.
+    #[serde(skip_serializing_if = "is_all")]
+    pub interleaved: Interleaved,
+}
+
+fn is_all(interleaved: &Interleaved) -> bool {
+    *interleaved == Interleaved::All
 }
 
 impl Default for Signal {
@@ -165,6 +174,7 @@ impl Default for Signal {
             period_s: default.period_s,
             largest: default.largest,
             rms: 1.5,
+            interleaved: default.interleaved,
         }
     }
 }
@@ -325,6 +335,16 @@ impl Condition {
         Ok(())
     }
 
+    /// Role of the target for the person, as a role of hoid identify; `None` if the display shows the error only.
+    pub(crate) fn role_of_target(&self) -> Option<String> {
+        let feedforward = ChannelRole::Feedforward;
+        match self.display {
+            Display::Compensatory => None,
+            Display::Pursuit => Some(feedforward.to_string()),
+            Display::Preview => Some(format!("{feedforward}:{}", self.preview_s)),
+        }
+    }
+
     /// Checks that the numbers of the condition are valid and that it can be run.
     pub(crate) fn check(&self) -> Result<(), LabError> {
         let wrong = |reason: String| Err(LabError::Message(reason));
@@ -374,7 +394,7 @@ impl Condition {
                 "the controlled element has {states} states, expected at most {MOST_STATES}"
             ));
         }
-        if course.excitations().iter().all(|e| e.function.sinusoids().is_empty()) {
+        if course.has_lines() == [false, false] {
             return wrong(
                 "without target and disturbance the person would have nothing to do; give a target or a disturbance"
                     .to_owned(),

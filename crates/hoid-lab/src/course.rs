@@ -27,6 +27,7 @@ impl Signal {
             period_s: self.period_s,
             largest: self.largest,
             rms: self.rms,
+            interleaved: self.interleaved,
             ..MultiSine::default()
         }
         .excitation()
@@ -115,6 +116,12 @@ impl TaskDefinition {
             Self::Reference(course) => [fixed(&course.scenario().forcing), Excitation::default()],
             Self::Family(course) => [course.scenario().target.clone(), course.scenario().disturbance.clone()],
         }
+    }
+
+    /// True if target and disturbance, in this order, have lines.
+    pub fn has_lines(&self) -> [bool; 2] {
+        self.excitations()
+            .map(|excitation| !excitation.function.sinusoids().is_empty())
     }
 
     /// Returns the position of the leading gain.

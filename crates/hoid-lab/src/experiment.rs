@@ -9,6 +9,7 @@ use serde_json::json;
 use crate::{
     LabError,
     config::{Condition, Config},
+    record::TARGET,
     session::{RunEnd, Session},
 };
 
@@ -157,17 +158,49 @@ pub fn manifest(out: &Path) -> Result<(), LabError> {
 /// Returns the known properties of a condition for the manifest.
 fn known(condition: &Condition) -> Result<ConditionSettings, LabError> {
     let course = condition.course()?;
-    let lines = course
-        .excitations()
-        .map(|excitation| !excitation.function.sinusoids().is_empty());
+    let [has_target, has_disturbance] = course.has_lines();
+    let role = condition.role_of_target().filter(|_| has_target);
+    // At the lines of a displayed target, u/e is not the response to the error.
+    let excitation = match (&role, has_target, has_disturbance) {
+        (Some(_), _, true) | (None, false, true) => Some("d"),
+        (None, true, _) => Some(TARGET),
+        _ => None,
+    };
     Ok(ConditionSettings {
         controlled_element: course.constant_element()?.map(|element| element.to_string()),
-        excitation: match lines {
-            [true, _] => Some("f_t".to_owned()),
-            [false, true] => Some("d".to_owned()),
-            _ => None,
-        },
+        excitation: excitation.map(str::to_owned),
+        roles: role.map(|role| format!("{TARGET}={role}")).into_iter().collect(),
         change_s: course.change_s(),
         ..ConditionSettings::default()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::family_scenario::Display;
+
+    use super::*;
+    use crate::config::Signal;
+
+    #[test]
+    fn a_displayed_target_is_a_further_input_of_the_group() {
+        let of = |display, disturbance| {
+            let condition = Condition {
+                target: Some(Signal::default()),
+                disturbance,
+                display,
+                preview_s: 0.5,
+                ..Condition::default()
+            };
+            let facts = known(&condition).unwrap();
+            (facts.roles.join(" "), facts.excitation.unwrap_or_default())
+        };
+        let pair = |roles: &str, excitation: &str| (roles.to_owned(), excitation.to_owned());
+        let both = Some(Signal::default());
+        assert_eq!(of(Display::Compensatory, both), pair("", "f_t"));
+        assert_eq!(of(Display::Pursuit, both), pair("f_t=feedforward", "d"));
+        assert_eq!(of(Display::Preview, both), pair("f_t=feedforward:0.5", "d"));
+        assert_eq!(of(Display::Preview, None), pair("f_t=feedforward:0.5", ""));
+    }
 }

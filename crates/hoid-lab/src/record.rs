@@ -1,5 +1,6 @@
 //! Conversion of a run to a record that all commands of hoid can read. It contains every tenth tick: e and u at that
-//! time, and the target, disturbance, output and displayed e. t = 0 is the start of the measurement.
+//! time, and the target, disturbance, output and displayed e. A target that the display showed has a role for the
+//! person. t = 0 is the start of the measurement.
 
 use hoid_model::{Channel, Record, SampleTime};
 
@@ -8,6 +9,9 @@ use crate::{
     session::{Logged, RunStart},
     task::{TICK_S, TICKS_PER_SAMPLE, Task},
 };
+
+/// Name of the channel of the target.
+pub(crate) const TARGET: &str = "f_t";
 
 /// Returns the record of a run, including the run-in.
 ///
@@ -40,9 +44,13 @@ pub fn record(begun: &RunStart, task: &Task, logged: &Logged) -> Result<Record, 
         channel("u", every(&logged.signals.u)),
     )?
     .starting_at(-(begun.run_in as f64) * TICK_S);
-    for (name, values) in [("f_t", &task.target), ("d", &task.disturbance)] {
+    let role_of_target = begun.condition.role_of_target().unwrap_or_default();
+    for (name, values, role) in [
+        (TARGET, &task.target, role_of_target),
+        ("d", &task.disturbance, String::new()),
+    ] {
         if values.iter().any(|v| *v != 0.0) {
-            record = record.with_channel(channel(name, every(values)))?;
+            record = record.with_channel(channel(name, every(values)).with_role(role))?;
         }
     }
     Ok(record

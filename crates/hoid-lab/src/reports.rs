@@ -12,6 +12,7 @@ use hoid_study::group::MANIFEST;
 use crate::{
     LabError,
     config::Config,
+    record::TARGET,
     session::{RunEnd, Session, Stem},
 };
 
@@ -76,6 +77,7 @@ fn one(program: &Path, config: &Config, stem: &Stem, name: &str) {
     let course = begun.as_ref().and_then(|begun| begun.condition.course().ok());
     // Margins are defined only for a constant controlled element.
     let element = course
+        .as_ref()
         .filter(|course| course.change_s().is_none())
         .and_then(|course| course.element_at(0.0).ok());
     match name {
@@ -88,6 +90,12 @@ fn one(program: &Path, config: &Config, stem: &Stem, name: &str) {
                 .arg(&place);
         }
         "identify" => {
+            let role = begun.as_ref().and_then(|begun| begun.condition.role_of_target());
+            let has_target = course.as_ref().is_some_and(|course| course.has_lines()[0]);
+            if let Some(role) = role.filter(|_| has_target) {
+                command.args(["--input", "e", "--input", TARGET]);
+                command.arg(format!("--role={TARGET}={role}"));
+            }
             command.arg("--report").arg(&place);
         }
         _ => {

@@ -14,6 +14,7 @@ use hoid_lab::{
     task::{Task, held_inputs},
     verify::{Checked, check},
 };
+use hoid_model::family_scenario::{Display, Interleaved};
 
 fn config() -> Config {
     Config {
@@ -116,6 +117,38 @@ fn a_run_is_verified_and_its_record_is_read_by_hoid() {
     assert_eq!(read.input(), record.input());
     for name in ["f_t", "d", "y", "e_shown"] {
         assert!(read.channel(name).is_some(), "{name}");
+    }
+}
+
+/// A display that shows the target gives it a role in the recording.
+#[test]
+fn a_displayed_target_has_its_role_in_the_recording() {
+    for (display, role) in [
+        (Display::Compensatory, None),
+        (Display::Pursuit, Some("feedforward")),
+        (Display::Preview, Some("feedforward:0.5")),
+    ] {
+        let dir = tempfile::tempdir().unwrap();
+        let mut config = config();
+        let condition = &mut config.condition[0];
+        (condition.display, condition.preview_s) = (display, 0.5);
+        for (signal, interleaved) in [
+            (&mut condition.target, Interleaved::Even),
+            (&mut condition.disturbance, Interleaved::Odd),
+        ] {
+            signal.as_mut().unwrap().interleaved = interleaved;
+        }
+        let mut session = Session::begin(dir.path(), &config, "P01", false).unwrap();
+        let (stem, log) = run(&mut session, usize::MAX);
+        drop(log);
+        session.end(&stem, RunEnd::Finished, BTreeMap::new()).unwrap();
+        let begun = RunStart::read(&stem).unwrap();
+        let logged = hoid_lab::session::Logged::read(&stem).unwrap();
+        let record = hoid_lab::record::record(&begun, &begun.task(&stem).unwrap(), &logged).unwrap();
+        hoid_io::write_record(&stem.file("beh.parquet"), &record).unwrap();
+        let read = hoid_io::read(&stem.file("beh.parquet")).unwrap();
+        let shown = read.channels().find(|channel| channel.name == "f_t").unwrap();
+        assert_eq!(shown.role, role.unwrap_or_default());
     }
 }
 

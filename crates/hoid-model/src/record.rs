@@ -13,6 +13,9 @@ pub struct Channel {
     pub name: String,
     /// Unit as text, empty if unknown.
     pub unit: String,
+    /// Role for the person who controls, such as `feedforward:0.5` for a target that is displayed 0.5 s ahead; empty if
+    /// the signal has none or it is unknown.
+    pub role: String,
     /// One value per sample.
     pub values: Vec<f64>,
 }
@@ -23,8 +26,16 @@ impl Channel {
         Self {
             name: name.into(),
             unit: unit.into(),
+            role: String::new(),
             values,
         }
+    }
+
+    /// Returns the same channel with a role for the person.
+    #[must_use]
+    pub fn with_role(mut self, role: impl Into<String>) -> Self {
+        self.role = role.into();
+        self
     }
 }
 
@@ -213,7 +224,9 @@ impl Record {
                 end_s: self.time_s(self.len() - 1),
             });
         }
-        let cut = |c: &Channel| Channel::new(c.name.clone(), c.unit.clone(), c.values[first..end].to_vec());
+        let cut = |c: &Channel| {
+            Channel::new(c.name.clone(), c.unit.clone(), c.values[first..end].to_vec()).with_role(c.role.clone())
+        };
         Ok(Self {
             label: self.label.clone(),
             sample_time: self.sample_time,

@@ -38,17 +38,19 @@ pub enum Wanted<'a> {
 pub fn record(found: &Bound<'_, PyAny>, wanted: Wanted<'_>) -> Outcome<Record> {
     let text = |name: &str| -> PyResult<String> { found.getattr(name)?.extract() };
     let sample_time = SampleTime::new(found.getattr("sample_time")?.extract()?)?;
-    let units: Bound<'_, PyDict> = found.getattr("units")?.cast_into().map_err(PyErr::from)?;
-    let unit = |name: &str| -> PyResult<String> {
-        match units.get_item(name)? {
-            Some(unit) => unit.extract(),
+    let words_of =
+        |attribute: &str| -> PyResult<Bound<'_, PyDict>> { found.getattr(attribute)?.cast_into().map_err(PyErr::from) };
+    let (units, roles) = (words_of("units")?, words_of("roles")?);
+    let words = |all: &Bound<'_, PyDict>, name: &str| -> PyResult<String> {
+        match all.get_item(name)? {
+            Some(words) => words.extract(),
             None => Ok(String::new()),
         }
     };
     let channel = |name: String, values: &Bound<'_, PyAny>| -> PyResult<Channel> {
         let values = vector(values)?;
-        let unit = unit(&name)?;
-        Ok(Channel::new(name, unit, values))
+        let (unit, role) = (words(&units, &name)?, words(&roles, &name)?);
+        Ok(Channel::new(name, unit, values).with_role(role))
     };
     let output = channel(text("output_name")?, &found.getattr("u")?)?;
     let input = found.getattr("e")?;
@@ -136,9 +138,12 @@ pub fn parts<'py>(py: Python<'py>, record: Record) -> PyResult<Bound<'py, PyDict
     parts.set_item("start_time", record.time_s(0))?;
     parts.set_item("label", record.label())?;
     let (input, output, others) = record.into_channels();
-    let (channels, units) = (PyDict::new(py), PyDict::new(py));
+    let (channels, units, roles) = (PyDict::new(py), PyDict::new(py), PyDict::new(py));
     for channel in input.iter().chain([&output]).chain(&others) {
         units.set_item(&channel.name, &channel.unit)?;
+        if !channel.role.is_empty() {
+            roles.set_item(&channel.name, &channel.role)?;
+        }
     }
     parts.set_item("input_name", input.as_ref().map_or("e", |c| c.name.as_str()))?;
     parts.set_item("output_name", &output.name)?;
@@ -149,5 +154,6 @@ pub fn parts<'py>(py: Python<'py>, record: Record) -> PyResult<Bound<'py, PyDict
     }
     parts.set_item("channels", channels)?;
     parts.set_item("units", units)?;
+    parts.set_item("roles", roles)?;
     Ok(parts)
 }

@@ -3,7 +3,8 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use hoid_analysis::{
-    AnalysisError, BatchEstimator, Identification, Identified, Recordings, Request, ResolvedRequest,
+    AnalysisError, Axis, AxisPair, BatchEstimator, Coupling, Identification, Identified, Recordings, Request,
+    ResolvedRequest,
     json::{BatchResult, state},
     registry::estimators,
 };
@@ -13,7 +14,7 @@ use pyo3::prelude::*;
 
 use crate::{
     arrays::{self, Wanted},
-    errors::{DataError, Failure, Outcome},
+    errors::{DataError, Failure, Outcome, bad_option},
     family::PyOperatorFit,
     files,
     fit::{PartRead, PyFit},
@@ -60,6 +61,56 @@ pub fn identify<'py>(
         }
     };
     Ok((native(py, fit)?, notes))
+}
+
+/// Input of a coupling, its probability by chance, whether there is a response, and why it was not tested.
+type CouplingParts = (String, Option<f64>, bool, String);
+
+/// The operators of several axes, each with its couplings. `axes` has the records of each axis, `pairs` its signals.
+#[pyfunction]
+#[pyo3(signature = (axes, pairs, *, options, faults, decimate))]
+pub fn identify_axes(
+    py: Python<'_>,
+    axes: Vec<Vec<Bound<'_, PyAny>>>,
+    pairs: Vec<String>,
+    options: BTreeMap<String, String>,
+    faults: &str,
+    decimate: &str,
+) -> Outcome<Vec<(PyOperatorFit, Vec<CouplingParts>)>> {
+    let request = Request {
+        structure: None,
+        method: None,
+        options,
+        faults: names::choice::<FaultHandling>("faults", faults)?,
+        rate: files::decimation(decimate)?,
+    };
+    let (ResolvedRequest::Operator(how), _) = request.resolve()? else {
+        return Err(bad_option(
+            "axes have operators: options of other structures do not apply",
+        ));
+    };
+    let pairs: Vec<AxisPair> = (pairs.iter())
+        .map(|pair| pair.parse().map_err(|why| bad_option(&format!("pairs: {why}"))))
+        .collect::<Outcome<_>>()?;
+    hoid_analysis::check_axes(&how, &pairs)?;
+    let mut all = Vec::with_capacity(pairs.len());
+    for (pair, records) in pairs.into_iter().zip(&axes) {
+        let records = arrays::records(records, Wanted::All)?;
+        all.push((pair, Recordings::of_records(records)));
+    }
+    let found = py.detach(|| hoid_analysis::axes(&how, all))?;
+    let parts = |coupling: Coupling| {
+        let (p_value, reason) = match coupling.p_value {
+            Ok(p) => (Some(p), String::new()),
+            Err(reason) => (None, reason),
+        };
+        (coupling.input, p_value, coupling.responds, reason)
+    };
+    let one = |axis: Axis| {
+        let couplings = axis.couplings.into_iter().map(parts).collect();
+        (PyOperatorFit(axis.identified), couplings)
+    };
+    Ok(found.into_iter().map(one).collect())
 }
 
 /// Restores a result from the text that `to_json` returned.

@@ -87,6 +87,7 @@ fn _pyhoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(identify::from_json, module)?,
         wrap_pyfunction!(identify::from_state, module)?,
         wrap_pyfunction!(identify::identify, module)?,
+        wrap_pyfunction!(identify::identify_axes, module)?,
         wrap_pyfunction!(recursion::recursive_methods, module)?,
         wrap_pyfunction!(recursion::renamed_method, module)?,
         wrap_pyfunction!(simulate::convert_discrete, module)?,

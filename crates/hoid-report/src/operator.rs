@@ -10,7 +10,7 @@ use hoid_model::{Complex64, ContinuousTransferFunction, FamilyOperator, GainUnit
 
 use crate::{
     FitSummary, ModelSection, ParameterRow, Picture, Report, facts,
-    figures::{ModelCurve, describing},
+    figures::{InputResponse, ModelCurve, describing, responses},
     model_figure, sentence,
 };
 
@@ -32,6 +32,10 @@ impl<'a> Report<'a> {
             pictures: (found.described.as_ref())
                 .map(|described| through_describing_function(fit, described))
                 .into_iter()
+                .chain(to_all_inputs(found).map(|svg| Picture {
+                    svg,
+                    caption: "The responses of u to each input, held over a sample, with their 95 % bands.".to_owned(),
+                }))
                 .collect(),
             ..Self::of_identified(found)
         }
@@ -54,12 +58,14 @@ impl<'a> Report<'a> {
     }
 }
 
-/// Draws the figure of an operator. If the records have a periodic excitation, it shows the operator with their
-/// describing function; otherwise it shows the frequency response with its bands.
+/// Draws the figure of an operator. With several inputs it shows the response to each of them. Otherwise, if the records
+/// have a periodic excitation, it shows the operator with their describing function; if not, the frequency response
+/// with its bands.
 pub fn operator_figure(found: &Identified) -> String {
-    match &found.described {
-        Some(described) => picture(&found.fit, described),
-        None => model_figure(&found.fit.operator(0).polynomial_fit, &found.data.records, None),
+    match (&found.described, to_all_inputs(found)) {
+        (_, Some(all)) => all,
+        (Some(described), None) => picture(&found.fit, described),
+        (None, None) => model_figure(&found.fit.operator(0).polynomial_fit, &found.data.records, None),
     }
 }
 
@@ -107,10 +113,24 @@ fn answer(found: &Identified) -> FitSummary {
         interval: p.interval,
         remark: remark(p),
     };
+    let further = found.fit.channels.iter().flat_map(|channel| {
+        let own = channel.response.iter().flat_map(|response| &response.parameters);
+        own.map(|p| ParameterRow {
+            name: format!("{}: {}", channel.name, p.name),
+            ..row(p)
+        })
+    });
     FitSummary {
         verdict: found.fit.verdict.clone(),
         sentence: sentence_of_operator(found),
-        parameters: found.fit.operator(0).parameters.iter().map(row).collect(),
+        parameters: found
+            .fit
+            .operator(0)
+            .parameters
+            .iter()
+            .map(row)
+            .chain(further)
+            .collect(),
     }
 }
 
@@ -124,6 +144,40 @@ fn margins(fit: &FamilyFit, element: &ContinuousTransferFunction) -> Option<Marg
         phase_crossover_rad_s: gain_margin.map(|(omega, _)| omega),
         gain_margin_db: gain_margin.map(|(_, db)| db),
     })
+}
+
+/// Frequency range of the responses to several inputs, rad/s, and the number of frequencies.
+const CHANNEL_RANGE: (f64, f64) = (0.3, 16.0);
+const CHANNEL_POINTS: usize = 120;
+
+/// The figure of the responses to all inputs; `None` for a fit with one.
+fn to_all_inputs(found: &Identified) -> Option<String> {
+    let fit = &found.fit;
+    let (low, high) = CHANNEL_RANGE;
+    let high = high.min(0.9 * std::f64::consts::PI / fit.sample_time.s());
+    let step = (high / low).ln() / (CHANNEL_POINTS - 1) as f64;
+    let omega: Vec<f64> = (0..CHANNEL_POINTS).map(|k| low * (step * k as f64).exp()).collect();
+    let further: Vec<InputResponse> = (fit.channels.iter())
+        .filter_map(|channel| {
+            let response = channel.response.as_ref()?;
+            Some(InputResponse {
+                title: format!("to {} ({})", channel.name, channel.role),
+                points: channel.frequency_response(&omega, (fit.sample_time, fit.intersample))?,
+                delay_s: response.operator.tau_e_s() - channel.preview_s,
+            })
+        })
+        .collect();
+    if further.is_empty() {
+        return None;
+    }
+    let error = found.data.records.first()?.input_channel()?;
+    let feedback = InputResponse {
+        title: format!("to {} (feedback)", error.name),
+        points: fit.frequency_response(0, &omega),
+        delay_s: fit.operator(0).operator.tau_e_s(),
+    };
+    let all: Vec<InputResponse> = std::iter::once(feedback).chain(further).collect();
+    Some(responses("inputs", "Responses to all inputs", &all))
 }
 
 /// Highest frequency shown in a figure with a neuromuscular peak, as a multiple of the natural frequency.

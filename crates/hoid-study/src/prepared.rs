@@ -57,6 +57,7 @@ fn decimated(record: &Record, n: usize) -> Result<Record, String> {
             &channel.unit,
             channel.values.iter().step_by(n).copied().collect(),
         )
+        .with_role(&channel.role)
     };
     let sample_time = SampleTime::new(record.sample_time().s() * n as f64).map_err(text)?;
     let input = record.input_channel().map(thinned).ok_or("the record has no input")?;

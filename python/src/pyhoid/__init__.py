@@ -37,6 +37,7 @@ from .estimates import Estimate, Operator, Remnant
 from .experiment import ExperimentDesign, design
 from .fit import Fit, FrequencyResponse, Series, Validation
 from .groups import group, group_manifest, simulate_group, simulate_people
+from .axes import Axis, Coupling, identify_axes
 from .identification import from_json, identify, identify_operator
 from .operator_fit import OperatorFit
 from .operator_parameters import OperatorParameter
@@ -103,6 +104,7 @@ __all__ = [
     "group",
     "group_manifest",
     "identify",
+    "identify_axes",
     "identify_operator",
     "info",
     "margins",

@@ -530,6 +530,14 @@ def identify(
     decimate: str,
     progress: _Progress,
 ) -> tuple[OperatorFit | Fit | TimeVaryingFit, list[str]]: ...
+def identify_axes(
+    axes: Sequence[Sequence[Record]],
+    pairs: Sequence[str],
+    *,
+    options: dict[str, str],
+    faults: str,
+    decimate: str,
+) -> list[tuple[OperatorFit, list[tuple[str, float | None, bool, str]]]]: ...
 def even_times(times: npt.NDArray[np.float64]) -> tuple[float | None, int]: ...
 def info(
     path: _Path,

@@ -93,6 +93,10 @@ class Record:
         Name of the record for messages and reports.
     units : mapping of str to str, optional
         Units of the channels.
+    roles : mapping of str to str, optional
+        Roles of displayed channels for the person, such as ``{"f_t": "feedforward:0.5"}`` for a
+        target that is displayed 0.5 s ahead. A result whose model leaves such a channel out is
+        doubtful.
     **channels : array_like, shape (N,)
         Other channels by name, such as ``f_t`` for the forcing function.
 
@@ -117,6 +121,7 @@ class Record:
         start_time: float = 0.0,
         label: str = "",
         units: Mapping[str, str] | None = None,
+        roles: Mapping[str, str] | None = None,
         **channels: Any,
     ) -> None:
         self._fill(
@@ -126,6 +131,7 @@ class Record:
             start_time=float(start_time),
             label=label,
             units=dict(units or {}),
+            roles=dict(roles or {}),
             channels={name: signal(values, name) for name, values in channels.items()},
         )
         _pyhoid.check_record(self)
@@ -140,6 +146,7 @@ class Record:
         label: str,
         units: dict[str, str],
         channels: dict[str, FloatArray],
+        roles: dict[str, str] | None = None,
         input_name: str = "e",
         output_name: str = "u",
         input_lead: float = 0.0,
@@ -152,6 +159,8 @@ class Record:
         self.start_time: float = start_time
         self.label: str = label
         self.units: dict[str, str] = units
+        #: Roles of displayed channels for the person.
+        self.roles: dict[str, str] = dict(roles or {})
         self.channels: dict[str, FloatArray] = {
             name: kept(values) for name, values in channels.items()
         }
@@ -346,9 +355,40 @@ class Record:
             start_time=self.start_time + first * self.sample_time,
             label=self.label,
             units=self.units,
+            roles=self.roles,
             channels={name: values[first:end] for name, values in self.channels.items()},
             input_name=self.input_name,
             output_name=self.output_name,
+            input_lead=self.input_lead,
+            own=True,
+        )
+        record.steps = list(self.steps)
+        return record
+
+    def with_signals(self, input: str, output: str) -> Record:
+        """The record with other channels as its input (the error) and its output (the control).
+
+        >>> record.with_signals("ey", "uy")
+        """
+        all_channels = {name: self[name] for name in self.names}
+        for name in (input, output):
+            if name not in all_channels:
+                names = ", ".join(all_channels)
+                raise DataError(f"the record has no channel {name}; it has {names}")
+        if input == output:
+            raise DataError(f"{input} is both input and output, expected two channels")
+        record = Record.__new__(Record)
+        record._fill(
+            e=all_channels.pop(input),
+            u=all_channels.pop(output),
+            sample_time=self.sample_time,
+            start_time=self.start_time,
+            label=self.label,
+            units=self.units,
+            roles=self.roles,
+            channels=all_channels,
+            input_name=input,
+            output_name=output,
             input_lead=self.input_lead,
             own=True,
         )
@@ -432,6 +472,7 @@ class Record:
             "start_time",
             "label",
             "units",
+            "roles",
             "channels",
             "input_name",
             "output_name",

@@ -44,6 +44,11 @@ pub trait BatchEstimator: Sized + 'static {
         false
     }
 
+    /// Names of its inputs besides the error.
+    fn further_inputs(&self) -> Vec<&str> {
+        Vec::new()
+    }
+
     /// Returns the method and the limits of the search.
     fn search(&self) -> &SearchOptions;
 

@@ -41,6 +41,10 @@ impl BatchEstimator for FamilyEstimator {
         all
     }
 
+    fn further_inputs(&self) -> Vec<&str> {
+        self.channels.iter().map(|channel| channel.name.as_str()).collect()
+    }
+
     /// With a first-order hold between recorded samples the sampling rate must be kept.
     fn counts_samples(&self) -> bool {
         self.intersample == Intersample::Foh

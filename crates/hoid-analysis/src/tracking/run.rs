@@ -140,6 +140,7 @@ impl Tracking {
         let verdict = trace.verdict(record, choice.as_ref())?;
         let verdict = verdict.prepend(findings_of_quality(account, record, Of::Person));
         let verdict = verdict.append(data.element_finding(used.controlled_element.as_ref(), None));
+        let verdict = verdict.append(data.display_finding(&[]));
         let mut settings = settings_of_recursion(&self.recursion, &plan, &used, choice.as_ref());
         let own = OwnSettings {
             trace: &trace,

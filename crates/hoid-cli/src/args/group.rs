@@ -71,6 +71,10 @@ pub struct GroupInitArgs {
         conflicts_with = "controlled_element"
     )]
     pub element: Vec<ConditionElement>,
+    /// Further input of the person in all conditions, with its role and preview time in s, as in hoid identify, such as
+    /// r=feedforward:0.25. May be repeated
+    #[arg(long, value_name = "COLUMN=ROLE[:S]")]
+    pub role: Vec<String>,
     /// Samples by which the control is recorded later than the error [default: found with the controlled element, else
     /// 0]
     #[arg(long, value_name = "N", allow_hyphen_values = true)]

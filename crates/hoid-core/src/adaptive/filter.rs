@@ -237,9 +237,9 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.saturation.update(u);
         self.detector.pass_over();
         if let Some(end) = end {
-            // When a limit is first recognised, the previous sample was already at this limit. The correction takes
-            // effect in the next replay.
-            self.history.revise_previous(end);
+            // When a limit is first recognised, a previous sample with the same output was already at this limit. The
+            // correction takes effect in the next replay.
+            self.history.revise_previous(u, end);
             return self.pass(u, end);
         }
         if self.is_stationary(u) {

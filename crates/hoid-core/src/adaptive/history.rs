@@ -107,10 +107,10 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
         self.put(USES, newest, sample_use.number());
     }
 
-    /// Changes the use of the last sample but one if it updated the estimate.
-    pub fn revise_previous(&mut self, sample_use: Use) {
+    /// Changes the use of the last sample but one if its output was `u` and it updated the estimate.
+    pub fn revise_previous(&mut self, u: f64, sample_use: Use) {
         if let Some(previous) = self.samples.checked_sub(2)
-            && self.output(previous).1 == Use::Update
+            && self.output(previous) == (u, Use::Update)
         {
             self.put(USES, previous, sample_use.number());
         }
@@ -138,6 +138,18 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_the_same_output_is_revised() {
+        let mut history = History::new([0.0; 30]);
+        for u in [1.0, 2.0, 2.0, 1.0] {
+            history.push(0.5);
+            history.complete(u, Use::Update);
+            history.revise_previous(u, Use::AtUpperLimit);
+        }
+        let uses: [Use; 4] = core::array::from_fn(|k| history.output(k as u64).1);
+        assert_eq!(uses, [Use::Update, Use::AtUpperLimit, Use::Update, Use::Update]);
+    }
 
     #[test]
     fn the_last_samples_are_there_and_nothing_before_the_record() {

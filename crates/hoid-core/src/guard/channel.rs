@@ -285,8 +285,11 @@ impl ChannelGuard {
         for ((tail_ratio, q), p) in self.tail_ratio.iter_mut().zip(&self.quantiles).zip(&self.inner) {
             let quotient = q / p;
             // Unknown quantiles give 0/0; the limit of such a tail is the lower bound `LIMIT`, which is about that of a
-            // Gaussian tail.
-            let square = (quotient * quotient).clamp(LIMIT, LARGEST_TAIL_RATIO);
+            // Gaussian tail. `clamp` would return NaN, which no later block removes.
+            let square = match quotient.is_nan() {
+                true => LIMIT,
+                false => (quotient * quotient).clamp(LIMIT, LARGEST_TAIL_RATIO),
+            };
             *tail_ratio += weight * (square - *tail_ratio);
         }
     }
@@ -535,6 +538,16 @@ mod tests {
         assert!(!channel.is_outlier(&channel.errors(1e9)));
         channel.start_detection();
         assert!(channel.is_known() && channel.is_outlier(&channel.errors(1e9)));
+    }
+
+    #[test]
+    fn a_heavy_tail_is_learnt_after_blocks_without_knowledge() {
+        let mut channel = ChannelGuard::new(0.01);
+        channel.end_block();
+        assert_eq!(channel.tail_ratio, [LIMIT; ORDERS]);
+        channel.set_tails([3.0; ORDERS], [1.0; ORDERS]);
+        let expected = 9.0_f64.clamp(LIMIT, LARGEST_TAIL_RATIO);
+        assert!(channel.tail_ratio.iter().all(|heavy| (heavy - expected).abs() < 1e-12));
     }
 
     #[test]

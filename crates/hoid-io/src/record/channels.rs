@@ -8,15 +8,22 @@ pub(crate) fn channels(record: &Record) -> Vec<&Channel> {
     target.into_iter().chain(others).collect()
 }
 
-/// Returns the comments of a file: units and sample time.
+/// Returns the comments of a file: units, roles and sample time.
 pub(crate) fn comments(record: &Record, channels: &[&Channel]) -> Vec<String> {
+    // A line cannot hold a comma or a line break: such words are omitted.
+    let fits = |text: &str| !text.is_empty() && !text.contains([',', '\n', '\r']);
+    let list = |words: fn(&Channel) -> &str| {
+        let with_words = channels.iter().filter(move |c| fits(&c.name) && fits(words(c)));
+        with_words.map(move |c| format!("{} {}", c.name, words(c)))
+    };
     let mut comments = Vec::new();
     if channels.iter().any(|c| !c.unit.is_empty()) {
-        // A unit with a comma or a line break does not fit into this line and is omitted.
-        let fits = |text: &str| !text.is_empty() && !text.contains([',', '\n', '\r']);
-        let with_unit = channels.iter().filter(|c| fits(&c.name) && fits(&c.unit));
-        let units: String = with_unit.map(|c| format!(", {} {}", c.name, c.unit)).collect();
-        comments.push(format!("units: t s{units}"));
+        let units: Vec<String> = std::iter::once("t s".to_owned()).chain(list(|c| &c.unit)).collect();
+        comments.push(format!("units: {}", units.join(", ")));
+    }
+    let roles: Vec<String> = list(|c| &c.role).collect();
+    if !roles.is_empty() {
+        comments.push(format!("roles: {}", roles.join(", ")));
     }
     comments.push(format!("sample_time: {} s", record.sample_time().s()));
     comments

@@ -91,11 +91,14 @@ impl TableReader<'_> {
     ) -> Result<ReadRecord, IoError> {
         let signals = || input.into_iter().chain([output]);
         let used = |column: usize| signals().any(|(signal, _)| signal.columns().any(|used| used == column));
-        let about = |column: &Column| (column.name.clone(), column.unit.clone(), column.is_held);
-        let all: Vec<(String, String, bool)> = self.table.columns.iter().map(about).collect();
+        let about = |column: &Column| {
+            let channel = Channel::new(column.name.clone(), column.unit.clone(), Vec::new());
+            (channel.with_role(column.role.clone()), column.is_held)
+        };
+        let all: Vec<(Channel, bool)> = self.table.columns.iter().map(about).collect();
         let mut columns: Vec<Option<Channel>> = Vec::with_capacity(all.len());
-        for (column, (name, unit, is_held)) in all.into_iter().enumerate() {
-            if !used(column) && (name.is_empty() || Some(column) == time) {
+        for (column, (channel, is_held)) in all.into_iter().enumerate() {
+            if !used(column) && (channel.name.is_empty() || Some(column) == time) {
                 columns.push(None);
                 continue;
             }
@@ -110,13 +113,13 @@ impl TableReader<'_> {
                         None => values,
                         Some((t, n)) => repair::resample(t, &values, (grid.start_s, grid.sample_time.s()), n, is_held),
                     };
-                    columns.push(Some(Channel::new(name, unit, values)));
+                    columns.push(Some(Channel { values, ..channel }));
                 }
                 Err(error) if used(column) => return Err(error),
                 Err(error) => {
                     self.table
                         .notes
-                        .push(format!("column {} is left out: {error}", named(&name)));
+                        .push(format!("column {} is left out: {error}", named(&channel.name)));
                     columns.push(None);
                 }
             }

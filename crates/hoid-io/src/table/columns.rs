@@ -24,6 +24,8 @@ pub(crate) struct Column {
     pub(crate) name: String,
     /// Unit of the column; empty if unknown.
     pub(crate) unit: String,
+    /// Role of the signal for the person; empty if unknown.
+    pub(crate) role: String,
     /// One value per row; NaN if the cell contains no number.
     pub(crate) values: Vec<f64>,
     /// Rows that contain text, in increasing order.
@@ -214,32 +216,40 @@ pub(crate) fn check_number(columns: usize, file: &str) -> Result<(), IoError> {
     })
 }
 
-/// Reads the units from the comments above a table, and returns the sample time stated in the comments.
+/// Reads units and roles from the comments above a table, and returns the sample time stated in the comments.
 pub(crate) fn read_comments<'a>(comments: impl Iterator<Item = &'a str>, columns: &mut [Column]) -> Option<f64> {
     let mut sample_time_s = None;
     for line in comments {
         let line = line.trim_start_matches('#').trim();
         if let Some(units) = line.strip_prefix("units:") {
-            // Parts in excess of the number of columns are ignored.
-            for part in units.split(',').take(columns.len()).map(str::trim) {
-                // Names and units may contain blanks: of the matching columns the one with the longest name is used.
-                let unit_of = |column: &Column| {
-                    let unit = part.strip_prefix(column.name.as_str())?;
-                    unit.starts_with(char::is_whitespace).then(|| unit.trim().to_owned())
-                };
-                let best = columns
-                    .iter_mut()
-                    .filter(|c| !c.name.is_empty() && unit_of(c).is_some());
-                if let Some(column) = best.max_by_key(|c| c.name.len()) {
-                    column.unit = unit_of(column).unwrap_or_default();
-                }
-            }
+            for_each_named(units, columns, |column, unit| column.unit = unit);
+        } else if let Some(roles) = line.strip_prefix("roles:") {
+            for_each_named(roles, columns, |column, role| column.role = role);
         } else if let Some(stated) = line.strip_prefix("sample_time:") {
             let value = stated.trim().trim_end_matches('s').trim().parse().ok();
             sample_time_s = value.filter(|ts: &f64| ts.is_finite() && *ts > 0.0);
         }
     }
     sample_time_s
+}
+
+/// Calls `set` with each column that a list `NAME WORDS, NAME WORDS` names, and its words.
+fn for_each_named(list: &str, columns: &mut [Column], set: impl Fn(&mut Column, String)) {
+    // If there are more parts than columns, the rest is ignored.
+    for part in list.split(',').take(columns.len()).map(str::trim) {
+        // A name may contain blanks, and so may its words: the matching column with the longest name applies.
+        let words_of = |column: &Column| {
+            let words = part.strip_prefix(column.name.as_str())?;
+            words.starts_with(char::is_whitespace).then(|| words.trim().to_owned())
+        };
+        let named = columns
+            .iter_mut()
+            .filter(|c| !c.name.is_empty() && words_of(c).is_some());
+        if let Some(column) = named.max_by_key(|c| c.name.len()) {
+            let words = words_of(column).unwrap_or_default();
+            set(column, words);
+        }
+    }
 }
 
 /// Source of a table from which rows were removed; messages still refer to the rows of the file.

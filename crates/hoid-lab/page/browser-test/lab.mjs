@@ -70,10 +70,10 @@ export function injectTime() {
 }
 
 /**
- * A person who is a program, in the page: u = 0.7 e(t - 0.2 s) and a little noise, by pointer events
- * each 8 ms; in injected time as fast as it goes, in real time until the run is done.
+ * A person who is a program, in the page: u = 0.7 e(t - 0.2 s) + K_d f'(t - 0.2 s) and a little noise, by pointer
+ * events each 8 ms; in injected time as fast as it goes, in real time until the run is done.
  */
-export async function operator({ injected, until }) {
+export async function operator({ injected, until, K_d = 0 }) {
   const canvas = document.querySelector("canvas.task");
   const kind = "onpointerrawupdate" in window ? "pointerrawupdate" : "pointermove";
   const seen = [];
@@ -84,11 +84,14 @@ export async function operator({ injected, until }) {
   };
   const move = (now) => {
     const { run, map } = window.hoidLab;
-    seen.push([now, run.e]);
+    seen.push([now, run.e, run.e + run.y]);
     let k = seen.length - 1;
     while (k > 0 && seen[k][0] > now - 200) k--;
     noise = 0.95 * noise + 0.1 * random();
-    const u = 0.7 * seen[k][1] + noise;
+    const [then, e, f] = seen[k];
+    const [before, , last] = seen[Math.max(k - 4, 0)];
+    const rate = then > before ? (1000 * (f - last)) / (then - before) : 0;
+    const u = 0.7 * e + K_d * rate + noise;
     const part = Math.max(-1, Math.min(1, u / map.gain));
     canvas.dispatchEvent(new PointerEvent(kind, { pointerType: "mouse", clientX: map.centre + part * map.span }));
   };

@@ -293,6 +293,59 @@ const steps = {
     near(Math.abs(value), 1.4, 0.25, "difference of the crossover");
   },
 
+  async "displays that show the target"() {
+    const hoid = (...args) => {
+      const done = spawnSync(program, args, { cwd: folder, encoding: "utf8" });
+      assert.equal(done.status, 0, `hoid ${args.join(" ")}: ${done.stderr}`);
+      return JSON.parse(done.stdout);
+    };
+    const displays = join(folder, "displays.toml");
+    const conditions = ["pursuit", "preview"].map(
+      (display) => `[[condition]]
+name = "${display}"
+display = "${display}"
+measurement_s = 80
+break_s = 0
+target = { rms = 1.5, interleaved = "even" }
+disturbance = { rms = 0.5, interleaved = "odd" }
+`,
+    );
+    writeFileSync(displays, `name = "displays"\norder = "given"\n[limits]\nframe_ms = 5000\ninput_ms = 5000\n${conditions.join("")}`);
+    const out = join(folder, "displays");
+    const server = await lab(program, "--out", out, "--config", displays);
+    const page = await open(server.address, { time: "injected" });
+    await consent(page, "S1");
+    for (const end of [/^Score/, "Done. Thank you."]) {
+      await startRun(page);
+      await page.evaluate(operator, { injected: true, K_d: 0.15 });
+      await heading(page, end);
+      if (end !== "Done. Thank you.") await page.getByText("The display shows the target").waitFor();
+    }
+    // Its page is that of both inputs.
+    await page.getByRole("link", { name: /: identify/ }).first().waitFor({ timeout: 240_000 });
+    const href = await page.getByRole("link", { name: /: identify/ }).first().getAttribute("href");
+    const html = await page.evaluate(async (href) => (await fetch(href)).text(), href);
+    assert.match(html, /f_t=feedforward/);
+    await page.close();
+    await server.end();
+    const { people } = hoid("group", join(out, "group.toml"), "--out", "seen", "--json");
+    for (const { condition, open_loop, channels } of people) {
+      const [{ input, form, parameters }] = channels;
+      assert.deepEqual([input, form], ["f_t", "derivative"], condition);
+      const { K_d, tau_f } = parameters;
+      console.log(`  ${condition}: K_d ${K_d.value.toFixed(3)} ± ${K_d.standard_error.toFixed(3)} s, tau_f ${tau_f.value.toFixed(3)} s`);
+      near(K_d.value, 0.15, 0.03, `K_d, ${condition}`);
+      near(open_loop.crossover_rad_s.value, 2.8, 0.5, `crossover, ${condition}`);
+    }
+    // With the error alone it is doubtful, and the remedy is named.
+    const run = join(out, "sub-S1", "ses-01");
+    for (const name of readdirSync(run).filter((name) => name.endsWith("_beh.parquet"))) {
+      const { verdict } = hoid("identify", join(run, name), "--from", "0", "--json");
+      assert.equal(verdict.level, "doubtful", name);
+      assert.match(verdict.reasons.join(" "), /the display showed f_t .*--role f_t=feedforward/, name);
+    }
+  },
+
   async "a disk that is full in the middle of a run"() {
     const disk = join(folder, "disk");
     mkdirSync(disk);

@@ -282,9 +282,10 @@ function result(): void {
 /** The last live estimate of a run, for the person. */
 async function estimate(number: number): Promise<void> {
   const place = document.getElementById("person");
-  const lines = (await wire.data(number))?.live ?? [];
-  const last = lines[lines.length - 1];
-  if (!place || !last) return;
+  const run = await wire.data(number);
+  const last = run?.live[run.live.length - 1];
+  if (!place || !run || !last) return;
+  const shown = run.condition.display === "compensatory" ? "" : "The display shows the target: this is the response to the error alone. The page of identify has both.";
   const cell = (name: string, told: [number | null, number | null], unit: string, none = "–") =>
     h("div", {}, name, h("b", {}, told[0] === null ? none : `${digits(told[0])} ${unit}`), told[1] === null ? "" : `± ${digits(told[1])}`);
   place.replaceChildren(
@@ -299,6 +300,7 @@ async function estimate(number: number): Promise<void> {
       cell("Crossover", last.crossover_rad_s, "rad/s"),
       cell("Phase margin", last.phase_margin_deg, "deg"),
     ),
+    h("p", {}, shown),
   );
 }
 

@@ -37,7 +37,8 @@ pub struct MultiSine {
 }
 
 /// Selection of primes, which gives a target and a disturbance separate lines.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Interleaved {
     /// All primes.
     #[default]

@@ -10,6 +10,7 @@
 //! | [`maps`] | a quantity over two variables as coloured cells |
 //! | [`bode_grid`] | several Bode diagrams next to each other, each with several responses |
 //! | [`describing`] | a describing function with its errors and coherence, and the curves of models |
+//! | [`responses`] | frequency responses to several inputs, with 95 % bands |
 //! | [`people_by_condition`] | estimates for people by condition, with the mean and its interval |
 //! | [`curves`] | any other curves, with bands, error bars, markers and stems |
 //! | [`FigureFormat`], [`with_width_mm`] | conversion of the SVG text to SVG, PDF or PNG, and its width on paper |
@@ -40,6 +41,7 @@ mod maps;
 mod palette;
 mod panel;
 mod people;
+mod responses;
 mod scale;
 mod series;
 mod style;
@@ -60,7 +62,8 @@ pub use file::{DPI, FigureFormat, with_width_mm};
 pub use maps::{MapGrid, MapPanel, maps};
 pub use palette::{Shade, shade};
 pub use panel::{Beyond, CurveKind, Ordinate, TraceCurve, TracePanel};
-pub use people::{PeopleGrid, PeoplePanel, CategoryEstimate, people_by_condition};
+pub use people::{CategoryEstimate, PeopleGrid, PeoplePanel, people_by_condition};
+pub use responses::{InputResponse, responses};
 pub(crate) use time_response::has_close_up;
 pub use time_response::time_response;
 pub use trace::{TraceGrid, trace_panels};

@@ -5,7 +5,7 @@
 //! interval has no upper limit, `> x` gives its lower end.
 
 use hoid_ident::family::Parameter;
-use hoid_model::{VerdictLevel, uncertainty::Estimate};
+use hoid_model::{Form, VerdictLevel, uncertainty::Estimate};
 use hoid_study::group::{GroupSummary, Person};
 use minijinja::{Value, context};
 
@@ -56,6 +56,8 @@ pub fn people_table<'a>(people: impl Iterator<Item = &'a Person>) -> PeopleTable
     }
     let parameters = headings.len();
     headings.extend(columns.iter().map(|(_, heading)| (*heading).to_owned()));
+    let further = further_columns(&people);
+    headings.extend(further.iter().map(|(_, _, heading)| heading.clone()));
     headings.push("verdict".to_owned());
     let row = |p: &&Person| {
         let runs = match p.run.as_str() {
@@ -75,6 +77,7 @@ pub fn people_table<'a>(people: impl Iterator<Item = &'a Person>) -> PeopleTable
                 .iter()
                 .map(|(name, _)| p.parameter(name).map_or_else(dash, parameter)),
         );
+        cells.extend(further.iter().map(|(input, name, _)| response_cell(p, input, name)));
         cells.push(p.verdict.map_or("", VerdictLevel::name).to_owned());
         cells
     };
@@ -82,6 +85,41 @@ pub fn people_table<'a>(people: impl Iterator<Item = &'a Person>) -> PeopleTable
         headings,
         rows: people.iter().map(row).collect(),
         parameters,
+    }
+}
+
+/// Name of the column with the form of the response to a further input.
+const FORM: &str = "form";
+/// Names and headings of the parameters of a response to a further input that others lack.
+const OF_FURTHER: [(&str, &str); 2] = [("K_d", "K_d (s)"), ("tau_f", "tau_f (s)")];
+
+/// Input, name and heading of each column of the responses to further inputs.
+fn further_columns<'a>(people: &[&'a Person]) -> Vec<(&'a str, &'static str, String)> {
+    let mut all: Vec<(&str, &str, String)> = Vec::new();
+    for channel in people.iter().flat_map(|p| &p.channels) {
+        let input = channel.name.as_str();
+        if all.iter().any(|(known, ..)| *known == input) {
+            continue;
+        }
+        all.push((input, FORM, format!("response to {input}")));
+        let has = |name: &str| {
+            let mut own = people.iter().flat_map(|p| &p.channels).filter(|c| c.name == input);
+            own.any(|c| c.parameter(name).is_some())
+        };
+        let used = COLUMNS.into_iter().chain(OF_FURTHER).filter(|(name, _)| has(name));
+        all.extend(used.map(|(name, heading)| (input, name, format!("{input}: {heading}"))));
+    }
+    all
+}
+
+/// The cell of a person in a column of the responses to further inputs.
+fn response_cell(p: &Person, input: &str, name: &str) -> String {
+    let Some(channel) = p.channels.iter().find(|channel| channel.name == input) else {
+        return dash();
+    };
+    match (name, channel.form) {
+        (FORM, form) => form.map_or("none found", Form::name).to_owned(),
+        _ => channel.parameter(name).map_or_else(dash, parameter),
     }
 }
 

@@ -14,7 +14,7 @@
 use std::path::Path;
 
 use hoid_analysis::{Recordings, Tracking};
-use hoid_ident::{Estimator, GreyBox, choose_orders, order_selection::Criterion};
+use hoid_ident::{Estimator, GreyBox, choose_orders, family::SeenChannel, order_selection::Criterion};
 use hoid_io::OutputTable;
 use hoid_model::{Decimation, Form, Orders, Record, Structure, uncertainty::Estimate};
 use hoid_numerics::statistics::root_mean_square;
@@ -26,6 +26,7 @@ use super::{
     family_fits,
     manifest::{Manifest, RunEntry},
     person::{ALL, Person, PersonStatus, people_of, people_table},
+    person_channel::PersonChannel,
     reading::{Pairing, Recorded, Run, account, read_files, read_run, run_of},
     run_orders::{self, label_of},
     run_rows::{RunRows, RunTables},
@@ -36,6 +37,8 @@ use crate::statistics::median;
 
 /// Label of a run that could not be read.
 pub(super) const READ: &str = "read";
+/// Label of the grey box.
+const GREY_BOX: &str = "grey box";
 /// Label of quantities that describe the recording itself.
 pub(super) const RECORD: &str = "record";
 /// Name of the table of people.
@@ -47,16 +50,31 @@ pub(super) struct FromCell {
     box_jenkins: Result<Orders, String>,
     /// Form of the operator of the person; `None` if the person has no operator.
     form: Option<Form>,
+    /// The further inputs to which the person responds, each in its form.
+    channels: Vec<SeenChannel>,
 }
 
 impl FromCell {
     /// Extracts these results from two tables of the cell: its estimates and its people.
     pub fn of(estimates: &OutputTable, people: &OutputTable) -> Self {
+        let people = people_of(people);
+        let person = people.first();
+        let channels = person.map_or(&[][..], |person| &person.channels);
         Self {
             arx: run_orders::chosen(estimates, Structure::Arx),
             box_jenkins: run_orders::chosen(estimates, Structure::BoxJenkins),
-            form: people_of(people).first().and_then(|person| person.form.parse().ok()),
+            form: person.and_then(|person| person.form.parse().ok()),
+            channels: channels.iter().filter_map(PersonChannel::in_use).collect(),
         }
+    }
+
+    /// Returns the reason why a model with one input does not apply; `None` if it does.
+    fn against_one_input(&self) -> Option<String> {
+        let names: Vec<&str> = self.channels.iter().map(|channel| channel.name.as_str()).collect();
+        (!names.is_empty()).then(|| {
+            let names = names.join(" and ");
+            format!("it has one input, but u also responds to {names}: its estimates would be biased")
+        })
     }
 
     fn orders(&self, structure: Structure) -> &Result<Orders, String> {
@@ -79,7 +97,7 @@ pub(super) fn analyse(manifest: &Manifest, base: &Path, entry: &RunEntry, from_c
             analysis.analyse(&run, from_cell);
             if let Some(form) = from_cell.form.filter(|_| manifest.analysis.each_run) {
                 let paired = read_run(manifest, base, entry, Pairing::InTheLoop);
-                analysis.family_of_run(paired.map(|run| run.record), form);
+                analysis.family_of_run(paired.map(|run| run.record), form, &from_cell.channels);
             }
         }
         Err(reason) => analysis.rows.failed(None, READ, &reason),
@@ -123,7 +141,8 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
         (None, false) => analysis.family_together(manifest, cell.key(), &entries, &runs),
     };
     let records: Vec<Record> = runs.into_iter().map(|run| run.record).collect();
-    if let Some(first) = records.first() {
+    let one_input = people[0].channels.iter().all(|channel| channel.form.is_none());
+    if let Some(first) = records.first().filter(|_| one_input) {
         let tau_s = people[0].parameter("tau_e").map(|tau| tau.value);
         let nk = tau_s.map(|tau_s| run_orders::nk_of(tau_s, first.sample_time().s(), late_samples));
         // The names of the structures were checked with the manifest.
@@ -167,6 +186,9 @@ impl<'a> RunAnalysis<'a> {
         for (name, value) in of_record.into_iter().chain(change) {
             self.rows.row(Some(windows[2]), RECORD, name, Estimate::fixed(value));
         }
+        if let Some(reason) = from_cell.against_one_input() {
+            return self.one_input(&reason);
+        }
         // The names of structures and recursions were checked with the manifest.
         for structure in self.settings.polynomials().unwrap_or_default() {
             let label = label_of(structure);
@@ -196,6 +218,19 @@ impl<'a> RunAnalysis<'a> {
         }
         if self.settings.grey_box {
             self.grey_box(record, &windows);
+        }
+    }
+
+    /// Reports why the models and recursions with one input are not fitted.
+    fn one_input(&mut self, reason: &str) {
+        for structure in self.settings.polynomials().unwrap_or_default() {
+            self.rows.omitted(label_of(structure), reason);
+        }
+        for method in self.settings.recursions().unwrap_or_default() {
+            self.rows.omitted(&traces::label_of(&method), reason);
+        }
+        if self.settings.grey_box {
+            self.rows.omitted(GREY_BOX, reason);
         }
     }
 
@@ -283,10 +318,10 @@ impl<'a> RunAnalysis<'a> {
         }
     }
 
-    /// Fits the family to one run, in the form chosen for the person.
-    fn family_of_run(&mut self, record: Result<Record, String>, form: Form) {
+    /// Fits the family to one run, in the forms chosen for the person.
+    fn family_of_run(&mut self, record: Result<Record, String>, form: Form, channels: &[SeenChannel]) {
         let fit = record.and_then(|record| {
-            let estimator = family_fits::estimator_of_run(self.settings, &self.rows.condition, form)?;
+            let estimator = family_fits::estimator_of_run(self.settings, &self.rows.condition, form, channels)?;
             let fit = estimator.fit(std::slice::from_ref(&record));
             Ok((fit.map_err(|error| error.to_string())?, record))
         });
@@ -300,7 +335,6 @@ impl<'a> RunAnalysis<'a> {
     }
 
     fn grey_box(&mut self, record: &Record, windows: &[Window; 3]) {
-        const LABEL: &str = "grey box";
         for window in windows {
             let found = record
                 .span(window.from_s, window.to_s)
@@ -315,10 +349,10 @@ impl<'a> RunAnalysis<'a> {
             match found {
                 Ok(fit) => {
                     self.rows
-                        .response_rows(*window, LABEL, fit.polynomial_fit(0), record.sample_time().s());
-                    self.rows.operator_rows(*window, LABEL, fit.operator(0));
+                        .response_rows(*window, GREY_BOX, fit.polynomial_fit(0), record.sample_time().s());
+                    self.rows.operator_rows(*window, GREY_BOX, fit.operator(0));
                 }
-                Err(reason) => self.rows.failed(Some(*window), LABEL, &reason),
+                Err(reason) => self.rows.failed(Some(*window), GREY_BOX, &reason),
             }
         }
     }

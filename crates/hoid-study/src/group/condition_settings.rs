@@ -1,5 +1,6 @@
 //! Known properties of a condition: the keys of `[conditions.NAME]`.
 
+use hoid_ident::family::SeenChannel;
 use hoid_model::ContinuousTransferFunction;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -17,6 +18,10 @@ pub struct ConditionSettings {
     /// Channel whose lines excite the loop: f_t or a disturbance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub excitation: Option<String>,
+    /// Further inputs of the person with their roles, such as `r=feedforward:0.25` for a target that is displayed 0.25 s
+    /// ahead.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub roles: Vec<String>,
     /// Period of the excitation, s. Default: the longest period of which all lines are harmonics.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub period_s: Option<f64>,
@@ -45,6 +50,22 @@ impl ConditionSettings {
             None => self.controlled_element.as_deref(),
             Some(_) => None,
         }
+    }
+
+    /// Returns the further inputs.
+    ///
+    /// # Errors
+    /// The invalid entry, and the remedy.
+    pub(super) fn channels(&self) -> Result<Vec<SeenChannel>, String> {
+        let mut all: Vec<SeenChannel> = Vec::with_capacity(self.roles.len());
+        for text in &self.roles {
+            let channel: SeenChannel = text.parse().map_err(|why| format!("roles: found {text:?}: {why}"))?;
+            if all.iter().any(|other| other.name == channel.name) {
+                return Err(format!("roles: {} has two roles, expected one", channel.name));
+            }
+            all.push(channel);
+        }
+        Ok(all)
     }
 
     /// Checks the controlled elements and the settings of the change between them.

@@ -2,7 +2,7 @@
 //! by the joint fit.
 
 use hoid_analysis::{Excitation, Identification, Identified};
-use hoid_ident::family::{FamilyEstimator, FamilyFit};
+use hoid_ident::family::{FamilyEstimator, FamilyFit, SeenChannel};
 use hoid_model::{ContinuousTransferFunction, Form, Record, uncertainty::Estimate};
 
 use super::{
@@ -27,7 +27,10 @@ pub(super) fn identification(
 ) -> Result<Identification, String> {
     let facts = &rows.condition;
     Ok(Identification {
-        estimator: manifest.analysis.family()?,
+        estimator: FamilyEstimator {
+            channels: facts.channels()?,
+            ..manifest.analysis.family()?
+        },
         excitation: (facts.excitation.clone()).map_or(Excitation::Nothing, Excitation::Named),
         period_s: facts.period_s,
         faults: manifest.read.faults.handling(),
@@ -46,14 +49,16 @@ fn estimator(settings: &AnalysisSettings, condition: &ConditionSettings) -> Resu
     })
 }
 
-/// Returns the estimator for one run of a person whose form is known. A single run has no individual parameters.
+/// Returns the estimator for one run of a person whose forms are known. A single run has no individual parameters.
 pub(super) fn estimator_of_run(
     settings: &AnalysisSettings,
     condition: &ConditionSettings,
     form: Form,
+    channels: &[SeenChannel],
 ) -> Result<FamilyEstimator, String> {
     Ok(FamilyEstimator {
         forms: vec![form],
+        channels: channels.to_vec(),
         individual: Vec::new(),
         ..estimator(settings, condition)?
     })
@@ -102,7 +107,13 @@ pub(super) fn rows_of_fit(rows: &mut RunRows<'_>, window: Window, label: &str, f
         "innovation_variance",
         Estimate::fixed(fit.innovation_variance),
     );
-    if let Ok(simulated) = of.polynomial_fit.simulate(record) {
+    // Without the responses to further inputs, which its polynomials lack.
+    let own = match fit.channels.is_empty() {
+        true => Ok(record.clone()),
+        false => fit.without_channels(record, FamilyEstimator::default().detrend),
+    };
+    let vaf_of = own.and_then(|record| Ok((of.polynomial_fit.simulate(&record)?, record)));
+    if let Ok((simulated, record)) = vaf_of {
         let vaf = hoid_ident::validation::vaf(&record.output()[simulated.first..], &simulated.values);
         rows.row(Some(window), label, "vaf", Estimate::fixed(vaf));
     }

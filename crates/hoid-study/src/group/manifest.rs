@@ -21,6 +21,7 @@
 //! [conditions.fo]
 //! controlled_element = "1/1,0"
 //! excitation = "d"
+//! roles = ["r=feedforward:0.25"]          # further inputs, as --role of hoid identify
 //!
 //! [[runs]]
 //! file = "P03_fo_03.csv"
@@ -187,6 +188,7 @@ impl Manifest {
         for (name, facts) in &self.conditions {
             facts
                 .check_elements()
+                .and_then(|()| facts.channels().map(|_| ()))
                 .map_err(|reason| format!("[conditions.{name}]: {reason}"))?;
         }
         self.prepare
@@ -269,6 +271,26 @@ impl Manifest {
     pub fn by_rate(&self, condition: &str) -> Result<Decimation, String> {
         let of_condition = self.conditions.get(condition).and_then(|facts| facts.prepare.as_ref());
         self.prepare.by_rate(of_condition)
+    }
+
+    /// Sets the further inputs of all conditions.
+    ///
+    /// # Errors
+    /// The invalid entry; a run without the name of a condition, which has no settings.
+    pub fn set_roles(&mut self, roles: &[String]) -> Result<(), String> {
+        if roles.is_empty() {
+            return Ok(());
+        }
+        for run in &self.runs {
+            if run.condition.is_empty() {
+                let file = run.file.display();
+                return Err(format!("{file} has no condition: name {{condition}} in --pattern"));
+            }
+            let facts = self.conditions.entry(run.condition.clone()).or_default();
+            facts.roles = roles.to_vec();
+            facts.channels()?;
+        }
+        Ok(())
     }
 
     /// Returns the manifest as TOML text.

@@ -10,7 +10,7 @@
 //! | [`run_group`] | analysis of a group in a directory, part by part |
 //! | `reading` | reading and preparation of runs; a single run: [`RecordedRun`] |
 //! | `analysis` | analysis of the runs of a person in a condition (`block`) and of single runs: windows (`windows`), orders (`run_orders`) and table rows (`run_rows`) |
-//! | `family_fits`, [`Person`] | the operator of a person in a condition, and its row in the table of people |
+//! | `family_fits`, [`Person`], [`PersonChannel`] | the operator of a person in a condition, its responses to further inputs, and its row in the table of people (`parameter_columns`) |
 //! | [`RunEstimates`] | estimates of each run, read back from the tables |
 //! | [`GroupSummary`] | failures, people, and the verdict on the group as a whole |
 //! | `traces` | recursive estimates as table rows |
@@ -39,8 +39,10 @@ mod frequency;
 mod inspection;
 mod join;
 mod manifest;
+mod parameter_columns;
 mod pattern;
 mod person;
+mod person_channel;
 mod preparation_settings;
 mod read_settings;
 mod reading;
@@ -66,6 +68,7 @@ pub use inspection::{Evidence, commented, inspect};
 pub use manifest::{MANIFEST, Manifest, RunEntry};
 pub use pattern::{FileNameParts, Pattern};
 pub use person::{FormEvidence, Person, PersonStatus};
+pub use person_channel::PersonChannel;
 pub use preparation_settings::{NumberOrText, PreparationSettings};
 pub use read_settings::{Detrending, FaultTreatment, ReadSettings};
 pub use reading::RecordedRun;

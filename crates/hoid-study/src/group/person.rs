@@ -4,15 +4,19 @@
 //! A row contains the form; for each parameter its value, its standard errors for these runs (`_se`) and for the person
 //! (`_se_person`), its 95 % interval (`_low`, `_high`), whether the data determine it (`_determined`), and the share of
 //! the prior (`_prior_share`); crossover and phase margin with the controlled element, with errors and intervals; the
-//! evidence for each form tried (`criterion_FORM`, relative to the best form, and `weight_FORM`); the statistics of the
-//! fit and its verdict. There are no columns for parameters that no person has or for forms that were not tried. If
+//! evidence for each form tried (`criterion_FORM`, relative to the best form, and `weight_FORM`); the responses to
+//! further inputs ([`PersonChannel`]); the statistics of the fit and its verdict. There are no columns for parameters that no person has or for forms that were not tried. If
 //! some parameters are individual, a person has one row for each run.
 
 use hoid_ident::family::{FamilyFit, OperatorOfRecord, Parameter};
 use hoid_io::{ColumnValues, OutputTable, TableSchema};
 use hoid_model::{ContinuousTransferFunction, Form, VerdictLevel, operator_family::PARAMETERS, uncertainty::Estimate};
 
-use super::tables::{joined, numbers, sentences, real, schema, text, texts};
+use super::{
+    parameter_columns,
+    person_channel::{self, PersonChannel},
+    tables::{joined, numbers, real, schema, sentences, text, texts},
+};
 use crate::columns::Rows;
 
 /// Name of the run for results that apply to all runs.
@@ -67,6 +71,8 @@ pub struct Person {
     pub forms: Vec<FormEvidence>,
     /// Parameters of the operator.
     pub parameters: Vec<Parameter>,
+    /// The responses to further inputs.
+    pub channels: Vec<PersonChannel>,
     /// Crossover frequency with the controlled element, rad/s.
     pub crossover_rad_s: Option<Estimate>,
     /// 95 % interval of the crossover frequency from Student's t distribution, since the errors are based on few runs.
@@ -102,6 +108,7 @@ impl Person {
             form: String::new(),
             forms: Vec::new(),
             parameters: Vec::new(),
+            channels: Vec::new(),
             crossover_rad_s: None,
             crossover_interval: None,
             phase_margin_deg: None,
@@ -133,6 +140,7 @@ impl Person {
             form: fit.form.name().to_owned(),
             forms: evidence(fit),
             parameters: parameters.clone(),
+            channels: fit.channels.iter().map(PersonChannel::of).collect(),
             crossover_rad_s: measures.map(|m| m.crossover_rad_s),
             crossover_interval: measures.and_then(|m| m.crossover_interval),
             phase_margin_deg: measures.map(|m| m.phase_margin_deg),
@@ -189,20 +197,9 @@ impl Person {
         rows.text("notes", &joined(self.notes.iter().map(String::as_str)));
         rows.real("runs", self.runs as f64);
         for p in &self.parameters {
-            let name = &p.name;
-            rows.real(name, p.value);
-            rows.real(&format!("{name}_se"), p.standard_error.unwrap_or(f64::NAN));
-            rows.real(
-                &format!("{name}_se_person"),
-                p.standard_error_person.unwrap_or(f64::NAN),
-            );
-            let (low, high) = p.interval.unwrap_or((f64::NAN, f64::NAN));
-            rows.real(&format!("{name}_low"), low);
-            rows.real(&format!("{name}_high"), high);
-            rows.real(&format!("{name}_prior_share"), p.prior_share);
-            let determined = if p.determined { "yes" } else { "no" };
-            rows.text(&format!("{name}_determined"), determined);
+            parameter_columns::write(rows, &p.name, p);
         }
+        self.channels.iter().for_each(|channel| channel.write(rows));
         for (name, estimate, interval) in [
             ("crossover_rad_s", self.crossover_rad_s, self.crossover_interval),
             ("phase_margin_deg", self.phase_margin_deg, self.phase_margin_interval),
@@ -236,19 +233,6 @@ impl Person {
             })
         };
         let interval = |name: &str| any(&format!("{name}_low")).zip(any(&format!("{name}_high")));
-        let parameter = |&(name, unit): &(&str, &'static str)| {
-            any(name).map(|value| Parameter {
-                name: name.to_owned(),
-                unit,
-                value,
-                standard_error: any(&format!("{name}_se")),
-                standard_error_person: any(&format!("{name}_se_person")),
-                interval: interval(name),
-                prior_share: any(&format!("{name}_prior_share")).unwrap_or(0.0),
-                determined: cell(&format!("{name}_determined")) == "yes",
-                averaged_over: Vec::new(),
-            })
-        };
         let evidence = |form: &Form| {
             Some(FormEvidence {
                 form: *form,
@@ -265,7 +249,11 @@ impl Person {
             reason: cell("reason"),
             form: cell("form"),
             forms: Form::ALL.iter().filter_map(evidence).collect(),
-            parameters: PARAMETERS.iter().filter_map(parameter).collect(),
+            parameters: PARAMETERS
+                .into_iter()
+                .filter_map(|parameter| parameter_columns::read(table, row, "", parameter))
+                .collect(),
+            channels: PersonChannel::read(table, row),
             crossover_rad_s: estimate("crossover_rad_s"),
             crossover_interval: interval("crossover_rad_s"),
             phase_margin_deg: estimate("phase_margin_deg"),
@@ -310,12 +298,13 @@ pub(super) fn people_table(people: &[Person]) -> OutputTable {
     let names: Vec<&str> = names.iter().copied().filter(|name| used(name)).collect();
     let tried = |form: &&Form| people.iter().any(|p| p.evidence(**form).is_some());
     let forms: Vec<&str> = Form::ALL.iter().filter(tried).map(|form| form.name()).collect();
-    let mut rows = Rows::new(&people_schema(&names, &forms));
+    let of_channels = person_channel::columns(people.iter().flat_map(|p| &p.channels));
+    let mut rows = Rows::new(&people_schema(&names, &forms, &of_channels));
     people.iter().for_each(|person| person.write(&mut rows));
     rows.into_table(Vec::new())
 }
 
-fn people_schema(parameters: &[&str], forms: &[&str]) -> TableSchema {
+fn people_schema(parameters: &[&str], forms: &[&str], (texts, numbers): &(Vec<String>, Vec<String>)) -> TableSchema {
     let ends = ["crossover_rad_s", "phase_margin_deg"];
     let of_ends: Vec<String> = ends
         .iter()
@@ -323,9 +312,12 @@ fn people_schema(parameters: &[&str], forms: &[&str]) -> TableSchema {
         .collect();
     let of_parameters: Vec<String> = parameters
         .iter()
-        .flat_map(|name| ["", "_se", "_se_person", "_low", "_high", "_prior_share"].map(|end| format!("{name}{end}")))
+        .flat_map(|name| parameter_columns::real_names(name))
         .collect();
-    let determined: Vec<String> = parameters.iter().map(|name| format!("{name}_determined")).collect();
+    let determined: Vec<String> = parameters
+        .iter()
+        .map(|name| parameter_columns::text_name(name))
+        .collect();
     let of_forms: Vec<String> = forms
         .iter()
         .flat_map(|form| ["criterion", "weight"].map(|of| format!("{of}_{form}")))
@@ -338,6 +330,8 @@ fn people_schema(parameters: &[&str], forms: &[&str]) -> TableSchema {
             .chain(text(&determined))
             .chain(real(&of_ends))
             .chain(real(&of_forms))
+            .chain(text(texts))
+            .chain(real(numbers))
             .chain(real(&["chi2", "dof", "kappa", "noise_order"]))
             .chain(text(&["verdict", "reasons", "notes"])),
     )
@@ -354,6 +348,8 @@ pub(super) fn people_of(table: &OutputTable) -> Vec<Person> {
 
 #[cfg(test)]
 mod tests {
+    use hoid_ident::family::ChannelRole;
+
     use super::*;
 
     #[test]
@@ -389,6 +385,27 @@ mod tests {
                 parameter("T_I", "s", Some((4.0, f64::INFINITY)), false),
                 parameter("tau_e", "s", Some((0.18, 0.22)), true),
             ],
+            channels: vec![
+                PersonChannel {
+                    name: "r".to_owned(),
+                    role: ChannelRole::Feedforward,
+                    preview_s: 0.25,
+                    p_value: 1e-9,
+                    form: Some(Form::Derivative),
+                    parameters: vec![
+                        parameter("K_d", "s", Some((0.1, 0.3)), true),
+                        parameter("tau_f", "s", None, true),
+                    ],
+                },
+                PersonChannel {
+                    name: "y".to_owned(),
+                    role: ChannelRole::Output,
+                    preview_s: 0.0,
+                    p_value: 0.4,
+                    form: None,
+                    parameters: Vec::new(),
+                },
+            ],
             crossover_rad_s: Some(Estimate {
                 value: 3.0,
                 standard_error: Some(0.1),
@@ -407,6 +424,7 @@ mod tests {
         assert_eq!((person.name().as_str(), failed.name().as_str()), ("P in c, run 3", "Q"));
         // No person has a lead: no columns for it.
         assert!(table.column("T_L").is_none() && table.column("T_I_low").is_some());
+        assert!(table.column("r_tau_f").is_some() && table.column("y_tau_f").is_none());
         assert!(table.column("weight_gain").is_none() && table.column("weight_lead").is_some());
         person.parameters.clear();
         assert!(people_table(&[person]).column("tau_e").is_none());

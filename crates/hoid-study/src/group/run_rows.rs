@@ -235,4 +235,11 @@ impl<'a> RunRows<'a> {
         self.estimates.text("status", "failed");
         self.estimates.text("reason", reason);
     }
+
+    /// An estimator that does not apply, and the reason.
+    pub fn omitted(&mut self, estimator: &str, reason: &str) {
+        self.begin(None, estimator);
+        self.estimates.text("status", "omitted");
+        self.estimates.text("reason", reason);
+    }
 }

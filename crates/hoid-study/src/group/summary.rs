@@ -8,6 +8,7 @@
 //! | `condition-failed` | doubt | no operator could be fitted to a person in a condition |
 //! | `person-not-determined`, `person-doubtful` | doubt | the operator of a person is not determined, or is doubtful |
 //! | `fits-failed` | note | other fits failed; the table of estimates gives the reasons |
+//! | `one-input-models` | note | models with one input are omitted, because the person also responds to other inputs |
 //! | `condition-changes` | note | there is no operator, because the task changes within the runs |
 //!
 //! If the data of one person carry no information, the group is doubtful, not undetermined: the results of the other
@@ -131,6 +132,17 @@ fn findings(runs: usize, failures: &[RunFailure], people: &[Person], other: usiz
             )),
             _ => None,
         });
+    }
+    let seen = |p: &&Person| p.channels.iter().any(|channel| channel.form.is_some());
+    let of_several: Vec<String> = people.iter().filter(seen).map(Person::name).collect();
+    if !of_several.is_empty() {
+        all.push(Finding::note(
+            "one-input-models",
+            format!(
+                "models with one input and recursions are omitted for {}: u also responds to further inputs",
+                of_several.join(", ")
+            ),
+        ));
     }
     if other > 0 {
         all.push(Finding::note(

@@ -1,9 +1,9 @@
 //! Output for a finished group, as a page of text and as a JSON object.
 
 use hoid::ident::family::Parameter;
-use hoid::model::VerdictLevel;
+use hoid::model::{Form, VerdictLevel};
 use hoid::report::{PeopleTable, people_table};
-use hoid::study::group::{GroupSummary, Person, RunFailure};
+use hoid::study::group::{GroupSummary, Person, PersonChannel, RunFailure};
 use serde_json::{Map, Value, json};
 
 use crate::{json, text};
@@ -102,6 +102,9 @@ fn person(p: &Person) -> Value {
     set("form", json!(p.form));
     let parameters: Map<String, Value> = p.parameters.iter().map(|q| (q.name.clone(), parameter(q))).collect();
     set("parameters", Value::Object(parameters));
+    if !p.channels.is_empty() {
+        set("channels", p.channels.iter().map(channel).collect());
+    }
     if let (Some(crossover), Some(margin)) = (p.crossover_rad_s, p.phase_margin_deg) {
         set(
             "open_loop",
@@ -120,6 +123,19 @@ fn person(p: &Person) -> Value {
         json!({"level": VerdictLevel::name(level), "reasons": p.reasons, "notes": p.notes}),
     );
     Value::Object(map)
+}
+
+/// The response to a further input.
+fn channel(of: &PersonChannel) -> Value {
+    let parameters: Map<String, Value> = of.parameters.iter().map(|q| (q.name.clone(), parameter(q))).collect();
+    json!({
+        "input": of.name,
+        "role": of.role.name(),
+        "preview": json::number(of.preview_s),
+        "form": of.form.map(Form::name),
+        "parameters": parameters,
+        "p_value": json::number(of.p_value),
+    })
 }
 
 /// An unbounded end of an interval is null in JSON.

@@ -118,6 +118,9 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
     let evidence = inspect(&mut manifest, &args.directory, &known)?;
     ConditionElement::apply(&args.element, &mut manifest)
         .map_err(|reason| CliError::Usage(format!("--element: {reason}")))?;
+    manifest
+        .set_roles(&args.role)
+        .map_err(|reason| CliError::Usage(format!("--role: {reason}")))?;
     if args.out.is_some() {
         // File names are relative to the manifest.
         let directory = args.directory.canonicalize().unwrap_or_else(|_| args.directory.clone());

@@ -168,6 +168,7 @@ fn column(name: &str, column_path: &ColumnPath, numbers: &Numbers) -> Column {
         } else {
             column_path.unit.clone()
         },
+        role: String::new(),
         precision: if is_time(name) {
             Precision::of_times(&values, numbers.kind().is_single())
         } else {
