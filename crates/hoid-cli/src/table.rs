@@ -44,7 +44,10 @@ impl Rows {
 
     /// Marks the rows as a time series. If space is short, some rows, but not the last, may be omitted.
     pub fn into_time_series(self) -> Self {
-        Self { is_time_series: true, ..self }
+        Self {
+            is_time_series: true,
+            ..self
+        }
     }
 
     pub fn add_row<T: Into<String>>(&mut self, cells: impl IntoIterator<Item = T>) {

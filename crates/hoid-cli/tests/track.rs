@@ -511,7 +511,10 @@ fn what_does_not_fit_together_ends_with_two() {
         (&["--structure", "arx"], "bj with nb = 2"),
         (&["--structure", "grey-box"], "bj"),
         (&["--forgetting", "random-walk"], "drift K_e=.01"),
-        (&["--drift", "K_e=.1"], "forgetting = random-walk, to which this option belongs"),
+        (
+            &["--drift", "K_e=.1"],
+            "forgetting = random-walk, to which this option belongs",
+        ),
         (&["--forgetting", "random-walk", "--drift", "b0=.1"], "K_e"),
         (&["--rate", ".1"], "forgetting = gradient, to which this option belongs"),
         (&["--forgetting", "gradient", "--rate", "3"], "between 0 and 2"),

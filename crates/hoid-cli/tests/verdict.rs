@@ -91,7 +91,10 @@ fn a_delay_at_the_end_of_its_range_is_the_first_line_of_the_page() {
     ];
     let page = good(d, &arguments);
     assert!(page.starts_with("Verdict: doubtful\n- "), "{page}");
-    assert!(page.contains("lies at an end of its search range, 0.190 to 0.230 s"), "{page}");
+    assert!(
+        page.contains("lies at an end of its search range, 0.190 to 0.230 s"),
+        "{page}"
+    );
     let oe = json(d, &["identify", "c.csv", "--structure", "oe", "--nk", "29", "--json"]);
     let kinds: Vec<&str> = oe["verdict"]["findings"]
         .as_array()

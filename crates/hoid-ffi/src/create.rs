@@ -3,7 +3,7 @@
 use std::ffi::{CStr, c_char};
 
 use crate::{
-    boundary::{HoidTracker, bytes, into_handle, with_tracker_mut, write_array, free_handle, text},
+    boundary::{HoidTracker, bytes, free_handle, into_handle, text, with_tracker_mut, write_array},
     session::Session,
     status::{Failure, HOID_BAD_POINTER, HoidStatus, guarded},
 };

@@ -8,7 +8,7 @@ use std::ffi::c_char;
 use hoid_model::VerdictLevel;
 
 use crate::{
-    boundary::{HoidTracker, put, write_array, with_tracker},
+    boundary::{HoidTracker, put, with_tracker, write_array},
     session::Session,
     status::{Failure, HoidStatus},
     types::{HoidChange, HoidCounts, HoidEstimate},

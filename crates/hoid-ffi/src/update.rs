@@ -3,7 +3,7 @@
 use hoid_track::Sample;
 
 use crate::{
-    boundary::{HoidTracker, with_tracker_mut, put},
+    boundary::{HoidTracker, put, with_tracker_mut},
     session::Session,
     status::HoidStatus,
     types::HoidOutcome,

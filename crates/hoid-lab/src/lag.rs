@@ -46,10 +46,12 @@ impl Lag {
             all.iter().find(|p| p.name == "T_I" && p.determined).cloned()
         });
         match parameter.map(|p| (p.value, p.standard_error)) {
-            Some((value, Some(error))) if value.is_finite() && value > MIN_SIGNIFICANCE * error => Self::Known(Estimate {
-                value,
-                standard_error: Some(error),
-            }),
+            Some((value, Some(error))) if value.is_finite() && value > MIN_SIGNIFICANCE * error => {
+                Self::Known(Estimate {
+                    value,
+                    standard_error: Some(error),
+                })
+            }
             _ => Self::NotDetermined,
         }
     }

@@ -25,7 +25,7 @@ use serde::Serialize;
 
 use crate::{
     LabError,
-    session::{Ended, RunEnd, Logged, RunStart, Stem},
+    session::{Ended, Logged, RunEnd, RunStart, Stem},
     task::{Task, held_inputs},
 };
 

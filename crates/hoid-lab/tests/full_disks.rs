@@ -19,7 +19,7 @@ use disk::{Disk, copied, fill};
 use hoid_lab::{
     config::{Condition, Config, Signal},
     plant::InputMap,
-    session::{Batch, Event, Frame, RunEnd, Logged, RunLog, Session, Stem},
+    session::{Batch, Event, Frame, Logged, RunEnd, RunLog, Session, Stem},
     task::{Task, held_inputs},
     verify::check,
 };
@@ -236,7 +236,10 @@ fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     // A run that cannot be closed is not verified.
     fill(&ballast);
     let said = person.finish(number).unwrap_err();
-    assert!(said.contains("free space on the disk and start the run again"), "{said}");
+    assert!(
+        said.contains("free space on the disk and start the run again"),
+        "{said}"
+    );
     assert_eq!(person.state()["next"], 0);
     fs::remove_file(&ballast).unwrap();
     person.next(number + 1).unwrap();

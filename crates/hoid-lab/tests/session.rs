@@ -333,7 +333,12 @@ fn every_session_opens_whatever_was_cut_or_lost() {
         if round % 100 == 0 {
             let (stem, log) = run(&mut opened, usize::MAX);
             drop(log);
-            assert!(opened.end(&stem, RunEnd::Finished, BTreeMap::new()).unwrap().is_verified());
+            assert!(
+                opened
+                    .end(&stem, RunEnd::Finished, BTreeMap::new())
+                    .unwrap()
+                    .is_verified()
+            );
         }
         for name in hoid_io::file_names(copy.path()).unwrap() {
             fs::remove_file(copy.path().join(name)).unwrap();

@@ -202,7 +202,11 @@ pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
             if of.is_empty() {
                 continue;
             }
-            let mut words: Vec<String> = of.iter().take(LISTED_INDIVIDUALLY).map(|fault| fault.to_string()).collect();
+            let mut words: Vec<String> = of
+                .iter()
+                .take(LISTED_INDIVIDUALLY)
+                .map(|fault| fault.to_string())
+                .collect();
             if of.len() > LISTED_INDIVIDUALLY {
                 words.push(format!("and {} more of this kind", of.len() - LISTED_INDIVIDUALLY));
             }

@@ -126,7 +126,10 @@ impl Schedule {
                 midpoint_s,
                 interval_s,
             } => {
-                let (since, reach) = ((t_s - midpoint_s) / interval_s, COMPLETE_AFTER / (rate_per_s * interval_s));
+                let (since, reach) = (
+                    (t_s - midpoint_s) / interval_s,
+                    COMPLETE_AFTER / (rate_per_s * interval_s),
+                );
                 // Earlier changes are complete, and their sum is zero because their number is even.
                 let first = 2.0 * ((since - reach).max(0.0) / 2.0).floor();
                 let last = (since + reach).ceil();

@@ -199,7 +199,9 @@ impl ChangeMeasures {
         let declared: Vec<f64> = trace.changes().iter().map(|(t, _)| *t).collect();
         let to_be_found: Vec<f64> = changes_s.iter().copied().filter(|c| *c > fitted_s).collect();
         let lag = |change: &f64| {
-            let first = declared.iter().find(|t| (*change..change + DECLARATION_TIME_S).contains(*t));
+            let first = declared
+                .iter()
+                .find(|t| (*change..change + DECLARATION_TIME_S).contains(*t));
             first.map(|t| t - change)
         };
         let lags: Vec<f64> = to_be_found.iter().filter_map(lag).collect();

@@ -76,7 +76,15 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
             left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1))
                 .is_ok()
         };
-        run_group(&manifest, data.path(), &pieces, &options(1, true), &|_| (), &should_continue).unwrap();
+        run_group(
+            &manifest,
+            data.path(),
+            &pieces,
+            &options(1, true),
+            &|_| (),
+            &should_continue,
+        )
+        .unwrap();
     }
     assert!(content(&whole) == content(&pieces));
 
@@ -87,7 +95,15 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
         left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1))
             .is_ok()
     };
-    run_group(&manifest, data.path(), &damaged, &options(1, false), &|_| (), &should_continue).unwrap();
+    run_group(
+        &manifest,
+        data.path(),
+        &damaged,
+        &options(1, false),
+        &|_| (),
+        &should_continue,
+    )
+    .unwrap();
     for name in ["000000-traces.parquet", "000008-estimates.parquet"] {
         let path = damaged.join("parts").join(name);
         let mut bytes = fs::read(&path).unwrap();

@@ -233,7 +233,10 @@ fn parts_that_do_not_belong_together_are_refused() {
         "{}",
         of(&["1", "2"])
     );
-    assert!(matches!(of(&["1", "2", "half"]), StudyError::DuplicateBlock { block: 0, .. }));
+    assert!(matches!(
+        of(&["1", "2", "half"]),
+        StudyError::DuplicateBlock { block: 0, .. }
+    ));
     assert!(matches!(of(&["1", "2", "other"]), StudyError::OtherStudy { .. }));
     assert!(matches!(of(&["1", "2", "fewer"]), StudyError::OtherStudy { .. }));
     assert!(matches!(of(&["1", "nothing"]), StudyError::NoStudy { .. }));
@@ -370,7 +373,11 @@ fn stopped(directory: &Path) {
         jobs: Some(1),
         ..RunOptions::default()
     };
-    assert!(!run(&plan(), directory, &options, &|_| (), &should_continue).unwrap().finished);
+    assert!(
+        !run(&plan(), directory, &options, &|_| (), &should_continue)
+            .unwrap()
+            .finished
+    );
 }
 
 fn parts(directory: &Path) -> Vec<PathBuf> {

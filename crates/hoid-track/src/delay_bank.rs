@@ -191,7 +191,11 @@ impl Recursion for DelayBank {
     }
 
     fn delay(&self) -> Option<Delay> {
-        let weights: Vec<f64> = self.evidence.iter().map(|evidence| (evidence / EVIDENCE_DIVISOR).exp()).collect();
+        let weights: Vec<f64> = self
+            .evidence
+            .iter()
+            .map(|evidence| (evidence / EVIDENCE_DIVISOR).exp())
+            .collect();
         let sum: f64 = weights.iter().sum();
         let moment = |of: &dyn Fn(f64) -> f64| {
             let each = weights.iter().enumerate().map(|(k, weight)| weight * of(k as f64));

@@ -124,7 +124,9 @@ impl<const N: usize> Gain<N> {
                 (Some(WindupGuard::Off), _) => return f64::INFINITY,
                 (Some(WindupGuard::Bound(multiple)), _) => multiple,
                 // P is proportional to 1/N after a start of N samples, and to 1 - lambda with forgetting.
-                (None, None) if from.from_fit && i < p => LARGEST_VARIANCE_GROWTH * (from.residuals * (1.0 - lambda[i])).max(1.0),
+                (None, None) if from.from_fit && i < p => {
+                    LARGEST_VARIANCE_GROWTH * (from.residuals * (1.0 - lambda[i])).max(1.0)
+                }
                 _ => ROOM_WITHOUT_FIT,
             };
             room * matrix[i][i]

@@ -160,7 +160,8 @@ impl State for WarmUp {
             u: 0.0,
             reference: None,
         };
-        self.samples.resize(kept.min(MAX_KEPT_LENGTHS.saturating_mul(self.length)), nothing);
+        self.samples
+            .resize(kept.min(MAX_KEPT_LENGTHS.saturating_mul(self.length)), nothing);
         for sample in &mut self.samples {
             let mut known = sample.reference.is_some();
             let mut reference = sample.reference.unwrap_or(f64::NAN);

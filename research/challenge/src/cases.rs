@@ -5,7 +5,7 @@
 //! again ([`draw`](super::draw)).
 
 use super::{
-    case::{Imperfection, Case, Course, DelayKnown, Forcing, Form, OperatorChange, Sampling, Spectrum, Theme},
+    case::{Case, Course, DelayKnown, Forcing, Form, Imperfection, OperatorChange, Sampling, Spectrum, Theme},
     operator::{Parameter, Plant},
 };
 
@@ -39,8 +39,8 @@ type Kind = (&'static str, &'static str, Spectrum, Course, Imperfection);
 
 /// All remnants, and all imperfections of the stick and the recorder.
 const KINDS: [Kind; 21] = {
-    use Imperfection as B;
     use Course as C;
+    use Imperfection as B;
     use Spectrum as S;
     [
         ("lag-1", "1/(T_n s + 1), steady", S::Lag(1), C::Steady, B::None),

@@ -42,13 +42,13 @@ mod simulate;
 mod tables;
 mod world;
 
-pub use case::{Imperfection, Case, Course, DelayKnown, Forcing, Form, OperatorChange, Sampling, Spectrum, Theme};
+pub use case::{Case, Course, DelayKnown, Forcing, Form, Imperfection, OperatorChange, Sampling, Spectrum, Theme};
 pub use cases::cases;
 pub use draw::{Portion, RunOf, Seeds};
 pub use entrant::{Alarm, Entrant, EntrantResult, ReportedResponse, Seam, Task};
 pub use entrants::entrants;
 pub use error::ChallengeError;
-pub use measure::{ChangeOutcome, Line, Moment, EvaluationRun};
+pub use measure::{ChangeOutcome, EvaluationRun, Line, Moment};
 pub use operator::{Operator, Parameter, Plant, hold};
 pub use page::page;
 pub use people::{PeopleOptions, challenge_people};

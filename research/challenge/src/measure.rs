@@ -12,7 +12,7 @@ use hoid_model::Complex64;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    case::{Imperfection, Case},
+    case::{Case, Imperfection},
     draw::RunOf,
     entrant::{Entrant, EntrantResult, ReportedResponse, Task},
     oracle::{batch, evidence},

@@ -14,7 +14,7 @@ use super::{
     draw::{Portion, RunOf, Seeds},
     entrant::Entrant,
     entrants::entrants,
-    measure::{BATCH, Line, EvaluationRun},
+    measure::{BATCH, EvaluationRun, Line},
 };
 use crate::ChallengeError;
 

@@ -14,12 +14,12 @@ use hoid_model::{Channel, Complex64, Record, SampleTime};
 use hoid_sim::SimError;
 
 use super::{
-    case::{Imperfection, Case, DelayKnown, Forcing, Sampling},
+    case::{Case, DelayKnown, Forcing, Imperfection, Sampling},
     draw::{RunOf, person},
     driving::{Strength, forcing, sizes},
     noise::Noise,
     operator::{Canonical, Operator, hold},
-    world::{OperatorPolynomials, LoopState},
+    world::{LoopState, OperatorPolynomials},
 };
 
 /// A run with its true values.

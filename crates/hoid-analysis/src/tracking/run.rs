@@ -171,7 +171,8 @@ impl Tracking {
         if self.start_span_s.is_some() && matches!(self.recursion.start, RequestedStart::Coefficients(_)) {
             return Err(options(
                 "--start-span is the span of the start fit, and --start gives the start itself; drop one of the \
-                 two".to_owned(),
+                 two"
+                .to_owned(),
             ));
         }
         if self.start_span_s.is_some() && method.starts_itself() {

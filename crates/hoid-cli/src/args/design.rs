@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use hoid::design::experiment::{ALPHA, Against, Between, POWER, People, RUN_TO_RUN, Remnant, TargetDifference, RequestedQuantity};
+use hoid::design::experiment::{
+    ALPHA, Against, Between, POWER, People, RUN_TO_RUN, Remnant, RequestedQuantity, TargetDifference,
+};
 use hoid::model::{ContinuousTransferFunction, Form, family_scenario::Display};
 
 use super::{choices::choice_of, figure::FigureArgs, parse::parse_span, show::ShowArgs};

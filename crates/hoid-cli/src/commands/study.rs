@@ -60,9 +60,12 @@ fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
         csv: args.csv,
     };
     let estimates = usize::try_from(plan.estimates()).unwrap_or(usize::MAX);
-    let outcome = with_progress(&plan.name, &args.out, (estimates, "estimates"), |progress, should_continue| {
-        run(&plan, &args.out, &options, progress, should_continue)
-    })?;
+    let outcome = with_progress(
+        &plan.name,
+        &args.out,
+        (estimates, "estimates"),
+        |progress, should_continue| run(&plan, &args.out, &options, progress, should_continue),
+    )?;
     if args.json {
         output::print(&format!("{:#}\n", outcome_json(&plan, &outcome)))?;
         return Ok(());

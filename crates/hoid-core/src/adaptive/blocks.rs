@@ -152,7 +152,11 @@ impl Block {
         cholesky::solve(&factor, STATES, &mut state);
         let inverse = cholesky::scaled_inverse(&factor, STATES, 1.0);
         let residual_squares = (self.square - dot(&state, &self.with_output)).max(self.samples * 1e-12);
-        Some(Solution { state, inverse, residual_squares })
+        Some(Solution {
+            state,
+            inverse,
+            residual_squares,
+        })
     }
 
     /// Score `b - A x` of a state x. Its expected value is zero at the true state.

@@ -334,7 +334,8 @@ impl Candidate {
         if settled {
             // Student's density with n degrees of freedom, without constants that cancel in differences between
             // candidates.
-            let density = -0.5 * n * (libm::log(*predictive_variance) + 2.0 * libm::log1p(energy / (n * *predictive_variance)));
+            let density =
+                -0.5 * n * (libm::log(*predictive_variance) + 2.0 * libm::log1p(energy / (n * *predictive_variance)));
             self.evidence = density + libm::exp(-n * ts / EVIDENCE_S) * self.evidence;
         }
         *rests_on = (*rests_on + n).min(LEVEL_S / ts).max(n);

@@ -56,7 +56,11 @@ crate::state!([] Contrast { difference, covariance, before, covariance_before, r
 impl Contrast {
     /// Computes the difference between two spans of blocks. `with_prior` adds a prior to the sums of each span;
     /// `empirical_share` is w. Returns `None` if the data of a span do not determine a state.
-    pub(super) fn between(sides: [&[Block]; 2], empirical_share: f64, with_prior: impl Fn(Block) -> Block) -> Option<Self> {
+    pub(super) fn between(
+        sides: [&[Block]; 2],
+        empirical_share: f64,
+        with_prior: impl Fn(Block) -> Block,
+    ) -> Option<Self> {
         let sums = sides.map(|blocks| with_prior(Block::of(blocks)));
         let [Some(before), Some(now)] = sums.each_ref().map(Block::solved) else {
             return None;

@@ -66,7 +66,9 @@ impl ChangePrior {
     pub(super) fn is_valid(&self) -> bool {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         let share = |x: f64| (0.0..=1.0).contains(&x);
-        [self.block, self.mean_interval_s, self.settling[1]].into_iter().all(positive)
+        [self.block, self.mean_interval_s, self.settling[1]]
+            .into_iter()
+            .all(positive)
             && self.variance.into_iter().all(positive)
             && self.change_deviation.into_iter().chain(self.drift).all(|x| x >= 0.0)
             && self.settling[0] >= 0.0
@@ -136,8 +138,10 @@ impl Mixture {
     }
 
     fn of(prior: &ChangePrior, start: impl Fn(usize) -> ([f64; STATES], Covariance, f64)) -> Self {
-        let share =
-            |class: usize| [prior.steady, 1.0 - prior.steady][class % 2] * [1.0 - prior.free_numerator, prior.free_numerator][class / 2];
+        let share = |class: usize| {
+            [prior.steady, 1.0 - prior.steady][class % 2]
+                * [1.0 - prior.free_numerator, prior.free_numerator][class / 2]
+        };
         let mut mixture = Self {
             hypotheses: [Hypothesis::new([0.0; STATES], [[0.0; STATES]; STATES], 0.0, 0, LEAST_LOG_WEIGHT); HYPOTHESES],
             count: 0,

@@ -334,7 +334,13 @@ impl Profile {
         }
         // A channel that has never moved (there is no input, or it was not recorded) is not frozen.
         let below = |found: f64, share: f64, typical: f64| typical > 0.0 && found <= share * typical;
-        let still = |c: usize| below(block.differences[c][0], CONSTANT_FRACTION, self.typical.differences[c][0]);
+        let still = |c: usize| {
+            below(
+                block.differences[c][0],
+                CONSTANT_FRACTION,
+                self.typical.differences[c][0],
+            )
+        };
         let silent = |c: usize| below(block.range[c][1] - block.range[c][0], IDLE, self.typical.magnitude[c]);
         let count = |run: u32, is: bool| if is { run.saturating_add(1) } else { 0 };
         let frozen_e = still(0);
@@ -349,7 +355,10 @@ impl Profile {
         for (c, run) in self.rescaled.iter_mut().enumerate() {
             let [least, most] = ratios[c];
             let other = ratios[1 - c][1];
-            *run = count(*run, least > RESCALED && most < LARGEST_ORDER_RATIO * least && other < OTHER_CHANNEL_RATIO);
+            *run = count(
+                *run,
+                least > RESCALED && most < LARGEST_ORDER_RATIO * least && other < OTHER_CHANNEL_RATIO,
+            );
         }
         let evidence = self.distance(block, [0, 1]) - self.distance(block, [1, 0]) - SWAPPED_DRIFT;
         let evidence = evidence.clamp(-MOST_EVIDENCE, MOST_EVIDENCE);

@@ -137,7 +137,11 @@ impl Resting {
         let believed = (LONGEST_REST_FACTOR * longest as f64 * self.sample_time).max(ACCEPTED_REST_S);
         // Number of samples before this constant span.
         let time = self.samples.saturating_sub(self.constant_samples) as f64;
-        self.constant_samples > 0 && rests >= RESTS && samples as f64 >= SHARE * time && duration_s < believed && !self.rejected
+        self.constant_samples > 0
+            && rests >= RESTS
+            && samples as f64 >= SHARE * time
+            && duration_s < believed
+            && !self.rejected
     }
 }
 

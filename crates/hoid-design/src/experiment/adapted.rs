@@ -69,8 +69,9 @@ pub(super) fn population(
     form: Option<Form>,
 ) -> Result<(NamedState, Vec<NamedState>), DesignError> {
     let form = form.unwrap_or_else(|| form_of(element));
-    let named =
-        |name: String, muscles: NeuromuscularValues| adapted(element, form, muscles).map(|state| NamedState { name, state });
+    let named = |name: String, muscles: NeuromuscularValues| {
+        adapted(element, form, muscles).map(|state| NamedState { name, state })
+    };
     let typical = named("typical of the population".to_owned(), NeuromuscularValues::with(None))?;
     let mut others = Vec::new();
     for entry in OperatorPrior::population().entries() {
@@ -107,7 +108,11 @@ pub(super) fn time_constant(slope: f64, longest_s: f64) -> f64 {
     (x / NEAR_CROSSOVER_RAD_S).clamp(SHORTEST_S, longest_s)
 }
 
-fn adapted(element: &ContinuousTransferFunction, form: Form, muscles: NeuromuscularValues) -> Result<FamilyState, DesignError> {
+fn adapted(
+    element: &ContinuousTransferFunction,
+    form: Form,
+    muscles: NeuromuscularValues,
+) -> Result<FamilyState, DesignError> {
     let operator = unit_operator(element, form, muscles)?;
     let (low, high) = CROSSOVERS_RAD_S;
     let crossover = |k: usize| high * (low / high).powf(k as f64 / (TRIALS - 1) as f64);

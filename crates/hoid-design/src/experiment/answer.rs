@@ -8,7 +8,7 @@ use hoid_model::{
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
-use super::{DesignedLine, DifferencePlan, Enters, Expected, ExpectedResponse, Task, RequestedQuantity};
+use super::{DesignedLine, DifferencePlan, Enters, Expected, ExpectedResponse, RequestedQuantity, Task};
 
 /// Expected errors with a name: for another person, or for another forcing function of the same duration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

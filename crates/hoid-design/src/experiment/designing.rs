@@ -13,10 +13,10 @@ use std::f64::consts::TAU;
 use nalgebra::DVector;
 
 use super::{
-    DesignError, Enters, Expected, Forcing, Task, RequestedQuantity,
+    DesignError, Enters, Expected, Forcing, RequestedQuantity, Task,
     information::Loop,
     joint::Quantity,
-    lines::{crest_factor, are_separate_lines, multiples, set_phases},
+    lines::{are_separate_lines, crest_factor, multiples, set_phases},
     periods,
     search::Search,
 };

@@ -98,7 +98,10 @@ mod tests {
                 let z = omega / nm;
                 let arm = hoid_model::Complex64::new(1.0 - z * z, 2.0 * zeta * z).inv();
                 let moved = seen.operator.response(omega) * state.controlled_element.response(omega);
-                assert!((moved.norm() / arm.norm() - FOLLOWED_FRACTION).abs() < 1e-9, "{element}: {moved}");
+                assert!(
+                    (moved.norm() / arm.norm() - FOLLOWED_FRACTION).abs() < 1e-9,
+                    "{element}: {moved}"
+                );
                 let shown = super::super::information::ahead(seen.preview_s, omega);
                 let phase = (moved * shown).arg();
                 if display == Display::Preview {

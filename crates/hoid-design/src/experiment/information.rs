@@ -154,7 +154,8 @@ impl<'a> Loop<'a> {
 
     /// Returns the rms of e and u, and K^2 of the remnant, for a forcing function.
     fn powers(&self, lines: &[(LineInformation, f64)]) -> [f64; 3] {
-        let sum = |of: fn(&LineInformation) -> f64| -> f64 { lines.iter().map(|(w, square)| 0.5 * square * of(w)).sum() };
+        let sum =
+            |of: fn(&LineInformation) -> f64| -> f64 { lines.iter().map(|(w, square)| 0.5 * square * of(w)).sum() };
         let (e, u) = (sum(|w| w.error), sum(|w| w.control));
         let share = self.task.remnant.share;
         let gain = share / (1.0 - share) * u / self.noise[0];
@@ -197,8 +198,12 @@ impl<'a> Loop<'a> {
 
     /// Returns power and information of each line for unit amplitude, with the square of its amplitude.
     fn lines(&self, forcing: &Forcing) -> Vec<(LineInformation, f64)> {
-        let of =
-            |(enters, line): &(Enters, Sinusoid)| (self.line_information((*enters, line.omega_rad_s)), line.amplitude_deg.powi(2));
+        let of = |(enters, line): &(Enters, Sinusoid)| {
+            (
+                self.line_information((*enters, line.omega_rad_s)),
+                line.amplitude_deg.powi(2),
+            )
+        };
         forcing.lines().iter().map(of).collect()
     }
 

@@ -21,6 +21,7 @@ mod designing;
 mod difference;
 mod error;
 mod expected;
+mod feedforward;
 mod files;
 mod group_people;
 mod information;
@@ -31,7 +32,6 @@ mod power;
 mod request;
 mod response;
 mod search;
-mod feedforward;
 mod task;
 mod wanted;
 

@@ -8,11 +8,11 @@ use hoid_model::{
 
 use super::{
     Against, BETWEEN_PEOPLE, Between, DesignError, DesignedLine, Designing, DifferenceRequest, Enters, Expected,
-    ExperimentDesign, Forcing, NamedExpected, People, Remnant, Task, RequestedQuantity,
+    ExperimentDesign, Forcing, NamedExpected, People, Remnant, RequestedQuantity, Task,
     chosen::{Chosen, Given, NamedState, left_out},
-    expected,
+    expected, feedforward,
     information::Loop,
-    periods, feedforward,
+    periods,
 };
 
 /// Request for the design of an experiment.

@@ -10,7 +10,7 @@ use std::ffi::{c_char, c_int, c_uint, c_void};
 use hoid_io::fmu::FmuStart;
 
 use super::{
-    component::{Component, ERROR, Fmi2Logger, Logger, folder, free, list, list_mut, create, with_instance, string},
+    component::{Component, ERROR, Fmi2Logger, Logger, create, folder, free, list, list_mut, string, with_instance},
     instance::Instance,
     values::Done,
 };

@@ -14,7 +14,7 @@ use std::{
 use hoid_io::fmu::FmuStart;
 
 use super::{
-    component::{Component, ERROR, Fmi3Logger, Logger, free, create, with_instance},
+    component::{Component, ERROR, Fmi3Logger, Logger, create, free, with_instance},
     fmi2::{as_text, boolean, get, integer, not_served, real, set, text, three},
     instance::Instance,
 };

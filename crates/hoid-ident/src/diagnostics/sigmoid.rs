@@ -67,9 +67,7 @@ impl SigmoidFit {
             match parameter.remark {
                 Some(Remark::AtBound) if name == "tau_e" => all.push(Finding::doubt(
                     "delay-at-bound",
-                    format!(
-                        "the delay {value:.3} s lies at an end of its search range; widen this range"
-                    ),
+                    format!("the delay {value:.3} s lies at an end of its search range; widen this range"),
                 )),
                 // At a bound of T_I the operator is a pure integration, or has no lag.
                 Some(Remark::AtBound) if name == "T_I" => all.push(Finding::note(

@@ -48,7 +48,9 @@ impl Comparison {
         let mut counting = criteria.clone();
         // If a form lacks a lag that the person has, the neuromuscular poles replace this lag.
         retain(&mut counting, |i| !neuromuscular_poles_are_lags(&tried[i]));
-        retain(&mut counting, |i| tried[i].fit.as_ref().is_ok_and(|fit| !is_undetermined(fit)));
+        retain(&mut counting, |i| {
+            tried[i].fit.as_ref().is_ok_and(|fit| !is_undetermined(fit))
+        });
         if prediction.noise_free().is_some() {
             keep_simplest(&mut counting, tried, prediction.equal());
         }

@@ -84,9 +84,7 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
     if high > low && (tau <= low || tau >= high) {
         all.push(Finding::doubt(
             "delay-at-bound",
-            format!(
-                "the delay {tau:.3} s lies at an end of its search range, {low} to {high} s; widen this range"
-            ),
+            format!("the delay {tau:.3} s lies at an end of its search range, {low} to {high} s; widen this range"),
         ));
     }
     if !judged.apart {
@@ -250,7 +248,10 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
     if !pulled.is_empty() {
         all.push(Finding::note(
             "prior-pull",
-            format!("the prior shifts {}; --prior none omits the prior", pulled.join(" and ")),
+            format!(
+                "the prior shifts {}; --prior none omits the prior",
+                pulled.join(" and ")
+            ),
         ));
     }
     if !open.is_empty() {

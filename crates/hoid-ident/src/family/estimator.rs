@@ -323,8 +323,7 @@ impl FamilyEstimator {
             return Err(IdentError::BadOption {
                 option: "the forms of the operator".to_owned(),
                 found: self.forms.iter().map(|f| f.name()).collect::<Vec<_>>().join(", "),
-                expected: "gain, lag or lead-lag, because a pure derivative needs neuromuscular dynamics"
-                    .to_owned(),
+                expected: "gain, lag or lead-lag, because a pure derivative needs neuromuscular dynamics".to_owned(),
             });
         }
         Ok(forms)

@@ -20,7 +20,7 @@ use super::{
     intersample::Intersample,
     layout::FamilyLayout,
     noise::{Autoregression, NoiseProducts},
-    prediction_fit::{UNDETERMINED_RIDGE, PredictionFit},
+    prediction_fit::{PredictionFit, UNDETERMINED_RIDGE},
     prior::OperatorPrior,
 };
 use crate::{

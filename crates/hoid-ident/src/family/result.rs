@@ -300,7 +300,11 @@ impl FamilyFit {
         element: &ContinuousTransferFunction,
     ) -> Option<LoopMeasures> {
         let measures = loop_measures(operator, covariance, element, (self.sample_time, self.intersample))?;
-        Some(measures.with_student_intervals(self.clusters).with_run_to_run(self.run_to_run))
+        Some(
+            measures
+                .with_student_intervals(self.clusters)
+                .with_run_to_run(self.run_to_run),
+        )
     }
 
     /// Returns a coordinate of the operator of a record with its standard error.

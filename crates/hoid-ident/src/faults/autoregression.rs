@@ -54,7 +54,10 @@ impl Autoregression {
             let all: Vec<f64> = rows.iter().map(|t| found.residual(x, *t)).collect();
             let scale = quantile(&mut all.iter().map(|e| e.abs()).collect::<Vec<_>>(), 0.5) / 0.674_489_75;
             let scale = scale.max(FLOOR * deviation);
-            let kept = rows.iter().zip(&all).filter(|(_, e)| e.abs() <= LARGEST_RESIDUAL * scale);
+            let kept = rows
+                .iter()
+                .zip(&all)
+                .filter(|(_, e)| e.abs() <= LARGEST_RESIDUAL * scale);
             let kept: Vec<usize> = kept.map(|(t, _)| *t).collect();
             if kept.len() < 5 * p {
                 break;

@@ -111,7 +111,9 @@ impl CrossResponse {
         };
         let (loss, solution) = without(None)?;
         let (other, _) = without(Some(OWN_LAGS))?;
-        let of_sum: Vec<f64> = (0..size).map(|i| f64::from((OWN_LAGS..OWN_LAGS + OTHER_LAGS).contains(&i))).collect();
+        let of_sum: Vec<f64> = (0..size)
+            .map(|i| f64::from((OWN_LAGS..OWN_LAGS + OTHER_LAGS).contains(&i)))
+            .collect();
         let sum: f64 = solution[OWN_LAGS..OWN_LAGS + OTHER_LAGS].iter().sum();
         let along = solve_symmetric(&gram, &of_sum)?;
         let variance = loss / (n - size) as f64 * along.iter().zip(&of_sum).map(|(a, b)| a * b).sum::<f64>();

@@ -240,7 +240,8 @@ impl Search<'_> {
             let largest = left.iter().copied().fold(0.0, f64::max);
             let clean = largest <= LARGEST_INNOVATION * LARGEST_INNOVATION || left_by_faults <= 0.05 * total;
             let decisive = left_by_pushes > MIN_SUM_RATIO * left_by_faults.max(left.len() as f64);
-            let is_fault = clean && better > ROOT_OF_MIN_ADVANTAGE * ROOT_OF_MIN_ADVANTAGE && (better > PART * fall || decisive);
+            let is_fault =
+                clean && better > ROOT_OF_MIN_ADVANTAGE * ROOT_OF_MIN_ADVANTAGE && (better > PART * fall || decisive);
             let worst = |k: usize| x[start + k].abs();
             let is_wild = m <= 3
                 && (0..m).all(|k| worst(k) > IMPOSSIBLE_DEVIATION * self.deviation)

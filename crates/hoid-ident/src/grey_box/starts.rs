@@ -45,7 +45,10 @@ pub(crate) struct Start {
 }
 
 /// Returns a criterion for the same data in which all records have the same parameters, with K_e_dot as a coordinate.
-pub(crate) fn common_parameter_criterion<'a>(criterion: &PhysicalCriterion<'a, Layout>, order: usize) -> PhysicalCriterion<'a, Layout> {
+pub(crate) fn common_parameter_criterion<'a>(
+    criterion: &PhysicalCriterion<'a, Layout>,
+    order: usize,
+) -> PhysicalCriterion<'a, Layout> {
     let of_slot = |slot: usize| {
         let bounds = criterion
             .layout

@@ -69,7 +69,11 @@ fn best_places(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Syst
     let coloured = o.nc + o.nd > 0;
     let orders = Orders {
         nc: 0,
-        nd: if coloured { o.nc + o.nd + EXTRA_NOISE_COEFFICIENTS } else { 0 },
+        nd: if coloured {
+            o.nc + o.nd + EXTRA_NOISE_COEFFICIENTS
+        } else {
+            0
+        },
         ..o
     };
     let ranking = Criterion {

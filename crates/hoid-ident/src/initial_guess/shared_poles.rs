@@ -172,7 +172,10 @@ mod tests {
     fn poles_are_dealt_out_in_every_way_with_conjugates_together() {
         let pair = [Complex64::new(0.5, 0.3), Complex64::new(0.5, -0.3)];
         let poles = [pair[0], pair[1], Complex64::new(0.9, 0.0), Complex64::new(-0.2, 0.0)];
-        let chosen: Vec<Vec<Complex64>> = pole_assignments(&poles, 2).into_iter().map(|(chosen, _)| chosen).collect();
+        let chosen: Vec<Vec<Complex64>> = pole_assignments(&poles, 2)
+            .into_iter()
+            .map(|(chosen, _)| chosen)
+            .collect();
         assert_eq!(chosen, [pair.to_vec(), poles[2..].to_vec()]);
         assert_eq!(pole_assignments(&poles, 1).len(), 2);
         assert_eq!(pole_assignments(&poles, 0), [(vec![], poles.to_vec())]);

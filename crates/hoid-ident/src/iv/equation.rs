@@ -290,7 +290,10 @@ impl<'a> IvProblem<'a> {
             let dependence = if dot(&z[lost], &z[lost]) == 0.0 {
                 format!("the instrument of {} is zero", self.names[lost])
             } else {
-                format!("the instrument of {} is a combination of the other instruments", self.names[lost])
+                format!(
+                    "the instrument of {} is a combination of the other instruments",
+                    self.names[lost]
+                )
             };
             return Err(IdentError::SingularInstruments { dependence });
         }

@@ -158,7 +158,8 @@ pub(super) fn solve_nonlinear_form(
             };
             nearest = Some((moved, there));
         }
-        let ended = moved <= limits.tolerance || iterations >= limits.max_iterations || without_gain >= MAX_STEPS_WITHOUT_GAIN;
+        let ended =
+            moved <= limits.tolerance || iterations >= limits.max_iterations || without_gain >= MAX_STEPS_WITHOUT_GAIN;
         if let (true, Some((_, mut last))) = (ended, nearest.take_if(|_| ended)) {
             last.noise = noise_of(&last.system);
             last.termination.iterations = iterations;

@@ -204,7 +204,11 @@ impl FourLaneTask for Gram<'_, '_> {
         let Self(columns) = self;
         let p = columns.len();
         let (mut tiles, mut others) = (Vec::with_capacity(p), Vec::with_capacity(p));
-        for (i, _) in columns.iter().enumerate().filter(|(_, column)| !column.is_shift_of_previous) {
+        for (i, _) in columns
+            .iter()
+            .enumerate()
+            .filter(|(_, column)| !column.is_shift_of_previous)
+        {
             others.clear();
             // The products with previous columns that do not follow others are already known.
             others.extend((0..p).filter(|j| *j >= i || columns[*j].is_shift_of_previous));

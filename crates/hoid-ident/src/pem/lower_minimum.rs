@@ -53,7 +53,11 @@ pub(crate) fn lower_minimum(
         max_iterations: STEPS,
         ..settings.search
     };
-    let [most_tried, most_finished] = if whole { [RANKED_STARTS, COMPLETED_SEARCHES] } else { COUNTS_FOR_LONG_RECORD };
+    let [most_tried, most_finished] = if whole {
+        [RANKED_STARTS, COMPLETED_SEARCHES]
+    } else {
+        COUNTS_FOR_LONG_RECORD
+    };
     let rival = whole.then_some(known.at.sum_of_squares);
     let mut tried: Vec<(String, Minimum)> = broad_starts(&part, &known.theta, workspace)
         .into_iter()

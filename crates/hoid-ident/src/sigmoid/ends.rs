@@ -122,7 +122,10 @@ impl ThetaEstimate<'_> {
         let mut whole = vec![0.0; self.theta.len()];
         for (place, slope) in self.layout.poles().into_iter().zip(&gradient[self.layout.varying..]) {
             // theta contains omega_nm and zeta_nm, not their logarithms.
-            let logarithmic = self.layout.neuromuscular_indices.is_some_and(|own| own.contains(&place));
+            let logarithmic = self
+                .layout
+                .neuromuscular_indices
+                .is_some_and(|own| own.contains(&place));
             whole[place] = if logarithmic { slope / self.theta[place] } else { *slope };
         }
         whole

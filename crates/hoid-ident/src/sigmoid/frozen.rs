@@ -35,7 +35,11 @@ pub(super) struct PoleCandidate {
 /// Returns the candidates of the grid for a form of the operator family.
 pub(super) fn of_family(criterion: &ChangeCriterion<'_>) -> Vec<PoleCandidate> {
     let (layout, ts) = (&criterion.layout, criterion.sample_time.s());
-    let muscles: &[(f64, f64)] = if layout.neuromuscular_indices.is_some() { &GRID } else { &[(0.0, 0.0)] };
+    let muscles: &[(f64, f64)] = if layout.neuromuscular_indices.is_some() {
+        &GRID
+    } else {
+        &[(0.0, 0.0)]
+    };
     let rates: &[f64] = if layout.lag.is_some() { &LAG_RATES } else { &[0.0] };
     let mut all = Vec::new();
     for nk in delays(criterion) {

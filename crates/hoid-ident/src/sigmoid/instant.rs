@@ -28,7 +28,11 @@ impl Instant {
         let rate = theta[layout.log_rate].exp();
         let x = rate * (t_s - theta[layout.midpoint]);
         // The exponential underflows to zero there and would be slow to compute.
-        let far = if x.abs() > UNDERFLOW_ARGUMENT { 0.0 } else { (-x.abs()).exp() };
+        let far = if x.abs() > UNDERFLOW_ARGUMENT {
+            0.0
+        } else {
+            (-x.abs()).exp()
+        };
         let rest = far / (1.0 + far);
         let share = if x < 0.0 { rest } else { 1.0 - rest };
         let slope = rest / (1.0 + far);

@@ -245,7 +245,12 @@ impl Layout {
     pub fn operator(&self, theta: &[f64], numerator: &[f64]) -> Result<FamilyOperator, ModelError> {
         let mut x = numerator[..self.varying].to_vec();
         x.extend(self.lag.map(|place| theta[place]));
-        x.extend(self.neuromuscular_indices.into_iter().flatten().map(|place| theta[place].ln()));
+        x.extend(
+            self.neuromuscular_indices
+                .into_iter()
+                .flatten()
+                .map(|place| theta[place].ln()),
+        );
         x.push(theta[self.delay]);
         FamilyOperator::new(self.form, self.neuromuscular, &x)
     }

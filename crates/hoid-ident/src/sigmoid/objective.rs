@@ -352,7 +352,10 @@ fn eliminate(columns: Vec<Vec<f64>>, eps: &mut [f64]) -> (Vec<Vec<f64>>, Vec<(f6
 impl Objective for ChangeCriterion<'_> {
     fn is_feasible(&self, theta: &[f64]) -> bool {
         theta.iter().all(|v| v.is_finite())
-            && self.layout.neuromuscular_indices.is_none_or(|[_, zeta]| theta[zeta] > 0.0)
+            && self
+                .layout
+                .neuromuscular_indices
+                .is_none_or(|[_, zeta]| theta[zeta] > 0.0)
             && UnitOperator::of(&self.layout, theta, self.piece, self.sample_time)
                 .is_some_and(|unit| unit.nk + self.layout.reach() + self.layout.nd <= self.first)
     }

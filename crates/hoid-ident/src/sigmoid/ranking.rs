@@ -34,7 +34,9 @@ impl<'c, 'a> Ranking<'c, 'a> {
     pub fn new(criterion: &'c ChangeCriterion<'a>, theta: &[f64]) -> Option<Self> {
         let layout = &criterion.layout;
         let unit = UnitOperator::of(layout, theta, None, criterion.sample_time)?;
-        let decay = layout.neuromuscular_indices.map_or(FAST, |[omega, zeta]| theta[omega] * theta[zeta]);
+        let decay = layout
+            .neuromuscular_indices
+            .map_or(FAST, |[omega, zeta]| theta[omega] * theta[zeta]);
         let ts = criterion.sample_time.s();
         let mut signals = Vec::with_capacity(criterion.data.len());
         for data in &criterion.data {

@@ -69,7 +69,11 @@ pub(crate) fn initial_guesses(
 }
 
 /// Returns the best poles from a grid and from a guess, each with the noise model of its residuals.
-fn best_of_family(criterion: &ChangeCriterion<'_>, guessed: Option<PoleCandidate>, log_rate: f64) -> Vec<(f64, PoleCandidate)> {
+fn best_of_family(
+    criterion: &ChangeCriterion<'_>,
+    guessed: Option<PoleCandidate>,
+    log_rate: f64,
+) -> Vec<(f64, PoleCandidate)> {
     let ranked = |frozen: PoleCandidate| Some((on_grid(criterion, &frozen, log_rate)?.0, frozen));
     let grid = of_family(criterion).into_iter().chain(guessed);
     let mut all: Vec<(f64, PoleCandidate)> = grid.filter_map(ranked).collect();

@@ -151,7 +151,12 @@ fn tracker() -> Vec<FmuVariable> {
         all.push(output(error, unit, Real(f64::NAN), error_help));
     }
     for name in DETERMINED {
-        all.push(output(name, "", Boolean(false), "true if the data determine this quantity"));
+        all.push(output(
+            name,
+            "",
+            Boolean(false),
+            "true if the data determine this quantity",
+        ));
     }
     all.extend([
         output("innovation", "", Real(f64::NAN), "a-priori innovation"),

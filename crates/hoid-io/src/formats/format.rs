@@ -104,7 +104,11 @@ impl Format {
 }
 
 /// Completes a table: its time is determined, and the requested columns and trial are selected.
-pub(super) fn with_time_and_selection<'a>(table: Table<'a>, is_trial: bool, options: &ReadOptions) -> Result<Table<'a>, IoError> {
+pub(super) fn with_time_and_selection<'a>(
+    table: Table<'a>,
+    is_trial: bool,
+    options: &ReadOptions,
+) -> Result<Table<'a>, IoError> {
     let table = with_time(table, options.time.as_ref())?;
     check_selected(&table.names(), options, table.source.file())?;
     let table = selected(table, |_, name| name == "t" || options.wants(name));

@@ -33,8 +33,10 @@ impl Source<'_> {
             (Some(ts), None) => SampleTime::new(ts).map_err(|error| self.model(error))?,
             (None, Some(rate)) => SampleTime::new(1.0 / rate).map_err(|error| self.model(error))?,
             (Some(_), Some(_)) => {
-                return Err(self.keys("sample_time_s and sampling_rate_hz specify the same quantity: give only one of \
-                                      the two"));
+                return Err(self.keys(
+                    "sample_time_s and sampling_rate_hz specify the same quantity: give only one of \
+                                      the two",
+                ));
             }
         };
         let initial = self.family_state(form, file.neuromuscular, "initial", &file.initial)?;

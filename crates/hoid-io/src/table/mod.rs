@@ -19,7 +19,7 @@ mod selection;
 pub(crate) use cell::{Cell, DECIMAL_COMMA, has_decimal_comma, with_decimal_point};
 pub use column_expression::ColumnExpression;
 pub(crate) use column_expression::Signal;
-pub(crate) use columns::{Column, Source, Table, UNITS_ROW, read_comments, check_names, check_number, kept};
+pub(crate) use columns::{Column, Source, Table, UNITS_ROW, check_names, check_number, kept, read_comments};
 pub use common_names::{control_among, error_among};
 pub(crate) use precision::Precision;
 pub(crate) use selection::{check_selected, selected};

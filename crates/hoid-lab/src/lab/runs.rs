@@ -10,7 +10,7 @@ use crate::{
     live::{LiveRun, Samples, start},
     record::record,
     reports,
-    session::{Batch, RunEnd, Logged, RunLog, RunStart, Session},
+    session::{Batch, Logged, RunEnd, RunLog, RunStart, Session},
     task::{TICKS_PER_SAMPLE, Task},
     utc,
     verify::Measures,

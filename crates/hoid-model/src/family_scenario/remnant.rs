@@ -225,7 +225,12 @@ impl RemnantPart {
             demand(quantity, memory_s, memory_s > 0.0, positive)?;
         }
         if let Some(Pulses { part: p, rate_per_s }) = self.pulses {
-            demand("part of the remnant that consists of pulses", p, (0.0..=1.0).contains(&p), part)?;
+            demand(
+                "part of the remnant that consists of pulses",
+                p,
+                (0.0..=1.0).contains(&p),
+                part,
+            )?;
             demand("rate of pulses in 1/s", rate_per_s, rate_per_s > 0.0, positive)?;
         }
         if let Some(Intermittence { on_s, off_s }) = self.intermittence {

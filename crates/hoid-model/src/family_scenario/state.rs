@@ -40,8 +40,7 @@ impl FamilyState {
         let open_loop = self.open_loop()?;
         if !closed_loop_is_stable(&open_loop) {
             return Err(ModelError::UnstableLoop {
-                reason: "the characteristic equation 1 + Y P = 0 has roots outside the left half plane"
-                    .to_owned(),
+                reason: "the characteristic equation 1 + Y P = 0 has roots outside the left half plane".to_owned(),
             });
         }
         Ok(crossings(|omega| open_loop.response(omega), MANUAL_CONTROL_RANGE_RAD_S))

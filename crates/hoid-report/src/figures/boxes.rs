@@ -139,7 +139,8 @@ pub fn box_plots(id: &str, title: &str, grid: &BoxGrid) -> String {
 
 impl BoxPanel {
     fn symmetric_log_axis(&self) -> Option<SymmetricLogAxis> {
-        self.linear_within.map(|linear_within| SymmetricLogAxis { linear_within })
+        self.linear_within
+            .map(|linear_within| SymmetricLogAxis { linear_within })
     }
 
     /// Position of a value on the ordinate: the value itself on a linear ordinate, otherwise in decades.

@@ -297,7 +297,10 @@ impl Curve {
                 continue;
             }
             let x = scale.place_x(self.x[k]);
-            let (from, to) = (scale.place_y(scale.clamp_to_axis(low)), scale.place_y(scale.clamp_to_axis(high)));
+            let (from, to) = (
+                scale.place_y(scale.clamp_to_axis(low)),
+                scale.place_y(scale.clamp_to_axis(high)),
+            );
             scene.add(draw::line((x, from), (x, to), &colour, 1.0, None));
             for (end, y) in [(low, from), (high, to)] {
                 // An end of a bar that lies beyond the axes has no cap.

@@ -7,7 +7,7 @@ use kuva::{
 
 use super::{
     MapColours,
-    colour_bar::{SPACE_FOR_BAR, ColourScale},
+    colour_bar::{ColourScale, SPACE_FOR_BAR},
     draw,
     frame::{self, Area, Frame, Ordinates},
     labels::marked,
@@ -76,7 +76,14 @@ pub fn maps(id: &str, title: &str, grid: &MapGrid) -> String {
         return frame::empty(id, title);
     }
     let height = (CELL * ny as f64).max(LEAST_HEIGHT);
-    let frame = Frame::with_space(n, columns, height, Ordinates::Shared, grid.titles.len(), (0.0, SPACE_FOR_BAR));
+    let frame = Frame::with_space(
+        n,
+        columns,
+        height,
+        Ordinates::Shared,
+        grid.titles.len(),
+        (0.0, SPACE_FOR_BAR),
+    );
     let (x_range, y_range) = ((0.5, nx as f64 + 0.5), (0.5, ny as f64 + 0.5));
     let x_names = grid.x_names(frame.area(0).width);
     let cell = |i: usize| {

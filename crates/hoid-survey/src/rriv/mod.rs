@@ -45,7 +45,7 @@ use hoid_track::{
 };
 
 use filters::{Filtered, Parts, Simulated, fill_f};
-use forgetting::{Forgetting, CAPACITY};
+use forgetting::{CAPACITY, Forgetting};
 use laguerre::LaguerreRegression;
 
 pub use options::RrivOptions;
@@ -216,7 +216,8 @@ impl RefinedRecursion {
             simulated.input.push(followed);
         }
         let before = Parts::of(&self.auxiliary, &self.orders);
-        let predicted = self.measured.response(before.b, before.f, nk) - weighted(before.d, self.output_errors.newest());
+        let predicted =
+            self.measured.response(before.b, before.f, nk) - weighted(before.d, self.output_errors.newest());
         let u = bounded(output.unwrap_or(predicted));
         let innovation = bounded(u - predicted);
         let shortened = moves && self.estimate(u, innovation);

@@ -3,7 +3,7 @@
 use super::{
     claim::{Claim, Source, Theme},
     evidence::{Evidence, Study},
-    rules::{ACCEPTABLE, CLOSE, LARGE, LINEAR, RELEVANT_DIFFERENCE, Part},
+    rules::{ACCEPTABLE, CLOSE, LARGE, LINEAR, Part, RELEVANT_DIFFERENCE},
     settings::{DELAYS, DISCRETE, HIGHER, LEVELS, NMS, ORDERS, Setting, TRUE_DELAY, bias_of, settings},
     statistics::{linearity, med, median_bias, share_of},
     value::Value,

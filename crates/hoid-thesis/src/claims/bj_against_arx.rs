@@ -3,7 +3,7 @@
 use super::{
     claim::{Claim, Source, Theme},
     evidence::Evidence,
-    rules::{Part, HEAVY_REDUCTION},
+    rules::{HEAVY_REDUCTION, Part},
     settings::{DELAYS, DISCRETE, HIGHER, LEVELS, ORDERS, Setting, TRUE_DELAY, WITHOUT_REMNANT, bias_of, settings},
     statistics::{med, median_magnitude},
 };

@@ -21,7 +21,7 @@ use hoid_study::{
 use hoid_track::Memory;
 
 use super::{
-    statistics::{SMALLEST_VALID_SHARE, NOTHING, jackknife, magnitudes, mean_of, median_of, share_of},
+    statistics::{NOTHING, SMALLEST_VALID_SHARE, jackknife, magnitudes, mean_of, median_of, share_of},
     value::Value,
 };
 

@@ -4,7 +4,7 @@
 use super::{
     claim::{Claim, Source, Theme},
     evidence::Evidence,
-    rules::{ACCEPTABLE, CLOSE, Part, HEAVY_REDUCTION},
+    rules::{ACCEPTABLE, CLOSE, HEAVY_REDUCTION, Part},
     settings::{DISCRETE, LEVELS, ORDERS, RECURSIVE_LEVELS, Setting, settings, with_f},
     value::Value,
 };

@@ -3,7 +3,7 @@
 use super::{
     claim::{Claim, Source, Theme},
     evidence::{Evidence, Study},
-    rules::{CLOSE, LARGE, RELEVANT_DIFFERENCE, Part},
+    rules::{CLOSE, LARGE, Part, RELEVANT_DIFFERENCE},
     settings::{DISCRETE, LEVELS, ORDERS, RECURSIVE_LEVELS, Setting, TRUE_DELAY, bias_of, settings, with_f},
     statistics::{jackknife, median_of, share_of},
     value::Value,

@@ -4,7 +4,7 @@
 use super::{
     claim::{Claim, Source, Theme},
     evidence::Evidence,
-    rules::{ACCEPTABLE, CLOSE, LARGE, Part, HEAVY_REDUCTION},
+    rules::{ACCEPTABLE, CLOSE, HEAVY_REDUCTION, LARGE, Part},
     settings::{DISCRETE, HIGHER, LEVELS, NMS, RECURSIVE_LEVELS, Setting, bias_of, settings, with_f},
     statistics::med,
 };

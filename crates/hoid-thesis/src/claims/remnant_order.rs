@@ -3,7 +3,7 @@
 use super::{
     claim::{Claim, Source, Theme},
     evidence::Evidence,
-    rules::{CLOSE, LARGE, RELEVANT_DIFFERENCE, Part},
+    rules::{CLOSE, LARGE, Part, RELEVANT_DIFFERENCE},
     settings::{DELAYS, DISCRETE, HIGHER, LEVELS, NMS, ORDERS, Setting, TRUE_DELAY, bias_of, settings},
     statistics::{interquartile_range, mean_of, med, median_bias, median_magnitude, spread},
     value::Value,

@@ -16,7 +16,7 @@ use hoid_ident::{settings, settings::Bounds};
 use num_complex::Complex64;
 
 use super::{
-    comparator::{About, Comparator, TrackingResult, Task},
+    comparator::{About, Comparator, Task, TrackingResult},
     least_squares::NormalEquations,
 };
 use crate::ThesisError;

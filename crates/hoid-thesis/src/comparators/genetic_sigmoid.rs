@@ -24,7 +24,7 @@ use hoid_model::OperatorParameters;
 use hoid_sim::RunSeed;
 
 use super::{
-    comparator::{About, Comparator, TrackingResult, Task},
+    comparator::{About, Comparator, Task, TrackingResult},
     unit_responses::unit_responses,
 };
 use crate::ThesisError;

@@ -25,7 +25,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use super::{
-    comparator::{About, Comparator, TrackingResult, Task},
+    comparator::{About, Comparator, Task, TrackingResult},
     least_squares::NormalEquations,
 };
 use crate::ThesisError;

@@ -30,7 +30,7 @@ mod unit_responses;
 mod wavelet;
 
 pub(crate) use comparator::response_of;
-pub use comparator::{About, Comparator, TrackingResult, Task};
+pub use comparator::{About, Comparator, Task, TrackingResult};
 pub use fourier::FourierCoefficients;
 pub use genetic_sigmoid::GeneticSigmoid;
 pub use lpv_subspace::LpvSubspace;

@@ -23,7 +23,7 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::{
-    comparator::{About, Comparator, TrackingResult, Task},
+    comparator::{About, Comparator, Task, TrackingResult},
     least_squares::NormalEquations,
 };
 use crate::ThesisError;

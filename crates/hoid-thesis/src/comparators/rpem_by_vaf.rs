@@ -9,7 +9,7 @@ use hoid_ident::{settings, settings::Bounds};
 use hoid_model::{PolynomialModel, Structure};
 use hoid_track::{CovarianceUpdates, Method, StartAt, TrackOptions, track_validated};
 
-use super::comparator::{About, Comparator, TrackingResult, Task};
+use super::comparator::{About, Comparator, Task, TrackingResult};
 use crate::ThesisError;
 
 const NAME: &str = "rpem-by-vaf";

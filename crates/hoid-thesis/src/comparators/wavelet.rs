@@ -14,7 +14,7 @@
 use hoid_ident::{settings, settings::Bounds};
 use num_complex::Complex64;
 
-use super::comparator::{About, Comparator, TrackingResult, Task};
+use super::comparator::{About, Comparator, Task, TrackingResult};
 use crate::ThesisError;
 
 const NAME: &str = "wavelet";

@@ -19,7 +19,7 @@ use super::{
     catalogue::{items, recorded_items},
     experiment::NAME as EXPERIMENT_RUNS,
     index::{IndexPage, StudyEntry},
-    item::{CLAIMS, Item, Studies, ProgressCallbacks},
+    item::{CLAIMS, Item, ProgressCallbacks, Studies},
 };
 use hoid_report::write_page;
 

@@ -62,7 +62,12 @@ fn root_mean_square(squares: &[f64]) -> f64 {
 ///
 /// # Errors
 /// [`ThesisError::Model`] if the record does not contain the true operator.
-pub fn errors(record: &Record, at: &[usize], omega_rad_s: &[f64], found: &TrackingResult) -> Result<Errors, ThesisError> {
+pub fn errors(
+    record: &Record,
+    at: &[usize],
+    omega_rad_s: &[f64],
+    found: &TrackingResult,
+) -> Result<Errors, ThesisError> {
     let mut spans = [const { Vec::new() }; 3];
     let mut parameters = [const { Vec::new() }; 5];
     for (i, k) in at.iter().enumerate() {

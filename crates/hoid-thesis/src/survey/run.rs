@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     ThesisError,
-    comparators::{TrackingResult, Task},
+    comparators::{Task, TrackingResult},
 };
 
 /// Number of samples between stored estimates.
@@ -102,18 +102,19 @@ fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Reco
         validation: Some(validation),
         change: scenario.schedule.change_s().zip(scenario.schedule.rate_per_s()),
     };
-    let measured = |name: &str, extra_information: &'static str, follow: &dyn Fn() -> Result<TrackingResult, ThesisError>| {
-        let begin = Instant::now();
-        let followed = follow();
-        let seconds = begin.elapsed().as_secs_f64();
-        let errors = followed.and_then(|found| errors(record, &at, omega, &found));
-        MethodResult {
-            name: name.to_owned(),
-            extra_information,
-            errors: errors.map_err(|error| error.to_string()),
-            seconds,
-        }
-    };
+    let measured =
+        |name: &str, extra_information: &'static str, follow: &dyn Fn() -> Result<TrackingResult, ThesisError>| {
+            let begin = Instant::now();
+            let followed = follow();
+            let seconds = begin.elapsed().as_secs_f64();
+            let errors = followed.and_then(|found| errors(record, &at, omega, &found));
+            MethodResult {
+                name: name.to_owned(),
+                extra_information,
+                errors: errors.map_err(|error| error.to_string()),
+                seconds,
+            }
+        };
     let estimators = plan.study.estimators_of(cell).map(|(_, estimator)| {
         let follow = || of_estimator(estimator, cell, &task);
         measured(&estimator.label, "", &follow)

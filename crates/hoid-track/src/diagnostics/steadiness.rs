@@ -99,8 +99,10 @@ impl Trace {
             ),
             Course::Sway(period) => (
                 "swaying",
-                format!("the {name} of the person oscillates by {size} with a period of about {period:.0} s (p = \
-                         {p:.0e})"),
+                format!(
+                    "the {name} of the person oscillates by {size} with a period of about {period:.0} s (p = \
+                         {p:.0e})"
+                ),
             ),
         };
         Some(Finding::doubt(

@@ -120,7 +120,8 @@ impl Guard {
                 self.channels[c].start_detection();
             }
         }
-        self.resting.set_tolerance(CONSTANT_FRACTION * typical.differences[1][0]);
+        self.resting
+            .set_tolerance(CONSTANT_FRACTION * typical.differences[1][0]);
     }
 }
 

@@ -191,7 +191,8 @@ impl Guard {
         // The number of held-back samples exceeds that in the ring only if the saved numbers were altered.
         let first = self.in_ring.saturating_sub(held as usize);
         let behind = ring[first..].iter().map(|raw| raw.values[0]);
-        let is_target = c == 0 && !ring.iter().any(|raw| raw.held[1]) && self.channels_before[0].moves_typically(behind);
+        let is_target =
+            c == 0 && !ring.iter().any(|raw| raw.held[1]) && self.channels_before[0].moves_typically(behind);
         self.in_ring = 0;
         if !is_target {
             self.tell(GuardKind::Step, c, held, size, GuardAction::Accepted, 0);

@@ -8,7 +8,7 @@
 
 use hoid_core::guard::{
     channel::ORDERS,
-    profile::{Block, CHANNELS, Profile, CONSTANT_FRACTION},
+    profile::{Block, CHANNELS, CONSTANT_FRACTION, Profile},
 };
 use hoid_model::Record;
 use hoid_numerics::statistics::{mean, upper_quantile};

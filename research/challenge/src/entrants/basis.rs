@@ -310,7 +310,11 @@ pub(super) fn regressor_responses(task: &Task, omega_rad_s: f64) -> [Complex64; 
 /// Returns the estimate of the response that corresponds to the gains.
 pub(super) fn reported(task: &Task, theta: &Gains, covariance: &Square) -> ReportedResponse {
     let covariance: Vec<f64> = covariance.iter().flatten().copied().collect();
-    let each: Vec<_> = task.lines_rad_s.iter().map(|omega| regressor_responses(task, *omega)).collect();
+    let each: Vec<_> = task
+        .lines_rad_s
+        .iter()
+        .map(|omega| regressor_responses(task, *omega))
+        .collect();
     ReportedResponse {
         response: each
             .iter()

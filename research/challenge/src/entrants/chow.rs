@@ -14,7 +14,7 @@ use hoid_model::Complex64;
 
 use super::{
     super::entrant::{Alarm, Entrant, EntrantResult, Task, of_complex},
-    basis::{Solved, Square, Sums, product, reported, whitened, regressor_responses},
+    basis::{Solved, Square, Sums, product, regressor_responses, reported, whitened},
 };
 
 /// Length of a block, s. `PRESENT_BLOCKS` and `PAST_BLOCKS` are the numbers of blocks in the present and the past, and

@@ -7,7 +7,7 @@
 
 use super::{
     super::entrant::{Entrant, EntrantResult, Task},
-    basis::{GAINS, product, reported, whitened, regressor_responses},
+    basis::{GAINS, product, regressor_responses, reported, whitened},
 };
 
 const DRIFT: f64 = 0.1;

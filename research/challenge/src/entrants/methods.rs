@@ -188,7 +188,9 @@ mod tests {
             seeds: Seeds::Open,
             number: 1,
         };
-        let line = EvaluationRun::new(&case, of).unwrap().line(&OfMethod(Method::adaptive()));
+        let line = EvaluationRun::new(&case, of)
+            .unwrap()
+            .line(&OfMethod(Method::adaptive()));
         let errors: Vec<f64> = line.moments.iter().map(|m| m.error).collect();
         assert!(errors.iter().all(|e| *e < 0.3), "{errors:?}");
     }

@@ -44,7 +44,9 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     reading::report_kept_rate(read.kept_rate(rate, counts));
     // The validation file is read before anything is written, so that an invalid file leaves no output.
     let other = args.validate.as_deref();
-    let other = other.map(|path| reading.file(path, reading::report_problems)).transpose()?;
+    let other = other
+        .map(|path| reading.file(path, reading::report_problems))
+        .transpose()?;
     match asked {
         ResolvedRequest::Operator(identification) => family::run(args, &identification, read, other),
         ResolvedRequest::Change(identification) => sigmoid::run(args, &identification, read),

@@ -51,7 +51,8 @@ pub fn run(args: &IdentifyArgs, structure: Structure) -> Result<(), CliError> {
     let roles = roles(&args.read.inputs[1..], of_further).map_err(CliError::of_options)?;
     paper_table::check(&args.show)?;
     let first = args.read.with_one_input();
-    let read: Recordings = reading::of(&first, Some(&args.mask), true)?.files(&args.records, reading::report_problems)?;
+    let read: Recordings =
+        reading::of(&first, Some(&args.mask), true)?.files(&args.records, reading::report_problems)?;
     let rate = args.read.prepare.rate.decimate;
     let found = output::watched("fitting", || {
         SeveralInputsResult::of(&model, roles, read, args.faults.faults, rate)

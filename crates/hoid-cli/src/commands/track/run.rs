@@ -57,7 +57,9 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     let read = reading.file(record, reading::report_problems)?;
     reading::report_kept_rate(read.kept_rate(tracking.rate, tracking.recursion.counts_samples()));
     let other = args.validate.as_deref();
-    let other = other.map(|path| reading.file(path, reading::report_problems)).transpose()?;
+    let other = other
+        .map(|path| reading.file(path, reading::report_problems))
+        .transpose()?;
     let plan = tracking.plan(&read)?;
     let tracked = recursion::searching(&plan, |each| tracking.run(read, other, each))?;
     let batch = report::batch_fits(args, &tracked)?;

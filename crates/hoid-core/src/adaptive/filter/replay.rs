@@ -166,8 +166,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         if stage > 1 && same {
             let loser = if takes_over { &self.live } else { &trial };
             let deficit = (evidence - self.live.evidence).abs();
-            self.alternatives
-                .put(self.starting_point_index(), loser.operator(), deficit, self.informative_samples());
+            self.alternatives.put(
+                self.starting_point_index(),
+                loser.operator(),
+                deficit,
+                self.informative_samples(),
+            );
         }
         if takes_over {
             self.live = trial;

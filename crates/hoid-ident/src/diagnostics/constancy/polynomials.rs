@@ -50,7 +50,10 @@ impl Fit {
             let mut eps = criterion.residuals_of(theta, 0, &mut workspace);
             eps.iter_mut().for_each(|x| *x = x.clamp(-bound, bound));
             let psi = self.jacobian_with_delay(&criterion, &mut workspace);
-            let free = psi.into_iter().enumerate().filter(|(i, _)| *i == p || !self.is_fixed_or_bounded[*i]);
+            let free = psi
+                .into_iter()
+                .enumerate()
+                .filter(|(i, _)| *i == p || !self.is_fixed_or_bounded[*i]);
             Some((eps, free.collect()))
         };
         let data = Data::of(records);
@@ -58,7 +61,8 @@ impl Fit {
         let over_all = |of: &dyn Fn(&ScoreBlock) -> f64| blocks.iter().map(of).sum::<f64>();
         let off = |i: usize| {
             let information = over_all(&|block| block.information[i * (p + 1) + i]);
-            over_all(&|block| block.score[i]).powi(2) > LARGEST_SCORE_SUM * LARGEST_SCORE_SUM * self.innovation_variance * information
+            over_all(&|block| block.score[i]).powi(2)
+                > LARGEST_SCORE_SUM * LARGEST_SCORE_SUM * self.innovation_variance * information
         };
         if (0..p).any(|i| !self.is_fixed_or_bounded[i] && off(i)) {
             return None;
@@ -93,7 +97,8 @@ impl Fit {
             Some(found) => all.extend(found),
             None => {
                 let names = orders.parameter_names().into_iter().enumerate();
-                let of_system = names.filter(|(i, name)| name.starts_with(['a', 'b', 'f']) && !self.is_fixed_or_bounded[*i]);
+                let of_system =
+                    names.filter(|(i, name)| name.starts_with(['a', 'b', 'f']) && !self.is_fixed_or_bounded[*i]);
                 all.extend(of_system.map(|(i, name)| Direction {
                     name,
                     unit: "",

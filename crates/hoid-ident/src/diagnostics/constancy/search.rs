@@ -114,7 +114,10 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
     if n < 2 * FEWEST || of.variance <= 0.0 || sets.is_empty() {
         return None;
     }
-    let matrices: Vec<DMatrix<f64>> = blocks.iter().map(|b| DMatrix::from_row_slice(p, p, &b.information)).collect();
+    let matrices: Vec<DMatrix<f64>> = blocks
+        .iter()
+        .map(|b| DMatrix::from_row_slice(p, p, &b.information))
+        .collect();
     let whole = matrices.iter().fold(DMatrix::zeros(p, p), |sum, m| sum + m);
     let inverse = pseudo_inverse(&whole)?;
     // With a prior or a bound the scores do not sum to zero; one step to the minimum without prior and bound removes

@@ -12,7 +12,7 @@ use std::ops::Range;
 
 use super::{
     blocks::{BLOCK_S, ScoreBlock},
-    search::{Change, Constancy, Course, Direction, drifts, sets, strongest_among, periodic_changes},
+    search::{Change, Constancy, Course, Direction, drifts, periodic_changes, sets, strongest_among},
 };
 use crate::diagnostics::whitened::{LIMIT, NOISE, Whitened, thinning};
 

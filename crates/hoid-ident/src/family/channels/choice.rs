@@ -79,7 +79,8 @@ impl FurtherInputs<'_> {
             // At this cost a parameter without effect is included in fewer than one of twenty records.
             let excess =
                 (fits.iter().filter_map(|(_, fit)| Some(fit.as_ref()?.1.excess()))).fold(f64::INFINITY, f64::min);
-            let cost = |fit: &ChannelMinimum| fit.chi_squared / excess + COST_PER_PARAMETER * fit.coordinates.len() as f64;
+            let cost =
+                |fit: &ChannelMinimum| fit.chi_squared / excess + COST_PER_PARAMETER * fit.coordinates.len() as f64;
             let found = found.min_by(|a, b| cost(&a.1.1).total_cmp(&cost(&b.1.1)));
             let (form, fit) = found.ok_or(IdentError::NoFiniteLoss)?;
             let p_value = without.as_ref().map_or(0.0, |(_, without)| {

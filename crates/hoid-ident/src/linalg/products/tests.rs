@@ -16,7 +16,10 @@ fn waves(n: usize, count: usize) -> Vec<Vec<f64>> {
 
 fn leading(columns: &[Vec<f64>]) -> Vec<Lagged<'_>> {
     (columns.iter())
-        .map(|values| Lagged { values, is_shift_of_previous: false })
+        .map(|values| Lagged {
+            values,
+            is_shift_of_previous: false,
+        })
         .collect()
 }
 

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use super::text::{unescape_formula, comments, escape_formula, is_aside, place, reader, row_start, separator, text};
+use super::text::{comments, escape_formula, is_aside, place, reader, row_start, separator, text, unescape_formula};
 use crate::IoError;
 use crate::formats::format::RowWriter;
 use crate::results::{ColumnKind, ColumnValues, OutputColumn, OutputTable, TableSchema, Values};

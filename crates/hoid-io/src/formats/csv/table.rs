@@ -18,11 +18,11 @@ use std::ops::Range;
 
 use super::plain::{Layout, RowStarts, plain_rows};
 use super::text::{
-    unescape_formula, comments, has_decimal_commas, is_aside, is_unit, open_line, place, reader, refuse_blanks, row_start,
-    separator, text,
+    comments, has_decimal_commas, is_aside, is_unit, open_line, place, reader, refuse_blanks, row_start, separator,
+    text, unescape_formula,
 };
 use crate::IoError;
-use crate::table::{Cell, Column, Source, Table, read_comments, check_names, check_number, with_decimal_point};
+use crate::table::{Cell, Column, Source, Table, check_names, check_number, read_comments, with_decimal_point};
 use crate::time::{Moments, is_time};
 use crate::wording::{list, shown};
 

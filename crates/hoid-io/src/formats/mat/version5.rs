@@ -9,7 +9,7 @@ use super::objects::object;
 use crate::IoError;
 use crate::formats::arrays::{Array, Entry, Kind, Numbers, Value};
 use crate::formats::budget::{Budget, MOST_NESTED};
-use crate::wording::{shown, short_error};
+use crate::wording::{short_error, shown};
 
 const CELL: u32 = 1;
 const STRUCT: u32 = 2;

@@ -50,7 +50,10 @@ impl Reader<'_> {
         } else {
             ""
         };
-        let (file, found) = (self.file.to_owned(), format!("{}: {cut}{}", short_error(place), short_error(&what)));
+        let (file, found) = (
+            self.file.to_owned(),
+            format!("{}: {cut}{}", short_error(place), short_error(&what)),
+        );
         match ["version", "filter", "unsupported"]
             .iter()
             .any(|word| what.to_lowercase().contains(word))
@@ -266,7 +269,11 @@ impl Reader<'_> {
         if expected != Some(numbers.len()) {
             return Err(IoError::Damaged {
                 file: self.file.to_owned(),
-                found: format!("{}: {} numbers in an array of {dims:?}", short_error(path), numbers.len()),
+                found: format!(
+                    "{}: {} numbers in an array of {dims:?}",
+                    short_error(path),
+                    numbers.len()
+                ),
             });
         }
         Ok(Value::Array(Array {

@@ -16,7 +16,7 @@ use crate::formats::arrays::{COMMENTS, Contents, Entry, Indexing};
 use crate::formats::budget::Budget;
 use crate::formats::guarded::guarded;
 use crate::results::{TableSchema, Values};
-use crate::wording::{shown, start_of, short_error};
+use crate::wording::{short_error, shown, start_of};
 
 /// Reads the arrays from the bytes of a file.
 pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {

@@ -266,6 +266,9 @@ mod tests {
         assert_eq!(decompressed_size(&page(-1, 100, &[]), Compression::SNAPPY, 100), None);
         // Structures without an end, and a list longer than its data.
         assert_eq!(decompressed_size(&[0x1c; 100], GZIP(), 1), None);
-        assert_eq!(decompressed_size(&[0x19, 0xf5, 0xff, 0xff, 0xff, 0x7f, 0, 0], GZIP(), 1), None);
+        assert_eq!(
+            decompressed_size(&[0x19, 0xf5, 0xff, 0xff, 0xff, 0x7f, 0, 0], GZIP(), 1),
+            None
+        );
     }
 }

@@ -23,7 +23,7 @@ use crate::IoError;
 use crate::formats::budget::Budget;
 use crate::formats::guarded::guarded;
 use crate::table::check_number;
-use crate::wording::{shown, start_of, short_error};
+use crate::wording::{short_error, shown, start_of};
 
 /// Magic bytes at the start and the end of a file.
 const MAGIC: &[u8; 4] = b"PAR1";

@@ -6,7 +6,7 @@
 use super::columns::{Data, ReadColumn};
 use super::read::read;
 use crate::IoError;
-use crate::table::{Cell, Column, Precision, Source, Table, read_comments, check_names};
+use crate::table::{Cell, Column, Precision, Source, Table, check_names, read_comments};
 use crate::time::{Moments, is_time, seconds};
 use crate::wording::shown;
 

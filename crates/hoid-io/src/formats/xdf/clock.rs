@@ -197,7 +197,8 @@ fn lost(times: &[f64], k: usize, nominal_s: f64) -> bool {
     // Samples that would have arrived late together are skipped.
     let come = k.saturating_add((late_s / nominal_s).ceil() as usize);
     let from = come.min(times.len().saturating_sub(SAMPLES_PER_SIDE)).max(k);
-    let shift_s = lateness(from, (from + SAMPLES_PER_SIDE).min(times.len())) - lateness(k.saturating_sub(SAMPLES_PER_SIDE), k);
+    let shift_s =
+        lateness(from, (from + SAMPLES_PER_SIDE).min(times.len())) - lateness(k.saturating_sub(SAMPLES_PER_SIDE), k);
     shift_s > LOST_SAMPLES * nominal_s && shift_s > 0.5 * late_s
 }
 

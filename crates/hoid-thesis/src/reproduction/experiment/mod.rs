@@ -18,7 +18,7 @@ use std::sync::{Arc, OnceLock};
 
 use hoid_model::scenario::Condition;
 
-use super::item::{Item, ItemOutput, SharedRuns, ProgressCallbacks};
+use super::item::{Item, ItemOutput, ProgressCallbacks, SharedRuns};
 use crate::{
     ThesisError,
     experiment::{
@@ -70,7 +70,8 @@ impl Runs {
         make: impl Fn(&Item, &[EvaluatedRun]) -> ItemOutput + Send + Sync + 'static,
     ) -> Item {
         let runs = self.clone();
-        let made = move |item: &Item, _: Option<&hoid_study::Results>| make(item, &runs.get(&ProgressCallbacks::NONE).runs);
+        let made =
+            move |item: &Item, _: Option<&hoid_study::Results>| make(item, &runs.get(&ProgressCallbacks::NONE).runs);
         Item::new(name, title, caption, None, made)
     }
 }
