@@ -28,7 +28,6 @@ impl Signal {
             largest: self.largest,
             rms: self.rms,
             interleaved: self.interleaved,
-            ..MultiSine::default()
         }
         .excitation()
     }

@@ -146,7 +146,7 @@ fn a_displayed_target_has_its_role_in_the_recording() {
         let logged = hoid_lab::session::Logged::read(&stem).unwrap();
         let record = hoid_lab::record::record(&begun, &begun.task(&stem).unwrap(), &logged).unwrap();
         hoid_io::write_record(&stem.file("beh.parquet"), &record).unwrap();
-        let read = hoid_io::read(&stem.file("beh.parquet")).unwrap();
+        let read = hoid_io::read(stem.file("beh.parquet")).unwrap();
         let shown = read.channels().find(|channel| channel.name == "f_t").unwrap();
         assert_eq!(shown.role, role.unwrap_or_default());
     }

@@ -90,7 +90,7 @@ pub fn identify_axes(
         ));
     };
     let pairs: Vec<AxisPair> = (pairs.iter())
-        .map(|pair| pair.parse().map_err(|why| bad_option(&format!("pairs: {why}"))))
+        .map(|pair| pair.parse().map_err(|why| bad_option(format!("pairs: {why}"))))
         .collect::<Outcome<_>>()?;
     hoid_analysis::check_axes(&how, &pairs)?;
     let mut all = Vec::with_capacity(pairs.len());

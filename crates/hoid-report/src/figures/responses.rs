@@ -52,9 +52,10 @@ pub fn responses(id: &str, title: &str, inputs: &[InputResponse]) -> String {
                 kind: LineKind::Line,
                 shade: Shade::of_method(k + 1),
                 x: omega,
-                band: has_band
-                    .then(|| estimates.iter().map(band).collect())
-                    .unwrap_or_default(),
+                band: match has_band {
+                    true => estimates.iter().map(band).collect(),
+                    false => Vec::new(),
+                },
                 y: estimates.iter().map(|e| e.value).collect(),
                 bars: Vec::new(),
             }],
