@@ -69,16 +69,16 @@ class MethodSettings(TypedDict, total=False):
     # its initial value; off: no limit. For rls, rpem, physical.
     windup_guard: float | Literal["off"] | None
 
-    # Memory of single parameters, or of all with one letter, such as b0=256,f=inf,K_e=5s. For
-    # rls, rpem, physical, rriv, fused.
+    # Memory of individual parameters, or of all parameters with one letter, such as
+    # b0=256,f=inf,K_e=5s. For rls, rpem, physical, rriv, fused.
     memory_of: Mapping[str, float | str] | None
 
     # Memory of all parameters, in which the weight of a sample falls to 1/e: samples (256),
     # seconds (2.56s) or inf. For rls, rpem, physical, rriv, fused.
     memory: float | str | None
 
-    # Forgetting factor instead of a memory: lambda = 1 - 1/memory in samples. For rls, rpem,
-    # physical, rriv, fused.
+    # Forgetting factor instead of a memory: lambda = 1 - 1/N for a memory of N samples. For
+    # rls, rpem, physical, rriv, fused.
     forgetting_factor: float | None
 
     # Type of forgetting; window, variable and directional use the shortest memory. For rls,
@@ -127,7 +127,7 @@ class MethodSettings(TypedDict, total=False):
     # Samples between fits. For window.
     refit: int | None
 
-    # Channel outside the loop from which the instruments are made. For rriv.
+    # Channel from outside the loop, from which the instruments are made. For rriv.
     instruments: str | None
 
     # Log odds at which a change is declared. For multiple-model.
@@ -177,11 +177,12 @@ class MethodSettings(TypedDict, total=False):
 class BatchSettings(TypedDict, total=False):
     """Options of the batch estimators."""
 
-    # Noise model: autoregression (ar), with moving average nc (arma), or remnant of order m
-    # (remnant). For operators.
+    # Noise model: autoregression (ar), autoregression and moving average of order nc (arma), or
+    # remnant of order m (remnant). For operators.
     noise: Literal["ar", "arma", "remnant"] | None
 
-    # Change of the operator: none, or of its gains once, as a sigmoid. For operators.
+    # Change of the operator: none, or one change of its gains along a sigmoid, for which hoid
+    # identify refuses --figure, --validate, --horizon and --report. For operators.
     change: Literal["none", "sigmoid"] | None
 
     # Form of the operator; auto: average over the forms that the data allow, lead for --change
@@ -203,7 +204,7 @@ class BatchSettings(TypedDict, total=False):
         | None
     )
 
-    # Include neuromuscular dynamics omega_nm, zeta_nm. For operator, change="sigmoid".
+    # Include neuromuscular dynamics (omega_nm, zeta_nm). For operator, change="sigmoid".
     neuromuscular: Literal["yes", "no"] | None
 
     # Prior knowledge of the person: population (published people), none, a JSON result of
@@ -211,28 +212,28 @@ class BatchSettings(TypedDict, total=False):
     # omega_nm=10.5:0.3 (relative spread). For operator, change="sigmoid".
     prior: str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit | None
 
-    # Delay tau_e, or its range; for polynomials, replaces nk = tau_e/Ts + 1.
+    # Delay tau_e, or a range to search; for polynomials it replaces nk = tau_e/Ts + 1.
     delay: float | tuple[float, float] | None
 
-    # Behaviour of e between samples: zoh held; foh linear (logged from a faster or continuous
-    # signal; tau_e is half a sample longer); auto smooth, with the delay for a held e, unless
-    # noise-free data show zoh or foh. For operator.
+    # Behaviour of e between samples: held (zoh), linear (foh: e was logged from a faster or
+    # continuous signal; tau_e is half a sample longer), or smooth with the delay for a held e,
+    # unless noise-free data show zoh or foh (auto). For operator.
     intersample: Literal["auto", "zoh", "foh"] | None
 
-    # Run-to-run variation of a person's gain, relative to it; included in the error bars for
-    # fewer than five records. For operator.
+    # Run-to-run variation of a person's gain, relative to the gain; included in the error bars
+    # for fewer than five records. For operator.
     run_to_run: float | None
 
     # Role of each input other than the error: r=feedforward (displayed target;
-    # r=feedforward:0.5 with 0.5 s of preview), motion, output; a single form as
-    # r=feedforward/derivative. For operator.
+    # r=feedforward:0.5 with 0.5 s of preview), motion, output; /FORM restricts the response to
+    # one form, such as r=feedforward/derivative. For operator.
     role: Sequence[str] | None
 
-    # Parameters that differ between records, as K,T_L. For operator, noise="remnant".
+    # Parameters that differ between records, such as K,T_L. For operator, noise="remnant".
     individual: Sequence[str] | None
 
-    # Initial states of each record; auto: estimate, or backcast without an input (ar, ma,
-    # arma). For operators, pem.
+    # Initial states of each record; auto: estimate, but backcast for structures without an
+    # input (ar, ma, arma). For operators, pem.
     initial_state: Literal["auto", "zero", "estimate", "backcast"] | None
 
     # Search: Gauss-Newton (gn), Levenberg-Marquardt (lm), steepest descent (grad). For
@@ -252,23 +253,23 @@ class BatchSettings(TypedDict, total=False):
     # Period of the excitation. For operator.
     period: float | None
 
-    # Controlled element in s, as 90/(s(s+6)), or NUM/DEN in descending powers of s, as
-    # 90/1,6,0: adds crossover frequency and margins. For polynomials, operator,
+    # Controlled element in s, such as 90/(s(s+6)), or NUM/DEN in descending powers of s, such
+    # as 90/1,6,0: adds crossover frequency and margins. For polynomials, operator,
     # noise="remnant".
     controlled_element: str | tuple[Sequence[float], Sequence[float]] | None
 
-    # Quantities that the verdict covers: response, crossover, phase_margin or parameters, as
-    # crossover,tau_e.
+    # Quantities that the verdict covers: response, crossover, phase_margin or parameters, such
+    # as crossover,tau_e.
     answers: Sequence[str] | None
 
     # Order m of the remnant, a number or a range to search. For noise="remnant".
     remnant_order: int | tuple[int, int] | range | None
 
-    # Parameters fixed at a value, as d1=-0.85,f1=-1.9. For noise="remnant", change="sigmoid",
-    # pem.
+    # Parameters fixed at a value, such as d1=-0.85,f1=-1.9. For noise="remnant",
+    # change="sigmoid", pem.
     fix: Mapping[str, float] | None
 
-    # Bounds of parameters, as b0=0..0.2,f2=..0.99; either end may be omitted. For
+    # Bounds of parameters, such as b0=0..0.2,f2=..0.99; either end may be omitted. For
     # noise="remnant", change="sigmoid", pem.
     bound: Mapping[str, tuple[float | None, float | None]] | None
 
@@ -305,7 +306,7 @@ class BatchSettings(TypedDict, total=False):
 METHODS = """``"rls"``: recursive least squares;
         ``"rpem"``: recursive prediction-error method, for every structure;
         ``"physical"``: recursive prediction-error method in the operator's parameters;
-        ``"window"``: a batch fit of the last seconds, repeated;
+        ``"window"``: repeated batch fit of a moving window;
         ``"rriv"``: recursive refined instrumental variable;
         ``"multiple-model"``: a bank of hypotheses about when the person changed, which sets its
         own memory and reports changes;
@@ -330,14 +331,14 @@ SETTINGS = """covariance : float
             How far each variance in P may grow where nothing excites its parameter, as a
             multiple of its initial value; off: no limit. For rls, rpem, physical.
         memory_of : Mapping[str, float | str]
-            Memory of single parameters, or of all with one letter, such as b0=256,f=inf,K_e=5s.
-            For rls, rpem, physical, rriv, fused.
+            Memory of individual parameters, or of all parameters with one letter, such as
+            b0=256,f=inf,K_e=5s. For rls, rpem, physical, rriv, fused.
         memory : float | str
             Memory of all parameters, in which the weight of a sample falls to 1/e: samples
             (256), seconds (2.56s) or inf. For rls, rpem, physical, rriv, fused.
         forgetting_factor : float
-            Forgetting factor instead of a memory: lambda = 1 - 1/memory in samples. For rls,
-            rpem, physical, rriv, fused.
+            Forgetting factor instead of a memory: lambda = 1 - 1/N for a memory of N samples.
+            For rls, rpem, physical, rriv, fused.
         forgetting : Literal['exponential', 'random-walk', 'window', 'variable', 'directional', 'gradient']
             Type of forgetting; window, variable and directional use the shortest memory. For
             rls, rpem, physical.
@@ -367,7 +368,7 @@ SETTINGS = """covariance : float
         refit : int
             Samples between fits. For window.
         instruments : str
-            Channel outside the loop from which the instruments are made. For rriv.
+            Channel from outside the loop, from which the instruments are made. For rriv.
         alarm : float
             Log odds at which a change is declared. For multiple-model.
         smooth : bool
@@ -404,37 +405,39 @@ SETTINGS = """covariance : float
 
 #: The options, as the documentation of `identify` lists them.
 BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
-            Noise model: autoregression (ar), with moving average nc (arma), or remnant of order
-            m (remnant). For operators.
+            Noise model: autoregression (ar), autoregression and moving average of order nc
+            (arma), or remnant of order m (remnant). For operators.
         change : Literal['none', 'sigmoid']
-            Change of the operator: none, or of its gains once, as a sigmoid. For operators.
+            Change of the operator: none, or one change of its gains along a sigmoid, for which
+            hoid identify refuses --figure, --validate, --horizon and --report. For operators.
         form : Literal['auto', 'gain', 'lead', 'lead2', 'lag', 'lead-lag', 'lead2-lag', 'quadratic-integral', 'lead-droop', 'derivative', 'derivative-lead']
             Form of the operator; auto: average over the forms that the data allow, lead for
             --change sigmoid. For operator, change="sigmoid".
         neuromuscular : Literal['yes', 'no']
-            Include neuromuscular dynamics omega_nm, zeta_nm. For operator, change="sigmoid".
+            Include neuromuscular dynamics (omega_nm, zeta_nm). For operator, change="sigmoid".
         prior : str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit
             Prior knowledge of the person: population (published people), none, a JSON result of
             another fit, or NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_L, T_I, such as
             omega_nm=10.5:0.3 (relative spread). For operator, change="sigmoid".
         delay : float | tuple[float, float]
-            Delay tau_e, or its range; for polynomials, replaces nk = tau_e/Ts + 1.
+            Delay tau_e, or a range to search; for polynomials it replaces nk = tau_e/Ts + 1.
         intersample : Literal['auto', 'zoh', 'foh']
-            Behaviour of e between samples: zoh held; foh linear (logged from a faster or
-            continuous signal; tau_e is half a sample longer); auto smooth, with the delay for a
-            held e, unless noise-free data show zoh or foh. For operator.
+            Behaviour of e between samples: held (zoh), linear (foh: e was logged from a faster
+            or continuous signal; tau_e is half a sample longer), or smooth with the delay for a
+            held e, unless noise-free data show zoh or foh (auto). For operator.
         run_to_run : float
-            Run-to-run variation of a person's gain, relative to it; included in the error bars
-            for fewer than five records. For operator.
+            Run-to-run variation of a person's gain, relative to the gain; included in the error
+            bars for fewer than five records. For operator.
         role : Sequence[str]
             Role of each input other than the error: r=feedforward (displayed target;
-            r=feedforward:0.5 with 0.5 s of preview), motion, output; a single form as
-            r=feedforward/derivative. For operator.
+            r=feedforward:0.5 with 0.5 s of preview), motion, output; /FORM restricts the
+            response to one form, such as r=feedforward/derivative. For operator.
         individual : Sequence[str]
-            Parameters that differ between records, as K,T_L. For operator, noise="remnant".
+            Parameters that differ between records, such as K,T_L. For operator,
+            noise="remnant".
         initial_state : Literal['auto', 'zero', 'estimate', 'backcast']
-            Initial states of each record; auto: estimate, or backcast without an input (ar, ma,
-            arma). For operators, pem.
+            Initial states of each record; auto: estimate, but backcast for structures without
+            an input (ar, ma, arma). For operators, pem.
         search_method : Literal['auto', 'gn', 'lm', 'grad']
             Search: Gauss-Newton (gn), Levenberg-Marquardt (lm), steepest descent (grad). For
             operators, pem.
@@ -448,19 +451,19 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
         period : float
             Period of the excitation. For operator.
         controlled_element : str | tuple[Sequence[float], Sequence[float]]
-            Controlled element in s, as 90/(s(s+6)), or NUM/DEN in descending powers of s, as
-            90/1,6,0: adds crossover frequency and margins. For polynomials, operator,
+            Controlled element in s, such as 90/(s(s+6)), or NUM/DEN in descending powers of s,
+            such as 90/1,6,0: adds crossover frequency and margins. For polynomials, operator,
             noise="remnant".
         answers : Sequence[str]
             Quantities that the verdict covers: response, crossover, phase_margin or parameters,
-            as crossover,tau_e.
+            such as crossover,tau_e.
         remnant_order : int | tuple[int, int] | range
             Order m of the remnant, a number or a range to search. For noise="remnant".
         fix : Mapping[str, float]
-            Parameters fixed at a value, as d1=-0.85,f1=-1.9. For noise="remnant",
+            Parameters fixed at a value, such as d1=-0.85,f1=-1.9. For noise="remnant",
             change="sigmoid", pem.
         bound : Mapping[str, tuple[float | None, float | None]]
-            Bounds of parameters, as b0=0..0.2,f2=..0.99; either end may be omitted. For
+            Bounds of parameters, such as b0=0..0.2,f2=..0.99; either end may be omitted. For
             noise="remnant", change="sigmoid", pem.
         nk : int | tuple[int, int] | range | str
             Delay of b0 in samples (29) or dead time in s (0.28s), or a range (20..40,
