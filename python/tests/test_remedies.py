@@ -17,7 +17,8 @@ CRATES = Path(__file__).parents[2] / "crates"
 # Libraries whose messages come through Python.
 LIBRARIES = ("hoid-io", "hoid-model", "hoid-ident", "hoid-track", "hoid-analysis")
 # What is only of the program: files of its own, pages, how it prints; and examples for its developers.
-OF_THE_PROGRAM = {"json", "scenario"}
+# The help of `change` lists what the command refuses.
+OF_THE_PROGRAM = {"figure", "horizon", "json", "report", "scenario", "validate"}
 
 
 def table(path: Path, rows: list[tuple[Any, ...]]) -> Path:

@@ -61,6 +61,7 @@ __all__ = [
     "from_json",
     "from_state",
     "identify",
+    "identify_axes",
     "in_python",
     "info",
     "margins",

@@ -368,7 +368,7 @@ class Record:
     def with_signals(self, input: str, output: str) -> Record:
         """The record with other channels as its input (the error) and its output (the control).
 
-        >>> record.with_signals("ey", "uy")
+        >>> record.with_signals("f_t", "u")
         """
         all_channels = {name: self[name] for name in self.names}
         for name in (input, output):
