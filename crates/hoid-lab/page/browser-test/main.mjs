@@ -158,7 +158,7 @@ const steps = {
     await picture(page, "broken-off");
     // A second window takes over while nothing runs; the first looks on.
     const second = await open(server.address);
-    await page.getByText("This window only watches").waitFor();
+    await heading(page, "This window only watches");
     await picture(page, "looks-on");
     await second.close();
     await server.end("SIGKILL");
