@@ -21,7 +21,7 @@ const OPEN: &str = "open-answer";
 /// determined.
 const LARGEST_ERRORS: [f64; 2] = [0.5, 30.0];
 
-/// An answer, and the reason why it is undetermined, if it is.
+/// Name of an answer and, if the answer is undetermined, the reason.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answered {
     /// Name of the answer: `response`, `crossover`, `phase_margin`, or the name of a parameter.
@@ -80,8 +80,8 @@ pub fn with_answers(verdict: Verdict, answers: &[Answered], asked: &[String]) ->
     verdict.append(open)
 }
 
-/// Returns the verdict on one answer: the findings on the fit as a whole, and the reason why this answer is
-/// undetermined.
+/// Returns the verdict on one answer: the findings on the fit as a whole and, if this answer is undetermined, the
+/// reason.
 pub fn of_answer(verdict: &Verdict, answer: &Answered) -> Verdict {
     let whole = verdict.findings().iter().filter(|finding| finding.kind != OPEN);
     Verdict::of(whole.chain(&answer.open).cloned().collect())
@@ -101,7 +101,7 @@ fn answered(name: &str, why: Option<String>) -> Answered {
 /// An estimate with its 95 % interval.
 type Measured = (Estimate, Option<(f64, f64)>);
 
-/// Judges the crossover and the phase margin of a loop, given with their intervals; `None` for a quantity that does not
+/// Judges the crossover and the phase margin of a loop. Each is given with its interval, or as `None` if it does not
 /// exist.
 fn of_loop(measures: [Option<Measured>; 2]) -> impl Iterator<Item = Answered> {
     let words = ["the crossover", "the phase margin"];

@@ -149,7 +149,7 @@ pub fn check_axes(identification: &Identification, pairs: &[AxisPair]) -> Result
     Ok(())
 }
 
-/// Adds the error of another axis to the records that do not contain it.
+/// Adds the error of another axis as a channel to the records that do not contain it and have the same length.
 fn with_error(records: &mut [Record], name: &str, other: &[Record]) -> Result<(), AnalysisError> {
     for (record, of) in records.iter_mut().zip(other) {
         if record.channel(name).is_none() && record.len() == of.len() {

@@ -7,7 +7,7 @@ use hoid_model::Record;
 
 use crate::{AnalysisError, recordings::Recordings};
 
-/// Refuses recordings if two of them contain the same samples.
+/// Refuses recordings if two of them contain the same samples of e and u.
 pub(crate) fn refuse_copies(all: &Recordings) -> Result<(), AnalysisError> {
     for (i, record) in all.records.iter().enumerate() {
         let same = |other: &&Record| {

@@ -1,10 +1,10 @@
 //! Estimation of a describing function and its verdict from recordings, which are repaired, decimated and cut to whole
 //! periods.
 //!
-//! For a periodic signal the offset of a channel is a phase shift. It is not removed by shifting rows, which would cost
-//! the last whole period, but by correcting the ratio at each line ([`without_offsets`]). The same applies to the shift
-//! of the input by which a decimation accounts for its hold, since a ratio of Fourier coefficients of samples involves
-//! no hold.
+//! For a periodic signal the offset of a channel is a phase shift. The offset is not removed by shifting rows, which
+//! would cost the last whole period, but by correcting the ratio at each line ([`without_offsets`]). The shift of the
+//! input by which decimation accounts for its longer hold is corrected in the same way, since a ratio of Fourier
+//! coefficients of samples involves no hold.
 //!
 //! [`without_offsets`]: crate::without_offsets
 
@@ -21,14 +21,14 @@ use crate::{
 /// Options for the estimation of a describing function from recordings.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Describing {
-    /// Excitation, lines, period, controlled element, span. The offset given here, in samples of the recordings, is
+    /// Excitation, lines, period, controlled element and span. The offset given here, in samples of the recordings, is
     /// added to the offsets of the channels.
     pub options: DescriptionOptions,
-    /// Offsets by channel that were not removed in reading.
+    /// Offsets that were not removed in reading, with the names of their channels as keys.
     pub offsets: BTreeMap<String, Offset>,
     /// Treatment of faults of the recordings.
     pub faults: FaultHandling,
-    /// Whether a high sampling rate is reduced.
+    /// Decimation of recordings at a high sampling rate.
     pub rate: Decimation,
 }
 
@@ -47,8 +47,8 @@ impl Describing {
     /// Repairs and decimates the recordings, estimates their describing function and forms the verdict.
     ///
     /// # Errors
-    /// [`AnalysisError`] if there is no result, for example because there are no lines, no whole period or no such
-    /// channel.
+    /// [`AnalysisError`] if there is no result, for example because there are no lines, there is no whole period, or a
+    /// channel does not exist.
     pub fn run(&self, recordings: Recordings) -> Result<Described, AnalysisError> {
         let read = recordings.repaired(self.faults, Of::Person)?;
         let first = read.records.first().ok_or(AnalysisError::NoRecordings)?;

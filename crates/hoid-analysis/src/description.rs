@@ -47,8 +47,8 @@ impl Excitation {
 
 impl Recordings {
     /// Computes the describing function of the recordings. If rows were cut for an offset, so that the periods are no
-    /// longer complete, the recordings are read again without the offset; for a periodic signal it is a phase shift,
-    /// which is corrected at the lines. `None` if no excitation is requested.
+    /// longer complete, the recordings are read again without the offset: for a periodic signal the offset is a phase
+    /// shift, which is corrected at the lines. Returns `None` if no excitation is requested.
     ///
     /// # Errors
     /// [`AnalysisError`] if there are no lines, or if the files cannot be read again.
@@ -83,7 +83,7 @@ impl Recordings {
         let again = repaired_alike(again.records, handling)?;
         let late = again.first().map_or(Ok(0.0), |r| late_samples(r, &offsets))?;
         let ts_s = again.first().map_or(1.0, |r| r.sample_time().s());
-        // The records are decimated to the sampling rate of the fit.
+        // The records that were read again are decimated to the sampling rate of the fit.
         let used_s = self.records.first().map_or(ts_s, |r| r.sample_time().s());
         let factor = (used_s / ts_s).round().max(1.0) as usize;
         let unmoved = again

@@ -79,8 +79,8 @@ impl Reading {
     }
 }
 
-/// Returns the error for a column that is in another of the files. The signals of an eye tracker and of a stick, each
-/// with its own rate, for example, are not two recordings.
+/// Returns the error for a column that is in another of the files. For example, an eye tracker and a stick recorded in
+/// two files, each with its own rate, are not two recordings.
 fn in_another_file(error: AnalysisError, path: &Path, paths: &[PathBuf]) -> AnalysisError {
     let AnalysisError::Io(IoError::NoSuchColumn { missing, .. }) = &error else {
         return error;

@@ -17,16 +17,16 @@ pub struct FoundFault {
     /// Time of the first sample of the fault, s; `None` if the fault has no location in time.
     #[serde(rename = "from")]
     pub from_s: Option<f64>,
-    /// Time of the sample after the last one of the fault, s.
+    /// Time of the first sample after the fault, s.
     #[serde(rename = "to")]
     pub to_s: Option<f64>,
     /// Number of samples.
     pub samples: usize,
-    /// Size, in the unit that belongs to the kind.
+    /// Size of the fault, in the unit that belongs to its kind.
     pub size: f64,
     /// Size in robust standard deviations, for kinds that have a test statistic.
     pub deviations: Option<f64>,
-    /// The action taken.
+    /// Action taken on the fault.
     pub action: &'static str,
     /// Description as a sentence without a full stop.
     pub words: String,
@@ -49,7 +49,7 @@ impl From<&Fault> for FoundFault {
 }
 
 impl From<&QualityIssue> for FoundFault {
-    /// The fault extends from the first to the last location of the issue.
+    /// Creates a fault that extends from the first to the last location of the issue.
     fn from(issue: &QualityIssue) -> Self {
         Self {
             kind: issue.kind.name(),

@@ -16,7 +16,7 @@ pub struct Identification<E = FamilyEstimator> {
     pub period_s: Option<f64>,
     /// Treatment of faults of the recordings.
     pub faults: FaultHandling,
-    /// Whether a high sampling rate is reduced.
+    /// Decimation of recordings at a high sampling rate.
     pub rate: Decimation,
     /// Controlled element; if it is given, the verdict includes the loop.
     pub controlled_element: Option<ContinuousTransferFunction>,

@@ -185,7 +185,7 @@ impl<F> Identified<F> {
     /// like the fitted recordings.
     ///
     /// # Errors
-    /// [`AnalysisError`] if there is no recording, or if it has another sampling rate or is too short.
+    /// [`AnalysisError`] if there is no recording, or if the recording has another sampling rate or is too short.
     pub fn validated(&self, model: &Fit, other: Recordings) -> Result<Validated, AnalysisError> {
         let name = other.names.first().cloned().ok_or(AnalysisError::NoRecordings)?;
         let other = other.at_rate(self.rate, self.counts_samples)?.records.into_iter();

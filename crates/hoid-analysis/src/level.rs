@@ -9,8 +9,8 @@ use crate::{
     settings::Setting,
 };
 
-/// True if the level of the recordings may be estimated. It is not estimated if the means were removed in reading, or
-/// if the data are used unchanged.
+/// True if the level of the recordings may be estimated. It is not estimated for a model without an input, if the means
+/// were removed in reading, or if the data are used unchanged.
 pub(crate) fn may_have_level(recordings: &Recordings, with_input: bool, handling: FaultHandling) -> bool {
     with_input
         && handling != FaultHandling::Keep
@@ -29,7 +29,7 @@ pub(crate) fn levels_into(
     }
 }
 
-/// The level of records for a model that does not change and is fitted to data without a level.
+/// The level of the records, for a time-invariant model that is fitted after the level has been removed.
 pub(crate) struct Level {
     /// The records including their level; `None` if the level was not removed.
     as_read: Option<Vec<Record>>,

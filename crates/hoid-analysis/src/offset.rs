@@ -1,4 +1,4 @@
-//! Channels that were recorded late, in the case of periodic signals: the offset is a phase shift, and cutting rows
+//! Treatment of channels that were recorded late, for periodic signals: the offset is a phase shift, and cutting rows
 //! would leave incomplete periods.
 
 use std::collections::BTreeMap;

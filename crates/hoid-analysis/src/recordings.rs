@@ -121,8 +121,8 @@ impl Recordings {
         recorded_element(&self.records, given, excitation)?.finding(given)
     }
 
-    /// Returns a doubt if the display showed a channel that is not an input of the model. `inputs` are the inputs besides
-    /// the error.
+    /// Returns a warning if the display showed a channel that is not an input of the model. `inputs` are the inputs of
+    /// the model besides the error.
     pub(crate) fn display_finding(&self, inputs: &[&str]) -> Option<Finding> {
         let first = self.records.first()?;
         let own = [first.input_channel(), Some(first.output_channel())];

@@ -10,14 +10,15 @@ use crate::{
     recordings::{Account, Recordings},
 };
 
-/// Minimum length in s of a segment between two faults that is used, since a few seconds do not determine an operator.
+/// Length in s below which a segment between two faults is not used if there is a longer one, since a few seconds do
+/// not determine an operator.
 const SHORTEST_PIECE_S: f64 = 4.0;
 /// Maximum number of levels of a step input.
 const MOST_LEVELS: usize = 16;
 
 impl Recordings {
-    /// Repairs the faults of the recordings; a recording that is cut becomes several. The account of its first segment
-    /// contains the findings and their consequences for all results.
+    /// Repairs the faults of the recordings; a recording that is cut becomes several. The account of the first segment
+    /// of a recording contains the findings and their consequences for all results.
     ///
     /// # Errors
     /// [`AnalysisError::SameSamples`] if a run is given twice.
@@ -38,7 +39,8 @@ impl Recordings {
             };
             let mut found = repair(&record, handling)?;
             if steps || (of == Of::System && record.sample_time().s() > SLOWEST_S) {
-                // For step inputs and slow systems, such as a furnace, these findings are typical and become notes.
+                // Faults found in data with step inputs, or in data of slow systems such as a furnace, are typical and
+                // become notes.
                 let note = |finding: Finding| Finding::note(finding.kind, finding.message);
                 found.findings = found.findings.into_iter().map(note).collect();
             }

@@ -30,7 +30,7 @@ pub struct Request {
     pub options: BTreeMap<String, String>,
     /// Treatment of faults of the recordings.
     pub faults: FaultHandling,
-    /// Whether a high sampling rate is reduced.
+    /// Decimation of recordings at a high sampling rate.
     pub rate: Decimation,
 }
 
@@ -47,7 +47,7 @@ pub enum ResolvedRequest {
     Polynomials(Identification<Polynomials>),
 }
 
-/// Evaluates an expression for every kind of identification.
+/// Evaluates an expression with the identification that a resolved request contains, for each kind of model.
 macro_rules! each {
     ($asked:expr, $how:ident => $what:expr) => {
         match $asked {
@@ -200,7 +200,7 @@ impl Request {
             .ok_or_else(|| options(unknown_method(estimator)))
     }
 
-    /// True if the request contains an option that only polynomial models have.
+    /// True if an option in the request selects a polynomial model.
     fn is_polynomial(&self) -> bool {
         let asks_for_operator = self.has(&["noise", "change", "remnant_order"]);
         let of_polynomials = |text: &String| {

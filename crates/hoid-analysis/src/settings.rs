@@ -33,7 +33,7 @@ impl Setting {
         Self { given, ..self }
     }
 
-    /// Marks the settings whose values differ from the defaults as given.
+    /// Marks as given the settings whose values differ from the defaults.
     pub fn against(all: Vec<Self>, by_default: &[Self]) -> Vec<Self> {
         let is_default = |one: &Self| {
             by_default

@@ -22,7 +22,7 @@ pub enum CliError {
     /// The arguments are contradictory or invalid.
     #[error("{0}")]
     Usage(String),
-    /// The file does not have the requested columns; the message contains the command that names its columns.
+    /// The file does not have the requested columns; the message contains a command with the columns of the file.
     #[error("{0}")]
     OtherColumns(String),
     /// A stream cannot be read, parsed or written.
@@ -111,7 +111,7 @@ impl From<hoid_lab::LabError> for CliError {
 }
 
 impl CliError {
-    /// Converts a problem with options that was found before anything was read.
+    /// Converts an error in the options that was found before any file was read.
     pub fn of_options(error: AnalysisError) -> Self {
         match error {
             AnalysisError::Ident(IdentError::BadOption {
@@ -123,7 +123,7 @@ impl CliError {
         }
     }
 
-    /// Returns an error if the verdict of a printed result requires one.
+    /// Returns an error if the verdict on a printed result is that the requested quantity is not determined.
     ///
     /// # Errors
     /// [`CliError::NotDetermined`] if the data do not determine the requested quantity.

@@ -17,7 +17,7 @@ static LAST: AtomicI32 = AtomicI32::new(SIGINT);
 const SIGINT: i32 = 2;
 
 /// From this call on, an interrupt removes partial output before it ends the program. Without this call the system ends
-/// the program, and the next run removes its partial output.
+/// the program, and the next run removes the partial output.
 pub fn catch() {
     // If interrupts cannot be caught, the command runs without this handling.
     let _ = listen(|signal| {
@@ -29,7 +29,7 @@ pub fn catch() {
     });
 }
 
-/// Sets another handler of interrupts, which is called on a separate thread.
+/// Replaces the default handling of interrupts by a function, which is called on a separate thread.
 pub fn on_interrupt(new: impl FnMut(i32) + Send + 'static) {
     *answer() = Some(Box::new(new));
 }

@@ -10,7 +10,7 @@ use hoid::ident::{
 
 use crate::error::CliError;
 
-/// Returns the given orders; the delay may be given by a separate option.
+/// Returns the orders given by `--orders`. A delay given by `--nk` is checked, but is not part of the result.
 pub fn named_orders(orders: Option<&str>, nk: Option<&DelayRange>) -> Result<NamedOrders, CliError> {
     let read = orders.filter(|text| !text.trim().is_empty()).map(NamedOrders::read);
     let all = match read {

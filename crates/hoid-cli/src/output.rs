@@ -60,8 +60,8 @@ fn coloured(page: &str) -> String {
 /// Minimum and maximum width of a page: narrower lines would split words, wider lines are hard to read.
 const WIDTHS: (usize, usize) = (60, 110);
 
-/// Returns the width of the screen in columns: `COLUMNS`, otherwise the width of the terminal; `None` if the output
-/// goes to a file, whose lines are not wrapped.
+/// Returns the width for wrapping in columns, limited to [`WIDTHS`]: the value of `COLUMNS`, otherwise the width of the
+/// terminal; `None` if neither is known, as for output to a file, whose lines are then not wrapped.
 pub fn width() -> Option<usize> {
     let told = std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok());
     let asked = || {
@@ -138,7 +138,8 @@ pub fn print_notices() {
     }
 }
 
-/// Converts the result of a write to standard output.
+/// Flushes standard output after a write, whose result is `written`. A pipe closed by its reader is not an error, but
+/// is remembered.
 ///
 /// # Errors
 /// As [`print`].

@@ -1,7 +1,7 @@
 //! Pages and types generated from the registry of methods: the page of options in the book, and the keywords of the
 //! Python package.
 //!
-//! `HOID_UPDATE_DOCS=1 cargo test -p hoid-cli` updates them.
+//! `HOID_UPDATE_DOCS=1 cargo test -p hoid-cli` updates these pages and types.
 
 use hoid::analysis::registry::estimators;
 use hoid::ident::settings::{Kind, MethodSpec, Setting};
@@ -139,7 +139,7 @@ struct Keywords<'a> {
 }
 
 impl<'a> Keywords<'a> {
-    /// Collects the options of the methods, except those that Python has in a different form.
+    /// Collects the options of the methods, except those in `without`, which have a different form in Python.
     fn of(methods: &'a [MethodSpec], without: &[&str]) -> Self {
         let mut settings: Vec<(&Setting, Vec<&str>)> = Vec::new();
         for spec in methods {

@@ -39,7 +39,7 @@ pub fn verdict(verdict: &Verdict) -> String {
 /// Hint at the end of a page that has further details.
 pub const MORE: &str = "More with -v: what else was tried, tests, every setting; --report DIR writes a page.\n";
 
-/// Hint at the end of the page of an operator whose gains change; such a model has no report.
+/// Hint at the end of the page of an operator whose gains change; there is no report about such an operator.
 pub const MORE_CHANGE: &str = "More with -v: search, residual tests, every setting; --trace FILE writes the gains.\n";
 
 /// Hint at the end of a page whose only further details are the settings.
@@ -79,7 +79,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
     };
     let mut text = String::new();
     for (k, one) in all.enumerate() {
-        // The steps applied to a record are always reported; identical records share one report.
+        // A record that has faults, or whose steps differ from those of the first record, is always listed.
         if verbose || k < shown || !quiet(one.1) {
             text.push_str(&line(one));
         }
@@ -96,7 +96,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
     text
 }
 
-/// Lists the constants of u that were estimated together with the fit.
+/// Lists, for each record, the constant level of u that was estimated together with the fit, if there is one.
 pub fn levels(files: &[String], accounts: &[Account]) -> String {
     let line = |(file, account): (&String, &Account)| {
         let level = account.level.as_ref()?;
@@ -161,7 +161,7 @@ pub fn coefficients(fit: &Fit) -> String {
     format!("{}\n", estimates(what, named))
 }
 
-/// Describes how the search ended.
+/// Describes how the search for the minimum ended.
 pub fn search(fit: &Fit) -> String {
     let t = fit.termination();
     format!(
@@ -172,7 +172,7 @@ pub fn search(fit: &Fit) -> String {
     )
 }
 
-/// Warns if the model is not stable; otherwise empty.
+/// Returns a warning if the model is not stable; otherwise empty.
 pub fn instability(fit: &Fit) -> &'static str {
     if fit.model().is_stable() {
         ""
@@ -481,7 +481,8 @@ pub fn residual_tests(files: &[String], validations: &[Validation]) -> String {
     text
 }
 
-/// Describes the uncertainty of the delay that follows from a search over nk: tau_e = (nk - 1) Ts.
+/// Describes the range of delays in the 95 % likelihood interval of a search over nk, where tau_e = (nk - 1) Ts; empty
+/// if there is no interval.
 pub fn delay(choice: &Choice) -> String {
     let ts = choice.fit.model().sample_time().s();
     let seconds = |nk: usize| significant((nk as f64 - 1.0).max(0.0) * ts);
@@ -506,7 +507,7 @@ pub fn candidates(choice: &Choice) -> String {
         let value = |f: &hoid::ident::order_selection::CandidateFigures| f.value(choice.criterion);
         value(a.1).total_cmp(&value(b.1))
     });
-    // The columns are the default ones and, if it is not among them, the selection criterion.
+    // A selection criterion that is not among the default columns gets a column of its own.
     let decides = !matches!(choice.criterion, Criterion::Loss | Criterion::Aic | Criterion::Bic);
     let mut header = vec!["candidate", "loss", "AIC", "BIC", ""];
     if decides {

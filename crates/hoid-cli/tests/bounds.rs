@@ -40,7 +40,7 @@ fn limits_are_named_at_once() {
                 "--orders",
             ],
             vec![&all],
-            "at most 100000: narrow --nk and --orders",
+            "at most 100000 candidates: narrow --nk and --orders",
         ),
         (
             &track,

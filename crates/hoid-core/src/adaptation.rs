@@ -14,7 +14,7 @@
 //! | [`Forgetting::Gradient`] | no P: `g = gamma psi/(c + psi' psi)`, where c is a hundredth of the largest mean power of psi so far | Ljung and Söderström, section 3.5 |
 //!
 //! [`crate::covariance`] implements these rules. A rectangular window is a separate adaptation, [`crate::window`].
-//! [`crate::error_bars`] computes the uncertainty of an estimate for any such gain.
+//! [`crate::error_bars`] computes the uncertainty of an estimate for the gain of any rule.
 
 use crate::error_bars::{ErrorBars, ErrorPropagation};
 
@@ -51,7 +51,7 @@ pub enum Forgetting<const N: usize> {
     },
 }
 
-/// Change of the estimate at one sample.
+/// Change of the estimate that one sample causes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ParameterStep<const N: usize> {
     /// Change of theta.
@@ -61,7 +61,7 @@ pub struct ParameterStep<const N: usize> {
 }
 
 impl<const N: usize> ParameterStep<N> {
-    /// Zero step: the estimate stays constant.
+    /// Step of zero, at which the estimate stays constant.
     pub(crate) const NONE: Self = Self {
         step: [0.0; N],
         gain: [0.0; N],
@@ -74,21 +74,21 @@ pub trait Adaptation<const N: usize> {
     /// Returns the step for the gradient psi and the innovation eps at theta. `variance` is sigma^2, or zero if sigma^2
     /// is unknown.
     fn update(&mut self, psi: &[f64; N], eps: f64, theta: &[f64; N], variance: f64) -> ParameterStep<N>;
-    /// Returns the covariance of theta divided by sigma^2 if the adaptation computes it without [`ErrorBars`],
+    /// Returns the covariance of theta divided by sigma^2 if the adaptation itself computes it, without [`ErrorBars`];
     /// otherwise `None`.
     fn own_covariance(&self) -> Option<[[f64; N]; N]> {
         None
     }
-    /// Adds the parameter drift of one sample to the error bars.
+    /// Adds the parameter drift that the rule of forgetting assumes for one sample to the error bars.
     fn add_drift_to<const K: usize, B: ErrorPropagation<N, K>>(&self, _bars: &mut B) {}
     /// True if the step depends on sigma^2.
     fn needs_innovation_variance(&self) -> bool {
         false
     }
-    /// Returns the covariance of theta divided by sigma^2.
+    /// Returns the covariance of theta divided by sigma^2, from the adaptation itself or from the error bars.
     fn normalised_covariance<const K: usize>(&self, bars: &ErrorBars<N, K>) -> [[f64; N]; N] {
         self.own_covariance().unwrap_or_else(|| bars.normalised_covariance())
     }
-    /// True if all numbers are finite.
+    /// True if all numbers of the adaptation are finite.
     fn is_valid(&self) -> bool;
 }

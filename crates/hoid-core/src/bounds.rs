@@ -1,7 +1,7 @@
-//! Limits a number to an interval without panicking.
+//! Limit of a number to an interval, without a panic.
 
-/// Limits a value to an interval. A bound that is NaN has no effect. If the bounds are reversed, as they can be after
-/// loading a damaged file, the upper bound applies, whereas [`f64::clamp`] panics.
+/// Limits a value to an interval. A bound that is NaN has no effect. If the bounds are reversed, as they can be after a
+/// damaged file has been loaded, the upper bound applies, whereas [`f64::clamp`] panics.
 #[inline]
 pub fn within(value: f64, [low, high]: [f64; 2]) -> f64 {
     value.max(low).min(high)

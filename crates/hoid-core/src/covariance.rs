@@ -1,4 +1,4 @@
-//! Gain of the prediction-error method: P with a rule of forgetting and protection against windup.
+//! Gain of the prediction-error method, computed from P, with a rule of forgetting and protection against windup.
 //!
 //! The equations are in [`crate::adaptation`].
 //!
@@ -13,8 +13,8 @@ use crate::{
     ud_covariance::UdCovariance,
 };
 
-/// Number of rounds of pseudo-measurements within the shortest memory, if N is small enough. The variance of a
-/// parameter then grows by at most e^{1/4} between two of its turns.
+/// Number of times that each parameter gets a pseudo-measurement within the shortest memory, if N is small enough. The
+/// variance of a parameter then grows by at most e^{1/4} between two of its pseudo-measurements.
 const ROUNDS_PER_MEMORY: f64 = 4.0;
 /// `psi' P psi` below which a sample is not used as a measurement.
 const NO_EXCITATION: f64 = 1e-100;
@@ -22,7 +22,7 @@ const NO_EXCITATION: f64 = 1e-100;
 const POWER_WEIGHT: f64 = 0.01;
 /// Offset c of the normalised gradient, relative to the largest mean power of psi.
 const GRADIENT_OFFSET: f64 = 0.01;
-/// Value below which the additional forgetting of early samples ends.
+/// Value of the additional forgetting of early samples below which it ends.
 const NO_EARLY_FORGETTING: f64 = 1e-9;
 /// Maximum number of samples between two pseudo-measurements.
 const LONGEST_PERIOD: f64 = 64.0;
@@ -52,8 +52,8 @@ pub struct Covariance<const N: usize> {
     /// Mean power of psi, and its largest value so far, for the gradient method.
     power: f64,
     largest_power: f64,
-    /// Number of samples between two pseudo-measurements, number of samples until the next one, and index of its
-    /// parameter.
+    /// Number of samples between two pseudo-measurements, number of samples until the next pseudo-measurement, and
+    /// index of the parameter that it concerns.
     period: u32,
     until_turn: u32,
     turn: usize,
@@ -70,8 +70,8 @@ impl<const N: usize> Covariance<N> {
         self.turn = self.turn.min(N.saturating_sub(1));
     }
 
-    /// Builds the adaptation. `factors` is the initial P. `bound` is the largest variance of each parameter in the
-    /// units of P, or infinity for no limit.
+    /// Builds the adaptation from the factors of the initial P. `bound` is the largest variance of each parameter in
+    /// the units of P, or infinity for no limit.
     pub fn new(factors: UdCovariance<N>, forgetting: Forgetting<N>, bound: [f64; N]) -> Self {
         let mut scales = [[1.0; N]; 2];
         let mut uniform_growth = 0.0;
@@ -129,7 +129,7 @@ impl<const N: usize> Covariance<N> {
     }
 
     /// Multiplies P by a factor. With a factor below one, the estimate changes less until the earlier data are
-    /// forgotten; with a factor above one, it changes more.
+    /// forgotten; with a factor above one, the estimate changes more.
     pub fn scale(&mut self, factor: f64) {
         self.factors.scale_all(factor);
     }
@@ -140,7 +140,7 @@ impl<const N: usize> Covariance<N> {
     }
 
     /// Returns the step for any rule of forgetting, including the additional forgetting of early samples.
-    /// [`Adaptation::update`] handles the typical case itself.
+    /// [`Adaptation::update`] itself handles exponential forgetting without early forgetting.
     #[inline(never)]
     fn update_by_rule(&mut self, psi: &[f64; N], eps: f64, variance: f64) -> ParameterStep<N> {
         if self.early > NO_EARLY_FORGETTING {
@@ -181,8 +181,8 @@ impl<const N: usize> Covariance<N> {
 
     /// Returns the step with the variable forgetting factor; `sum_of_squares` is N_0 sigma^2.
     fn update_variable(&mut self, psi: &[f64; N], eps: f64, sum_of_squares: f64, smallest: f64) -> ParameterStep<N> {
-        // 1 + psi' P psi is the variance of the innovation divided by sigma^2. An innovation larger than this variance
-        // explains shortens the memory.
+        // 1 + psi' P psi is the variance of the innovation divided by sigma^2. An innovation larger than expected from
+        // this variance shortens the memory.
         let denominator = 1.0 + self.factors.quadratic_form(psi);
         let gain = self.factors.measurement_update(psi, 1.0);
         let expected = denominator * sum_of_squares;
@@ -211,14 +211,15 @@ impl<const N: usize> Covariance<N> {
     fn update_gradient(&mut self, psi: &[f64; N], eps: f64, rate: f64) -> ParameterStep<N> {
         let power: f64 = psi.iter().map(|p| p * p).sum();
         self.power += (power - self.power) * POWER_WEIGHT;
-        // The offset keeps the step bounded when psi vanishes; rate psi/psi'psi would grow without limit.
+        // The offset keeps the step bounded when psi vanishes; without it, the gain rate psi/(psi' psi) would grow
+        // without limit.
         self.largest_power = self.largest_power.max(self.power);
         let denominator = GRADIENT_OFFSET * self.largest_power + power;
         let scale = if denominator > 0.0 { rate / denominator } else { 0.0 };
         scaled(psi.map(|p| scale * p), eps)
     }
 
-    /// Accumulates the forgetting of this sample. At the end of a period it makes the next pseudo-measurement.
+    /// Accumulates the forgetting of this sample, and makes the next pseudo-measurement at the end of a period.
     #[inline]
     fn count_forgotten(&mut self, forgotten: f64) {
         self.forgotten += forgotten;
@@ -254,7 +255,7 @@ impl<const N: usize> Adaptation<N> for Covariance<N> {
     fn update(&mut self, psi: &[f64; N], eps: f64, _theta: &[f64; N], variance: f64) -> ParameterStep<N> {
         let exponential = matches!(self.forgetting, Forgetting::Exponential { .. });
         if !exponential || self.early > NO_EARLY_FORGETTING {
-            // The copy allows psi to stay in registers in the typical case.
+            // The copy allows psi to stay in registers under exponential forgetting.
             let psi = *psi;
             return self.update_by_rule(&psi, eps, variance);
         }

@@ -6,8 +6,8 @@
 //! `Phi_j = sum over k of h_k/(k+j)!`: `Phi_1 = exp[z1, z2]`, `Phi_2 = exp[0, z1, z2]`, and
 //! `Phi_j = 1/j! + s Phi_{j+1} - q Phi_{j+2}`.
 //!
-//! All Phi_j are entire functions of (s, q): complex, real and double poles, and poles at the origin, are cases of the
-//! same functions. To avoid cancellation they are evaluated in different ways:
+//! All Phi_j are entire functions of (s, q), so the same functions apply to complex, real and double poles and to poles
+//! at the origin. To avoid cancellation they are evaluated in different ways:
 //!
 //! - small poles: backward recursion for the Phi_j from `Phi_j = 1/j!` (Clenshaw's summation), and the corresponding
 //!   recursion for the slopes `D_j = dPhi_j/ds`, `D_j = Phi_{j+1} + s D_{j+1} - q D_{j+2}`, with no division and no
@@ -163,7 +163,8 @@ fn complex_poles(h: f64, q: f64, x: f64) -> [f64; 4] {
 fn real_poles(h: f64, q: f64, x: f64) -> [f64; 4] {
     let r = libm::sqrt(x);
     let far = h + libm::copysign(r, h);
-    // The nearer pole follows from the product, since the difference of h and r would cancel.
+    // The poles h + r and h - r have the product q; the pole nearer to the origin is computed from q, since the
+    // difference of h and r would cancel.
     let near = q / far;
     let (near_exp, near_expm1) = exp_and_expm1(near);
     let (far_exp, far_expm1) = exp_and_expm1(far);
@@ -174,7 +175,8 @@ fn real_poles(h: f64, q: f64, x: f64) -> [f64; 4] {
         let phi1 = (far_exp - near_exp) / (far - near);
         (phi1, (mean - phi1) / (2.0 * x))
     };
-    // For poles farther apart than this, differences are used, because q may be zero; for closer poles q is above 0.5.
+    // If the poles are farther apart than this, their differences are used, because q may be zero; for closer poles q
+    // is above 0.5.
     let phi2 = if r > 0.25 {
         let near_ratio = if near == 0.0 { 1.0 } else { near_expm1 / near };
         (far_expm1 / far - near_ratio) / (far - near)

@@ -1,8 +1,8 @@
 //! Covariance of a recursive estimate, for any gain.
 //!
 //! Let `theta~ = theta - theta^` be the error of the estimate of a constant theta. To first order the a-priori
-//! innovation is `eps^ = eps + h' X`, where X contains theta~ and the errors that past estimates have left in the
-//! filters of the predictor,
+//! innovation is `eps^ = eps + h' X`, where the vector X contains theta~ and the errors that past estimates have left
+//! in the filters of the predictor,
 //!
 //! - `dw = w - w^ = b~' x - f~' w^ - (F^ - 1) dw`,
 //! - `dv = v^ - v = dw - a~' u`,
@@ -19,14 +19,14 @@
 //! elements, so `Sigma a = z - Sigma (h - a)`, which shares two thirds of the products. No assumption is made about g.
 //! The error bars are valid for a scalar forgetting factor, for which they tend to `P/(1 + lambda)` in the ARX case (L.
 //! Ljung and T. Söderström, *Theory and Practice of Recursive Identification*, 1983, eq. 4.136), for a forgetting
-//! matrix, a shortened step, or a gradient step. Without forgetting, `Sigma` becomes P. The default `h = psi` gives the
-//! same result if the estimate hardly changes within the memory of the filters. If the memory of the estimate is not
-//! much longer than that of 1/F, the variances of this default are up to a third too small, but a step costs half as
-//! much. The default corresponds to K = 0, where no filter errors are stored.
+//! matrix, a shortened step, or a gradient step. Without forgetting, `Sigma` becomes P. The default error bars use
+//! `h = psi` and K = 0, so that no filter errors are stored. They give the same result if the estimate hardly changes
+//! within the memory of the filters. If the memory of the estimate is not much longer than that of 1/F, the variances
+//! of the default are up to a third too small, but a step costs half as much.
 //!
-//! **Outliers.** An innovation larger than a few sigma changes the estimate as if it were at that limit (P. J. Huber,
-//! *Robust Statistics*, 1981, section 7.3); the gain in the equations above is then the reduced gain that was applied.
-//! The innovation variance uses the unclipped innovation, so that it follows a lasting change of the noise.
+//! **Outliers.** An innovation beyond a limit of a few sigma changes the estimate as if it were at that limit (P. J.
+//! Huber, *Robust Statistics*, 1981, section 7.3); the gain in the equations above is then the reduced gain that was
+//! applied. The innovation variance uses the unclipped innovation, so that it follows a lasting change of the noise.
 //!
 //! The innovation variance sigma^2 is the mean of `eps^2/(1 + h' Sigma h)`, whose terms each have the expected value
 //! sigma^2.
@@ -42,11 +42,11 @@ pub const LARGEST_GROWTH: f64 = 1e6;
 /// Number of samples between two checks of the variances.
 const CHECK_PERIOD: u32 = 64;
 
-/// Covariance Sigma divided by sigma^2, and sigma^2 itself. N is the capacity for parameters, K the capacity for the
+/// Covariance Sigma in units of sigma^2, and sigma^2 itself. N is the capacity for parameters, K the capacity for the
 /// errors of the filters ([`ErrorLayout::filter_errors`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorBars<const N: usize, const K: usize> {
-    /// Covariance of theta.
+    /// Covariance of theta, divided by sigma^2.
     theta: [[f64; N]; N],
     /// Covariance of each filter error with theta.
     cross: [[f64; N]; K],
@@ -116,9 +116,9 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         self.until_check = self.until_check.clamp(1, CHECK_PERIOD);
     }
 
-    /// Builds the error bars from the covariance of theta divided by the innovation variance; the filters are assumed
-    /// to contain correct past signals. Innovations larger than `limit` times sigma change the estimate as if they were
-    /// at this limit; infinity means no limit.
+    /// Builds the error bars from `start`, the covariance of theta divided by the innovation variance; the past signals
+    /// in the filters are assumed to be correct. Innovations larger than `limit` times sigma change the estimate as if
+    /// they were at this limit; infinity means no limit.
     pub fn new(start: &[[f64; N]; N], innovation_variance: InnovationVariance, limit: f64) -> Self {
         Self {
             theta: *start,
@@ -156,7 +156,7 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         (theta, filters)
     }
 
-    /// Inserts the new dw, dv and de in front of the past errors of the same kind, given `Sigma h`.
+    /// Inserts the new dw, dv and de, each in front of the past errors of its kind, given `Sigma h`.
     #[inline(always)]
     fn insert(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>, z: [f64; N], z_filters: [f64; K]) {
         let (with_theta, with_filters) = self.covariances_of_new(layout, rows, z, z_filters);
@@ -185,8 +185,8 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         }
     }
 
-    /// Returns `Sigma a` for the rows a of the new dw, dv and de, computed from `Sigma h`: their covariances with theta
-    /// and with the past filter errors.
+    /// Returns `Sigma a` for the rows a of the new dw, dv and de, computed from `Sigma h`: the covariances of the new
+    /// errors with theta and with the past filter errors.
     #[inline(always)]
     fn covariances_of_new(
         &self,
@@ -204,7 +204,7 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
             if kinds[kind].1 == 0 {
                 continue;
             }
-            // h and the row differ in the elements of A (for dw), of C and D, and of the filter errors.
+            // The vector h and the row differ in the elements of A (for dw), of C and D, and of the filter errors.
             let of_a = if kind == 0 { layout.na } else { 0 };
             let (first, noise) = layout.noise;
             for j in (0..of_a).chain(first..first + noise) {
@@ -363,7 +363,7 @@ impl<const N: usize, const K: usize> ErrorPropagation<N, K> for ErrorBars<N, K> 
             }
         }
         if count > 0 {
-            // Sigma h after the update is z - g (k' h) - k (g' h).
+            // The product Sigma h after the update is z - g (k' h) - k (g' h).
             let (mut k_h, mut g_h) = (0.0, 0.0);
             for i in 0..N {
                 k_h += k[i] * rows.e.theta[i];

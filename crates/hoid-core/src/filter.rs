@@ -22,8 +22,8 @@ pub fn divide_in_place(d: &[f64], x: &mut [f64]) {
     divide_from(d, x, 0);
 }
 
-/// As [`divide_in_place`], starting at index `from`. The values before that index are past outputs of the filter;
-/// outputs before the slice are zero.
+/// As [`divide_in_place`], but starting at index `from`. The values before that index are past outputs of the filter;
+/// outputs before the start of the slice are zero.
 pub fn divide_from(d: &[f64], x: &mut [f64], from: usize) {
     let before = |lag: usize, x: &[f64]| from.checked_sub(lag).map_or(0.0, |t| x[t]);
     match *d {
@@ -52,7 +52,7 @@ pub fn divide_from(d: &[f64], x: &mut [f64], from: usize) {
     }
 }
 
-/// As [`divide_from`] for a low order, with the past output in registers.
+/// As [`divide_from`] for a low order, with the past outputs in registers.
 fn divide_in_registers<const N: usize>(d: [f64; N], x: &mut [f64], from: usize) {
     let mut past: [f64; N] = core::array::from_fn(|i| from.checked_sub(i + 1).map_or(0.0, |t| x[t]));
     for value in &mut x[from..] {
@@ -71,11 +71,11 @@ fn divide_in_registers<const N: usize>(d: [f64; N], x: &mut [f64], from: usize) 
 /// Second-order all-pole filter `y = x / (1 + d_1 q^-1 + d_2 q^-2)` from rest, four samples at a time.
 ///
 /// Computed sample by sample, each output would wait for the previous output. With the impulse response h, four outputs
-/// can be written as `y(t+k) = sum_{i<=k} h_i x(t+k-i) + h_{k+1} y(t-1) - d_2 h_k y(t-2)`, k = 0 to 3. All four then
-/// wait only for y(t-1) and y(t-2), and only for one product and two sums.
+/// can be written as `y(t+k) = sum_{i<=k} h_i x(t+k-i) + h_{k+1} y(t-1) - d_2 h_k y(t-2)`, k = 0 to 3. All four outputs
+/// then wait only for y(t-1) and y(t-2), and only for one product and two sums.
 #[derive(Debug, Clone, Copy)]
 pub struct SecondOrder {
-    /// Impulse response h_1 to h_4; h_0 is one.
+    /// Samples h_1 to h_4 of the impulse response; h_0 is one.
     h: [f64; 4],
     /// Products -d_2 h_0 to -d_2 h_3.
     g: [f64; 4],

@@ -14,19 +14,20 @@
 //!   `b2 = f2 (K_e A(-delta) + K_e_dot R(-delta))`;
 //! - `b0 + b1 + b2 = K_e (1 + f1 + f2)`, the gain at zero frequency.
 //!
-//! In terms of the [`DividedDifferences`] at the poles times t, with `s = -2 zeta omega t` and `q = omega^2 t^2`:
+//! In terms of the [`DividedDifferences`] at the poles multiplied by the time t, with `s = -2 zeta omega t` and
+//! `q = omega^2 t^2`:
 //!
 //! - `A = q Phi_2`, `R = omega^2 t Phi_1`; at Ts, `f1 = -2 E C`, `f2 = e^s`, `1 + f1 + f2 = q chi`;
 //! - A and `R/omega` are functions of (omega t, zeta), so `dA/dt = R` and `dR/dt = omega^2 Phi_0` give their
 //!   derivatives with respect to omega: `omega t^2 Phi_1` for A and `omega t (Phi_0 + Phi_1)` for R. The derivatives
 //!   with respect to zeta follow by the chain rule through s: `dA/ds = q D_2`, `dR/ds = omega^2 t D_1`;
-//! - `df1/domega = 2 Ts (omega Ts Phi_1 + zeta Phi_0)`, `df1/dzeta = 2 omega Ts Phi_0`. The derivatives of `1 + f1 +
-//!   f2` have `Phi_0 - f2 = -q dchi/ds` in place of `Phi_0`.
+//! - `df1/domega = 2 Ts (omega Ts Phi_1 + zeta Phi_0)`, `df1/dzeta = 2 omega Ts Phi_0`. The derivatives of
+//!   `1 + f1 + f2` have `Phi_0 - f2 = -q dchi/ds` in place of `Phi_0`.
 //!
-//! No terms cancel if omega Ts is small. delta = 0 gives b2 = 0 and the hold of eq. 11. The response is continuous in
-//! tau and has a kink where tau is a whole number of samples, because the step response starts with the slope
-//! `omega^2 K_e_dot`. At delta = 0 and delta = Ts the derivatives with respect to tau are therefore one-sided, from
-//! within the sample.
+//! No terms cancel if omega Ts is small. For delta = 0, b2 is zero and the model is that of eq. 11. The response is
+//! continuous in tau and has a kink where tau is a whole number of samples, because the step response starts with the
+//! slope `omega^2 K_e_dot`. At delta = 0 and delta = Ts the derivatives with respect to tau are therefore one-sided,
+//! from within the sample.
 //!
 //! The parameters are not checked here. If a parameter is not finite, or if the poles are so fast that an exponential
 //! overflows, the coefficients are not finite.
@@ -121,8 +122,7 @@ impl Poles {
     }
 }
 
-/// Contributions of K_e and K_e_dot, A and R, to the step response at one time, with their derivatives; `dA/dt` equals
-/// R.
+/// Contributions A of K_e and R of K_e_dot to the step response at one time, with their derivatives; `dA/dt` equals R.
 #[derive(Debug, Clone, Copy)]
 struct Gains {
     step: f64,
@@ -156,7 +156,7 @@ impl Gains {
     }
 
     /// Derivatives of the step response with respect to K_e, K_e_dot, omega, zeta and tau. The derivative with respect
-    /// to tau has the opposite sign of that with respect to t.
+    /// to tau is minus that with respect to t.
     fn row(&self, k_e: f64, k_e_dot: f64) -> [f64; 5] {
         [
             self.step,

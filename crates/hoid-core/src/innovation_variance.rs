@@ -1,7 +1,7 @@
 //! Variance of the innovations, estimated with an exponential memory.
 //!
-//! `sigma^2 = sum_k lambda^{t-k} s_k/sum_k lambda^{t-k}`. Here s_k is the square of an innovation divided by its
-//! variance in units of sigma^2, so that each s_k has the expected value sigma^2.
+//! `sigma^2 = sum_k lambda^{t-k} s_k/sum_k lambda^{t-k}`. Here s_k is the square of an innovation divided by the ratio
+//! of its variance to sigma^2, so that each s_k has the expected value sigma^2.
 
 /// Weighted mean of the s_k. The sum of the weights is the number of residuals from which the variance is estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,7 +24,7 @@ impl InnovationVariance {
         }
     }
 
-    /// Updates the variance with s_k, the square of an innovation divided by its variance in units of sigma^2.
+    /// Updates the variance with s_k, the square of an innovation divided by the ratio of its variance to sigma^2.
     #[inline(always)]
     pub fn update(&mut self, squared: f64) {
         self.sum = self.lambda * self.sum + squared;
@@ -54,8 +54,8 @@ impl InnovationVariance {
         self.sum > 0.0 && eps * eps * self.residuals > limit * limit * self.sum
     }
 
-    /// Limits the number of residuals that the variance counts as, without changing the variance: the next residuals
-    /// then have more weight.
+    /// Limits the number of residuals from which the variance counts as estimated, without changing the variance: the
+    /// next residuals then have more weight.
     pub fn limit_residuals(&mut self, residuals: f64) {
         if self.residuals > residuals && residuals > 0.0 {
             self.sum *= residuals / self.residuals;

@@ -25,8 +25,8 @@
 //! ([`Predictor::correct`]). With these a-posteriori residuals the recursion converges faster (L. Ljung and T.
 //! Söderström, *Theory and Practice of Recursive Identification*, 1983, section 3.7.3 and eq. 3.151).
 //!
-//! The last L samples of the input are stored, so that B can start at any `offset` within them: a delay can be changed
-//! without a transient. N is the capacity for parameters.
+//! The last L samples of the input are stored, so that B can start at any `offset` within them, and a delay can be
+//! changed without a transient. N is the capacity for parameters.
 
 use core::hint::black_box;
 
@@ -43,8 +43,8 @@ pub enum Regressor {
     /// Gradient of the prediction error, for the prediction-error method.
     #[default]
     Gradient,
-    /// Gradient with `D/(C F)` as a cascade, `1/F` followed by `D/C`, for comparison. It is the same for a constant
-    /// theta, and converges more slowly while theta changes.
+    /// Gradient with `D/(C F)` as a cascade, `1/F` followed by `D/C`, for comparison. It equals the gradient above for
+    /// a constant theta; while theta changes, the recursion converges more slowly with it.
     Cascade,
     /// Unfiltered signals: pseudo-linear regression, also called extended least squares (Ljung and Söderström, section
     /// 3.7.4). It needs fewer operations. Convergence is guaranteed only if `1/C - 1/2` (`1/F - 1/2` for an
@@ -82,7 +82,8 @@ crate::state!([S, const N: usize, const L: usize] Predictor<S, N, L> {
 });
 
 impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
-    /// Builds the predictor with all filters at rest. Returns `None` if the shape exceeds N or L, or has no parameter.
+    /// Builds the predictor with all filters at rest. Returns `None` if the shape exceeds the capacities N or L, or has
+    /// no parameter.
     pub fn new(shape: S, regressor: Regressor) -> Option<Self> {
         let inputs = shape.nb().max(shape.nd() + 1).max(shape.nc() + shape.nf());
         let fits = (1..=N).contains(&shape.parameters()) && (shape.nb() == 0 || inputs <= L);
@@ -128,7 +129,7 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         }
     }
 
-    /// Offset of B. If B cannot shift, this is a constant at compile time.
+    /// Offset of B. If B cannot shift, the offset is the constant zero at compile time.
     #[inline(always)]
     fn offset(&self) -> usize {
         if L > N { self.offset } else { 0 }
@@ -184,7 +185,8 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         [w, v, v + dot(d, &self.v) - dot(c, &self.eps)]
     }
 
-    /// Advances the filters by the predicted sample, with the updated estimate, and returns the a-posteriori residual.
+    /// Advances the filters by the predicted sample with the updated estimate theta, and returns the a-posteriori
+    /// residual.
     #[inline(always)]
     pub fn correct(&mut self, theta: &[f64; N]) -> f64 {
         let shape = self.shape;
@@ -239,7 +241,7 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
     /// Replaces the missing output of the pending sample by its one-step prediction.
     pub fn bridge(&mut self, theta: &[f64; N]) {
         self.pending[0] = 0.0;
-        // eps is the output minus its prediction, so an output of zero gives minus the prediction.
+        // The residual is the output minus its prediction, so at an output of zero it is the negative prediction.
         self.pending[0] = -self.residual(theta)[2];
     }
 
@@ -279,9 +281,9 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
     }
 }
 
-/// Product of coefficients and a history whose numbers were stored individually just before.
+/// Product of coefficients and a history whose numbers were stored one by one just before.
 ///
-/// Each number is read separately. A wide load right after several narrow stores would wait until all of them have
+/// Each number is read separately. A wide load right after several narrow stores would wait until all stores have
 /// reached the memory, so that successive samples could not overlap. The compiler tends to generate such loads.
 #[inline(always)]
 fn dot_of_fresh(coefficients: &[f64], history: &[f64]) -> f64 {

@@ -26,7 +26,7 @@ pub enum Stable {
 const HALVINGS: u32 = 12;
 
 impl Stable {
-    /// True if theta has all roots of these polynomials inside the unit circle.
+    /// True if all roots of the selected polynomials of theta are inside the unit circle.
     #[inline]
     pub fn holds<S: Shape>(self, shape: &S, theta: &[f64]) -> bool {
         let [_, _, c, d, f] = shape.split(theta);
@@ -34,7 +34,7 @@ impl Stable {
     }
 }
 
-/// Returns `part/whole`, or 1 if both are equal, including two zeros.
+/// Returns `part/whole`, or 1 if `part` and `whole` are equal, including two zeros.
 #[inline(always)]
 pub fn ratio(part: f64, whole: f64) -> f64 {
     if part == whole { 1.0 } else { part / whole }
@@ -47,8 +47,8 @@ pub(crate) fn all_finite<const N: usize>(values: &[f64; N]) -> bool {
     values.iter().fold(0.0, |sum, v| sum + 0.0 * v) == 0.0
 }
 
-/// Returns the largest of the fractions 1, 1/2, 1/4 ... of a step that is allowed, and theta after the reduced step.
-/// Returns 0 and the old theta if no fraction is allowed.
+/// Reduces a step to the largest of the fractions 1, 1/2, 1/4 ... at which the new theta is allowed. Returns the
+/// fraction and the new theta, or 0 and the old theta if no fraction is allowed.
 #[inline]
 pub fn backtrack<const N: usize>(
     theta: &[f64; N],
@@ -63,7 +63,7 @@ pub fn backtrack<const N: usize>(
     halved(&theta, &step, allowed)
 }
 
-/// As [`backtrack`], if the full step is not allowed.
+/// As [`backtrack`], for a full step that is not allowed.
 #[cold]
 #[inline(never)]
 fn halved<const N: usize>(theta: &[f64; N], step: &[f64; N], allowed: impl Fn(&[f64; N]) -> bool) -> (f64, [f64; N]) {

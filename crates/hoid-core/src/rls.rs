@@ -31,7 +31,7 @@ crate::state!([S, const N: usize, A: crate::state::State, B: crate::state::State
 
 impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<S, N, A, B> {
     /// Starts from theta `[a.., b..]` with zeros before the first sample. Returns `None` if there is no parameter, if
-    /// there are more than N parameters or parameters of C, D or F, or if the rule of forgetting needs the innovation
+    /// there are more than N parameters, if C, D or F has parameters, or if the rule of forgetting needs the innovation
     /// variance but `bars` do not estimate it.
     pub fn new(shape: S, theta: [f64; N], adaptation: A, bars: B) -> Option<Self> {
         let linear = (shape.nc(), shape.nd(), shape.nf()) == (0, 0, 0);
@@ -61,8 +61,8 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         let sound = all_finite(&theta);
         if sound {
             self.theta = theta;
-            // theta changed by g eps_limited = (eps_limited/eps) g eps, so the error bars use the gain that was
-            // actually applied.
+            // theta changed by g eps_limited = (eps_limited/eps) g eps, so the error bars use the gain
+            // (eps_limited/eps) g.
             let used = ratio(limited, innovation);
             let gain = moved.gain.map(|g| used * g);
             self.bars.update(
@@ -73,7 +73,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
             );
             self.adaptation.add_drift_to(&mut self.bars);
             self.shift(psi, u);
-        // A number that is not finite would stay in the regressor for max(na, nb) samples.
+        // The regressor is reset, since a number that is not finite would stay in it for max(na, nb) samples.
         } else {
             self.psi = [0.0; N];
             self.restarts += 1;
@@ -146,7 +146,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         &mut self.adaptation
     }
 
-    /// Returns the number of steps that were not finite, after which the regressor was reset.
+    /// Returns the number of restarts: steps that were not finite, after which the regressor was reset.
     pub fn restarts(&self) -> u64 {
         self.restarts
     }

@@ -80,7 +80,8 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         // The filters continue with the a-posteriori residuals of the new theta (Ljung and Söderström 1983, eq. 3.151).
         self.correct(&theta);
         (self.theta, self.psi) = (theta, psi);
-        // The error bars use the step that was applied: shortened by `allowed` and limited by `used`.
+        // The error bars use the gain that was applied: reduced by the factor `allowed` for stability and by `used` for
+        // the limit on outliers.
         let gain = moved.gain.map(|g| allowed * used * g);
         self.bars.update(&layout, &rows, &gain, innovation);
         self.adaptation.add_drift_to(&mut self.bars);

@@ -1,8 +1,7 @@
 //! Dependence of the errors in the filters of the predictor on the errors of the parameters.
 //!
-//! A wrong estimate leaves errors in the memory of the filters of the [`crate::predictor`]. If a vector X contains
-//! theta~ and the past filter errors, the new errors are linear functions of X. The equations are in
-//! [`crate::error_bars`].
+//! A wrong estimate leaves errors in the memory of the filters of the [`crate::predictor`]. The new errors are linear
+//! functions of a vector X that contains theta~ and the past filter errors. The equations are in [`crate::error_bars`].
 
 use crate::shape::Shape;
 
@@ -13,11 +12,11 @@ pub struct ErrorLayout {
     pub na: usize,
     /// Index of the first coefficient of C and D, and number of coefficients of C and D.
     pub noise: (usize, usize),
-    /// Index of the first dw among the filter errors, and number of dw.
+    /// Index of the first dw among the filter errors, and number of stored dw.
     pub w: (usize, usize),
-    /// Index of the first dv, and number of dv; there are none without A, since dv then equals dw.
+    /// Index of the first dv, and number of stored dv, which is zero without A, since dv then equals dw.
     pub v: (usize, usize),
-    /// Index of the first de, and number of de.
+    /// Index of the first de, and number of stored de.
     pub e: (usize, usize),
 }
 
@@ -71,7 +70,7 @@ pub struct LinearForm<const N: usize, const K: usize> {
     pub filters: [f64; K],
 }
 
-/// Dependence of the new dw, dv and de on X. That of de is also the sensitivity h of the innovation.
+/// Dependence of the new dw, dv and de on X. The dependence of de is also the sensitivity h of the innovation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensitivities<const N: usize, const K: usize> {
     /// Dependence of dw on X.
@@ -83,8 +82,8 @@ pub struct Sensitivities<const N: usize, const K: usize> {
 }
 
 impl<const N: usize, const K: usize> Sensitivities<N, K> {
-    /// Returns the sensitivities for an estimate that does not change within the memory of its filters: `h = psi`,
-    /// without filter errors.
+    /// Returns the sensitivities for an estimate that does not change within the memory of its filters: h equals psi,
+    /// and there are no filter errors.
     #[inline(always)]
     pub fn from_gradient(psi: &[f64; N]) -> Self {
         let form = LinearForm {

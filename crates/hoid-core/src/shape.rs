@@ -1,4 +1,4 @@
-//! Orders of the general model, stored as numbers or in the type.
+//! Orders of the general model, stored as values or in the type.
 //!
 //! The parameters of `A u = (B/F) q^-nk e + (C/D) eps` form one vector, `theta = [a.. b.. c.. d.. f..]`. A [`Shape`]
 //! contains the number of coefficients of each polynomial, and therefore the position of each polynomial in theta.

@@ -15,7 +15,7 @@ pub const MAX_ORDER: usize = 64;
 /// never reported without proof.
 #[inline]
 pub fn roots_inside(d: &[f64], radius: f64) -> bool {
-    // Most polynomials of an operator are short, and a recursion tests them at every sample.
+    // Most polynomials of an operator have a low order, and a recursion tests them at every sample.
     match *d {
         [] if radius > 0.0 => true,
         [d1] if radius > 0.0 => d1.abs() < radius,

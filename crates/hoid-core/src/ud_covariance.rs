@@ -20,8 +20,9 @@
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
 pub struct UdCovariance<const N: usize> {
-    /// Column j holds `U_ij`, i < j, and `d_j` in place of the 1; the other elements are not used. The d_j are not
-    /// contiguous, so that no compiler loads them as a vector, in which the first element would wait for the last.
+    /// Column j holds `U_ij`, i < j, and `d_j` in place of the unit diagonal element; the other elements are not used.
+    /// The d_j are not contiguous, so that no compiler loads them as a vector, in which the first element would wait
+    /// for the last.
     u: [[f64; N]; N],
 }
 
@@ -49,7 +50,7 @@ impl<const N: usize> UdCovariance<N> {
             }
             factored.u[j][j] = d;
             if d == 0.0 {
-                // A constant parameter cannot be correlated with other parameters.
+                // A parameter that stays constant cannot be correlated with other parameters.
                 if (0..j).any(|i| rest[i][j] != 0.0) {
                     return None;
                 }
@@ -90,7 +91,7 @@ impl<const N: usize> UdCovariance<N> {
         self.update_projected_by(grown, f, v, variance)
     }
 
-    /// Performs the measurement with given projections.
+    /// Performs the measurement with the given d_j (in `grown`) and projections f and v.
     #[inline(always)]
     fn update_projected_by(&mut self, grown: [f64; N], f: [f64; N], v: [f64; N], variance: f64) -> [f64; N] {
         // Bierman's recursion: alpha_j = R + sum_{i<=j} f_i v_i. All d_j are multiplied by positive ratios, so that P
@@ -123,7 +124,7 @@ impl<const N: usize> UdCovariance<N> {
         f.iter().zip(&v).map(|(f, v)| f * v).sum()
     }
 
-    /// As [`UdCovariance::measurement_update`], with the result of [`UdCovariance::projections`] for psi.
+    /// As [`UdCovariance::measurement_update`], given the result of [`UdCovariance::projections`] for psi.
     #[inline(always)]
     pub fn update_projected(&mut self, (f, v): ([f64; N], [f64; N]), variance: f64) -> [f64; N] {
         let grown = core::array::from_fn(|j| self.u[j][j]);
@@ -183,7 +184,7 @@ impl<const N: usize> UdCovariance<N> {
         for j in (0..N).rev() {
             let s = a[j];
             let d = self.u[j][j] + c * s * s;
-            // d is zero only if both of its terms are zero; the vector then has no component here.
+            // d is zero only if both of its terms are zero; the vector then has no component along this column.
             if d > 0.0 {
                 let share = c / d;
                 c = share * self.u[j][j];

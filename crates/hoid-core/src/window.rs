@@ -3,12 +3,12 @@
 //! Each sample gives a linear equation for theta, `y = psi' theta + eps` with `y = eps(t) + psi(t)' theta(t-1)`. For
 //! ARX and FIR models, y is the output and psi the regressor, regardless of theta. The estimate is the least-squares
 //! estimate over the window, `theta = R^{-1} sum psi y`, `R = sum psi psi'`. It is exact for ARX and FIR models; for
-//! the other structures it is the recursive prediction-error method with this memory.
+//! the other structures it is the recursive prediction-error method with a rectangular memory.
 //!
 //! If the oldest term were subtracted from a single sum at each sample, rounding errors would accumulate without limit.
 //! The window is therefore kept as two sums. One sum grows from a boundary on; the other sum, which grew until that
-//! boundary, loses its terms one by one. When it has lost all terms, the first sum replaces it. No rounding error
-//! persists for longer than two windows.
+//! boundary, loses its terms one by one. When the second sum has lost all terms, the first sum replaces it. No rounding
+//! error persists for longer than two windows.
 //!
 //! The covariance of theta divided by sigma^2 is `R^{-1}`. If the window does not determine theta (fewer samples than
 //! parameters, or no excitation), theta stays constant and there is no covariance. The caller owns the memory of
@@ -18,8 +18,8 @@ use hoid_numerics::cholesky;
 
 use crate::adaptation::{Adaptation, ParameterStep};
 
-/// Smallest pivot of R, scaled to a unit diagonal, with which a window determines theta: several hundred rounding
-/// units.
+/// Smallest pivot of R, scaled to a unit diagonal, with which a window determines theta; it is several hundred times
+/// the rounding unit.
 const SMALLEST_PIVOT: f64 = 1e-13;
 /// Power of a gradient component, relative to its largest power so far, below which the parameter is not excited.
 const NO_EXCITATION: f64 = 1e-20;
@@ -37,7 +37,7 @@ crate::state!([const N: usize] NormalEquations<N> { r, psi_y });
 #[derive(Debug, Clone, PartialEq)]
 pub struct Window<const N: usize, M> {
     memory: M,
-    /// Number of parameters in use, at most N.
+    /// Number of parameters to be estimated, at most N.
     parameters: usize,
     /// Length W of the window in samples.
     length: usize,
@@ -183,7 +183,7 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Adaptation<N> for Window<N,
         for i in 0..p {
             self.largest[i] = self.largest[i].max(self.growing.r[i][i] + self.fading.r[i][i]);
         }
-        // With as many samples as parameters, the residuals are zero and carry no information.
+        // If there are no more samples than parameters, the residuals are zero and carry no information.
         let factor = if self.filled > p { self.cholesky() } else { None };
         let Some(factor) = factor else {
             self.undetermined += 1;

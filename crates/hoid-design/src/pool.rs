@@ -54,7 +54,7 @@ pub struct PooledParameter {
     pub name: String,
     /// Unit of the parameter.
     pub unit: String,
-    /// Median over people.
+    /// Median of the population, `exp(mu)`.
     pub centre: f64,
     /// Standard deviation between people of the logarithm of the parameter.
     pub spread: f64,
@@ -187,7 +187,8 @@ fn pooled((name, unit): (&str, &str), own: &[(&str, Option<Observation>)]) -> Re
 }
 
 impl Population {
-    /// Returns the JSON object that `--prior` reads; each parameter has the standard error for a new person.
+    /// Returns the JSON object that `--prior` reads; the standard error of each parameter is its standard deviation for
+    /// a new person.
     pub fn json(&self) -> Value {
         let parameter = |p: &PooledParameter| {
             json!({

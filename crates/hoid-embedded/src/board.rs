@@ -7,7 +7,7 @@ use semihosting::{fs::File, io::Read, println, process};
 use crate::run;
 
 unsafe extern "C" {
-    /// Ends of the stack, defined by the linker.
+    /// Upper and lower end of the stack, defined by the linker.
     static _stack_start: u32;
     static _stack_end: u32;
 }
@@ -47,7 +47,7 @@ fn used() -> usize {
     let words = (top as usize - bottom as usize) / size_of::<u32>();
     // SAFETY: both pointers are ends of one region of the board's memory, which contains `words` aligned words. The
     // reads are volatile, since the upper part of the stack is in use; this part is not read, because the loop ends at
-    // the first word that was used.
+    // the first word that has been written.
     let painted = (0..words)
         .take_while(|i| unsafe { bottom.add(*i).read_volatile() } == PAINT)
         .count();

@@ -1,6 +1,6 @@
 //! Reads samples and writes estimates.
 //!
-//! An input line is `e,u`, sampled at intervals of [`SAMPLE_TIME_S`]. An output line is a row of the trace of
+//! An input line is `e,u`; successive lines are [`SAMPLE_TIME_S`] apart. An output line is a row of the trace of
 //! `hoid track` with the columns [`HEADER`]: t, then K_e, K_e_dot, omega_nm, zeta_nm and tau_e, each with its standard
 //! error.
 
@@ -19,11 +19,11 @@ pub const UNREADABLE: &str = "run.csv cannot be read";
 const HEADER: &str = "t,K_e,K_e_se,K_e_dot,K_e_dot_se,omega_nm,omega_nm_se,zeta_nm,zeta_nm_se,tau_e,tau_e_se";
 /// Sample time in s.
 const SAMPLE_TIME_S: f64 = 0.01;
-/// nk of the textbook operator, from which the initial delay of the filter follows.
+/// Delay nk, in samples, of the textbook operator, from which the initial delay of the filter follows.
 const NK: f64 = 29.0;
 /// Number of samples per output line.
 const EVERY: u32 = 100;
-/// Length of the memory: more than `least_memory(SAMPLE_TIME_S)`, but too short for replays.
+/// Length of the memory in numbers: more than `least_memory(SAMPLE_TIME_S)`, but too short for replays.
 const MEMORY: usize = 3 * 128;
 /// Longest input line in bytes.
 const LONGEST: usize = 80;

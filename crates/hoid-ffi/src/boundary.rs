@@ -1,7 +1,7 @@
 //! Pointers from the caller, and all assumptions of this crate about them.
 //!
 //! A pointer that is null or not aligned is rejected. Two conditions cannot be checked and must be guaranteed by the
-//! caller of every function: the pointer refers to an object as described in the header, and no other thread uses the
+//! caller of every function: the pointer refers to an object as described in the C header, and no other thread uses the
 //! object at the same time.
 
 use std::{
@@ -80,8 +80,8 @@ pub(crate) unsafe fn put<T>(pointer: *mut T, value: T, what: &str) -> Result<(),
     Ok(())
 }
 
-/// Writes an array of values and their number to the memory that the caller provides. If `list` is null and `room` is
-/// zero, only the number is written.
+/// Writes an array of values, and the number of values, to the memory that the caller provides. If `list` is null and
+/// `room` is zero, only the number is written.
 ///
 /// # Safety
 /// `list` is null or points to memory for `room` values, and `count` is null or points to memory for a number.
@@ -110,7 +110,7 @@ pub(crate) unsafe fn write_array<T: Copy>(
     Ok(())
 }
 
-/// Passes a tracker to the caller.
+/// Passes ownership of a tracker to the caller.
 ///
 /// # Safety
 /// `place` is null or points to memory for a pointer.

@@ -2,7 +2,8 @@
 //!
 //! This is the only crate of the workspace with unsafe code. A C interface is unsafe because it must trust pointers,
 //! and the unsafe code does nothing else: `boundary` reads strings and writes results through pointers from the caller,
-//! and no other code dereferences such a pointer. The module `session` behind it is safe and independent of C.
+//! and no other code of the tracker interface dereferences such a pointer. The module `session`, which the functions of
+//! the interface call, is safe and independent of C.
 //!
 //! Every function follows three rules:
 //!

@@ -1,4 +1,4 @@
-//! Request for a tracker: method, sample time, options in JSON, and a fit.
+//! Request for a tracker: method, sample time, options in JSON, and an earlier fit.
 //!
 //! The options are one object with the keywords of `pyhoid.Tracker`: `structure`; `na` to `nk` (a number, or a pair of
 //! limits between which the order is searched during the warm-up); `criterion`; `start` (coefficients by name, or
@@ -28,12 +28,12 @@ pub(crate) struct TrackerRequest {
     pub sample_time_s: f64,
     /// Options in JSON.
     pub options: Option<String>,
-    /// A fit in JSON.
+    /// Earlier fit of the person, in JSON.
     pub fit: Option<String>,
 }
 
 impl TrackerRequest {
-    /// Builds the requested recursion at its start.
+    /// Builds the requested recursion in its initial state.
     pub fn live(&self) -> Result<Live, Failure> {
         let sample_time = SampleTime::new(self.sample_time_s)?;
         let mut options = object(self.options.as_deref().unwrap_or("{}"))?;
@@ -70,7 +70,8 @@ impl TrackerRequest {
     }
 }
 
-/// Sets the options of the method, those first on which other options depend, and then the fit.
+/// Sets the options of the method, in an order in which each option follows those on which it depends, and then the
+/// fit.
 fn set(method: &mut Method, mut options: Map<String, Value>, fit: Option<&str>) -> Result<(), Failure> {
     let mut fitted = fit.map(|text| operator(text, "the fit")).transpose()?;
     if let Some(prior) = options.get("prior") {
@@ -199,7 +200,7 @@ fn range(value: &Value, name: &str) -> Result<RangeInclusive<usize>, String> {
     }
 }
 
-/// Returns a value in the notation of the command line; `None` for a value that sets nothing.
+/// Returns a value in the notation of the command line; `None` for null, false and an empty object, which set nothing.
 fn text(value: &Value) -> Option<String> {
     Some(match value {
         Value::Null | Value::Bool(false) => return None,

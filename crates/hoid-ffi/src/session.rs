@@ -1,5 +1,5 @@
-//! Tracker built from a request, including its warm-up. The module is independent of C except for the names, which must
-//! remain valid for the caller in C.
+//! Tracker built from a request, including its warm-up. The module is independent of C except for the C strings of the
+//! names, which must remain valid for a C caller.
 
 use std::ffi::{CStr, CString};
 
@@ -12,7 +12,7 @@ use crate::{
     types::{HOID_SHIFTS, HoidChange, HoidCounts, HoidEstimate, HoidOutcome, HoidShift},
 };
 
-/// Names and units of the parameters of the operator, in the order of the tables.
+/// Names and units of the parameters of the operator, in the order in which they are reported.
 const OPERATOR: [(&CStr, &CStr); 6] = [
     (c"K_e", c""),
     (c"T_L", c"s"),
@@ -49,7 +49,7 @@ impl Session {
         Self::of(asked)
     }
 
-    /// Builds the requested tracker at its start.
+    /// Builds the requested tracker in its initial state.
     pub fn of(asked: TrackerRequest) -> Result<Self, Failure> {
         let mut session = Self {
             live: asked.live()?,
@@ -93,7 +93,8 @@ impl Session {
         }
     }
 
-    /// Takes a sample. If `moves` is false, the filters are updated but the estimate stays constant.
+    /// Takes a sample and returns its outcome. If `moves` is false, the filters are updated but the estimate stays
+    /// constant.
     pub fn take(&mut self, sample: Sample, moves: bool) -> HoidOutcome {
         let taken = (self.live).update(sample, moves, &|plan, record| plan.choose(record, &|| {}));
         if taken.started.is_some() {
@@ -191,7 +192,7 @@ impl Session {
         })
     }
 
-    /// Returns the counts since the start.
+    /// Returns the numbers of samples and events since the start.
     pub fn counts(&self) -> HoidCounts {
         let counts = self.live.counts();
         HoidCounts {

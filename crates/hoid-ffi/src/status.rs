@@ -103,7 +103,7 @@ pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> String {
 
 fn remember(text: &str) {
     let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
-    // While a thread ends, its thread-local storage may no longer exist.
+    // While a thread is terminating, its thread-local storage may no longer exist.
     let _ = LAST.try_with(|last| *last.borrow_mut() = text);
 }
 

@@ -1,8 +1,8 @@
 //! Assembly of a fit at a minimum: loss, innovation variance and covariance from the sum of squares.
 //!
 //! With n residuals, p free parameters and s initial states, `V = sum eps^2 / n` and
-//! `sigma^2 = sum eps^2 / (n - p - s)`. The covariance of theta is `sigma^2 (psi' psi)^-1` over the
-//! free parameters (L. Ljung, *System Identification*, 1999, eq. 9.19 and 9.42).
+//! `sigma^2 = sum eps^2 / (n - p - s)`. The covariance of the free parameters is `sigma^2 (psi' psi)^-1` with
+//! `psi = -d eps/d theta` (L. Ljung, *System Identification*, 1999, eq. 9.19 and 9.42).
 
 use hoid_model::{PolynomialModel, SampleTime, Structure};
 
@@ -62,7 +62,7 @@ pub(crate) fn assembled_fit(
 }
 
 impl Fit {
-    /// Returns the same fit with the covariance `variance (psi' psi)^-1`.
+    /// Returns the fit with its covariance set to `variance (psi' psi)^-1`; `inverse_gram` is `(psi' psi)^-1` by rows.
     pub(crate) fn with_covariance(self, variance: f64, inverse_gram: &[f64]) -> Self {
         Self {
             covariance: Some(inverse_gram.iter().map(|g| variance * g).collect()),
@@ -71,7 +71,7 @@ impl Fit {
     }
 }
 
-/// Returns for each of the p parameters whether it is missing from `free`: fixed or at a bound.
+/// Returns for each of the p parameters whether it is fixed or at a bound, which means that its index is not in `free`.
 pub(crate) fn is_fixed_or_bounded(free: &[usize], p: usize) -> Vec<bool> {
     (0..p).map(|i| !free.contains(&i)).collect()
 }

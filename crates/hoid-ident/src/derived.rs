@@ -1,18 +1,17 @@
 //! Poles, zeros, crossover and margins of a fit, with standard errors by the delta method.
 //!
-//! A simple root z of `p(z) = z^n + p_1 z^{n-1} + ... + p_n` depends on the coefficients with the derivative
-//! `dz/dp_j = -z^{n-j} / p'(z)`; the same formula holds for B with its leading coefficient b_0. At a multiple root the
-//! derivative does not exist. Near a multiple root the standard error grows without bound, because the root itself is
-//! ill determined.
+//! A simple root z of `p(z) = z^n + p_1 z^{n-1} + ... + p_n` has the derivative `dz/dp_j = -z^{n-j} / p'(z)` with
+//! respect to the coefficient p_j; the same formula holds for B, which also has a leading coefficient b_0. At a
+//! multiple root the derivative does not exist. Near a multiple root the standard error grows without bound, because
+//! the root itself is ill determined.
 //!
-//! The open loop is `L(omega, theta) = H(omega, theta) Y_c(omega)` with a given controlled element Y_c. If theta
-//! changes, omega_c and phi_m follow from the condition `|L| = 1`:
+//! The open loop is `L(omega, theta) = H(omega, theta) Y_c(omega)` with a given controlled element Y_c. The effects of
+//! theta on the crossover frequency omega_c and the phase margin phi_m follow from the condition `|L| = 1`:
 //!
-//! `d omega_c = -(d ln|L|/d theta) / (d ln|L|/d omega)`,
-//! `d phi_m = d arg L/d theta + (d arg L/d omega) d omega_c`,
+//! `d omega_c = -(d ln|L|/d theta) / (d ln|L|/d omega)`, `d phi_m = d arg L/d theta + (d arg L/d omega) d omega_c`.
 //!
-//! The gain margin follows in the same way from the condition `arg L = -180 deg`, with phase and gain exchanged. A
-//! searched delay also changes the phase by `-omega d tau` (`searched_delay.rs`).
+//! The effect on the gain margin follows in the same way from the condition `arg L = -180 deg`, with the roles of phase
+//! and gain exchanged. A searched delay also changes the phase by `-omega d tau` (`searched_delay.rs`).
 
 use hoid_model::{
     Complex64, margins::Margins, margins::margins, polynomial, polynomial_model::monic, uncertainty::Estimate,
@@ -33,8 +32,8 @@ pub struct Root {
 }
 
 impl Root {
-    /// Returns natural frequency in rad/s and damping ratio of the continuous-time pole `ln(z)/Ts`; `None` if z is one,
-    /// zero or a negative real number.
+    /// Returns the natural frequency in rad/s and the damping ratio of the continuous-time pole `ln(z)/Ts`; `None` if z
+    /// is one, zero or a negative real number.
     pub fn frequency_and_damping(&self, sample_time_s: f64) -> Option<(f64, f64)> {
         if self.value.im == 0.0 && self.value.re <= 0.0 {
             return None;
@@ -45,7 +44,8 @@ impl Root {
     }
 }
 
-/// Crossover and margins of an open loop with their standard errors; each is `None` if there is no such crossing.
+/// Crossover frequencies and margins of an open loop with their standard errors; a value is `None` if the loop does not
+/// have the crossing that defines it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MarginEstimates {
     /// Gain crossover frequency omega_c in rad/s.
@@ -72,8 +72,8 @@ impl From<Margins> for MarginEstimates {
 
 impl Fit {
     /// Returns the roots of A, B, C, D and F, in this order, with their standard errors. The poles of the system are
-    /// the roots of A and F, and its zeros are the roots of B (without the zeros of the delay). The poles of the noise
-    /// filter are the roots of A and D, and its zeros are the roots of C.
+    /// the roots of A and F, and its zeros are the roots of B (the delay is not counted). The poles of the noise filter
+    /// are the roots of A and D, and its zeros are the roots of C.
     pub fn roots(&self) -> Vec<Root> {
         let m = self.model();
         let o = self.orders();
@@ -94,8 +94,8 @@ impl Fit {
         all
     }
 
-    /// Returns the standard errors of the root `z` of `p`. The coefficients of `p` are in theta from index `at`, with
-    /// the leading coefficient if `leading` is true.
+    /// Returns the standard errors of the real and imaginary part of the root `z` of `p`; `None` if they are unknown.
+    /// The coefficients of `p` are in theta from index `at`; `leading` is true if they include the leading coefficient.
     fn root_error(&self, p: &[f64], z: Complex64, at: usize, leading: bool) -> Option<(f64, f64)> {
         let covariance = self.covariance()?;
         let n = p.len() - 1;
@@ -112,12 +112,12 @@ impl Fit {
         let error =
             |gradient: &[f64]| Estimate::with_variance(0.0, variance_along(gradient, covariance)).standard_error;
         let (re, im) = (error(&by_re)?, if z.im == 0.0 { 0.0 } else { error(&by_im)? });
-        // Fixed coefficients have no variance.
+        // A root that depends only on fixed coefficients has no standard error.
         (re > 0.0 || im > 0.0).then_some((re, im))
     }
 
-    /// Returns crossover frequencies and margins, with standard errors, of the open loop with a controlled element of
-    /// this frequency response.
+    /// Returns crossover frequencies and margins, with standard errors, of the open loop of the model and a controlled
+    /// element with the given frequency response. Crossings are searched in the given range.
     pub fn margins(&self, controlled_element: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> MarginEstimates {
         let open_loop = |omega: f64| self.model().response(omega) * controlled_element(omega);
         let found = margins(open_loop, range_rad_s);
@@ -146,7 +146,7 @@ impl Fit {
                 .zip(&moved)
                 .map(|(g, d)| (g.im + along.im * d).to_degrees())
                 .collect();
-            // The delay changes the phase, not the magnitude.
+            // The delay changes the phase of L, not its magnitude.
             estimates.crossover_rad_s = with(found.crossover_rad_s, moved, 0.0);
             estimates.phase_margin_deg = with(found.phase_margin_deg, phase, -omega.to_degrees());
         }

@@ -37,7 +37,7 @@ pub enum IdentError {
         /// Sample time of the first record, s.
         expected: f64,
     },
-    /// There are no more residuals than unknowns.
+    /// The number of residuals does not exceed the number of unknowns.
     #[error(
         "record {label} has {samples} samples; {orders} with its delay and initial states needs more than {needed}; use a longer record or lower orders"
     )]
@@ -111,7 +111,7 @@ pub enum IdentError {
     /// The start of the search cannot be used.
     #[error("the start cannot be used: {reason}")]
     BadStart {
-        /// Reason and remedy.
+        /// Reason why the start cannot be used, and remedy.
         reason: String,
     },
     /// The model has no parameter with this name.
@@ -198,7 +198,8 @@ pub enum IdentError {
     },
 }
 
-/// Returns the lower of the two sampling frequencies, in Hz: records with either sample time can be resampled to it.
+/// Returns the lower of the sampling frequencies that belong to two sample times, in Hz: records with either sample
+/// time can be resampled to it.
 fn lower_rate(a_s: f64, b_s: f64) -> String {
     let hz = 1.0 / a_s.max(b_s);
     let digits = format!("{hz:.6}");

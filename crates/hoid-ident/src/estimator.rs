@@ -1,6 +1,6 @@
 //! Estimator based on the prediction error method, with its options.
 //!
-//! Options, their validation, and the functions that fit. The method itself is in [`crate::pem`].
+//! The estimator contains the options, validates them and starts the fit; the method itself is in [`crate::pem`].
 
 use std::collections::BTreeMap;
 
@@ -34,7 +34,7 @@ pub struct Estimator {
     /// The orders.
     pub orders: Orders,
     /// Initial states of each record. Default (`None`): automatic, which means `Estimate` for a structure with an input
-    /// and `Backcast` for a structure without one, whose output is assumed to be stationary before the record as well.
+    /// and `Backcast` for a structure without one, whose output is assumed to be stationary before the record too.
     pub initial_state: Option<InitialState>,
     /// Search method and limits of the search.
     pub search: SearchOptions,
@@ -47,16 +47,16 @@ pub struct Estimator {
     pub constraints: BTreeMap<String, Constraint>,
     /// Weighted prior guesses of coefficients, by name.
     pub priors: BTreeMap<String, Prior>,
-    /// Loss function of the residuals. Default: quadratic. With a robust loss, e and u are first limited to four
-    /// standard deviations from the prediction of each sample by its neighbours ([`crate::faults::resistant`]).
+    /// Loss function of the residuals. Default: quadratic. With a robust loss, each sample of e and u is first limited
+    /// to four standard deviations from the value interpolated from its neighbours ([`crate::faults::resistant`]).
     pub loss: Loss,
     /// Purpose of the model. Default: prediction.
     pub focus: Focus,
     /// True if u of each record contains a constant that is not a response to e; the constant is estimated like the
     /// initial states ([`crate::level`]). Ignored with initial states of zero. Default false.
     pub level: bool,
-    /// True if A must also be stable, so that the model from e to u is stable. C and F are always stable. Default
-    /// false.
+    /// True if A is constrained to be stable too, so that the model from e to u is stable; C and F are always stable.
+    /// Default false.
     pub stable: bool,
 }
 
@@ -96,7 +96,7 @@ impl Estimator {
     pub fn check(&self) -> Result<(), IdentError> {
         self.orders.check(self.structure)?;
         let mut named = self.constraints.keys().chain(self.priors.keys()).peekable();
-        // Most fits have no named coefficients; the list of names is then not built.
+        // Most fits have no constraints or priors; the list of coefficient names is then not needed.
         let names = named.peek().map_or_else(Vec::new, |_| self.orders.parameter_names());
         for name in named {
             if !names.contains(name) {
@@ -149,7 +149,7 @@ impl Estimator {
         Ok(())
     }
 
-    /// Returns the rule for initial states that is used: the given rule, or the result of the automatic choice.
+    /// Returns the assumption about the initial states that the fit uses: the given one, or the automatic choice.
     pub fn initial_state_in_use(&self) -> InitialState {
         self.initial_state.unwrap_or(if self.structure.has_input() {
             InitialState::Estimate
@@ -173,8 +173,8 @@ impl Estimator {
     /// As [`Estimator::fit`].
     pub fn fit_from(&self, records: &[Record], first: usize) -> Result<Fit, IdentError> {
         self.check()?;
-        // The samples are limited first, since the robust loss bounds the effect of residuals but not of faulty samples
-        // in the regressors.
+        // Outlying samples of e and u are limited first, since the robust loss bounds the effect of large residuals but
+        // not that of faulty samples in the regressors.
         let held = match self.loss {
             Loss::Huber { .. } => held(records),
             Loss::Quadratic => None,
@@ -208,8 +208,8 @@ impl Estimator {
         })
     }
 
-    /// True if the system from e to u minimises the simulation error and this differs from the prediction error (every
-    /// structure except output error).
+    /// True if the fit minimises the simulation error and this differs from the prediction error, as for every
+    /// structure except output error.
     fn simulates(&self) -> bool {
         self.focus == Focus::Simulation && self.structure != Structure::OutputError
     }

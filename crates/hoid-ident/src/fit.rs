@@ -101,8 +101,8 @@ impl Fit {
         self.covariance.as_deref()
     }
 
-    /// Returns name, value and standard error of each parameter: the coefficients of theta, or the physical parameters
-    /// of a grey box.
+    /// Returns the name, value and standard error of each parameter: the coefficients of theta, or the physical
+    /// parameters of a grey box.
     pub fn parameters(&self) -> Vec<(String, Estimate)> {
         if let Some(physical) = &self.physical {
             return physical.parameters.clone();
@@ -139,7 +139,7 @@ impl Fit {
         self.residuals
     }
 
-    /// Returns the number s of estimated initial states, over all records.
+    /// Returns the number s of estimated initial states and levels in all records.
     pub fn state_count(&self) -> usize {
         self.states
     }
@@ -251,7 +251,7 @@ impl Fit {
         self.robust
     }
 
-    /// True for a grey box, whose theta is a function of physical parameters.
+    /// True for a grey-box fit, whose theta is a function of physical parameters.
     pub fn is_grey_box(&self) -> bool {
         self.physical.is_some()
     }
@@ -324,7 +324,7 @@ impl Fit {
     /// `by_delay` (1/s) with respect to the delay; `None` without a covariance.
     pub(crate) fn variance_of(&self, by_theta: &[f64], by_delay: f64) -> Option<f64> {
         let covariance = self.covariance.as_ref()?;
-        // The covariance already contains (g's)^2 var tau.
+        // The covariance already contains the term (g's)^2 var tau, where s is the slope d theta/d tau.
         let with_delay = self.searched_delay.as_ref().map_or(0.0, |delay| {
             let moved = dot(by_theta, &delay.slope);
             delay.variance_s2 * by_delay * (2.0 * moved + by_delay)
@@ -396,8 +396,8 @@ fn output_less(record: &Record, mut errors: Series) -> Series {
     errors
 }
 
-/// Returns orders and theta of the output-error model `u = B/(A F) q^-nk e + eps` with the same system. The residual of
-/// this model is the simulation error.
+/// Returns orders and theta of the output-error model `u = B/(A F) q^-nk e + eps` that responds to e as `model` does.
+/// The residual of this output-error model is the simulation error.
 fn output_error_form(model: &PolynomialModel) -> (Orders, Vec<f64>) {
     let orders = model.orders();
     let den = product(&monic(model.a()), &monic(model.f()));

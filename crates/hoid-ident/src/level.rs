@@ -7,9 +7,9 @@
 //! `c = mean(u) - G(1) mean(e)`,
 //!
 //! so that a fit to e and u without their means ([`hoid_model::Detrend::Mean`]) is equivalent to a fit that also
-//! estimates c for each record (L. Ljung, *System Identification*, 1999, section 14.1), except for end effects: the
-//! mean of u in a step response, for example, is not the level. In this case c is an unknown of the fit, like the
-//! initial states ([`crate::Estimator::level`]), and the constant that remains in a record is
+//! estimates c for each record (L. Ljung, *System Identification*, 1999, section 14.1), except for end effects: in a
+//! step response, for example, c does not follow from the means. With the option [`crate::Estimator::level`], c is
+//! therefore an unknown of the fit, like the initial states. The constant in a record with the residuals eps is then
 //!
 //! `c = eps'z / z'z`, where z denotes the residuals for u = 1 and e = 0.
 //!
@@ -25,13 +25,14 @@ use hoid_numerics::statistics::mean;
 
 use crate::{Fit, IdentError, linalg::least_squares::dot};
 
-/// Mean square of the residuals for u = 1 below which a constant in u has no effect on the residuals.
+/// Mean square of the residuals for u = 1 below which a constant in u counts as having no effect on the residuals.
 const MIN_MEAN_SQUARE: f64 = 1e-16;
 /// Channel that contains the true gain in simulated runs, which have no level.
 const TRUTH: &str = "K_e";
 
-/// True if the records may have a level. False for simulated runs, which contain their true gain, and if e or u is
-/// constant: the fit rejects such a record and reports the original value.
+/// True if the records may have a level. False for simulated runs, which are recognised by the channel of their true
+/// gain. False also if e or u is constant: the fit rejects such a record, and must report the value before the removal
+/// of the means.
 pub fn may_have_level(records: &[Record]) -> bool {
     let simulated = records.iter().any(|record| record.channel(TRUTH).is_some());
     let moves = |x: &[f64]| x.iter().any(|v| *v != x[0]);
@@ -45,8 +46,8 @@ pub fn without_level(records: &[Record]) -> Vec<Record> {
 }
 
 impl Fit {
-    /// Returns the constant part of u that is not a response to e, by least squares over the residuals; `None` if a
-    /// constant in u has no effect on the residuals, as with a root of A or D at one.
+    /// Returns the constant part of u in a record that is not a response to e, by least squares over the residuals;
+    /// `None` if a constant in u has no effect on the residuals, as with a root of A or D at one.
     ///
     /// # Errors
     /// The errors of [`Fit::residuals`].
@@ -60,8 +61,8 @@ impl Fit {
     }
 
     /// Returns the level c of u in a record, in the unit of u, with its standard error. The model must have been fitted
-    /// to the record without its means. `None` if the model has no static gain (an integrator) or no input, or if the
-    /// fit is exact.
+    /// to this record with the means of e and u removed. `None` if the model has no static gain (an integrator) or no
+    /// input, or if the fit is exact.
     pub fn level(&self, record: &Record) -> Option<Estimate> {
         let model = self.model();
         let covariance = self.covariance()?;

@@ -1,4 +1,4 @@
-//! A noise model estimated from the disturbance alone.
+//! A noise model estimated from the disturbance v alone.
 
 use hoid_model::polynomial::reflected_inside;
 
@@ -39,7 +39,7 @@ pub(crate) fn noise_model(v: &[Vec<f64>], nc: usize, nd: usize) -> (Vec<f64>, Ve
 }
 
 /// Returns the coefficients of the regression of the first signal on lagged signals, given as (index of the signal,
-/// lag), over the rows from `first` on.
+/// lag), over the samples from `first` on of all records; `None` if the regression is singular.
 fn lagged_regression<const K: usize>(
     records: &[[&[f64]; K]],
     lags: &[(usize, usize)],

@@ -357,9 +357,9 @@ pub fn choose_orders_with(
         starts: 1,
         ..template.clone()
     };
-    // Delays are fitted in blocks: within a block, each delay starts from the result of the previous delay. The blocks
-    // do not depend on the number of threads and the results are collected by index, so that the table does not depend
-    // on the number of threads either.
+    // Candidates that differ only in the delay are fitted in blocks of consecutive delays: each fit starts from the
+    // result for the previous delay in the block. The blocks do not depend on the number of threads and the results are
+    // collected by index, so that the table does not depend on the number of threads either.
     let delays = ranges.nk.clone().count();
     let blocks: Vec<&[Orders]> = combinations
         .chunks(delays)
@@ -390,10 +390,11 @@ pub fn choose_orders_with(
     })
 }
 
-/// Number of delays in a block, each fitted from the result of the previous one.
+/// Number of delays in a block; within a block, each fit starts from the result for the previous delay.
 const BLOCK_SIZE: usize = 12;
 
-/// Fits orders that differ only in the delay, each starting from the coefficients of the previous fit.
+/// Fits candidates that differ only in the delay. Each search starts from the coefficients of the previous fit; if it
+/// does not converge, it is repeated with automatic starts.
 fn fit_neighbours(
     quick: &Estimator,
     block: &[Orders],
@@ -493,8 +494,8 @@ pub fn default_delay_range(sample_time: hoid_model::SampleTime) -> RangeInclusiv
     sample_time.nk(0.05)..=sample_time.nk(0.6)
 }
 
-/// Returns the orders that represent an operator, with the default ranges of the command line: nk is searched, and for
-/// Box-Jenkins also nd from 1 to 4.
+/// Returns the orders that represent an operator, with the default ranges of the command line: nk is searched if there
+/// is an input, and for Box-Jenkins also nd from 1 to 4.
 pub fn default_operator_ranges(structure: Structure, sample_time: hoid_model::SampleTime) -> OrderRanges {
     let mut ranges = OrderRanges::from(structure.operator_orders(1));
     if structure.has_input() {

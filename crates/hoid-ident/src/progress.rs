@@ -1,7 +1,7 @@
 //! Progress of a fit, reported to a caller that waits for the fit.
 //!
 //! A fit of several forms or orders takes seconds if the records are long or numerous. The fit reports the number of
-//! finished items; without a watcher this costs nothing.
+//! finished items; without a watcher the reports cost practically no time.
 
 use std::{
     cell::RefCell,
@@ -28,7 +28,7 @@ thread_local! {
     static WATCHER: RefCell<Option<Watcher>> = const { RefCell::new(None) };
 }
 
-/// Runs `work` and passes every progress report of this thread to the watcher.
+/// Runs `work`, passes every progress report of this thread to the watcher, and returns the result of `work`.
 pub fn watched<T>(watcher: impl Fn(Step) + Send + Sync + 'static, work: impl FnOnce() -> T) -> T {
     /// Restores the previous watcher when dropped, also after a panic.
     struct Before(Option<Watcher>);
@@ -43,7 +43,7 @@ pub fn watched<T>(watcher: impl Fn(Step) + Send + Sync + 'static, work: impl FnO
 
 /// Reports the number of finished items to the watcher of this thread.
 pub(crate) fn step(what: &'static str, done: usize, total: usize) {
-    // Cloned out of the cell first, because the watcher may itself run a fit.
+    // The watcher is cloned out of the cell first, because it may itself run a fit.
     let watcher = WATCHER.with_borrow(Clone::clone);
     if let Some(watcher) = watcher {
         watcher(Step { what, done, total });

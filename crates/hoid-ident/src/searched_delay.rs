@@ -1,22 +1,23 @@
 //! Contribution of a searched delay to the error bars of a fit.
 //!
 //! A searched nk is estimated from the data like theta, and theta depends on it. The residual also has a derivative
-//! with respect to the delay. With the response of the model `x = (D/C) w = sum_j b_j psi_bj`, this is
-//! `d(t) = -d eps/d tau = (x(t-1) - x(t+1))/(2 Ts)`, a central difference, for which x(t+1) is known one sample ahead.
-//! With `G = psi' psi` the estimate of theta depends on the delay with the slope
+//! with respect to the delay tau. With the filtered response of the model `x = (D/C) w = sum_j b_j psi_bj`, this
+//! derivative is computed by central differences, `d(t) = -d eps/d tau = (x(t-1) - x(t+1))/(2 Ts)`. With `G = psi' psi`
+//! the estimate of theta depends on the delay with the slope
 //!
 //! `s = d theta/d tau = -G^-1 psi' d`
 //!
 //! and the component of `d` orthogonal to psi determines the delay:
-//! `var tau = sigma^2/(d'd - d' psi G^-1 psi' d) + Ts^2/12`. The first term is the corner element of the inverse
-//! information of theta and tau together (L. Ljung, *System Identification*, 1999, section 9.4). The second term is due
-//! to the integer nk (W. F. Sheppard, *Proc. London Math. Soc.* 29 (1898) 353-380). The variance is limited to that of
-//! a uniform distribution over the searched range. The covariance of theta becomes `P + s s' var tau`, and a quantity
-//! with the gradient g with respect to theta and the derivative h with respect to the delay has the variance
+//! `var tau = sigma^2/(d'd - d' psi G^-1 psi' d) + Ts^2/12`. The first term is sigma^2 times the diagonal element for
+//! tau of the inverse information matrix of theta and tau together (L. Ljung, *System Identification*, 1999, section
+//! 9.4). The second term is due to the integer nk (W. F. Sheppard, *Proc. London Math. Soc.* 29 (1898) 353-380). The
+//! variance is limited to that of a uniform distribution over the searched range. The covariance of theta becomes
+//! `P + s s' var tau`, and a quantity with the gradient g with respect to theta and the derivative h with respect to
+//! the delay has the variance
 //!
 //! `g' P g + (g' s + h)^2 var tau`.
 //!
-//! The two terms of `g' s + h` partly cancel in the frequency response: a longer delay is compensated by a faster
+//! For the frequency response, the two terms of `g' s + h` partly cancel: a longer delay is compensated by a faster
 //! neuromuscular system.
 
 use hoid_model::Record;
@@ -103,7 +104,7 @@ impl Fit {
     }
 }
 
-/// Computes `-d eps/d tau` from the columns of psi for the coefficients of B.
+/// Returns `-d eps/d tau`, computed from the columns of psi for the coefficients of B.
 fn along_the_delay(b: &[f64], of_b: &[Vec<f64>], sample_time_s: f64) -> Vec<f64> {
     let n = of_b.first().map_or(0, Vec::len);
     let x = |t: usize| -> f64 { b.iter().zip(of_b).map(|(b, column)| b * column[t]).sum() };

@@ -1,12 +1,12 @@
-//! Polynomial models with several inputs.
+//! Polynomial models with several inputs, fitted by the prediction error method.
 //!
 //! `A(q) u(t) = sum_i (B_i(q)/F_i(q)) q^-nk_i x_i(t) + (C(q)/D(q)) eps(t)`
 //!
-//! by the prediction error method (L. Ljung, *System Identification*, 1999, section 4.2, eq. 4.35): ARX, FIR, ARMAX,
-//! ARARX, ARARMAX, output error, Box-Jenkins and the general structure, with nb, nf and nk for each input. FIR and ARX
-//! are linear in theta and solved in one step. The other structures start from a high-order ARX model: its response to
-//! each input alone is nearly free of noise, and B and F of that input are fitted to this response as to a record with
-//! one input.
+//! Source: L. Ljung, *System Identification*, 1999, section 4.2, eq. 4.35. The structures are ARX, FIR, ARMAX, ARARX,
+//! ARARMAX, output error, Box-Jenkins and the general structure, with nb, nf and nk for each input. FIR and ARX are
+//! linear in theta and solved in one step. The other structures start from a high-order ARX model: its response to each
+//! input alone is nearly free of noise, and B and F of that input are fitted to this response as to a record with one
+//! input.
 //!
 //! ```
 //! use hoid_ident::several_inputs::{InputOrders, SeveralInputs};
@@ -52,10 +52,10 @@ use crate::{
     optimize::{Linearisation, Minimum, Objective, minimise},
 };
 
-/// Maximum number of coefficients that A and each B of the high-order model have in addition to the orders of the
+/// Maximum number of coefficients that A and each B of the high-order ARX model have in addition to the orders of the
 /// fitted model.
 const HIGH_ORDER: usize = 12;
-/// Relative increase of the normal matrix diagonal in the high-order model.
+/// Relative increase of the diagonal of the normal matrix in the regression for the high-order ARX model.
 const RIDGE: f64 = 1e-8;
 /// Order of the autoregression that estimates the innovations for the start of C.
 const LONG: usize = 24;
@@ -218,7 +218,7 @@ impl SeveralInputs {
     ) -> Option<SeveralInputsFit> {
         let mut at = criterion.linearise(&vec![0.0; criterion.parameters()], &mut Workspace::of_thread());
         let theta = at.solution(ridge)?;
-        // Not below the rounding error of such a regression.
+        // The sum of squares must not be smaller than the rounding error of this regression.
         let squares = (at.sum_of_squares - dot(&theta, &at.descent)).max(1e-12 * at.sum_of_squares);
         at.sum_of_squares = squares;
         Some(self.assembled(criterion, sample_time, (theta, DIRECT), &at))
@@ -295,7 +295,7 @@ impl SeveralInputs {
         all
     }
 
-    /// Returns the criterion with these orders; `of` returns the orders of each further input.
+    /// Returns the criterion for these orders of A, B, C, D and F; `of` returns the orders of each further input.
     fn criterion<'a>(
         &self,
         records: &'a [Record],
@@ -448,7 +448,7 @@ impl SeveralInputs {
         Ok(all)
     }
 
-    /// Returns the start of a structure with A and no F: an ARX model, with the coefficients of C and D zero.
+    /// Returns the start of a structure with A and no F: an ARX model, with the coefficients of C and D set to zero.
     fn start_with_a(&self, records: &[Record], workspace: &mut Workspace) -> Result<Vec<f64>, IdentError> {
         let arx = Orders {
             nc: 0,
@@ -468,7 +468,8 @@ impl SeveralInputs {
         Ok(self.theta_of(a, &systems, &vec![0.0; self.nc + self.nd]))
     }
 
-    /// Estimates C and D for the part of u that the inputs do not explain.
+    /// Returns the coefficients of C and D for the part `left` of u that the inputs do not explain; zero if they cannot
+    /// be estimated.
     fn noise(&self, left: &[Vec<f64>]) -> Vec<f64> {
         let none = || vec![0.0; self.nc + self.nd];
         if self.nc == 0 {

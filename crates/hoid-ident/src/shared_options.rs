@@ -1,4 +1,5 @@
-//! Options shared by several batch estimators. Each option is defined once, for a given field of the estimator.
+//! Options shared by several batch estimators. Each option is defined once, for any estimator with the corresponding
+//! field.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
@@ -27,7 +28,7 @@ const fn or_auto<const N: usize, const M: usize>(names: [&'static str; N]) -> [&
     all
 }
 
-/// Mutable access to a field of an estimator.
+/// Function that returns a mutable reference to a field of an estimator.
 pub type Field<E, T> = fn(&mut E) -> &mut T;
 
 /// Returns the option for the type of noise model of an operator; this option also determines which estimator is used.
@@ -74,7 +75,7 @@ pub fn neuromuscular<E: 'static>(field: Field<E, bool>) -> BatchOption<E> {
     })
 }
 
-/// Returns `yes` or `no`.
+/// Returns `yes` for true and `no` for false.
 pub fn yes_words(yes: bool) -> String {
     if yes { "yes" } else { "no" }.to_owned()
 }
@@ -179,7 +180,7 @@ pub fn constraints<E: 'static>(
     ]
 }
 
-/// Read access to the constraints of an estimator.
+/// Function that returns the constraints of an estimator.
 pub type Constraints<E> = fn(&E) -> &BTreeMap<String, Constraint>;
 
 fn constrain(

@@ -10,8 +10,8 @@ use crate::{Fit, Reason};
 const DIGITS: i32 = 5;
 
 impl fmt::Display for Fit {
-    /// Formats title, parameters with standard errors (one row each), loss, criteria, and the termination of the
-    /// search.
+    /// Formats the title, the parameters with standard errors (one row each), the loss, the criteria, and the
+    /// termination of the search.
     ///
     /// ```
     /// # use hoid_ident::Estimator;

@@ -96,7 +96,7 @@ pub enum IoError {
         found: String,
         /// The known extensions.
         expected: String,
-        /// Remedy such as "; unpack it first"; empty if none is known.
+        /// Remedy, such as "; unpack it first"; empty if none is known.
         remedy: String,
     },
     /// Contents that are not text.
@@ -388,9 +388,9 @@ pub enum IoError {
         file: String,
         /// Place of the row before the first gap.
         place: String,
-        /// Time in this row, s.
+        /// Time in the row before the first gap, s.
         after_s: f64,
-        /// Time in the row after the gap, s.
+        /// Time in the row after the first gap, s.
         next_s: f64,
         /// Number of samples missing in the first gap.
         missing: u64,
@@ -408,9 +408,9 @@ pub enum IoError {
         file: String,
         /// Place of the row with the largest deviation.
         place: String,
-        /// Time in this row, s.
+        /// Time in the row with the largest deviation, s.
         found: f64,
-        /// Deviation from the grid, s.
+        /// Deviation of this time from the grid, s.
         deviation_s: f64,
         /// Largest permitted deviation, s.
         tolerance_s: f64,
@@ -424,9 +424,9 @@ pub enum IoError {
     ResampledTooLong {
         /// Name of the file.
         file: String,
-        /// First time, s.
+        /// First time of the record, s.
         start_s: f64,
-        /// Last time, s.
+        /// Last time of the record, s.
         end_s: f64,
         /// Number of samples after resampling.
         samples: f64,
@@ -601,7 +601,7 @@ pub enum IoError {
 /// Returns the remedy for a file that cannot be written.
 fn remedy_of_writing(source: &std::io::Error) -> &'static str {
     use std::io::ErrorKind;
-    // The CSV writer wraps the I/O error.
+    // An I/O error inside an error of the CSV writer determines the remedy.
     let wrapped = source.get_ref().and_then(|inner| inner.downcast_ref::<csv::Error>());
     let kind = match wrapped.map(csv::Error::kind) {
         Some(csv::ErrorKind::Io(inner)) => inner.kind(),

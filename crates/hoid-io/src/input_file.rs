@@ -1,4 +1,4 @@
-//! Reading of whole files other than recordings (text, settings of limited length, bytes), and the file names in a
+//! Reading of whole files that are not recordings (texts, settings of limited length, bytes), and the file names in a
 //! directory.
 
 use std::fs;
@@ -19,7 +19,7 @@ pub fn read_text(path: &Path) -> Result<String, IoError> {
     })
 }
 
-/// Reads the text of a settings file, whose length is limited to bound the memory.
+/// Reads the text of a settings file, whose length is limited so that parsing it takes little memory.
 ///
 /// # Errors
 /// [`IoError::Unreadable`] for errors reported by the operating system, and for a file that is too long.

@@ -2,8 +2,8 @@
 //!
 //! Recordings are in CSV, Parquet, NPZ, MATLAB or XDF format, with columns of any name, clocks with jitter, and missing
 //! rows. Reading selects the requested columns, determines the sampling, checks every value in use, and returns an
-//! evenly sampled [`Record`](hoid_model::Record), or an error with its position in the file. Data are repaired only on
-//! request; problems of the data are reported with the record.
+//! evenly sampled [`Record`](hoid_model::Record), or an error with its place in the file. Data are repaired only on
+//! request; problems with the data are reported with the record.
 //!
 //! ```
 //! use hoid_io::{ReadOptions, read_record};
@@ -29,7 +29,7 @@
 //! | `time` | [`TimeChoice`]: choice of the time column; [`even_times`]: check that the times are evenly spaced |
 //! | `record` | [`read_record`], [`read_aligned`], [`read_segments`] with [`ReadOptions`]; [`write_record`] |
 //! | `preparation` | [`Preparation`]: scale, offset, rate, run-in and trend of channels, and the list of applied steps |
-//! | `data_quality` | [`QualityIssue`]: problems of the sampling and the values, with their location and size |
+//! | `data_quality` | [`QualityIssue`]: problems with the sampling and the values, with their location and size |
 //! | `survey` | [`survey()`]: overview of the contents of a file |
 //! | `scenario` | [`read_scenario`]: scenarios in TOML |
 //! | [`fmu`] | functional mock-up units |

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use crate::table::{control_among, error_among};
 
-/// Maximum length in characters of a cell in a message.
+/// Maximum length, in characters, of a cell quoted in a message.
 const SHOWN: usize = 40;
 
 /// Formats a cell or a name for a message: shortened, and without terminal control characters.
@@ -26,10 +26,11 @@ pub(crate) fn start_of(bytes: &[u8]) -> String {
     format!("it starts with \"{}\"", String::from_utf8_lossy(start).escape_debug())
 }
 
-/// Maximum length in characters of a column name in a message.
+/// Maximum length, in characters, of a column name in a message.
 const NAMED: usize = 80;
 
-/// Formats a column name for a message: only its length and terminal control characters are changed.
+/// Formats a column name for a message: a long name is shortened, and control characters are escaped; nothing else is
+/// changed.
 pub(crate) fn named(name: &str) -> String {
     let mut text = String::with_capacity(name.len().min(4 * NAMED));
     for (at, character) in name.chars().enumerate() {
@@ -107,8 +108,8 @@ pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
     }
 }
 
-/// Returns the column that holds the requested signal under another name: the error for `e` or `error`, the control for
-/// `u` or `stick`.
+/// Returns the column that holds the requested signal under another name: if `e` or `error` is requested, the column of
+/// the error; if `u` or `stick` is requested, that of the control.
 fn by_role(asked: &str, names: &[&str]) -> Option<String> {
     let default = match (error_among(&[asked]), control_among(&[asked])) {
         (Some(_), _) => error_among(names),

@@ -51,7 +51,7 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// Returns the result as text for the page.
+    /// Returns the names and values of the results as text for the page.
     pub fn rows(&self) -> Vec<(String, String)> {
         let ms = 1e3;
         vec![

@@ -82,7 +82,7 @@ pub struct Limits {
 }
 
 impl Default for Limits {
-    /// Both limits are 100 ms, which is six frames at 60 Hz, or half of the delay of a typical operator.
+    /// Returns limits of 100 ms, which is six frames at 60 Hz, or half of the delay of a typical operator.
     fn default() -> Self {
         Self {
             frame_ms: 100.0,
@@ -134,7 +134,7 @@ pub struct Condition {
     pub half_width: f64,
     /// Display of the task.
     pub display: Display,
-    /// Time for which the future target is displayed ahead, s.
+    /// Length of the preview, s: the display shows the target up to this time ahead.
     pub preview_s: f64,
     /// u at full deflection of the device.
     pub full_deflection: f64,
@@ -156,8 +156,8 @@ pub struct Signal {
     pub largest: u32,
     /// Root mean square of the signal.
     pub rms: f64,
-    /// Which of the prime multiples it has. Where the display shows the target, target and disturbance need lines of
-    /// their own: `even` for one of them and `odd` for the other.
+    /// Choice of the prime multiples that the signal contains. If the display shows the target, target and disturbance
+    /// need lines of their own: `even` for one of them and `odd` for the other.
     #[serde(skip_serializing_if = "is_all")]
     pub interleaved: Interleaved,
 }
@@ -167,7 +167,7 @@ fn is_all(interleaved: &Interleaved) -> bool {
 }
 
 impl Default for Signal {
-    /// Period of 20 s, multiples up to 31, root mean square 1.5.
+    /// Returns a signal with a period of 20 s, multiples up to 31 and a root mean square of 1.5.
     fn default() -> Self {
         let default = MultiSine::default();
         Self {
@@ -180,7 +180,7 @@ impl Default for Signal {
 }
 
 impl Default for Condition {
-    /// Compensatory tracking with rate control (4/s), 80 s long after a run-in of 10 s.
+    /// Returns a condition with compensatory tracking and rate control (4/s), 80 s long after a run-in of 10 s.
     fn default() -> Self {
         Self {
             name: "rate".to_owned(),
@@ -220,7 +220,7 @@ and no sound. You may stop at any time with the Escape key or by closing the win
 with its folder. Do not take part if moving patterns make you unwell.";
 
 impl Default for Config {
-    /// A single run of about two minutes for trying out the lab.
+    /// Returns a configuration with a single run of about two minutes for trying out the lab.
     fn default() -> Self {
         Self {
             name: "First try".to_owned(),
@@ -335,7 +335,8 @@ impl Condition {
         Ok(())
     }
 
-    /// Role of the target for the person, as a role of hoid identify; `None` if the display shows the error only.
+    /// Returns the role of the target for the person, as a role of `hoid identify`; `None` if the display shows the
+    /// error only.
     pub(crate) fn role_of_target(&self) -> Option<String> {
         let feedforward = ChannelRole::Feedforward;
         match self.display {

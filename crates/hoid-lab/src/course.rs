@@ -123,7 +123,7 @@ impl TaskDefinition {
             .map(|excitation| !excitation.function.sinusoids().is_empty())
     }
 
-    /// Returns the position of the leading gain.
+    /// Returns the position of the leading gain in the realisation of the controlled element.
     pub fn realisation(&self) -> hoid_model::scenario::Realisation {
         match self {
             Self::Reference(course) => course.scenario().realisation,

@@ -54,7 +54,7 @@ pub enum LabError {
     /// An error in a scenario file.
     #[error(transparent)]
     Scenario(Box<ScenarioFileError>),
-    /// An invalid number.
+    /// An invalid value or signal of a model or a record.
     #[error(transparent)]
     Model(#[from] ModelError),
     /// An estimate that cannot be computed.

@@ -55,7 +55,7 @@ Names follow BIDS where BIDS defines names; it defines none for \
 validator may reject the folder.
 ";
 
-/// Writes the descriptive files that do not exist yet.
+/// Writes `README` and `dataset_description.json` unless they exist.
 ///
 /// # Errors
 /// [`LabError::Io`].
@@ -100,7 +100,8 @@ pub fn list(out: &Path) -> Result<(), LabError> {
     write(&out.join("participants.tsv"), &text)
 }
 
-/// Writes the manifest of all finished runs except unverified runs and training runs. Writes nothing if no run remains.
+/// Writes the manifest of all finished runs, in which unverified runs and training runs are marked as not analysed.
+/// Writes nothing if no run remains to be analysed.
 ///
 /// # Errors
 /// Errors of reading or writing files.

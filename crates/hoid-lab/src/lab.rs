@@ -194,7 +194,7 @@ impl Lab {
         if state.person == Some(id) {
             state.person = None;
             state.ready = None;
-            // If the files of the run cannot be completed, the session reports this when it is next opened.
+            // If the files of the run cannot be completed now, the run is closed when the session is next opened.
             let _ = self.shared.end_run(&mut state, RunEnd::Interrupted, BTreeMap::new());
             let left = self.shared.newest_person();
             if let Some(newest) = left {
@@ -248,7 +248,7 @@ impl Lab {
         Ok(Some((export::archive(&self.shared.out, &folder)?, "application/zip")))
     }
 
-    /// Returns the signals of a run, requested by a name such as `3.json`; `None` if there is no such run.
+    /// Returns the data for replaying a run, requested by a name such as `3.json`; `None` if there is no such run.
     ///
     /// # Errors
     /// Errors of reading files.

@@ -63,7 +63,7 @@ struct Span {
     record: Record,
 }
 
-/// The fits of one run.
+/// Repeated fits of the lag during one run.
 pub struct LagFits {
     spans: Sender<Span>,
     found: Receiver<(f64, Lag)>,

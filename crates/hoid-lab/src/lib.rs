@@ -2,7 +2,7 @@
 //!
 //! The page simulates the controlled element in steps of 1 ms from tables computed by this crate. It logs every input
 //! event, tick and frame, and sends them in batches. This crate appends the batches to the folder of the session,
-//! passes them to the tracker, and after the run recomputes them to the last bit.
+//! passes them to the tracker, and after the run recomputes every tick to the last bit.
 //!
 //! | module | contents |
 //! |---|---|

@@ -32,7 +32,7 @@ use crate::{
     task::{TICK_S, TICKS_PER_SAMPLE},
 };
 
-/// Initial delay of a method, in samples of 10 ms.
+/// Dead time n_k with which a method starts, in samples of 10 ms.
 const DEFAULT_NK: usize = 21;
 /// Frequency range in rad/s of the search for the crossover, and the number of its logarithmically spaced steps.
 const CROSSOVERS: (f64, f64, usize) = (0.3, 15.0, 40);
@@ -162,7 +162,7 @@ fn reported(estimate: Estimate) -> ReportedValue {
 }
 
 /// Returns the crossover frequency in rad/s and the phase margin in degrees, with first-order standard errors; `None`
-/// if `|L|` does not cross one from above.
+/// if `|L|` does not fall below one within the range of [`CROSSOVERS`].
 fn crossover(
     response: &dyn Fn(f64) -> Option<Response>,
     element: &ContinuousTransferFunction,
@@ -219,8 +219,8 @@ fn crossover(
     ))
 }
 
-/// Starts the thread of a run. It processes samples until the returned sender is dropped, passes each line to `tell`
-/// and appends it to `live.csv`.
+/// Starts the thread of the live estimate of a run. The thread processes samples until the returned sender is dropped,
+/// passes each line of estimates to `tell` and appends it to `live.csv`.
 pub fn start(mut run: LiveRun, stem: &Stem, tell: impl Fn(&LiveLine) + Send + 'static) -> Sender<Samples> {
     let (sender, receiver): (Sender<Samples>, Receiver<Samples>) = channel();
     let path: PathBuf = stem.file("live.csv");

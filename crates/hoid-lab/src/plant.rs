@@ -25,7 +25,7 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// Number of states.
+    /// Returns the number of states.
     pub fn order(&self) -> usize {
         self.b.len()
     }

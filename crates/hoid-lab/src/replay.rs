@@ -38,7 +38,7 @@ pub fn data(stem: &Stem) -> Result<Vec<u8>, LabError> {
     serde_json::to_vec(&data).map_err(|error| LabError::damaged(&stem.file("beh.parquet"), error.to_string()))
 }
 
-/// Rounds to six significant digits, which suffice for display.
+/// Rounds to six decimal places, which suffice for display.
 fn rounded(values: &[f64]) -> Vec<f64> {
     values.iter().map(|v| (v * 1e6).round() / 1e6).collect()
 }

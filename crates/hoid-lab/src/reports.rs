@@ -30,11 +30,11 @@ impl Pages {
     }
 }
 
-/// Commands run for each run; each writes to a folder with its name.
+/// Commands that are executed for each run; each command writes to a folder with its name.
 const COMMANDS: [&str; 3] = ["identify", "track", "describe"];
 
-/// Creates the pages of all finished runs that have none, then the pages of the group; `each` is called after every
-/// page.
+/// Creates the missing pages of all finished runs except training runs, then the page of the group; `each` is called
+/// after every page of a run.
 pub fn make(program: &Path, out: &Path, folder: &Path, each: &dyn Fn(&Pages)) -> Pages {
     let Ok(session) = Session::read(folder) else {
         return Pages::default();
@@ -170,8 +170,8 @@ pub fn found(folder: &Path) -> Pages {
     Pages(pages)
 }
 
-/// Returns a file of these pages with its media type; `None` if the name is not valid. Names may contain letters,
-/// digits, `-`, `_` and dots, but no leading dot, so that no name refers to a file outside its folder.
+/// Returns a file of the pages with its media type; `None` if a name is not valid or the file does not exist. Names may
+/// contain letters, digits, `-`, `_` and dots, but no leading dot, so that no name refers to a file outside its folder.
 ///
 /// # Errors
 /// Errors of reading the files.

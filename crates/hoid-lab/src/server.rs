@@ -1,9 +1,9 @@
 //! The server of the page: HTTP on 127.0.0.1, and WebSockets for the pages.
 //!
-//! The server provides one page, its data and the pages of results, to authorised clients only. The address contains a
-//! random token. A request is accepted only if its `Host` is the address of the server, if its `Origin`, when present,
-//! is also that address, and if it is a GET request of limited length. A request for a socket must have an origin. No
-//! message from a page contains a file name.
+//! The server provides one page, its data and the pages of results, to authorised clients only. The path of each
+//! request starts with a random token. A request is accepted only if its `Host` is the address of the server, if its
+//! `Origin`, when present, is also that address, and if it is a GET request of limited length. A request for a socket
+//! must have an origin. No message from a page contains a file name.
 //!
 //! | refused request | status |
 //! |---|---|
@@ -42,13 +42,13 @@ use http::{Reply, Request};
 const QUEUE: i32 = 4096;
 /// Maximum number of simultaneous connections with the token.
 const KNOWN: usize = 64;
-/// Timeout for reading from and writing to such a connection.
+/// Timeout for reading from and writing to an authorised connection.
 const IO_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// The page, built from `page/` by `npm run build`.
 const PAGE: &str = include_str!("../page/dist/lab.html");
 
-/// A server that listens.
+/// A server that listens on a port of 127.0.0.1.
 pub struct Server {
     listener: TcpListener,
     address: SocketAddr,

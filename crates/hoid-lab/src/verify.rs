@@ -10,8 +10,8 @@
 //! | `lab-log` | a file of the log is missing, truncated or invalid; its complete part is still used |
 //! | `lab-input` | u at a tick does not match the input events |
 //! | `lab-tick` | e at a tick differs in at least one bit from the e computed with the controlled element |
-//! | `lab-event` | an event took effect before its time stamp, or too late |
-//! | `lab-frame` | a frame was too late, or did not show the tick logged for it |
+//! | `lab-event` | an event took effect before its time stamp, too late, or out of sequence |
+//! | `lab-frame` | a frame was late, did not show the tick that was due, or showed another e than that of its tick |
 //! | `lab-changed` | a file was changed after the end of the run |
 //!
 //! u and e are compared bit by bit, except for the sign of zero, which is not preserved in text. e is recomputed from
@@ -31,7 +31,7 @@ use crate::{
 
 /// Largest relative difference in a table that may be due to different sine functions.
 const TABLE: f64 = 1e-9;
-/// A frame counts as missed if the interval between frames exceeds the typical one by this factor.
+/// A frame counts as missed if the interval between frames exceeds the typical interval by this factor.
 const MISSED_FRAME_RATIO: f64 = 1.5;
 
 /// Result of the verification of a run.
@@ -48,7 +48,7 @@ pub struct Checked {
 pub struct Measures {
     /// Number of ticks in the log.
     pub ticks: usize,
-    /// Frames.
+    /// Number of frames in the log.
     pub frames: usize,
     /// Median interval between frames, ms.
     pub frame_ms: f64,
@@ -214,7 +214,8 @@ fn errors_of(task: &Task, logged: &Logged) -> Option<Finding> {
     })
 }
 
-/// Returns the first index at which two signals differ in a bit, and the number of differences.
+/// Returns the first index at which two signals differ in a bit, and the number of differences; `None` if they are
+/// equal.
 fn differing(made: &[f64], logged: &[f64]) -> Option<(usize, usize)> {
     // Adding zero turns minus zero into zero.
     let differ = |(a, b): (&f64, &f64)| (a + 0.0).to_bits() != (b + 0.0).to_bits();
@@ -284,8 +285,8 @@ fn files_of(stem: &Stem, ended: &Ended) -> Result<Option<Finding>, LabError> {
     }))
 }
 
-/// Adds notes if input events came from a program or the time from another clock; such runs may nevertheless be
-/// verified.
+/// Returns notes if a program made input events or the time did not come from the browser; such runs may nevertheless
+/// be verified.
 fn input_findings(begun: &RunStart, ended: &Ended) -> Vec<Finding> {
     let made = ended.counted.get("synthetic_events").copied().unwrap_or(0.0);
     let mut notes = Vec::new();
@@ -329,7 +330,7 @@ fn measures(begun: &RunStart, task: &Task, logged: &Logged) -> Measures {
     let e = e.get(..task.ticks).unwrap_or(e);
     let measured = |e: &[f64]| rms(e.get(begun.run_in..).unwrap_or_default());
     let rms_e = measured(e);
-    // Simulation without control.
+    // The loop is simulated without control.
     let rest = task.run(&vec![0.0; e.len()]);
     let rms_forcing = measured(&rest.e);
     Measures {

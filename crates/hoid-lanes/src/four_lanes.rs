@@ -1,15 +1,16 @@
 //! Four numbers in one or two registers.
 //!
 //! A sum over a record is a recursion: each term has to wait for the sum of the preceding terms. Four partial sums,
-//! each over every fourth term, are independent of each other. Their number is four for all registers, since it
-//! determines the last digits of the sum. With AVX2 four numbers fill one register, otherwise two. Products and sums
-//! act on each number separately, without contraction, so all registers give bit-identical results.
+//! each over every fourth term, are independent of each other. There are four partial sums for all registers, since
+//! their number determines the last digits of the sum. With AVX2 four numbers fill one register; without it they fill
+//! two. Products and sums act on each number separately, without contraction, so all registers give bit-identical
+//! results.
 
 use std::ops::{Add, Mul, Sub};
 
 use crate::instruction_set::InstructionSet;
 
-/// Four numbers with lane-wise operations.
+/// Four numbers, with operations that act on each of them separately.
 pub trait FourLanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     /// Returns the same number in all four lanes.
     fn splat(self, value: f64) -> Self;
@@ -23,13 +24,13 @@ pub trait FourLanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output
 pub trait FourLaneTask {
     /// Result of the computation.
     type Output;
-    /// Runs the computation with numbers of the type of `zero`.
+    /// Runs the computation with numbers of the same type as `zero`.
     ///
     /// Mark this function, and all functions that it calls at every sample, as `#[inline(always)]`.
     fn run<F: FourLanes>(self, zero: F) -> Self::Output;
 }
 
-/// Registers that every processor of the compilation target has.
+/// Four numbers in the registers that every processor of the compilation target has.
 impl FourLanes for wide::f64x4 {
     #[inline(always)]
     fn splat(self, value: f64) -> Self {
@@ -126,7 +127,8 @@ pub fn with_four_lanes<T: FourLaneTask>(task: T) -> T::Output {
 }
 
 impl InstructionSet {
-    /// Runs a task like [`with_four_lanes`], but in these registers; `None` if this processor does not have them.
+    /// Runs a task like [`with_four_lanes`], but in the registers of this instruction set; `None` if the processor does
+    /// not have them.
     ///
     /// Four numbers fill only half of an AVX-512 register, so [`InstructionSet::Avx512`] selects AVX2 here.
     /// [`InstructionSet::Scalar`] selects the registers of a processor with neither AVX2 nor AVX-512.

@@ -1,16 +1,16 @@
-//! Selection of the vector registers, and tasks that run in them.
+//! Selection of the vector registers, and execution of tasks in them.
 
 use pulp::{NullaryFnOnce, Scalar, Simd, WithSimd};
 
 use crate::{number::Number, registers::TwoRegisters};
 
-/// Vector registers in use. All give bit-identical results.
+/// Vector registers to be used. All choices give bit-identical results.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum InstructionSet {
     /// Widest registers of this processor.
     #[default]
     Best,
-    /// One number per register, on any processor.
+    /// One number per register; available on any processor.
     Scalar,
     /// Four numbers per register, on processors with AVX2.
     Avx2,
@@ -22,7 +22,7 @@ pub enum InstructionSet {
 pub trait LaneTask {
     /// Result of the computation.
     type Output;
-    /// Runs the computation with numbers of the type of `zero`.
+    /// Runs the computation with numbers of the same type as `zero`.
     ///
     /// Mark this function, and all functions that it calls at every sample, as `#[inline(always)]`: a function that is
     /// not inlined is compiled for the narrowest registers.
@@ -57,7 +57,7 @@ fn in_registers<T: LaneTask, S: Simd>(simd: S, task: T) -> T::Output {
     simd.vectorize(InRegisters(task, simd))
 }
 
-/// Task for a single run.
+/// Task that processes a single run.
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 struct OneLane<T>(T);
 
@@ -90,12 +90,12 @@ impl InstructionSet {
         all.into_iter().filter(|set| set.lanes().is_some()).collect()
     }
 
-    /// Returns the number of runs computed at a time; `None` if this processor does not have these registers.
+    /// Returns the number of runs computed at a time; `None` if the processor does not support this instruction set.
     pub fn lanes(self) -> Option<usize> {
         self.with_lanes(CountLanes)
     }
 
-    /// Runs a task with one run per lane; `None` if this processor does not have these registers.
+    /// Runs a task with one run per lane; `None` if the processor does not support this instruction set.
     pub fn with_lanes<T: LaneTask>(self, task: T) -> Option<T::Output> {
         match self {
             Self::Best => Some(pulp::Arch::new().dispatch(Dispatched(task))),

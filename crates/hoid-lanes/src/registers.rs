@@ -1,4 +1,4 @@
-//! One number in each lane of two registers.
+//! Numbers in the lanes of two registers, one number in each lane.
 //!
 //! Two registers are used because the result of an operation takes several cycles, while another operation can start in
 //! each cycle: two independent registers hide the latency of a recursion.
@@ -17,7 +17,7 @@ pub(crate) struct TwoRegisters<S: Simd> {
 }
 
 impl<S: Simd> TwoRegisters<S> {
-    /// Number of lanes.
+    /// Number of lanes in both registers.
     const LANES: usize = 2 * S::F64_LANES;
 
     /// Returns the same number in all lanes.

@@ -1,7 +1,7 @@
 //! The controlled element.
 //!
-//! `H_CE(s) = K_c / (s (s + omega_b))` (eq. 4): an integrator below the break frequency omega_b, and a double
-//! integrator above.
+//! `H_CE(s) = K_c / (s (s + omega_b))` (eq. 4): approximately an integrator below the break frequency omega_b, and a
+//! double integrator above it.
 
 use crate::{ModelError, transfer_function::ContinuousTransferFunction};
 

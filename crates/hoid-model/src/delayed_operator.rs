@@ -6,14 +6,15 @@
 //! is the same as in [`crate::operator`].
 //!
 //! The model is linear in K_e and K_e_dot. Its response is a continuous function of tau with a kink wherever tau is an
-//! integer number of samples, because the step response starts with the slope `omega^2 K_e_dot`. At such a delay, the
-//! derivatives are those for increasing tau.
+//! integer number of samples, because the step response starts with the slope `omega^2 K_e_dot`. If tau is an integer
+//! number of samples, the derivatives are those for increasing tau.
 
 use hoid_core::held_operator::held_operator_delayed;
 
 use crate::{ModelError, OperatorParameters, SampleTime};
 
-/// The operator with any delay after a zero-order hold: `q^-nk (b0 + b1 q^-1 + b2 q^-2) / (1 + f1 q^-1 + f2 q^-2)`.
+/// Operator with a delay of any length, after a zero-order hold:
+/// `q^-nk (b0 + b1 q^-1 + b2 q^-2) / (1 + f1 q^-1 + f2 q^-2)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DelayedOperator {
     /// Delay of b0 in samples: the number of whole samples in tau_e plus the one-sample delay of the hold.
@@ -24,7 +25,8 @@ pub struct DelayedOperator {
     pub f: [f64; 2],
 }
 
-/// Names of the parameters, in the order of every array in this module. The units are deg/deg, s, rad/s, 1 and s.
+/// Names of the five parameters, in the order of every array of parameters in this module. The units are deg/deg, s,
+/// rad/s, 1 and s.
 pub const DELAYED_NAMES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 
 /// Largest distance from an integer number of samples, in samples, that is attributed to rounding; for example,
@@ -42,22 +44,23 @@ pub fn delayed_parameters(operator: &OperatorParameters) -> [f64; 5] {
     ]
 }
 
-/// Returns the exact discrete model of `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` for an error held over each sample.
+/// Returns the exact discrete model of the operator with the parameters `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`, for
+/// an error held over each sample.
 ///
 /// # Errors
 /// [`ModelError::OutOfRange`] if a parameter is not finite, omega_nm is not positive, the delay is negative, or a
-/// coefficient is not finite (a pole so fast that its exponential overflows).
+/// coefficient is not finite (because a pole is so fast that its exponential overflows).
 pub fn delayed_operator(parameters: [f64; 5], sample_time: SampleTime) -> Result<DelayedOperator, ModelError> {
     let whole_samples = whole_samples(parameters[4], sample_time)?;
     delayed_operator_within(whole_samples, parameters, sample_time)
 }
 
-/// As [`delayed_operator`], for a given number l of whole samples in the delay. Both ends of
+/// As [`delayed_operator`], for a given number l of whole samples in the delay. Both ends of the interval
 /// `l Ts <= tau <= (l + 1) Ts` are included, so that the model and its derivatives are smooth functions of tau over the
 /// whole interval.
 ///
 /// # Errors
-/// As [`delayed_operator`]; also if tau_e is outside this interval.
+/// As [`delayed_operator`]; also [`ModelError::OutOfRange`] if tau_e is outside this interval.
 pub fn delayed_operator_within(
     whole_samples: usize,
     parameters: [f64; 5],
@@ -137,7 +140,8 @@ pub fn whole_samples(tau_e_s: f64, sample_time: SampleTime) -> Result<usize, Mod
     Ok(if near { nearest } else { samples.floor() } as usize)
 }
 
-/// Checks the parameters and returns `delta = tau - l Ts` in s, without rounding errors at 0 and Ts.
+/// Checks the parameters and returns `delta = tau - l Ts` in s; a delta that differs from 0 or Ts only by rounding is
+/// set to that value.
 fn fraction(whole_samples: usize, parameters: [f64; 5], sample_time: SampleTime) -> Result<f64, ModelError> {
     let quantities = [
         "error gain K_e",
@@ -166,7 +170,7 @@ fn fraction(whole_samples: usize, parameters: [f64; 5], sample_time: SampleTime)
             expected: "a time within the sample that is requested",
         });
     }
-    // A delta within rounding of 0 or of one sample is set to that value.
+    // If delta equals 0 or one sample up to rounding, it is set to that value.
     Ok(match delta {
         d if d <= rounding => 0.0,
         d if d >= ts - rounding => ts,

@@ -4,8 +4,8 @@ use thiserror::Error;
 
 use crate::UnknownName;
 
-/// The reason why a model, a record or a conversion is not possible. Each message contains the quantity, the value
-/// found, the expected value and, where useful, the remedy.
+/// Reason why a model, a record or a conversion is not possible. Each message contains the quantity, the value found,
+/// the expected value and, where useful, the remedy.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ModelError {
@@ -14,12 +14,12 @@ pub enum ModelError {
     OutOfRange {
         /// Name of the quantity, with its symbol and unit.
         quantity: &'static str,
-        /// The given value.
+        /// Value that was given.
         found: f64,
-        /// The valid range.
+        /// Range of valid values.
         expected: &'static str,
     },
-    /// An unknown name.
+    /// A name that is not one of the available names.
     #[error(transparent)]
     UnknownName(#[from] UnknownName),
     /// A sample that is NaN or infinite.
@@ -27,11 +27,11 @@ pub enum ModelError {
         "channel {channel}: the value at sample {index} is {value}, expected a finite number; remove or repair the sample before identification"
     )]
     NotFinite {
-        /// Name of the channel.
+        /// Name of the channel that contains the sample.
         channel: String,
         /// Index of the sample, from 0.
         index: usize,
-        /// The value found.
+        /// Value of the sample.
         value: f64,
     },
     /// Channels of one record that differ in length.
@@ -49,7 +49,7 @@ pub enum ModelError {
     /// Invalid parameters of an operator.
     #[error("{reason}")]
     Operator {
-        /// The problem.
+        /// Description of the problem.
         reason: String,
     },
     /// A record without a sample.
@@ -61,7 +61,7 @@ pub enum ModelError {
     /// A channel name that is already taken.
     #[error("channel {name} exists already; give each channel its own name")]
     DuplicateChannel {
-        /// The name.
+        /// Name of the channel.
         name: String,
     },
     /// A channel that the record does not have.
@@ -69,17 +69,17 @@ pub enum ModelError {
     NoSuchChannel {
         /// The requested name.
         name: String,
-        /// The available names.
+        /// Names of the channels of the record.
         available: String,
     },
     /// A decimation that is not possible for a record.
     #[error("decimation of {label}: found {found}, expected {expected}")]
     Decimation {
-        /// Label of the record.
+        /// Label of the record, stream or option.
         label: String,
-        /// The value found.
+        /// Value found, such as the factor or the length of the record.
         found: String,
-        /// The expected value.
+        /// Condition that this value does not satisfy.
         expected: String,
     },
     /// Two records that cannot be joined.
@@ -87,9 +87,9 @@ pub enum ModelError {
     Joined {
         /// Label of the second record.
         label: String,
-        /// The differences.
+        /// Differences between the two records.
         found: String,
-        /// The requirements.
+        /// Requirements for joining two records.
         expected: &'static str,
     },
     /// A time span without samples of the record.
@@ -109,15 +109,15 @@ pub enum ModelError {
     Orders {
         /// The orders as given.
         found: String,
-        /// The problem, and the remedy.
+        /// Description of the problem, and the remedy.
         expected: String,
     },
-    /// A transfer function for which the method is not valid.
+    /// A transfer function that is invalid, or to which a method does not apply.
     #[error("transfer function {found}: {expected}")]
     TransferFunction {
         /// The transfer function as given.
         found: String,
-        /// The problem, and the remedy.
+        /// Description of the problem, and the remedy.
         expected: String,
     },
     /// A discrete model without a continuous counterpart.
@@ -129,11 +129,11 @@ pub enum ModelError {
          reachable level is {largest:.4}; request a lower level or use the definition var(u_n)/var(u)"
     )]
     UnreachableNoiseLevel {
-        /// The requested level.
+        /// Requested noise level P_n.
         demanded: f64,
         /// Order of the remnant filter.
         order: usize,
-        /// The noise level in the limit of an infinite gain.
+        /// Noise level in the limit of an infinite gain, which cannot be exceeded.
         largest: f64,
     },
     /// An unstable closed loop, which has no stationary variance and no margins.
@@ -157,7 +157,7 @@ pub enum NotConvertible {
     /// Polynomials that correspond to no operator of the family.
     #[error("the polynomials do not correspond to any operator of the family: {reason}")]
     NotOfTheFamily {
-        /// The problem.
+        /// Description of the problem.
         reason: String,
     },
     /// A pole on the closed negative real axis has no real logarithm.
@@ -166,10 +166,10 @@ pub enum NotConvertible {
          corresponds to the model"
     )]
     NegativeRealPole {
-        /// The pole.
+        /// Value of the pole in z.
         pole: f64,
     },
-    /// `omega_nm^2` would not be positive.
+    /// The square `omega_nm^2` would not be positive.
     #[error(
         "the continuous denominator s^2 + {a1:.4} s + {a2:.3e} has no positive omega_nm^2: the poles are real and lie on both sides of (or at) the origin of s"
     )]
@@ -179,7 +179,7 @@ pub enum NotConvertible {
         /// Constant coefficient of the continuous denominator.
         a2: f64,
     },
-    /// `b0 + b1 = 0`: no response to a constant error, so that T_L = K_e_dot / K_e does not exist.
+    /// `b0 + b1 = 0`: the model does not respond to a constant error, so that T_L = K_e_dot / K_e does not exist.
     #[error("the gain K_e is zero (b0 + b1 = 0), so that the lead time T_L = K_e_dot / K_e does not exist")]
     ZeroGain,
     /// Polynomial orders that differ from those of the operator model.
@@ -201,7 +201,7 @@ pub enum NotConvertible {
     /// A model without delay: after a zero-order hold the delay is at least one sample.
     #[error("nk = 0: a zero-order hold delays by at least one sample, so that tau_e = (nk - 1) Ts would be negative")]
     NoDelay,
-    /// A parameter that is not a finite number.
+    /// A coefficient that is not a finite number.
     #[error("the coefficient {name} is {value}")]
     NotFinite {
         /// Name of the coefficient.
@@ -214,7 +214,7 @@ pub enum NotConvertible {
     NotARemnantFilter {
         /// Order m of the noise polynomial.
         order: usize,
-        /// The problem.
+        /// Description of the problem.
         reason: String,
     },
 }

@@ -4,19 +4,19 @@ use std::fmt;
 
 use crate::numbers::{DASH, with_uncertainty};
 
-/// A number with its standard error; the standard error is `None` if the data do not determine it (a fixed delay, a
-/// singular information matrix).
+/// A number with its standard error; the standard error is `None` if it cannot be determined (for example, for a fixed
+/// delay or a singular information matrix).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Estimate {
-    /// The estimate.
+    /// Estimated value.
     pub value: f64,
     /// Standard error of the estimate.
     pub standard_error: Option<f64>,
 }
 
 impl Estimate {
-    /// Returns an estimate whose error has this variance. A variance that is negative or not finite gives no standard
-    /// error.
+    /// Returns an estimate with the given variance of its error. A variance that is negative or not finite gives no
+    /// standard error.
     pub fn with_variance(value: f64, variance: f64) -> Self {
         Self {
             value,
@@ -24,7 +24,7 @@ impl Estimate {
         }
     }
 
-    /// Returns a number without uncertainty.
+    /// Returns an estimate without a standard error.
     pub fn fixed(value: f64) -> Self {
         Self {
             value,
@@ -34,7 +34,8 @@ impl Estimate {
 }
 
 impl fmt::Display for Estimate {
-    /// Formats `value ± standard error` with two significant digits of the error; without an error, only the value.
+    /// Formats `value ± standard error` with two significant digits of the standard error; without a standard error,
+    /// only the value.
     ///
     /// ```
     /// # use hoid_model::uncertainty::Estimate;

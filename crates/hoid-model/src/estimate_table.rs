@@ -1,7 +1,7 @@
 //! Estimates as a plain text table: name, value ± standard error, unit.
 //!
-//! The standard error determines the digits ([`crate::numbers`]); values are right-aligned, standard errors are
-//! left-aligned.
+//! The standard error determines the number of digits ([`crate::numbers`]); values are right-aligned, standard errors
+//! are left-aligned.
 
 use std::fmt;
 
@@ -14,7 +14,7 @@ use crate::{
 /// except the first.
 ///
 /// # Errors
-/// The errors returned by the formatter.
+/// Any error returned by the formatter.
 ///
 /// ```
 /// use hoid_model::{estimate_table::write_rows, uncertainty::Estimate};

@@ -21,7 +21,7 @@ pub enum FaultKind {
     Frozen,
     /// A stretch in which all channels, or a single named channel, are at rest.
     Idle,
-    /// A value that left its range at one end and re-entered at the other.
+    /// A value that left the range of its channel at one end and re-entered at the other.
     Wrap,
     /// A permanent change of level from one sample to the next.
     Step,
@@ -56,7 +56,7 @@ pub enum FaultHandling {
     /// Short faults are bridged, and the record is cut at long faults.
     #[default]
     Bridge,
-    /// The record is cut at all faults.
+    /// The record is cut at every fault.
     Cut,
     /// The data are not searched for faults.
     Keep,
@@ -100,12 +100,12 @@ pub struct Fault {
     /// Number of faulty samples.
     pub samples: usize,
     /// Size of the fault: deviation of a spike or a step and modulus of a wrap in the unit of the channel, duration of
-    /// a frozen or idle stretch in s, factor of a change of scale, or the sample time in s.
+    /// a frozen or idle stretch in s, factor of a change of scale, or the sample time in s for a wrong unit of time.
     pub size: f64,
-    /// Size of the fault in robust standard deviations of its test statistic for good data; `None` if the kind has no
-    /// such statistic.
+    /// Size of the fault relative to the robust standard deviation that its test statistic has for good data; `None` if
+    /// the kind has no such statistic.
     pub deviations: Option<f64>,
-    /// Action taken.
+    /// Action taken because of the fault.
     pub action: FaultAction,
 }
 
@@ -123,7 +123,7 @@ impl Fault {
 }
 
 impl fmt::Display for Fault {
-    /// Formats the fault as a sentence without a full stop: "spike in e at 41.2 s, off by 30 (210 robust standard
+    /// Formats the fault as a phrase without a full stop: "spike in e at 41.2 s, off by 30 (210 robust standard
     /// deviations): bridged".
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let time = |s: f64| short(s, 6);
@@ -183,9 +183,9 @@ fn short(value: f64, digits: usize) -> String {
     }
 }
 
-/// Maximum number of faults of one kind that are reported individually; further faults are only counted.
+/// Maximum number of faults of one kind that are described individually; further faults are only counted.
 const LISTED_INDIVIDUALLY: usize = 3;
-/// Largest share of repaired samples for which no warning is given.
+/// Largest share of faulty samples (interpolated or cut out) for which no warning is given.
 pub const MOST_MENDED: f64 = 0.2;
 
 /// Returns the findings about faults: a note for repaired faults of a kind, a warning for faults that remain in the
@@ -213,7 +213,7 @@ pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
             let words = words.join("; ");
             all.push(match (left, kind) {
                 (false, _) => Finding::note("faults", words),
-                // With a wrong unit of time, no parameter is valid.
+                // If the unit of time is wrong, no parameter is valid.
                 (true, FaultKind::TimeUnit) => Finding::undetermined("faults", words),
                 (true, _) => Finding::doubt("faults", words),
             });
@@ -224,7 +224,7 @@ pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
         .filter(|fault| fault.action != FaultAction::Reported && fault.kind != FaultKind::Wrap)
         .map(|fault| fault.samples)
         .sum();
-    // Idle stretches that were cut out are not part of the run.
+    // Idle stretches that were cut out do not count as part of the run.
     let idle: usize = (faults.iter())
         .filter(|fault| fault.action == FaultAction::Cut && fault.kind == FaultKind::Idle)
         .map(|fault| fault.samples)

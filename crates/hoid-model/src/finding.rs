@@ -11,14 +11,14 @@
 //! | [`Severity::Doubt`] | doubtful |
 //! | [`Severity::Undetermined`] | not determined |
 //!
-//! A new test contributes to the verdict only by adding findings.
+//! A new test affects the verdict only through the findings that it adds.
 
 use std::fmt;
 
 /// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum Severity {
-    /// Information; the result remains valid.
+    /// The finding is information; the result remains valid.
     Note,
     /// The result may be wrong.
     Doubt,
@@ -35,12 +35,12 @@ crate::named_choice!(Severity, "severity", 3, {
 /// One observation about a result.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Finding {
-    /// Kind of the observation, as a name for programs: `not-converged`, `delay-at-bound`.
+    /// Kind of the observation, as a name for programs, such as `not-converged` or `delay-at-bound`.
     #[serde(deserialize_with = "crate::interned::name")]
     pub kind: crate::interned::Name,
     /// Severity of the observation.
     pub severity: Severity,
-    /// The observation as a sentence, with its numbers, without a full stop.
+    /// Observation as a sentence with its numbers, without a full stop.
     #[serde(rename = "words")]
     pub message: String,
 }
@@ -75,7 +75,7 @@ impl Finding {
 pub enum VerdictLevel {
     /// There is no evidence against the result.
     Trustworthy,
-    /// There is evidence against the result, given by the reasons.
+    /// There is evidence against the result; the findings describe it.
     Doubtful,
     /// The data do not determine the result.
     NotDetermined,
@@ -96,7 +96,7 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Returns the verdict of these findings; findings of equal severity keep their order.
+    /// Returns the verdict that follows from the findings; findings of equal severity keep their order.
     pub fn of(mut findings: Vec<Finding>) -> Self {
         findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
         let level = match findings.first().map(|finding| finding.severity) {
@@ -112,7 +112,7 @@ impl Verdict {
         Self::of(self.findings.into_iter().chain(more).collect())
     }
 
-    /// Returns the verdict with further findings, which may be the cause of the present ones, inserted before them.
+    /// Returns the verdict with further findings, which may be the cause of the present findings, inserted before them.
     pub fn prepend(self, first: impl IntoIterator<Item = Finding>) -> Self {
         Self::of(first.into_iter().chain(self.findings).collect())
     }
@@ -142,7 +142,7 @@ impl Verdict {
 }
 
 impl fmt::Display for Verdict {
-    /// Formats the level on the first line, followed by a line for each finding.
+    /// Formats the verdict: the level on the first line, followed by a line for each finding.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "Verdict: {}", self.level)?;
         for reason in self.reasons() {

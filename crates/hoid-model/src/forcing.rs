@@ -7,14 +7,14 @@
 //! sinusoid, and there is no leakage.
 //!
 //! [`ForcingFunction::samples`] uses `sin(a + b) = sin a cos b + cos a sin b` with b from a table over one block. This
-//! takes two products per sinusoid and sample instead of a sine; unlike with a recurrence, the error does not grow
-//! along the record.
+//! takes two products per sinusoid and sample instead of a sine; unlike the error of a recurrence, the error does not
+//! grow along the record.
 
 use std::f64::consts::TAU;
 
 use crate::{ModelError, SampleTime, remnant_gain::SpectralLine};
 
-/// One term of the forcing function.
+/// One sinusoid of the forcing function.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Sinusoid {
     /// Amplitude A_k, deg.
@@ -34,7 +34,7 @@ pub struct ForcingFunction {
 /// Duration in s that contains an integer number of periods of each reference frequency.
 pub const REFERENCE_PERIOD_S: f64 = 81.92;
 
-/// Table 1: n_t, A_k in deg, phi_k in rad.
+/// Rows of Table 1: n_t, A_k in deg, phi_k in rad.
 const TABLE_1: [(f64, f64, f64); 10] = [
     (3.0, 1.186, -0.753),
     (5.0, 1.121, 1.564),
@@ -48,12 +48,12 @@ const TABLE_1: [(f64, f64, f64); 10] = [
     (229.0, 0.025, 0.604),
 ];
 
-/// Number of samples in one block of the table of angles: near the square root of the record length, which minimises
-/// the total number of sines.
+/// Number of samples in one block of the table of angles: near the square root of the record length, for which the
+/// fewest sines are computed in total.
 const BLOCK: usize = 96;
 
 impl ForcingFunction {
-    /// Returns a forcing function of any number of sinusoids. With no sinusoid, the target is at rest.
+    /// Returns the forcing function with the given sinusoids. Without sinusoids, the target is at rest.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] if a number is not finite, a frequency is not positive, or two frequencies are equal.
@@ -87,7 +87,8 @@ impl ForcingFunction {
         Ok(Self { sinusoids })
     }
 
-    /// Returns the ten sinusoids of Table 1, `omega_k = n_t 2 pi / 81.92` exactly.
+    /// Returns the forcing function of Table 1 with ten sinusoids, whose frequencies are exactly
+    /// `omega_k = n_t 2 pi / 81.92`.
     pub fn reference() -> Self {
         let term = |(multiple, amplitude_deg, phase_rad)| Sinusoid {
             amplitude_deg,
@@ -99,12 +100,12 @@ impl ForcingFunction {
         }
     }
 
-    /// Returns the terms.
+    /// Returns the sinusoids.
     pub fn sinusoids(&self) -> &[Sinusoid] {
         &self.sinusoids
     }
 
-    /// Returns the amplitudes and frequencies that the computation of the remnant gain needs.
+    /// Returns amplitude and frequency of each sinusoid, for the computation of the remnant gain.
     pub fn lines(&self) -> Vec<SpectralLine> {
         let line = |s: &Sinusoid| SpectralLine {
             amplitude: s.amplitude_deg,
@@ -140,7 +141,7 @@ impl ForcingFunction {
         values
     }
 
-    /// Root mean square over a long time, deg.
+    /// Root mean square of the forcing function over a long time, deg.
     pub fn rms_deg(&self) -> f64 {
         let power: f64 = self.sinusoids.iter().map(|s| s.amplitude_deg.powi(2) / 2.0).sum();
         power.sqrt()

@@ -1,4 +1,4 @@
-//! Units of an operator's gains.
+//! Units of the gains of an operator.
 //!
 //! A gain is a ratio of the output u to the input e, so that its unit is the ratio of their units. It is reported only
 //! if the units of both channels are declared; for a recording without units, gains are reported without units. An
@@ -21,9 +21,9 @@ impl GainUnit {
         Self(declared.map(|(e, u)| (e.to_owned(), u.to_owned())))
     }
 
-    /// Returns the unit of a parameter from its name and from `own`, the factor by which the unit u/e is multiplied
-    /// ("s" for K_e_dot, "1/s" for K/T_I, "deg/deg" or "" for K). For a parameter that is not a gain, `own` is returned
-    /// unchanged.
+    /// Returns the unit of a parameter from its name and from `own`, its unit if e and u have the same unit: "s" for
+    /// K_e_dot, "1/s" for K/T_I, "deg/deg" or "" for K. A gain has the unit u/e times the unit of time in `own`, and no
+    /// unit if the units of the channels are unknown. For a parameter that is not a gain, `own` is returned unchanged.
     ///
     /// ```
     /// # use hoid_model::{Channel, GainUnit, Record, SampleTime};
@@ -51,7 +51,8 @@ impl GainUnit {
     }
 }
 
-/// True if a parameter is proportional to u/e. The remnant gain K_n is not, because it is a ratio of u to white noise.
+/// True if a parameter is proportional to u/e. The remnant gain K_n does not count as a gain, because it is a ratio of
+/// u to white noise.
 fn is_gain(parameter: &str) -> bool {
     let name = parameter.trim_end_matches(|c: char| c.is_ascii_digit());
     matches!(name, "K" | "K_e" | "K_e_dot" | "K_over_T_I" | "K_I")

@@ -1,4 +1,4 @@
-//! The exact zero-order hold of any rational transfer function, as a state space.
+//! State-space form of the exact zero-order hold of any rational transfer function.
 //!
 //! `x' = A x + B v(t - delta)`, `y = C x` in controllable canonical form, with an input v that is held over each sample
 //! and delayed by a fraction `0 <= delta < Ts` of a sample:
@@ -17,16 +17,16 @@ use num_complex::Complex64;
 
 use crate::{ModelError, SampleTime};
 
-/// A rational transfer function after a zero-order hold. Its state is that of `1/den`; the numerator is contained in
-/// the output row.
+/// A rational transfer function after a zero-order hold. Its state is that of `1/den`; the numerator determines the
+/// output row C.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldSystem {
     order: usize,
     /// The matrix Phi by rows.
     transition: Vec<f64>,
-    /// Gamma_0.
+    /// Gamma_0, the factor of v(k).
     now: Vec<f64>,
-    /// Gamma_1.
+    /// Gamma_1, the factor of v(k-1).
     before: Vec<f64>,
     output: Vec<f64>,
     direct: f64,
@@ -34,12 +34,12 @@ pub struct HeldSystem {
 }
 
 impl HeldSystem {
-    /// Creates the system `num(s)/den(s)` from coefficients in descending powers of s, with den monic and num of no
-    /// higher degree; `late` is delta/Ts.
+    /// Creates the system `num(s)/den(s)` from coefficients in descending powers of s, where den is monic and the
+    /// degree of num does not exceed that of den; `late` is delta/Ts.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] if `late` is not in `[0, 1)` or an exponential overflows;
-    /// [`ModelError::TransferFunction`] if num has a higher degree or den is not monic.
+    /// [`ModelError::TransferFunction`] if the degree of num exceeds that of den or den is not monic.
     pub fn new(num: &[f64], den: &[f64], late: f64, sample_time: SampleTime) -> Result<Self, ModelError> {
         if !(0.0..1.0).contains(&late) {
             return Err(ModelError::OutOfRange {
@@ -56,7 +56,7 @@ impl HeldSystem {
         }
         let order = den.len() - 1;
         let ts = sample_time.s();
-        // In ascending powers of s Ts: the state is z^(i) Ts^i / Ts^n.
+        // The coefficients are those of ascending powers of s Ts: the state is z^(i) Ts^i / Ts^n.
         let scaled = |p: &[f64], i: usize| {
             let coefficient = if i < p.len() { p[p.len() - 1 - i] } else { 0.0 };
             coefficient * ts.powi((order - i) as i32)
@@ -105,8 +105,8 @@ impl HeldSystem {
         &self.transition
     }
 
-    /// Returns Gamma_0, the contribution of the input v(k) to the next state; without a delay, v(k-1) does not
-    /// contribute.
+    /// Returns Gamma_0, the contribution of the input v(k) to the next state; if the input is not delayed, it is the
+    /// only contribution, since Gamma_1 is zero.
     pub fn input(&self) -> &[f64] {
         &self.now
     }
@@ -127,8 +127,8 @@ impl HeldSystem {
         self.output.iter().zip(state).map(|(c, x)| c * x).sum()
     }
 
-    /// Computes one step with the inputs v(k) and v(k-1); the result is written to `next`, which has the length of
-    /// `state`.
+    /// Computes the state one sample later from the inputs v(k) and v(k-1), and writes it to `next`, which has the
+    /// length of `state`.
     #[inline]
     pub fn step(&self, state: &[f64], now: f64, before: f64, next: &mut [f64]) {
         let rows = self.transition.chunks_exact(self.order.max(1));
@@ -140,7 +140,7 @@ impl HeldSystem {
 
     /// Returns `C (z I - Phi)^-1 (Gamma_0 + Gamma_1/z)` at `z = e^{j omega Ts}`, without the direct feedthrough.
     ///
-    /// `None` if z is a pole.
+    /// Returns `None` if z is a pole.
     pub fn response(&self, omega_rad_s: f64) -> Option<Complex64> {
         let n = self.order;
         if n == 0 {

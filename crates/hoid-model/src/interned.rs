@@ -1,8 +1,8 @@
 //! Names with static lifetime, for results that are read from files.
 //!
-//! Kinds of findings and units are literals of the program (`&'static str`). A result of another version may contain a
-//! name that this program does not have. Such a name is stored once, in a set that only grows. The length and the
-//! number of these names are limited, so that no file can exhaust the memory.
+//! Kinds of findings and units are literals of the program (`&'static str`). A result written by another version may
+//! contain a name that this program does not have. Such a name is stored once, in a set that only grows. The length and
+//! the number of these names are limited, so that no file can exhaust the memory.
 
 use std::{
     collections::BTreeSet,
@@ -11,17 +11,17 @@ use std::{
 
 use serde::{Deserialize, Deserializer, de::Error};
 
-/// A name. It is a type alias because serde would try to borrow a plain reference from its input.
+/// Name of a finding or a unit. It is a type alias because serde would try to borrow a plain reference from its input.
 pub type Name = &'static str;
 
-/// Longest name in bytes.
+/// Maximum length of a stored name in bytes.
 const LONGEST: usize = 64;
 /// Largest number of stored names.
 const MOST: usize = 10_000;
 
 static NAMES: LazyLock<Mutex<BTreeSet<Name>>> = LazyLock::new(Mutex::default);
 
-/// Returns the name with static lifetime; `None` if it is too long, or if too many names are stored.
+/// Returns the name with static lifetime; `None` if the name is too long, or if too many names are stored.
 pub fn interned(name: &str) -> Option<Name> {
     let mut names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(known) = names.get(name) {
@@ -35,7 +35,7 @@ pub fn interned(name: &str) -> Option<Name> {
     Some(kept)
 }
 
-/// Reads a name: `#[serde(deserialize_with = "hoid_model::interned::name")]`.
+/// Reads a name; for use as `#[serde(deserialize_with = "hoid_model::interned::name")]`.
 ///
 /// # Errors
 /// The errors of the deserializer, and an error for a name that cannot be stored ([`interned`]).

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 /// A choice with a name that users type. The macro [`named_choice!`](crate::named_choice) implements it.
 pub trait NamedChoice: Copy + PartialEq + Sized + 'static {
-    /// The kind of the choice, for messages: "structure".
+    /// Kind of the choice in messages, such as "structure".
     const WHAT: &'static str;
     /// All choices, in the order in which they are listed.
     const CHOICES: &'static [Self];
@@ -12,7 +12,7 @@ pub trait NamedChoice: Copy + PartialEq + Sized + 'static {
     /// Returns the name that users type.
     fn choice_name(self) -> &'static str;
 
-    /// Returns the choice with a name, case-insensitively.
+    /// Returns the choice with the given name, which is compared case-insensitively.
     ///
     /// # Errors
     /// [`UnknownName`], which lists the available names.
@@ -34,15 +34,15 @@ pub trait NamedChoice: Copy + PartialEq + Sized + 'static {
     }
 }
 
-/// An unknown name.
+/// A name that is not one of the available names.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("there is no {what} {found}; expected {expected}")]
 pub struct UnknownName {
-    /// The kind of the choice.
+    /// Kind of the choice, such as "structure".
     pub what: &'static str,
-    /// The name given.
+    /// Name that was given.
     pub found: String,
-    /// The available names.
+    /// Available names.
     pub expected: String,
 }
 
@@ -71,7 +71,7 @@ macro_rules! named_choice {
             /// The names of all choices.
             pub const NAMES: [&'static str; $count] = [$($name),+];
 
-            /// The name that users type.
+            /// Returns the name that users type.
             pub fn name(self) -> &'static str {
                 match self {
                     $(Self::$variant => $name),+
@@ -88,7 +88,7 @@ macro_rules! named_choice {
             }
         }
 
-        /// The name that users type.
+        /// Formats the choice as the name that users type.
         impl ::std::fmt::Display for $type {
             fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
                 f.pad(self.name())

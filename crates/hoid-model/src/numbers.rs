@@ -1,8 +1,8 @@
 //! Numbers with as many digits as their standard error allows.
 //!
-//! A standard error is itself known to a few per cent at best, so that it is given with two significant digits, and the
-//! value with the same number of decimals (ISO/IEC Guide 98-3, 7.2.6). Numbers without a standard error are given with
-//! five significant digits.
+//! A standard error is itself known to a few per cent at best. It is therefore given with two significant digits, and
+//! the value with the same number of decimals (ISO/IEC Guide 98-3, 7.2.6). Numbers without a standard error are given
+//! with five significant digits.
 
 /// Text for a missing number.
 pub const DASH: &str = "\u{2013}";
@@ -13,14 +13,14 @@ pub const Z_95: f64 = 1.959_963_984_540_054;
 const DIGITS_OF_ERROR: i32 = 2;
 const DIGITS_ALONE: i32 = 5;
 
-/// Relative standard error below which the error is attributed to rounding.
+/// Relative standard error below which the standard error is attributed to rounding.
 const LAST_DIGITS: f64 = 16.0 * f64::EPSILON;
-/// Number of digits of a value whose error is only rounding.
+/// Number of digits of a value whose standard error is only rounding.
 const ALL_DIGITS: i32 = 15;
 
-/// Returns value and standard error as text, with as many decimals as two significant digits of the error need. If the
-/// error is only rounding, the value has all its digits and the error is a dash. A value that is not finite gives
-/// dashes.
+/// Returns value and standard error as text, with as many decimals as two significant digits of the standard error
+/// need. If the standard error is only rounding, the value has all its digits and a dash replaces the standard error. A
+/// value that is not finite gives two dashes.
 pub fn with_uncertainty(value: f64, standard_error: Option<f64>) -> (String, String) {
     if !value.is_finite() {
         return (DASH.to_owned(), DASH.to_owned());
@@ -36,8 +36,8 @@ pub fn with_uncertainty(value: f64, standard_error: Option<f64>) -> (String, Str
     }
 }
 
-/// Returns the interval `value +- factor * standard_error` with the decimals of [`with_uncertainty`]; a dash without a
-/// standard error.
+/// Returns the interval `value +- factor * standard_error` with the decimals of [`with_uncertainty`]; a dash if there
+/// is no standard error.
 pub fn interval(value: f64, standard_error: Option<f64>, factor: f64) -> String {
     match standard_error.filter(|s| s.is_finite() && *s > 0.0 && value.is_finite()) {
         None => DASH.to_owned(),
@@ -79,15 +79,15 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     without_negative_zero(format!("{value:.decimals$}"))
 }
 
-/// Power of ten of the last significant digit.
+/// Returns the power of ten of the last significant digit.
 fn last_digit(value: f64, digits: i32) -> i32 {
-    // The number is rounded first: 0.0996 with two digits is 0.10, not 0.100.
+    // The number is rounded before its exponent is determined: 0.0996 with two digits is 0.10, not 0.100.
     let text = format!("{:.*e}", (digits - 1) as usize, value.abs());
     let exponent: i32 = text.split_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or(0);
     exponent - (digits - 1)
 }
 
-/// Returns the power of ten of a number; zero if the number is readable without an exponent.
+/// Returns the exponent of a number in scientific notation; zero for numbers that are written without an exponent.
 fn exponent_for(size: f64) -> i32 {
     let exponent = size.log10().floor();
     if (-3.0..6.0).contains(&exponent) {

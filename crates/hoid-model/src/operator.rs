@@ -3,8 +3,8 @@
 //! `H(s) = K_e (T_L s + 1) e^{-s tau_e} omega_nm^2 / (s^2 + 2 zeta_nm omega_nm s + omega_nm^2)`
 //! (eq. 2)
 //!
-//! After a zero-order hold this is exactly `(b0 + b1 q^-1) q^-nk / (1 + f1 q^-1 + f2 q^-2)` with
-//! `nk = tau_e/Ts + 1` (eq. 11), by the formulas of [`hoid_core::held_operator`].
+//! After a zero-order hold, H is exactly `(b0 + b1 q^-1) q^-nk / (1 + f1 q^-1 + f2 q^-2)` with `nk = tau_e/Ts + 1` (eq.
+//! 11), by the formulas of [`hoid_core::held_operator`].
 
 use hoid_core::held_operator::held_operator;
 use nalgebra::{Matrix4, Vector4};
@@ -14,7 +14,7 @@ use crate::{
     transfer_function::ContinuousTransferFunction,
 };
 
-/// The parameters of the operator's response to the error.
+/// Parameters of the operator's response to the error.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OperatorParameters {
     /// Error gain K_e, deg/deg.
@@ -32,7 +32,7 @@ pub struct OperatorParameters {
 /// The discrete operator that estimators fit: two coefficients in B, two poles, and a delay in samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DiscreteOperator {
-    /// `(b0 + b1 q^-1) q^-1 / (1 + f1 q^-1 + f2 q^-2)`.
+    /// Discrete model without the delay, `(b0 + b1 q^-1) q^-1 / (1 + f1 q^-1 + f2 q^-2)`.
     pub held: HeldSecondOrder,
     /// Delay of b0 in samples.
     pub nk: usize,
@@ -85,7 +85,7 @@ impl OperatorParameters {
         self.k_e * self.t_l_s
     }
 
-    /// Returns the parameters in the order of [`PHYSICAL_NAMES`].
+    /// Returns the parameters without the delay, in the order of [`PHYSICAL_NAMES`].
     fn without_delay(&self) -> [f64; 4] {
         [self.k_e, self.k_e_dot(), self.omega_nm_rad_s, self.zeta_nm]
     }
@@ -150,17 +150,17 @@ impl OperatorParameters {
 }
 
 impl DiscreteOperator {
-    /// Returns the operator with this discrete model (eq. 12).
+    /// Returns the parameters of the operator that has this discrete model (eq. 12).
     ///
     /// # Errors
-    /// [`NotConvertible`] with the reason; values are never clipped.
+    /// [`NotConvertible`] with the reason; parameters are never clipped to a valid range.
     pub fn parameters(&self) -> Result<OperatorParameters, NotConvertible> {
         if self.nk == 0 {
             return Err(NotConvertible::NoDelay);
         }
         let c = self.held.inverse_zoh(self.sample_time)?;
-        // K_e and omega_nm depend on 1 + f1 + f2, a difference of numbers of order 1, which consists only of rounding
-        // errors below this value.
+        // K_e and omega_nm depend on 1 + f1 + f2, a difference of numbers of order 1. Below this value the difference
+        // consists only of rounding errors.
         let at_one = (1.0 + self.held.f1 + self.held.f2).abs();
         if c.a2 <= 0.0 || at_one < AT_ORIGIN {
             return Err(NotConvertible::NoNaturalFrequency { a1: c.a1, a2: c.a2 });
@@ -190,7 +190,7 @@ pub fn discretisation_jacobian(operator: &OperatorParameters, sample_time: Sampl
 pub fn retrieval_jacobian(operator: &OperatorParameters, sample_time: SampleTime) -> Option<[[f64; 4]; 4]> {
     let forward = discretisation_jacobian(operator, sample_time);
     let matrix = Matrix4::from_fn(|i, j| forward[i][j]);
-    // Columns scaled to unit size: the gains and omega_nm differ by orders of magnitude.
+    // The columns are scaled to unit size, because the gains and omega_nm differ by orders of magnitude.
     let scale = Vector4::from_fn(|j, _| matrix.column(j).norm());
     if scale.iter().any(|s| *s == 0.0 || !s.is_finite()) {
         return None;

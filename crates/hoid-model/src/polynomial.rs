@@ -1,14 +1,15 @@
 //! Polynomials and their roots.
 //!
 //! Coefficients are stored in one order, `p[0] + p[1] x + ... + p[n] x^n` with `x = q^-1` for discrete time; transfer
-//! functions in s store descending powers, as documented there. Roots are computed as the eigenvalues of the balanced
-//! companion matrix (Edelman and Murakami, 1995), with one Newton step each.
+//! functions in s store descending powers, as their documentation states. Roots are computed as the eigenvalues of the
+//! balanced companion matrix (Edelman and Murakami, 1995), with one Newton step for each root.
 
 use hoid_core::stability::roots_inside;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-/// Returns the product of two polynomials (any order of powers, the same for both).
+/// Returns the product of two polynomials, whose coefficients may be in ascending or descending powers, but in the same
+/// order for both.
 pub fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
     if a.is_empty() || b.is_empty() {
         return Vec::new();
@@ -27,7 +28,7 @@ pub fn value(p: &[f64], x: Complex64) -> Complex64 {
     p.iter().rev().fold(Complex64::new(0.0, 0.0), |sum, &c| sum * x + c)
 }
 
-/// Returns the monic polynomial `z^n + p[1] z^{n-1} + ... + p[n]` with these roots, `p[0] = 1`. Complex roots must
+/// Returns the monic polynomial `z^n + p[1] z^{n-1} + ... + p[n]` with the given roots, `p[0] = 1`. Complex roots must
 /// occur in conjugate pairs; the imaginary remainder due to rounding is dropped.
 pub fn from_roots(roots: &[Complex64]) -> Vec<f64> {
     let mut p = vec![Complex64::new(1.0, 0.0)];
@@ -41,11 +42,12 @@ pub fn from_roots(roots: &[Complex64]) -> Vec<f64> {
     p.into_iter().map(|c| c.re).collect()
 }
 
-/// Returns the roots z of `p[0] z^n + p[1] z^{n-1} + ... + p[n]`, largest modulus first, with conjugates adjacent.
+/// Returns the roots z of `p[0] z^n + p[1] z^{n-1} + ... + p[n]`, the root of largest modulus first, with conjugates
+/// adjacent.
 ///
-/// For a polynomial in `q^-1` with `p[0] = 1` these are its zeros in z. Leading zero coefficients lower the degree; the
-/// zero polynomial and constants have no roots. `None` if a coefficient is not finite or the eigenvalue iteration
-/// fails.
+/// For a polynomial in `q^-1` with `p[0] = 1` these roots are its zeros in z. Leading zero coefficients lower the
+/// degree; the zero polynomial and constants have no roots. `None` if a coefficient is not finite or the eigenvalue
+/// iteration fails.
 pub fn roots(p: &[f64]) -> Option<Vec<Complex64>> {
     if p.iter().any(|c| !c.is_finite()) {
         return None;
@@ -72,7 +74,7 @@ pub fn roots(p: &[f64]) -> Option<Vec<Complex64>> {
     Some(found)
 }
 
-/// Roots of `z^2 + p z + q` without cancellation.
+/// Returns the roots of `z^2 + p z + q`, computed without cancellation.
 fn quadratic(p: f64, q: f64) -> [Complex64; 2] {
     let half = -p / 2.0;
     let discriminant = half * half - q;
@@ -101,7 +103,8 @@ fn by_companion(p: &[f64]) -> Option<Vec<Complex64>> {
     Some(polished)
 }
 
-/// One Newton step, used only if it reduces the residual (it may not at a multiple root).
+/// Returns the root after one Newton step, or the given root if the step does not reduce the residual (as at a multiple
+/// root).
 fn newton_step(p: &[f64], z: Complex64) -> Complex64 {
     let horner = |z: Complex64| {
         let mut f = Complex64::new(0.0, 0.0);
@@ -123,8 +126,8 @@ fn newton_step(p: &[f64], z: Complex64) -> Complex64 {
     if horner(better).0.norm() < f.norm() { better } else { z }
 }
 
-/// Returns the monic `[p_1, ..., p_n]` with each root outside the unit circle replaced by the inverse of its conjugate,
-/// which preserves the shape of the spectrum. `None` if the roots cannot be found.
+/// Returns the coefficients `[p_1, ..., p_n]` of the monic polynomial with each root outside the unit circle replaced
+/// by the inverse of its conjugate, which preserves the shape of the spectrum. `None` if the roots cannot be found.
 pub fn reflected_inside(coefficients: &[f64]) -> Option<Vec<f64>> {
     if roots_inside(coefficients, 1.0) {
         return Some(coefficients.to_vec());

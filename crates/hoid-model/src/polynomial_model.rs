@@ -21,7 +21,7 @@ pub struct PolynomialModel {
     theta: Vec<f64>,
 }
 
-/// A model as read from a file, not yet checked.
+/// A polynomial model as read from a file, before it is checked.
 #[derive(serde::Deserialize)]
 struct Written {
     structure: Structure,
@@ -39,10 +39,10 @@ impl TryFrom<Written> for PolynomialModel {
 }
 
 impl PolynomialModel {
-    /// Creates a model from its parameter vector.
+    /// Creates a model from its structure, its orders and its parameter vector.
     ///
     /// # Errors
-    /// [`ModelError::Orders`] if orders and structure contradict each other or theta has another length;
+    /// [`ModelError::Orders`] if the orders contradict the structure or the length of theta does not match the orders;
     /// [`ModelError::TransferFunction`] if a coefficient is not finite.
     pub fn new(
         structure: Structure,
@@ -71,12 +71,12 @@ impl PolynomialModel {
         })
     }
 
-    /// The structure.
+    /// Structure of the model.
     pub fn structure(&self) -> Structure {
         self.structure
     }
 
-    /// The orders.
+    /// Orders of the model.
     pub fn orders(&self) -> Orders {
         self.orders
     }
@@ -95,27 +95,27 @@ impl PolynomialModel {
         &self.theta[before..before + n]
     }
 
-    /// `[a1, ..., a_na]`.
+    /// Coefficients `[a1, ..., a_na]` of A.
     pub fn a(&self) -> &[f64] {
         self.part(0, self.orders.na)
     }
 
-    /// `[b0, ..., b_{nb-1}]`.
+    /// Coefficients `[b0, ..., b_{nb-1}]` of B.
     pub fn b(&self) -> &[f64] {
         self.part(self.orders.na, self.orders.nb)
     }
 
-    /// `[c1, ..., c_nc]`.
+    /// Coefficients `[c1, ..., c_nc]` of C.
     pub fn c(&self) -> &[f64] {
         self.part(self.orders.na + self.orders.nb, self.orders.nc)
     }
 
-    /// `[d1, ..., d_nd]`.
+    /// Coefficients `[d1, ..., d_nd]` of D.
     pub fn d(&self) -> &[f64] {
         self.part(self.orders.na + self.orders.nb + self.orders.nc, self.orders.nd)
     }
 
-    /// `[f1, ..., f_nf]`.
+    /// Coefficients `[f1, ..., f_nf]` of F.
     pub fn f(&self) -> &[f64] {
         self.part(self.orders.parameters() - self.orders.nf, self.orders.nf)
     }
@@ -134,7 +134,7 @@ impl PolynomialModel {
     /// Returns `B q^-nk / (A F)`.
     ///
     /// # Errors
-    /// None for a valid model; the error type is that of [`DiscreteTransferFunction::new`].
+    /// No error occurs for a valid model; the error type is that of [`DiscreteTransferFunction::new`].
     pub fn system(&self) -> Result<DiscreteTransferFunction, ModelError> {
         let mut num = vec![0.0; self.orders.nk];
         num.extend_from_slice(self.b());
@@ -197,7 +197,7 @@ impl PolynomialModel {
         if self.orders.nf == 0 { self.a() } else { self.f() }
     }
 
-    /// Returns the positions of `[b0, b1, f1, f2]` (or a1, a2) in theta, for models that
+    /// Returns the positions in theta of `[b0, b1, f1, f2]`, or of `[b0, b1, a1, a2]` if there is no F, for models that
     /// [`PolynomialModel::discrete_operator`] accepts.
     pub fn operator_positions(&self) -> [usize; 4] {
         let b = self.orders.na;

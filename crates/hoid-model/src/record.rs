@@ -1,8 +1,8 @@
 //! An evenly sampled record of a person's control activity.
 //!
 //! A [`Record`] contains the input of the person (the tracking error e), the output (the control u) and any other
-//! channel that was measured or simulated with them. It is checked when it is created: all channels have the same
-//! length and every sample is finite, so that later code need not check again.
+//! channel that was measured or simulated at the same samples. A record is checked when it is created: all channels
+//! have the same length and every sample is finite, so that later code need not check again.
 
 use crate::{ModelError, SampleTime};
 
@@ -13,10 +13,10 @@ pub struct Channel {
     pub name: String,
     /// Unit as text, empty if unknown.
     pub unit: String,
-    /// Role for the person who controls, such as `feedforward:0.5` for a target that is displayed 0.5 s ahead; empty if
-    /// the signal has none or it is unknown.
+    /// Role of the signal for the person, such as `feedforward:0.5` for a target that is displayed 0.5 s ahead; empty
+    /// if the signal has no role or its role is unknown.
     pub role: String,
-    /// One value per sample.
+    /// Values of the signal, one for each sample.
     pub values: Vec<f64>,
 }
 
@@ -31,7 +31,7 @@ impl Channel {
         }
     }
 
-    /// Returns the same channel with a role for the person.
+    /// Returns the channel with a role for the person.
     #[must_use]
     pub fn with_role(mut self, role: impl Into<String>) -> Self {
         self.role = role.into();
@@ -45,9 +45,9 @@ pub enum Detrend {
     /// No trend: the data remain unchanged.
     #[default]
     None,
-    /// The mean of each channel.
+    /// The mean of each channel is removed.
     Mean,
-    /// The least squares line of each channel.
+    /// The least-squares line of each channel is removed.
     Linear,
 }
 
@@ -71,7 +71,7 @@ impl Record {
     /// [`ModelError::EmptyRecord`], [`ModelError::LengthMismatch`], [`ModelError::NotFinite`],
     /// [`ModelError::DuplicateChannel`].
     pub fn new(sample_time: SampleTime, input: Channel, output: Channel) -> Result<Self, ModelError> {
-        // The input determines the length.
+        // The record is created from the input first, so that the input determines the length.
         let record = Self::of_output(sample_time, input)?;
         record.check(&output)?;
         Ok(Self {
@@ -102,19 +102,19 @@ impl Record {
         })
     }
 
-    /// Returns the same record with a name for messages and reports.
+    /// Returns the record with a name for messages and reports.
     pub fn labelled(mut self, label: impl Into<String>) -> Self {
         self.label = label.into();
         self
     }
 
-    /// Returns the same record with the time of its first sample in s.
+    /// Returns the record with the given time of its first sample, in s.
     pub fn starting_at(mut self, start_s: f64) -> Self {
         self.start_s = start_s;
         self
     }
 
-    /// Returns the same record with an additional channel.
+    /// Returns the record with an additional channel.
     ///
     /// # Errors
     /// [`ModelError::DuplicateChannel`], [`ModelError::LengthMismatch`], [`ModelError::NotFinite`].
@@ -141,7 +141,7 @@ impl Record {
         check_finite(channel)
     }
 
-    /// Name for messages and reports.
+    /// Name of the record in messages and reports.
     pub fn label(&self) -> &str {
         &self.label
     }
@@ -163,7 +163,7 @@ impl Record {
 
     /// Time of sample `k` in s.
     pub fn time_s(&self, k: usize) -> f64 {
-        // The time follows from the index and not from a sum, so that no rounding error grows along the record.
+        // The time is computed from the index and not by summation, so that no rounding error grows along the record.
         self.start_s + k as f64 * self.sample_time.s()
     }
 
@@ -202,15 +202,15 @@ impl Record {
         (self.input, self.output, self.others)
     }
 
-    /// Returns the values of a channel by its name.
+    /// Returns the values of the channel with a given name; `None` if there is no such channel.
     pub fn channel(&self, name: &str) -> Option<&[f64]> {
         self.channels().find(|c| c.name == name).map(|c| c.values.as_slice())
     }
 
-    /// Returns the samples with `from_s <= t < to_s`.
+    /// Returns the part of the record with the samples at `from_s <= t < to_s`.
     ///
     /// # Errors
-    /// [`ModelError::EmptySpan`] if there are no such samples.
+    /// [`ModelError::EmptySpan`] if the record has no samples in this span.
     pub fn span(&self, from_s: f64, to_s: f64) -> Result<Self, ModelError> {
         let ts = self.sample_time.s();
         // A bound that equals the time of a sample, up to rounding, is treated as that time.
@@ -237,8 +237,8 @@ impl Record {
         })
     }
 
-    /// Returns this record followed by another one, which starts one sample time after the last sample of this record,
-    /// so that the time of the boundary is known.
+    /// Returns this record followed by another record, which starts one sample time after the last sample of this
+    /// record, so that the time of the boundary is known.
     ///
     /// Channels that only one of the two records has are omitted; label, names and units are those of the first record.
     ///
@@ -280,14 +280,14 @@ impl Record {
         Ok(self)
     }
 
-    /// Returns the same record with its mean or its least squares line removed from input and output; other channels
-    /// remain unchanged.
+    /// Returns the record with the mean or the least-squares line of input and output removed; other channels remain
+    /// unchanged.
     pub fn detrended(mut self, how: Detrend) -> Self {
         self.signals_mut().for_each(|values| take_out(how, values));
         self
     }
 
-    /// Returns the same record with a function, such as a filter, applied to input and output; other channels remain
+    /// Returns the record with a function, such as a filter, applied to input and output; other channels remain
     /// unchanged.
     ///
     /// # Errors

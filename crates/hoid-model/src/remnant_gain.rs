@@ -16,10 +16,10 @@
 //!   `V_n/V_u`.
 //!
 //! All quantities are computed for the continuous loop, as in the thesis. V_n has a closed form. V_u is integrated by
-//! the adaptive Gauss-Kronrod rule of 7 and 15 points to 1e-10 relative, from a partition at the local maxima of the
-//! integrand: the peaks near crossover and at lightly damped closed-loop modes. S is evaluated from polynomials,
-//! `D / (D + N e^{-j omega tau})`, which is 0 at a pole of the loop on the imaginary axis, where `1/(1 + infinity)`
-//! would not be a number.
+//! the adaptive Gauss-Kronrod rule of 7 and 15 points to a relative tolerance of 1e-10, from a partition at the local
+//! maxima of the integrand: the peaks near crossover and at lightly damped closed-loop modes. S is evaluated from
+//! polynomials as `D / (D + N e^{-j omega tau})`. At a pole of the open loop on the imaginary axis this expression is
+//! 0, whereas `1/(1 + infinity)` would not be a number.
 
 use num_complex::Complex64;
 
@@ -54,7 +54,7 @@ const TOLERANCE: f64 = 1e-10;
 /// Computes the remnant gain K_n for a noise level P_n.
 ///
 /// `order` and `time_constant_s` describe the remnant filter and `lines` the forcing function; `sample_time` is the
-/// time between noise draws. K_n is 0 for a level of 0.
+/// time between two draws of the noise. K_n is 0 for a level of 0.
 ///
 /// # Errors
 /// [`ModelError::OutOfRange`] for a level below 0 (or not below 1 for [`NoiseDefinition::Response`]), a remnant order
@@ -103,7 +103,7 @@ pub fn remnant_gain(
             }
         }
     }
-    // A level of zero needs no gain, even in an unstable loop.
+    // A level of zero requires a gain of zero, even in an unstable loop.
     if level == 0.0 {
         return Ok(0.0);
     }
@@ -157,20 +157,20 @@ pub fn remnant_gain(
     }
 }
 
-/// Magnitudes in the closed loop, computed from polynomials.
+/// Closed loop, for the computation of the magnitudes of its responses from polynomials.
 struct Loop<'a> {
     operator: &'a ContinuousTransferFunction,
     controlled_element: &'a ContinuousTransferFunction,
 }
 
 impl Loop<'_> {
-    /// `|1/(1 + H_HO H_CE)|`.
+    /// Returns `|1/(1 + H_HO H_CE)|`.
     fn sensitivity(&self, omega: f64) -> f64 {
         let [_, den_operator, den_element, characteristic] = self.at(omega);
         (den_operator * den_element / characteristic).norm()
     }
 
-    /// `|H_HO/(1 + H_HO H_CE)|`.
+    /// Returns `|H_HO/(1 + H_HO H_CE)|`.
     fn response_to_target(&self, omega: f64) -> f64 {
         let [num_operator, _, den_element, characteristic] = self.at(omega);
         (num_operator * den_element / characteristic).norm()
@@ -189,7 +189,7 @@ impl Loop<'_> {
     }
 }
 
-/// `integral_0^x dt / (1 + t^2)^m`.
+/// Returns `integral_0^x dt / (1 + t^2)^m`.
 fn remnant_integral(order: usize, x: f64) -> f64 {
     let mut integral = x.atan();
     for k in 2..=order {
@@ -227,7 +227,7 @@ const GAUSS_WEIGHTS: [f64; 4] = [
     0.417_959_183_673_469_4,
 ];
 
-/// An interval with its integral and the difference between the two rules.
+/// An interval with its integral and the difference between the Gauss and the Kronrod rule.
 struct Interval {
     from: f64,
     to: f64,
@@ -259,7 +259,7 @@ impl Interval {
 
 const MOST_INTERVALS: usize = 4000;
 
-/// `integral of f from 0 to band` for a smooth non-negative f that varies on a logarithmic scale.
+/// Returns the integral from 0 to `band` of a smooth non-negative f that varies on a logarithmic scale.
 fn integrate(f: impl Fn(f64) -> f64, band: f64) -> f64 {
     const PER_DECADE: usize = 24;
     const DECADES: usize = 5;
@@ -269,7 +269,7 @@ fn integrate(f: impl Fn(f64) -> f64, band: f64) -> f64 {
     let mut edges = vec![0.0];
     for i in 0..points {
         let peak = i > 0 && values[i] >= values[i - 1] && values[i] >= values[i + 1];
-        // At least one edge per decade, so that no scale is overlooked.
+        // There is at least one edge of an interval per decade, so that no scale is overlooked.
         if peak || i % PER_DECADE == 0 {
             edges.push(at(i));
         }
@@ -278,7 +278,8 @@ fn integrate(f: impl Fn(f64) -> f64, band: f64) -> f64 {
     let mut intervals: Vec<Interval> = edges.windows(2).map(|e| Interval::new(&f, e[0], e[1])).collect();
     while intervals.len() < MOST_INTERVALS {
         let total: f64 = intervals.iter().map(|i| i.integral).sum();
-        // Each interval has its share of the tolerance; intervals that exceed it are halved.
+        // Each interval may contribute an equal share of the tolerance to the error; intervals that exceed this share
+        // are halved.
         let allowed = TOLERANCE * total / intervals.len() as f64;
         let (good, poor): (Vec<Interval>, Vec<Interval>) = intervals.into_iter().partition(|i| i.error <= allowed);
         intervals = good;

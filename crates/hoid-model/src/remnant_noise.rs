@@ -3,8 +3,8 @@
 //! `K_n/(T_n s + 1)^m`, driven by one normal deviate of unit variance per sample, has the innovation form `C/D eps`
 //! with `D = (1 - p q^-1)^m`, `p = e^{-Ts/T_n}`, and `sigma = K_n g(T_n)`; C is the monic spectral factor of the
 //! numerator of the zero-order hold ([`crate::remnant`]). The derivatives follow from `dp/dT_n = p Ts/T_n^2` and from
-//! the derivative `-N_a/N_zeta` of a zero zeta of the numerator N with respect to `a = Ts/T_n`, which also gives that
-//! of its mirror image `1/conj zeta`.
+//! the derivative `-N_a/N_zeta` of a zero zeta of the numerator N with respect to `a = Ts/T_n`; the derivative of zeta
+//! also gives that of its mirror image `1/conj zeta`.
 
 use crate::{
     ModelError, SampleTime,
@@ -14,9 +14,9 @@ use crate::{
 /// C, D and `g = sigma/K_n` of the innovation form, and their derivatives with respect to T_n.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RemnantNoise {
-    /// `[c1, ..., c_{m-1}]`.
+    /// Coefficients `[c1, ..., c_{m-1}]` of C.
     pub c: Vec<f64>,
-    /// `[d1, ..., dm]`.
+    /// Coefficients `[d1, ..., dm]` of D.
     pub d: Vec<f64>,
     /// Standard deviation of the innovation for K_n = 1.
     pub gain: f64,
@@ -53,14 +53,14 @@ pub fn remnant_noise(time_constant_s: f64, order: usize, sample_time: SampleTime
     let held = Factored::new(order, a);
     let a_slope = -a / time_constant_s;
     let d = denominator(order, (-a).exp());
-    // For a fast filter some zeros vanish; C is then padded with zero coefficients.
+    // If the filter is fast, some zeros vanish; C is then padded with zero coefficients.
     let padded = |p: &[f64], factor: f64| -> Vec<f64> {
         (1..order).map(|i| factor * p.get(i).copied().unwrap_or(0.0)).collect()
     };
     Ok(RemnantNoise {
         c: padded(&held.c, 1.0),
         c_slope: padded(&held.c_derivative, a_slope),
-        // d_i is proportional to p^i, and p to e^-a.
+        // The derivatives follow since d_i is proportional to p^i, and p = e^-a.
         d_slope: (1..=order).map(|i| -(i as f64) * d[i] * a_slope).collect(),
         d: d[1..].to_vec(),
         gain: held.innovation_sd,

@@ -31,7 +31,7 @@ impl SampleTime {
     /// Creates a sample time in s.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] unless it is positive and finite.
+    /// [`ModelError::OutOfRange`] unless the sample time is positive and finite.
     pub fn new(ts_s: f64) -> Result<Self, ModelError> {
         if ts_s.is_finite() && ts_s > 0.0 {
             Ok(Self(ts_s))
@@ -50,7 +50,7 @@ impl SampleTime {
         ((tau_e_s / self.0).round() as usize).saturating_add(1)
     }
 
-    /// Ts in s.
+    /// Returns the sample time Ts in s.
     pub fn s(self) -> f64 {
         self.0
     }
@@ -60,7 +60,7 @@ impl SampleTime {
         std::f64::consts::PI / self.0
     }
 
-    /// Returns a time in s as a number of samples if it is within `1e-6` of an integer number.
+    /// Returns a time in s as a number of samples, or `None` if it is not within `1e-6` samples of an integer number.
     ///
     /// The quotient is rounded, never truncated: `0.29 / 0.01` is `28.999999999999996` in floating point and means 29.
     pub fn whole_samples(self, time_s: f64) -> Option<usize> {

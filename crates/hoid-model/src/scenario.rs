@@ -23,16 +23,16 @@ use crate::{
     schedule::Schedule,
 };
 
-/// Longest run, in samples: 11 days at 100 Hz. Because of this limit, a time with a wrong exponent is reported before
-/// memory is exhausted.
+/// Longest run, in samples: 11 days at 100 Hz. Because of this limit, a time with a wrong exponent causes an error
+/// message before memory is exhausted.
 const MOST_SAMPLES: usize = 100_000_000;
 
 /// A state of adaptation: the operator and the controlled element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OperatingState {
-    /// The operator.
+    /// Operator in this state.
     pub operator: OperatorParameters,
-    /// The controlled element.
+    /// Controlled element in this state.
     pub controlled_element: ControlledElement,
 }
 
@@ -95,14 +95,14 @@ crate::named_choice!(Condition, "condition", 6, {
 /// Strength of the remnant, given as a noise level or as a gain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RemnantStrength {
-    /// The gain is computed for this noise level in each state.
+    /// Noise level, from which the gain is computed in each state.
     Level {
         /// Noise level P_n.
         level: f64,
         /// Definition of P_n.
         definition: NoiseDefinition,
     },
-    /// The gain K_n itself, before and after the change.
+    /// Gain K_n itself, before and after the change.
     Gain {
         /// K_n before the change.
         initial: f64,
@@ -112,8 +112,8 @@ pub enum RemnantStrength {
 }
 
 impl RemnantStrength {
-    /// Returns the strength with another level, another definition of the level, or both. `None` if a definition is
-    /// given without a level while the strength is a gain.
+    /// Returns this strength with another level, another definition of the level, or both. `None` if a definition is
+    /// given without a level and this strength is a gain.
     pub fn changed(self, level: Option<f64>, definition: Option<NoiseDefinition>) -> Option<Self> {
         match (self, level, definition) {
             (same, None, None) => Some(same),
@@ -133,7 +133,7 @@ impl RemnantStrength {
 /// The remnant of the operator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RemnantSetting {
-    /// Order m of the filter, 1 to 4.
+    /// Order m of the remnant filter, 1 to 4.
     pub order: usize,
     /// Time constant T_n, s.
     pub time_constant_s: f64,
@@ -142,7 +142,7 @@ pub struct RemnantSetting {
 }
 
 impl Default for RemnantSetting {
-    /// First order, T_n = 0.06 s, noise level P_n = 0.1.
+    /// Returns a remnant of first order with T_n = 0.06 s and the noise level P_n = 0.1.
     fn default() -> Self {
         Self {
             order: 1,
@@ -170,13 +170,13 @@ crate::named_choice!(Realisation, "realisation", 2, { Input => "input", Output =
 /// One task: operator, controlled element, remnant, forcing function and change over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
-    /// Name for tables and file names.
+    /// Name of the task in tables and file names.
     pub name: String,
     /// State before the change.
     pub initial: OperatingState,
     /// State after the change.
     pub last: OperatingState,
-    /// The change.
+    /// Course of the change over time.
     pub schedule: Schedule,
     /// Target signal.
     pub forcing: ForcingFunction,
@@ -192,7 +192,7 @@ pub struct Scenario {
     pub realisation: Realisation,
 }
 
-/// The parameters at one instant.
+/// True parameters of a scenario at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrueParameters {
     /// Operator.
@@ -216,7 +216,7 @@ pub struct ResolvedScenario {
 }
 
 impl Scenario {
-    /// Returns a condition of the thesis with the default remnant.
+    /// Returns the scenario of a condition of the thesis, with the default remnant.
     pub fn condition(condition: Condition) -> Self {
         let (s1, s2) = (OperatingState::s1(), OperatingState::s2());
         let (initial, last, rate) = match condition {
@@ -283,7 +283,7 @@ impl Scenario {
         scenario.remnant_gain_of(state, 0.0)
     }
 
-    /// Checks the scenario and computes the quantities for a simulation.
+    /// Checks the scenario and computes the quantities that a simulation needs.
     ///
     /// # Errors
     /// [`ModelError`], which names the parameter.
@@ -339,7 +339,7 @@ impl Scenario {
 }
 
 impl ResolvedScenario {
-    /// Returns the original scenario.
+    /// Returns the scenario from which the quantities were computed.
     pub fn scenario(&self) -> &Scenario {
         &self.scenario
     }
@@ -355,7 +355,7 @@ impl ResolvedScenario {
         self.scenario.schedule.value(initial as f64, last as f64, t_s).round() as usize
     }
 
-    /// Number of samples before t = 0.
+    /// Number of samples of the run-in, before t = 0.
     pub fn run_in_samples(&self) -> usize {
         self.run_in_samples
     }
@@ -365,7 +365,7 @@ impl ResolvedScenario {
         self.measurement_samples
     }
 
-    /// Returns the parameters at time `t_s`; t = 0 is the start of the measurement.
+    /// Returns the true parameters at time `t_s`; t = 0 is the start of the measurement.
     pub fn parameters_at(&self, t_s: f64) -> TrueParameters {
         let Scenario {
             initial,

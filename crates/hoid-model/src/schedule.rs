@@ -7,13 +7,13 @@
 
 use crate::ModelError;
 
-/// The change from the initial to the final value of every parameter of a scenario.
+/// Change of every parameter of a scenario from its initial to its final value.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Schedule {
-    /// The initial value throughout.
+    /// No change: each parameter keeps its initial value.
     #[default]
     Constant,
-    /// The sigmoid of eq. 5.
+    /// One change, by the sigmoid of eq. 5.
     Sigmoid {
         /// Transition rate G, 1/s.
         rate_per_s: f64,
@@ -26,7 +26,7 @@ pub enum Schedule {
         rate_per_s: f64,
         /// Time t_M of the first change, in s from the start of the measurement.
         midpoint_s: f64,
-        /// Time T from one change to the next, s.
+        /// Time T between successive changes, s.
         interval_s: f64,
     },
 }
@@ -78,7 +78,7 @@ impl Schedule {
         Ok(())
     }
 
-    /// Returns the time of the first change t_M in s, if there is one.
+    /// Returns the time t_M of the first change in s; `None` if there is no change.
     pub fn change_s(&self) -> Option<f64> {
         match *self {
             Self::Constant => None,
@@ -86,7 +86,7 @@ impl Schedule {
         }
     }
 
-    /// Returns the transition rate G in 1/s, if there is a change.
+    /// Returns the transition rate G in 1/s; `None` if there is no change.
     pub fn rate_per_s(&self) -> Option<f64> {
         match *self {
             Self::Constant => None,
@@ -108,15 +108,15 @@ impl Schedule {
         }
     }
 
-    /// Returns p(t) between `initial` and `final_value`. Far from a single change, it equals one of the two to the last
-    /// bit.
+    /// Returns p(t) between `initial` and `final_value`. Far from a single change, p(t) equals one of these values to
+    /// the last bit.
     pub fn value(&self, initial: f64, final_value: f64, t_s: f64) -> f64 {
         match *self {
             Self::Constant => initial,
             Self::Sigmoid { rate_per_s, midpoint_s } => {
                 let x = rate_per_s * (t_s - midpoint_s);
-                // The value is computed from the nearer end: the exponential cannot overflow, and far from t_M that end
-                // is exact.
+                // The value is computed from the nearer of the two end values: the exponential cannot overflow, and far
+                // from t_M the end value is exact.
                 let far = (-x.abs()).exp();
                 let part = (final_value - initial) * (far / (1.0 + far));
                 if x < 0.0 { initial + part } else { final_value - part }
@@ -130,7 +130,8 @@ impl Schedule {
                     (t_s - midpoint_s) / interval_s,
                     COMPLETE_AFTER / (rate_per_s * interval_s),
                 );
-                // Earlier changes are complete, and their sum is zero because their number is even.
+                // Earlier changes are complete, and the sum of their contributions is zero because their number is
+                // even.
                 let first = 2.0 * ((since - reach).max(0.0) / 2.0).floor();
                 let last = (since + reach).ceil();
                 let (mut covered, mut k) = (0.0, first);

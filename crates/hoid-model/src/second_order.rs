@@ -6,24 +6,23 @@
 //! `q = z1 z2 = a2 Ts^2`:
 //!
 //! - `f1 = -(e^z1 + e^z2)`, `f2 = e^s`;
-//! - the impulse response of `1/(s^2 + a1 s + a2)` at Ts is `Ts phi1`, its step response
-//!   `Ts^2 phi2`, with the divided differences of the exponential `phi1 = exp[z1, z2]` and
-//!   `phi2 = exp[0, z1, z2]`;
+//! - the impulse response of `1/(s^2 + a1 s + a2)` at Ts is `Ts phi1`, and the step response at Ts is `Ts^2 phi2`, with
+//!   the divided differences of the exponential `phi1 = exp[z1, z2]` and `phi2 = exp[0, z1, z2]`;
 //! - `b0_d = b0 Ts phi1 + b1 Ts^2 phi2` is the step response after one sample, and the gain at zero
 //!   frequency gives `b0_d + b1_d = b1 Ts^2 chi`,
 //!   `chi = (1 + f1 + f2) / q = exp[0, z1] exp[0, z2]`.
 //!
 //! These quantities are symmetric in the poles and entire functions of (s, q): the same formulas hold for complex, real
-//! and double poles and for poles at the origin of s ([`hoid_core::divided_differences`]). They replace the matrix
-//! exponential and logarithm of the extended matrix (eq. B.7) and give the same results. The inverse exists if no pole
-//! in z is on the closed negative real axis; the logarithm is then the principal one. Sources: N. J. Higham, *Functions
-//! of Matrices*, 2008, sections 2.4 and B.16 (divided differences); eq. B.3-B.10 of the thesis.
+//! and double poles and for poles at the origin of the s plane ([`hoid_core::divided_differences`]). They replace the
+//! matrix exponential and logarithm of the extended matrix (eq. B.7) and give the same results. The inverse exists if
+//! no pole in z is on the closed negative real axis; the logarithm is then the principal one. Sources: N. J. Higham,
+//! *Functions of Matrices*, 2008, sections 2.4 and B.16 (divided differences); eq. B.3-B.10 of the thesis.
 
 use hoid_core::divided_differences::DividedDifferences;
 
 use crate::{ModelError, NotConvertible, SampleTime};
 
-/// `(b0 s + b1) / (s^2 + a1 s + a2)`.
+/// Continuous system `(b0 s + b1) / (s^2 + a1 s + a2)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SecondOrder {
     /// Coefficient of s in the numerator.
@@ -70,7 +69,7 @@ impl SecondOrder {
 }
 
 impl HeldSecondOrder {
-    /// Returns the model if its coefficients are finite, so that no exponential has overflowed.
+    /// Returns the model if its coefficients are finite, that is, if no exponential has overflowed; otherwise an error.
     pub(crate) fn finite(self) -> Result<Self, ModelError> {
         for (quantity, found) in [("b0", self.b0), ("b1", self.b1), ("f1", self.f1), ("f2", self.f2)] {
             if !found.is_finite() {
@@ -84,7 +83,7 @@ impl HeldSecondOrder {
         Ok(self)
     }
 
-    /// Returns the continuous system with this exact discrete model.
+    /// Returns the continuous system that has this exact discrete model.
     ///
     /// # Errors
     /// [`NotConvertible::NegativeRealPole`], [`NotConvertible::NotFinite`].
@@ -111,13 +110,13 @@ impl HeldSecondOrder {
     }
 }
 
-/// The state space of `1/(s^2 + a1 s + a2)` in controllable canonical form (output and its rate)
-/// over one sample of held input: `x(t + Ts) = transition x(t) + input u(t)`.
+/// State space of `1/(s^2 + a1 s + a2)` in controllable canonical form (the states are the output and its rate) over
+/// one sample with a held input: `x(t + Ts) = transition x(t) + input u(t)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeldStates {
-    /// `e^{A Ts}` by rows.
+    /// Transition matrix `e^{A Ts}` by rows.
     pub transition: [[f64; 2]; 2],
-    /// `integral of e^{A s} B ds` over one sample.
+    /// Input vector `integral of e^{A s} B ds` over one sample.
     pub input: [f64; 2],
 }
 
@@ -135,7 +134,7 @@ impl HeldStates {
         }
     }
 
-    /// Returns the state one sample later.
+    /// Returns the state one sample after the state x, with the input u held in between.
     #[inline]
     pub fn step(&self, x: [f64; 2], u: f64) -> [f64; 2] {
         let [[a, b], [c, d]] = self.transition;
@@ -146,8 +145,8 @@ impl HeldStates {
     }
 }
 
-/// Zero-order hold of a system with a direct feedthrough d in addition to the strictly proper part:
-/// `d + (b0 s + b1)/(s^2 + a1 s + a2)`, numerator and denominator in descending powers.
+/// Returns the zero-order hold of a system with a direct feedthrough d in addition to its strictly proper part,
+/// `d + (b0 s + b1)/(s^2 + a1 s + a2)`. `num` and `den` are in descending powers of s.
 ///
 /// The held system has the numerator `d + (d f1 + b0_d) q^-1 + (d f2 + b1_d) q^-2`.
 ///
@@ -199,8 +198,8 @@ pub fn unhold_biproper(
     ))
 }
 
-/// Returns the sum and the product, times Ts and Ts^2, of the poles in s of `1 + f1 q^-1 + f2 q^-2`, by the principal
-/// logarithm.
+/// Returns the sum of the poles in s of `1 + f1 q^-1 + f2 q^-2`, times Ts, and their product, times Ts^2, by the
+/// principal logarithm.
 fn continuous_poles(f1: f64, f2: f64) -> Result<(f64, f64), NotConvertible> {
     let half = -f1 / 2.0;
     let x = half * half - f2;
@@ -215,9 +214,8 @@ fn continuous_poles(f1: f64, f2: f64) -> Result<(f64, f64), NotConvertible> {
     if lowest <= 0.0 {
         return Err(NotConvertible::NegativeRealPole { pole: lowest });
     }
-    // A pole near z = 1 is a pole near the origin of s: its distance from 1 follows from the value
-    // of the polynomial at 1, which the coefficients give more accurately than the difference of
-    // the roots.
+    // A pole near z = 1 corresponds to a pole near the origin of the s plane. Its distance from 1 is computed from the
+    // value of the polynomial at 1, which the coefficients give more accurately than the difference of the roots.
     let at_one = 1.0 + f1 + f2;
     let (far_z, near_z) = if (outer - 1.0).abs() > (inner - 1.0).abs() {
         (outer, inner)

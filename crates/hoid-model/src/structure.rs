@@ -5,7 +5,7 @@
 //! is the number of coefficients `b0 ... b_{nb-1}` of B, each other order is the number of coefficients after the
 //! leading 1, and nk is the delay of b0 in samples.
 //!
-//! This is the only list of structures: the command line, plans and Python use its names.
+//! This module contains the only list of structures: the command line, plans and Python use the names in it.
 //!
 //! ```
 //! use hoid_model::Structure;
@@ -52,7 +52,7 @@ pub enum Structure {
 }
 
 impl Structure {
-    /// Returns the polynomials of the structure, in the order of theta.
+    /// Returns the letters of the polynomials that the structure has, in the order of theta.
     pub fn polynomials(self) -> &'static str {
         match self {
             Self::Fir => "b",
@@ -80,9 +80,9 @@ impl Structure {
         matches!(self, Self::Fir | Self::Ar | Self::Arx)
     }
 
-    /// Returns the orders for which the structure is nearest to the human operator (two poles, b0 and b1) with a
-    /// remnant of first order: `ARX(na=2, nb=2)`, `BJ(nb=2, nc=0, nd=1, nf=2)`. If the structure has no poles or no
-    /// input, the orders are typical values.
+    /// Returns the orders at which the structure is nearest to the human operator (two poles, b0 and b1) with a remnant
+    /// of first order: `ARX(na=2, nb=2)`, `BJ(nb=2, nc=0, nd=1, nf=2)`. If the structure has no poles or no input, the
+    /// orders are typical values.
     pub fn operator_orders(self, nk: usize) -> Orders {
         let base = Orders {
             nb: 2,
@@ -90,7 +90,8 @@ impl Structure {
             ..Orders::default()
         };
         match self {
-            // 0.2 s at 100 Hz, about one time constant of the neuromuscular system.
+            // 20 coefficients cover 0.2 s at 100 Hz, about one time constant `1/(zeta omega)` of the neuromuscular
+            // system.
             Self::Fir => Orders { nb: 20, ..base },
             Self::Ar => Orders {
                 na: 2,
@@ -119,7 +120,7 @@ impl Structure {
         }
     }
 
-    /// Returns the name in tables and figures: `ARX`, `BJ`.
+    /// Returns the name of the structure in tables and figures, such as `ARX` or `BJ`.
     pub fn label(self) -> String {
         match self {
             Self::General => self.name().to_owned(),
@@ -143,21 +144,21 @@ crate::named_choice!(Structure, "structure", 11, {
     General => "general",
 });
 
-/// Longest delay of a model, samples: a hundred seconds at 10 kHz.
+/// Longest delay of a model in samples: a hundred seconds at 10 kHz.
 pub const MAX_DELAY: usize = 1_000_000;
 
-/// Numbers of coefficients and the delay.
+/// Orders of a model: the numbers of coefficients of its polynomials, and the delay.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize)]
 pub struct Orders {
-    /// Coefficients `a1 ... a_na` of A.
+    /// Number of coefficients `a1 ... a_na` of A.
     pub na: usize,
-    /// Coefficients `b0 ... b_{nb-1}` of B.
+    /// Number of coefficients `b0 ... b_{nb-1}` of B.
     pub nb: usize,
-    /// Coefficients `c1 ... c_nc` of C.
+    /// Number of coefficients `c1 ... c_nc` of C.
     pub nc: usize,
-    /// Coefficients `d1 ... d_nd` of D.
+    /// Number of coefficients `d1 ... d_nd` of D.
     pub nd: usize,
-    /// Coefficients `f1 ... f_nf` of F.
+    /// Number of coefficients `f1 ... f_nf` of F.
     pub nf: usize,
     /// Delay of b0 in samples.
     pub nk: usize,
@@ -192,13 +193,13 @@ impl Orders {
             .collect()
     }
 
-    /// Returns the first sample whose regression needs no input or output from before the record:
+    /// Returns the index of the first sample whose regression needs no input or output from before the record:
     /// `max(na, nk + nb - 1)`.
     pub fn first_regressed_sample(&self) -> usize {
         self.na.max(self.nk.saturating_add(self.nb.saturating_sub(1)))
     }
 
-    /// Checks the orders against the structure.
+    /// Checks that the orders are valid for the structure.
     ///
     /// # Errors
     /// [`ModelError::Orders`], which describes the problem.
@@ -267,10 +268,10 @@ impl fmt::Display for Orders {
     }
 }
 
-/// Returns theta in the order of these names. Each coefficient must be given.
+/// Returns theta in the order of `names`, with the coefficients from `start`. Each coefficient must be given.
 ///
 /// # Errors
-/// The problem, as the end of a sentence that starts with the name of the option.
+/// A description of the problem, as the end of a sentence that starts with the name of the option.
 pub fn theta_of(names: &[String], start: &BTreeMap<String, f64>) -> Result<Vec<f64>, String> {
     if let Some(unknown) = start.keys().find(|name| !names.contains(name)) {
         return Err(format!(

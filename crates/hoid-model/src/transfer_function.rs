@@ -6,7 +6,7 @@ use num_complex::Complex64;
 
 use crate::{ModelError, SampleTime, polynomial};
 
-/// `H(s) = num(s) / den(s) e^{-s tau}`, coefficients in descending powers of s.
+/// `H(s) = num(s) / den(s) e^{-s tau}`, with coefficients in descending powers of s.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ContinuousTransferFunction {
     num: Vec<f64>,
@@ -46,7 +46,7 @@ impl ContinuousTransferFunction {
         })
     }
 
-    /// Returns the same dynamics with a pure delay.
+    /// Returns the transfer function with the given pure delay.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] if the delay is negative or not finite.
@@ -86,7 +86,7 @@ impl ContinuousTransferFunction {
         }
     }
 
-    /// `H(j omega)`.
+    /// Returns the frequency response `H(j omega)`.
     pub fn response(&self, omega_rad_s: f64) -> Complex64 {
         let s = Complex64::new(0.0, omega_rad_s);
         let horner = |p: &[f64]| p.iter().fold(Complex64::new(0.0, 0.0), |sum, &c| sum * s + c);
@@ -98,8 +98,8 @@ fn without_leading_zeros(p: &[f64]) -> &[f64] {
     &p[p.iter().position(|&c| c != 0.0).unwrap_or(p.len())..]
 }
 
-/// `H(z) = num(z^-1) / den(z^-1)`, coefficients in ascending powers of `z^-1`, `den[0] = 1`. A pure delay of n samples
-/// is represented by n leading zeros in `num`.
+/// `H(z) = num(z^-1) / den(z^-1)`, with coefficients in ascending powers of `z^-1` and `den[0] = 1`. A pure delay of n
+/// samples is represented by n leading zeros in `num`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiscreteTransferFunction {
     num: Vec<f64>,
@@ -147,7 +147,7 @@ impl DiscreteTransferFunction {
         self.sample_time
     }
 
-    /// `H(e^{j omega Ts})`.
+    /// Returns the frequency response `H(e^{j omega Ts})`.
     pub fn response(&self, omega_rad_s: f64) -> Complex64 {
         let backward = Complex64::from_polar(1.0, -omega_rad_s * self.sample_time.s());
         polynomial::value(&self.num, backward) / polynomial::value(&self.den, backward)

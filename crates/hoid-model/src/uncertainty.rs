@@ -16,7 +16,7 @@ use crate::{
 
 pub use crate::estimate::Estimate;
 
-/// The operator with the standard errors of its parameters.
+/// Parameters of the operator with their standard errors.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OperatorEstimate {
     /// Error gain K_e, in the unit of u divided by the unit of e.
@@ -29,12 +29,12 @@ pub struct OperatorEstimate {
     pub omega_nm_rad_s: Estimate,
     /// Neuromuscular damping ratio zeta_nm.
     pub zeta_nm: Estimate,
-    /// Delay tau_e = (nk - 1) Ts, s: an integer number of samples, without a standard error if the delay was given.
+    /// Delay tau_e = (nk - 1) Ts, s: an integer number of samples; it has no standard error if it was given.
     pub tau_e_s: Estimate,
 }
 
 impl From<OperatorParameters> for OperatorEstimate {
-    /// Converts given parameters, which have no standard errors.
+    /// Converts given parameters to estimates without standard errors.
     fn from(o: OperatorParameters) -> Self {
         Self {
             k_e: Estimate::fixed(o.k_e),
@@ -48,7 +48,7 @@ impl From<OperatorParameters> for OperatorEstimate {
 }
 
 impl OperatorEstimate {
-    /// Returns the parameters without their errors.
+    /// Returns the parameters without their standard errors.
     pub fn parameters(&self) -> OperatorParameters {
         OperatorParameters {
             k_e: self.k_e.value,
@@ -59,8 +59,8 @@ impl OperatorEstimate {
         }
     }
 
-    /// Returns name, unit and estimate of each parameter, in the order of the tables; the names of the gains are those
-    /// that [`GainUnit`](crate::GainUnit) uses.
+    /// Returns name, unit and estimate of each parameter, in the order in which they are reported; the names of the
+    /// gains are those that [`GainUnit`](crate::GainUnit) uses.
     pub fn rows(&self) -> [(&'static str, &'static str, Estimate); 6] {
         [
             ("K_e", "", self.k_e),
@@ -87,7 +87,7 @@ impl fmt::Display for OperatorEstimate {
     }
 }
 
-/// The remnant filter with the standard errors of its parameters.
+/// Parameters of the remnant filter with their standard errors.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct RemnantEstimate {
     /// Order m of the filter.
@@ -107,7 +107,7 @@ impl fmt::Display for RemnantEstimate {
     }
 }
 
-/// `gradient' P gradient`, with the covariance P by rows.
+/// Returns the variance `gradient' P gradient`, where `covariance` is the covariance P by rows.
 pub fn variance_along(gradient: &[f64], covariance: &[f64]) -> f64 {
     let p = gradient.len();
     let mut total = 0.0;
@@ -142,7 +142,7 @@ pub fn operator_estimate(model: &PolynomialModel, covariance: &[f64]) -> Result<
         None => Estimate::fixed(value),
     };
     let row = |i: usize| jacobian.map(|j| j[i]);
-    // d T_L = (d K_e_dot - T_L d K_e) / K_e.
+    // The derivatives of the lead time constant follow from d T_L = (d K_e_dot - T_L d K_e) / K_e.
     let lead = jacobian.map(|j| std::array::from_fn(|k| (j[1][k] - parameters.t_l_s * j[0][k]) / parameters.k_e));
     Ok(OperatorEstimate {
         k_e: estimate(parameters.k_e, row(0)),

@@ -3,15 +3,16 @@
 //! 2013, section 4.2).
 //!
 //! Matrices are N by N; only the first n rows and columns are used. [`solve`] subtracts each known term as soon as it
-//! is known, whereas [`forward`] and [`backward`] sum the known terms and subtract the sum. The two together equal
-//! [`solve`] except for rounding.
+//! is known, whereas [`forward`] and [`backward`] sum the known terms and subtract the sum. Applied one after the
+//! other, [`forward`] and [`backward`] give the result of [`solve`] except for rounding.
 
 /// Replaces the lower triangle of A by L. Returns false if A is not positive definite.
 pub fn factor<const N: usize>(a: &mut [[f64; N]; N], n: usize) -> bool {
     factor_above(a, n, 0.0)
 }
 
-/// Replaces the lower triangle of A by L. Returns false if the square of a diagonal element of L is not above `least`.
+/// Replaces the lower triangle of A by L. Returns false if a pivot, the square of a diagonal element of L, is not above
+/// `least`.
 pub fn factor_above<const N: usize>(a: &mut [[f64; N]; N], n: usize, least: f64) -> bool {
     for i in 0..n {
         for j in 0..=i {

@@ -2,8 +2,9 @@
 //!
 //! **Positive definite matrices**, one right-hand side ([`solve`]). With rows `u_k` and pivots `p_k = u_kk`,
 //! `A = sum_k u_k' u_k/p_k` (C. F. Gauss, *Disquisitio de elementis ellipticis Palladis*, 1810). The right-hand side is
-//! eliminated together with A. In the back substitution each unknown is subtracted from all preceding equations as soon
-//! as it is known, so that no step waits for a complete sum. If the factor itself is needed, use [`crate::cholesky`].
+//! eliminated together with A. In the back substitution, the term of each unknown is subtracted from all preceding
+//! equations as soon as the unknown is known, so that no step waits for a complete sum. If the factor itself is needed,
+//! use [`crate::cholesky`].
 //!
 //! **General matrices**, several right-hand sides ([`solve_any`]), with row pivoting (G. H. Golub and C. F. Van Loan,
 //! *Matrix Computations*, 2013, section 3.4).
@@ -11,8 +12,8 @@
 /// Number of columns that are computed at a time.
 const WIDE: usize = 4;
 
-/// Replaces b by the solution for the first n of N unknowns. Returns false if A is not positive definite. Only the
-/// upper triangle of A is read, and it is overwritten. N must be a multiple of four.
+/// Replaces b by the solution of `A x = b` for the first n of N unknowns. Returns false if A is not positive definite.
+/// Only the upper triangle of A is read, and it is overwritten. N must be a multiple of four.
 #[inline(always)]
 pub fn solve<const N: usize>(a: &mut [[f64; N]; N], n: usize, b: &mut [f64; N]) -> bool {
     const { assert!(N.is_multiple_of(WIDE)) };

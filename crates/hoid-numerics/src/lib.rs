@@ -2,7 +2,7 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`statistics`] | mean, variance, root mean square; quantiles by three definitions |
+//! | [`statistics`] | mean, variance, root mean square; quantiles according to three definitions |
 //! | [`products`] | product of two vectors |
 //! | [`cholesky`] | small positive definite systems by Cholesky factorisation, and triangular systems |
 //! | [`elimination`] | small positive definite or general systems by elimination, without a stored factor |

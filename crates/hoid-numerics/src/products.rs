@@ -4,7 +4,7 @@
 /// slices.
 #[inline(always)]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // The sum does not start from zero, since every addition adds to the latency of a recursion.
+    // The sum starts with the first product instead of zero, since every addition adds to the latency of a recursion.
     let mut pairs = a.iter().zip(b);
     let Some((a, b)) = pairs.next() else {
         return 0.0;

@@ -9,9 +9,9 @@
 //! | [`nearest_quantile`] | `x_k`, where k is the integer nearest to `(n-1) p` | type 7 without interpolation |
 //! | [`upper_quantile`] | `x_k`, where k is the largest integer not above `n p` | right-continuous inverse of the empirical distribution, type 1 except where `n p` is an integer |
 //!
-//! The first function is used in tables and figures. The other two return one of the values and do not need a full
-//! sort. They are used for scales of many samples, and for thresholds whose results depend on the definition. For the
-//! median both return the upper of the two middle values.
+//! [`quantile`] is used in tables and figures. [`nearest_quantile`] and [`upper_quantile`] return one of the values and
+//! do not need a full sort. They are used for scales of many samples, and for thresholds whose results depend on the
+//! definition. For the median both return the upper of the two middle values.
 //!
 //! Values are ordered by [`f64::total_cmp`].
 
@@ -88,7 +88,7 @@ pub fn upper_median(values: &mut [f64]) -> Option<f64> {
     order_statistic(values, values.len() / 2)
 }
 
-/// Returns the value at this index in ascending order, or the largest value if the index is too large.
+/// Returns the value with this index in ascending order, or the largest value if the index is too large.
 fn order_statistic(values: &mut [f64], place: usize) -> Option<f64> {
     let last = values.len().checked_sub(1)?;
     Some(*values.select_nth_unstable_by(place.min(last), f64::total_cmp).1)

@@ -24,7 +24,7 @@ pub struct PyDescribingFunction {
     found: DescribingFunction,
 }
 
-/// A description with its verdict; the package wraps it in `pyhoid.Description`.
+/// A describing function with its verdict and its settings; the package wraps it in `pyhoid.Description`.
 #[pyclass(name = "Description", module = "pyhoid._pyhoid", frozen)]
 pub struct PyDescription(Described);
 
@@ -98,7 +98,7 @@ impl PyDescription {
         }
     }
 
-    /// Returns the phase in deg at each line, without jumps.
+    /// Returns the unwrapped phase in deg at each line.
     #[getter]
     fn phase_deg<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         array(py, self.0.found.phases_deg().iter().map(|p| p.value).collect())
@@ -118,8 +118,8 @@ impl PyDescription {
         Ok(Some(all))
     }
 
-    /// Returns two shares of the power of u: the part at non-excited frequencies, and this part together with the noise
-    /// at the lines.
+    /// Returns two estimates as shares of the variance of u: the part of u at non-excited frequencies, and the whole
+    /// remnant, which includes its part at the lines.
     #[getter]
     fn remnant(&self) -> (ValueWithError, ValueWithError) {
         let function = &self.0.found.function;
@@ -292,7 +292,7 @@ impl PyDescribingFunction {
         Ok(all)
     }
 
-    /// Returns crossover frequency and phase margin with a controlled element.
+    /// Returns crossover frequency and phase margin of the loop with a controlled element.
     fn margins<'py>(&self, py: Python<'py>, element: ControlledElement) -> Outcome<Bound<'py, PyDict>> {
         let margins = self.found.open_loop(&element.transfer_function()?).margins();
         let all = PyDict::new(py);

@@ -92,7 +92,7 @@ pub fn design_files_of(text: &str, scenario: &str) -> Outcome<(String, String, S
     ))
 }
 
-/// Returns the figures of a design as SVG: lines and response, and errors over the number of runs.
+/// Returns two figures of a design as SVG: the lines with the response, and the errors against the number of runs.
 #[pyfunction]
 pub fn design_figures_of(text: &str) -> Outcome<(String, String)> {
     let found = ExperimentDesign::from_json(text)?;

@@ -21,7 +21,7 @@ use crate::{
 #[pyclass(name = "OperatorFit", module = "pyhoid._pyhoid", frozen)]
 pub struct PyOperatorFit(pub Identified);
 
-/// Name, unit, value, standard errors of the runs and of the person, interval, share of the prior, whether the data
+/// Name, unit, value, standard errors for the runs and for the person, interval, share of the prior, whether the data
 /// determine the parameter, and the forms over which it was averaged.
 type ParameterParts = (
     String,
@@ -266,15 +266,16 @@ impl PyOperatorFit {
         self.0.controlled_element.as_ref().map(of).transpose()
     }
 
-    /// Returns all crossovers of the loop, and whether it is stable; `None` without a controlled element.
+    /// Returns all crossovers of the loop, its smallest phase margin, its gain margin, and whether it is stable; `None`
+    /// without a controlled element.
     #[getter]
     fn loop_shape<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let of = |element| shape_parts(py, &self.0.fit.loop_shape(0, element));
         self.0.controlled_element.as_ref().map(of).transpose()
     }
 
-    /// Returns crossover and phase margin with the errors of the person, not of these runs; `None` without a controlled
-    /// element.
+    /// Returns crossover and phase margin with the standard errors for the person, not for these runs; `None` without a
+    /// controlled element.
     #[getter]
     fn open_loop_person<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let of = |element| {

@@ -1,4 +1,4 @@
-//! Conversion of results with few numbers: estimates to pairs, operators to dictionaries.
+//! Conversion of small results to Python: estimates to pairs, operators to dictionaries.
 
 use hoid_ident::{
     MarginEstimates, ResponsePoint, Termination,

@@ -144,7 +144,7 @@ pub fn even_times(times: PyReadonlyArray1<'_, f64>) -> (Option<f64>, usize) {
     }
 }
 
-/// Returns the columns of a table from which a signal such as `r-y` or `-e` is computed, each with its sign.
+/// Returns the sign and the index of each column of a table from which a signal such as `r-y` or `-e` is computed.
 #[pyfunction]
 #[pyo3(signature = (text, names))]
 pub fn signal_of(text: &str, names: Vec<String>) -> Outcome<Vec<(f64, usize)>> {

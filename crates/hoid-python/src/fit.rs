@@ -28,7 +28,7 @@ pub struct PyFit {
     choice: Option<Choice>,
     /// Number of records to which the model was fitted.
     records: usize,
-    /// The result whose model this is; `None` if the model is a part of another result.
+    /// The complete result to which the model belongs; `None` if the model is a part of a result of another class.
     whole: Option<Whole>,
 }
 
@@ -60,7 +60,7 @@ enum Whole {
     Remnant(Box<Identified<GreyBoxFit>>),
 }
 
-/// Applies the same expression to each kind of result.
+/// Evaluates an expression for a result of either kind.
 macro_rules! each {
     ($whole:expr, $found:ident => $what:expr) => {
         match $whole {
@@ -281,7 +281,8 @@ impl PyFit {
             .collect()
     }
 
-    /// Returns the constant of u in each record of the fit, in the values of the file; empty if none was estimated.
+    /// Returns the constant level of u in each record of the fit, in the units of the recording; empty if no levels
+    /// were estimated.
     #[getter]
     fn levels(&self) -> Vec<Option<ValueWithError>> {
         let without = |whole: &&Whole| each!(whole, found => found.is_without_means());

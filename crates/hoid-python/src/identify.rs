@@ -63,10 +63,12 @@ pub fn identify<'py>(
     Ok((native(py, fit)?, notes))
 }
 
-/// Input of a coupling, its probability by chance, whether there is a response, and why it was not tested.
+/// Input of a coupling, p-value of the test for a response to it, whether there is a response, and the reason if it was
+/// not tested.
 type CouplingParts = (String, Option<f64>, bool, String);
 
-/// The operators of several axes, each with its couplings. `axes` has the records of each axis, `pairs` its signals.
+/// Identifies the operators of several axes, each with its couplings. `axes` contains the records of each axis, `pairs`
+/// its input and output.
 #[pyfunction]
 #[pyo3(signature = (axes, pairs, *, options, faults, decimate))]
 pub fn identify_axes(
@@ -119,7 +121,7 @@ pub fn from_json<'py>(py: Python<'py>, text: &str) -> Outcome<Bound<'py, PyAny>>
     Ok(native(py, BatchResult::from_json(text)?)?)
 }
 
-/// Restores a part of a result from the text that its `state` returned.
+/// Restores a model that is a part of another result from the text that its `state` returned.
 #[pyfunction]
 pub fn from_state(text: &str) -> PyResult<PyFit> {
     let part: PartRead = state::read(text).map_err(DataError::new_err)?;

@@ -53,9 +53,9 @@ pub fn with_progress<T>(status: &Arc<RunStatus>, work: impl FnOnce() -> T) -> T 
 
 /// Runs a computation without the interpreter lock and returns its result.
 ///
-/// `progress` is called with the completed and the total number of units. An interrupt requests the computation to
-/// stop. If `patient` is set, the computation reacts to this request and is awaited, so that its files are complete;
-/// otherwise it is left to end in its own thread.
+/// `progress` is called with the completed and the total number of units. An interrupt asks the computation to stop. If
+/// `patient` is set, the computation must react to this request, and `run` waits for it, so that its files are
+/// complete; otherwise the computation is left to end in its own thread.
 pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
     py: Python<'_>,
     total: u64,
@@ -70,7 +70,7 @@ pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
     let thread = std::thread::Builder::new().name("hoid".to_owned());
     thread
         .spawn(move || {
-            // After an interrupt the receiver is gone.
+            // After an interrupt the receiver may no longer exist.
             let _ = send.send(work(&shared));
         })
         .map_err(|error| bad_option(format!("the system cannot start a thread: {error}")))?;

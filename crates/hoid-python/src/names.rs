@@ -102,7 +102,7 @@ pub fn discretisation(found: &str, prewarp_rad_s: Option<f64>) -> Outcome<discre
     word("method", found, &words)
 }
 
-/// Returns a range that includes both ends.
+/// Returns the range between two ends, both included.
 pub fn range(option: &str, ends: (usize, usize)) -> Outcome<RangeInclusive<usize>> {
     if ends.0 > ends.1 {
         return Err(bad_option(format!(

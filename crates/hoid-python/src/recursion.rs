@@ -61,7 +61,7 @@ pub fn request(options: &Bound<'_, PyDict>) -> Outcome<TrackRequest> {
     })
 }
 
-/// Returns the method with its options, which are texts by name.
+/// Returns the method with its options, which are given as text by name.
 fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
     let mut method = match get::<String>(options, "method")? {
         Some(name) => {

@@ -156,7 +156,7 @@ pub fn margins<'py>(
     Ok(all)
 }
 
-/// Returns the entries for an operator of the family, including the gains of the parts of its remnant.
+/// Returns crossover and margins for an operator of the family, with the gain of each part of its remnant.
 fn family_margins<'py>(py: Python<'py>, scenario: &FamilyScenario, last: bool) -> Outcome<Bound<'py, PyDict>> {
     let state = if last { &scenario.last } else { &scenario.initial };
     let all = figures::plain_margins(py, &state.margins()?)?;

@@ -17,7 +17,8 @@ use crate::{
 pub struct PyTimeVaryingFit(pub Identified<SigmoidFit>);
 
 /// Returns the operator before or after the change. A gain with a lead is returned as for any fit; any other form is
-/// returned with its name and each parameter by name. Poles of the family are stable because of their bounds.
+/// returned with its name and each parameter by name. Operators of the family are stable because of the bounds of their
+/// parameters.
 fn operator<'py>(py: Python<'py>, of: &ChangedOperator) -> PyResult<Option<Bound<'py, PyDict>>> {
     if let Some(lead) = of.lead() {
         return figures::operator(py, &Ok(lead));
@@ -83,7 +84,8 @@ impl PyTimeVaryingFit {
         Ok(all)
     }
 
-    /// Returns whether there is a change, and the comparison with an operator that does not change.
+    /// Returns whether there is a change, the comparison with an operator that does not change, and the intervals of
+    /// t_M and G.
     #[getter]
     fn change<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (c, all) = (self.0.fit.comparison(), PyDict::new(py));
@@ -96,7 +98,7 @@ impl PyTimeVaryingFit {
         Ok(all)
     }
 
-    /// Returns the constant of u in each record; `None` where it was not estimated.
+    /// Returns the constant level of u in each record; `None` for a record in which it was not estimated.
     #[getter]
     fn levels(&self) -> Vec<Option<ValueWithError>> {
         self.0

@@ -133,7 +133,7 @@ impl PyTracker {
         self.live.tracker().is_some()
     }
 
-    /// Returns the reason why the last fit failed or the warm-up restarted.
+    /// Returns the reason why the last fit failed or the warm-up restarted; `None` if neither happened.
     #[getter]
     fn trouble(&self) -> Option<String> {
         match self.live.stage() {

@@ -1,5 +1,5 @@
-//! Figures of a designed experiment: the forcing function with the response of the person, and the expected errors over
-//! the number of runs.
+//! Figures of a designed experiment: the forcing function with the response of the person, and the expected errors as
+//! functions of the number of runs.
 
 use hoid_design::experiment::{DesignedLine, Enters, Expected, ExpectedResponse, ExperimentDesign};
 use hoid_model::uncertainty::Estimate;
@@ -9,9 +9,9 @@ use crate::{
     numbers::Z_95,
 };
 
-/// Draws the amplitudes of the lines and the gain and phase of the person. The operator has a 95 % band and each line a
-/// 95 % error bar, both expected from all runs. If the target is displayed, the response to it is drawn in the same
-/// way.
+/// Draws the amplitudes of the lines and the gain and phase of the person. The curve of the operator has a 95 % band,
+/// and the response at each line has a 95 % error bar; both are expected from all runs together. If the target is
+/// displayed, the response to it is drawn in the same way.
 pub fn design_figure(design: &ExperimentDesign) -> String {
     let is_seen = design.task.feedforward.is_some();
     let amplitude = |(shade, enters): (usize, Enters)| {
@@ -93,8 +93,9 @@ const FEWEST_RUNS: usize = 8;
 /// Largest upper end of the abscissa, in runs.
 const MOST_RUNS: usize = 200;
 
-/// Draws the expected errors over the number of runs, relative to the accepted errors, or in percent of the values if
-/// no accepted errors are given. A second panel shows the number of people needed to detect a planned difference.
+/// Draws the expected errors as functions of the number of runs: relative to the accepted errors, or in percent of the
+/// values if no accepted errors are given. A second panel shows the number of people needed to detect a planned
+/// difference.
 pub fn runs_figure(design: &ExperimentDesign) -> String {
     let last = (2 * design.runs_needed).max(design.runs).clamp(FEWEST_RUNS, MOST_RUNS);
     let runs: Vec<f64> = (1..=last).map(|runs| runs as f64).collect();
@@ -166,7 +167,7 @@ fn shown(design: &ExperimentDesign) -> Vec<(String, f64)> {
     if !design.wanted.is_empty() {
         return design.wanted.iter().map(|w| (w.name.clone(), 1.0 / w.error)).collect();
     }
-    // A relative error of the phase margin is not defined.
+    // A relative error of the phase margin has no meaning.
     let names = design
         .expected
         .names()

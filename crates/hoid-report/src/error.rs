@@ -5,14 +5,14 @@ use hoid_study::StudyError;
 use thiserror::Error;
 
 /// Errors that prevent a report. A model that cannot be converted or a record that cannot be validated does not prevent
-/// it: the page shows the reason instead.
+/// a report: the page shows the reason instead.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ReportError {
-    /// The report contains no model.
+    /// A report that contains no model.
     #[error("the report has no model; expected at least one fitted model")]
     NoModels,
-    /// The report contains no recursive estimate.
+    /// A report that contains no recursive estimate.
     #[error("the report has no trace; expected one to {maximum} recursive estimates")]
     NoTraces {
         /// Maximum number of traces on a page.

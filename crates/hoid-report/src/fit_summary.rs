@@ -1,5 +1,5 @@
 //! The head of a page: the verdict on the result, a summary in one sentence, and the parameters with their errors. The
-//! remainder of the page supports it.
+//! remainder of the page supports this summary.
 
 use hoid_model::{Verdict, VerdictLevel, numbers::significant, uncertainty::Estimate};
 use minijinja::{Value, context};
@@ -65,7 +65,7 @@ pub(crate) fn verdict(v: &Verdict) -> Value {
     }
 }
 
-/// Words, names and units for the parameters of an operator, in their order in a sentence.
+/// Word, name and unit of each parameter that occurs in the sentence about an operator, in the order of the sentence.
 const WORDS: [(&str, &str, &str); 7] = [
     ("gain", "K", ""),
     ("gain", "K_e", ""),

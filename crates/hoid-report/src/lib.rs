@@ -1,8 +1,8 @@
 //! Figures and HTML pages about identified models.
 //!
 //! A fit is a list of numbers; figures show how reliable it is: the frequency response with its bands, the residual
-//! tests, the simulated and the measured output. A [`Report`] puts them on one page, which contains all styles and
-//! figures:
+//! tests, the simulated and the measured output. A [`Report`] puts these figures on one page, which contains all styles
+//! and figures:
 //!
 //! ```
 //! use hoid_ident::Estimator;
@@ -43,7 +43,7 @@
 //! | [`TrackReport`], [`TraceSection`], [`BatchLine`], [`batch_fit`], [`default_batch_fits`] | one self-contained HTML page about recursive estimates over a record |
 //! | [`GroupReport`], [`GroupTables`], [`write_group_pages`], [`group_figures`] | one self-contained HTML page about a group of recorded runs |
 //! | [`comparison_figure`] | people by condition, with the means over people |
-//! | [`design_figure`], [`runs_figure`] | a designed experiment: lines and response, errors over runs |
+//! | [`design_figure`], [`runs_figure`] | a designed experiment: lines and response, errors by number of runs |
 //! | [`PaperTable`] | a result as a table for a paper |
 //! | [`facts`] | the table of settings on these pages |
 //! | [`figures`] | the figures of these pages, each as separate SVG text |

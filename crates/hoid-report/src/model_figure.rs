@@ -1,5 +1,5 @@
-//! The figure of a polynomial model. If the records have a periodic excitation, it shows the model with the describing
-//! function of the records; otherwise it shows the frequency response with its bands.
+//! The figure of a polynomial model. If the records have a periodic excitation, the figure shows the model with the
+//! describing function of the records; otherwise the frequency response of the model with its bands.
 
 use hoid_ident::{Fit, frequency::Description};
 use hoid_model::Record;

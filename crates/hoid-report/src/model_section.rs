@@ -24,7 +24,7 @@ pub struct ModelSection<'a> {
 }
 
 impl ModelSection<'_> {
-    /// The validation of the model on each of its records, or the reason why it failed.
+    /// The validation of the model on each of its records, or the reason why the validation failed.
     pub(crate) fn validate(&self) -> Vec<Result<Validation, String>> {
         let validation = |record| self.fit.validate(record).map_err(|e| e.to_string());
         self.records.iter().map(validation).collect()

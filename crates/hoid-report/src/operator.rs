@@ -58,9 +58,9 @@ impl<'a> Report<'a> {
     }
 }
 
-/// Draws the figure of an operator. With several inputs it shows the response to each of them. Otherwise, if the records
-/// have a periodic excitation, it shows the operator with their describing function; if not, the frequency response
-/// with its bands.
+/// Draws the figure of an operator. With several inputs the figure shows the response to each input. With a single
+/// input it shows the operator with the describing function of the records, or the frequency response with its bands if
+/// the records have no periodic excitation.
 pub fn operator_figure(found: &Identified) -> String {
     match (&found.described, to_all_inputs(found)) {
         (_, Some(all)) => all,
@@ -150,7 +150,7 @@ fn margins(fit: &FamilyFit, element: &ContinuousTransferFunction) -> Option<Marg
 const CHANNEL_RANGE: (f64, f64) = (0.3, 16.0);
 const CHANNEL_POINTS: usize = 120;
 
-/// The figure of the responses to all inputs; `None` for a fit with one.
+/// The figure of the responses to all inputs; `None` for a fit with a single input.
 fn to_all_inputs(found: &Identified) -> Option<String> {
     let fit = &found.fit;
     let (low, high) = CHANNEL_RANGE;

@@ -44,7 +44,7 @@ pub fn render_with(own: &[(&str, &str)], name: &str, values: Value) -> Result<St
         .map_err(defect)
 }
 
-/// Names and values for the table of settings.
+/// Converts pairs of name and value for the table of settings.
 pub(crate) fn facts(pairs: &[(String, String)]) -> Vec<Value> {
     pairs.iter().map(|(label, text)| context! { label, text }).collect()
 }

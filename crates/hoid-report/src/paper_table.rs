@@ -29,7 +29,7 @@ struct Column {
 enum Cells {
     Text(Vec<String>),
     Number(Vec<f64>),
-    /// Values with their standard errors; in data files the errors are in a column with this name.
+    /// Values with their standard errors; in data files the errors are in a separate column with this name.
     Estimate(Vec<[f64; 2]>, String),
     /// Ends of intervals with the standard errors that determine their digits.
     End(Vec<[f64; 2]>),

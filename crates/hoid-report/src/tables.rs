@@ -97,7 +97,7 @@ pub fn comparison(models: &[ModelSection<'_>], qualities: &[Result<GoodnessOfFit
     }
 }
 
-/// The true operator, if all models with a true operator have the same; otherwise `None`.
+/// The true operator, if all models for which it is known have the same; otherwise `None`.
 fn common_truth(models: &[ModelSection<'_>]) -> Option<OperatorParameters> {
     let mut known = models.iter().filter_map(|m| m.truth);
     let first = known.next()?;
@@ -129,7 +129,7 @@ fn squared(unit: &str) -> String {
     }
 }
 
-/// The coefficients of a fit: name, value, standard error and 95 % interval of each.
+/// Returns the name, value, standard error and 95 % interval of each coefficient of a fit.
 pub fn coefficients(fit: &Fit) -> Vec<Value> {
     let rows = fit.parameters().into_iter().map(|(name, estimate)| {
         let (value, error) = with_uncertainty(estimate.value, estimate.standard_error);
@@ -203,7 +203,7 @@ pub fn no_remnant(fit: &Fit) -> Option<String> {
     (reason(RemnantDiscretisation::BackwardEuler)? == first).then_some(first)
 }
 
-/// The course of the fit, as pairs of label and text.
+/// Describes how the fit was computed, as pairs of label and text.
 pub fn course(fit: &Fit, records: &[Record]) -> Vec<Value> {
     let end = fit.termination();
     let (n, p, s) = (fit.residual_count(), fit.free_count(), fit.state_count());

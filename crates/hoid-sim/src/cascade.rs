@@ -7,7 +7,7 @@
 
 use hoid_lanes::Number;
 
-/// Highest order of the remnant filter.
+/// Highest order m of the remnant filter.
 pub(crate) const HIGHEST_ORDER: usize = hoid_model::remnant::HIGHEST_ORDER;
 
 /// Coefficients of the cascade for one sample.

@@ -15,7 +15,7 @@ pub enum SimError {
         "the loop diverges: {signal} is not finite at t = {time_s:.2} s; check gains, delay and controlled element of {scenario}"
     )]
     Diverged {
-        /// Signal that is not finite.
+        /// Name of the signal that is not finite.
         signal: &'static str,
         /// Time of the first sample that is not finite, in s.
         time_s: f64,
@@ -33,7 +33,7 @@ pub enum SimError {
         scenario: String,
         /// Delay of the operator in s.
         tau_e_s: f64,
-        /// Half the sample time in s.
+        /// Half the sample time in s, with which the delay is compared.
         half_a_sample_s: f64,
     },
     /// No acceptable person was found in the ranges of a population.
@@ -51,9 +51,9 @@ pub enum SimError {
     /// The length of the noise differs from that of the run.
     #[error("the noise has {found} samples, but the run needs {expected} (run-in and measurement)")]
     NoiseLength {
-        /// Number of given samples.
+        /// Number of samples of the given noise.
         found: usize,
-        /// Number of required samples.
+        /// Number of samples of the run.
         expected: usize,
     },
     /// This processor does not support the instruction set.

@@ -2,7 +2,7 @@
 //!
 //! Operator, remnant filter and controlled element are each discretised exactly (zero-order hold), so that the
 //! simulated record follows the model of an estimator without integration errors. The random numbers of a run are
-//! identified by seed, cell and replication, not by a thread, so any run can be repeated alone.
+//! identified by seed, cell and replication, not by the thread that computes it, so any run can be repeated alone.
 //!
 //! ```
 //! use hoid_model::scenario::{Condition, Scenario};

@@ -1,11 +1,11 @@
 //! Standard normal deviates from a generator of random bits.
 //!
 //! The deviates are those of `rand_distr`, by the ziggurat method. The area below the density is divided into 256
-//! layers of equal area. A random layer i and a random position in it give a deviate directly if the position lies
-//! below the edge of the next layer, which happens 99 times out of 100 (G. Marsaglia and W. W. Tsang, *J. Statistical
-//! Software* 5 (2000) 8; J. A. Doornik, *An Improved Ziggurat Method to Generate Normal Random Samples*, 2005). Such
-//! deviates are computed here, many at a time; the other deviates are computed by `rand_distr` from the same random
-//! numbers. The results are therefore the same and take less time.
+//! layers of equal area. A random layer i and a random position in it give a deviate directly if the position is within
+//! the next, narrower layer, which happens 99 times out of 100 (G. Marsaglia and W. W. Tsang, *J. Statistical Software*
+//! 5 (2000) 8; J. A. Doornik, *An Improved Ziggurat Method to Generate Normal Random Samples*, 2005). Such deviates are
+//! computed here, many at a time; the other deviates are computed by `rand_distr` from the same random numbers. The
+//! results are therefore the same as those of `rand_distr` and take less time.
 
 use std::{convert::Infallible, sync::OnceLock};
 
@@ -47,13 +47,14 @@ const LAYERS: usize = 256;
 #[inline(always)]
 fn quick(edges: &[f64; LAYERS + 1], bits: u64) -> Option<f64> {
     let layer = bits as usize % LAYERS;
-    // A number in the range [2, 4), minus 3.
+    // The highest 52 bits give a number in the range [2, 4), from which 3 is subtracted.
     let place = f64::from_bits(1024 << 52 | bits >> 12) - 3.0;
     let deviate = place * edges[layer];
     (deviate.abs() < edges[layer + 1]).then_some(deviate)
 }
 
-/// Returns the edges used by `rand_distr`: each edge is twice the middle of its layer, which is always accepted.
+/// Returns the edges used by `rand_distr`: each edge is computed as twice the deviate in the middle of its layer, which
+/// is always accepted.
 fn edges() -> [f64; LAYERS + 1] {
     let mut edges = [0.0; LAYERS + 1];
     for (layer, edge) in (0..).zip(&mut edges[..LAYERS]) {
@@ -63,7 +64,7 @@ fn edges() -> [f64; LAYERS + 1] {
     edges
 }
 
-/// Generator that first returns the number for the middle of a layer, and after that the largest number.
+/// Generator whose first number is that for the middle of a layer; all further numbers are the largest possible number.
 struct Middle(u64);
 
 impl TryRng for Middle {
@@ -86,7 +87,7 @@ impl TryRng for Middle {
 /// Number of bytes that are drawn at a time.
 const DRAWN: usize = 2048;
 
-/// Random numbers of a generator, drawn many at a time, which gives the same numbers in half the time.
+/// Random numbers of a generator, drawn many at a time: the numbers are the same, but take half the time.
 struct Buffered {
     generator: ChaCha8Rng,
     bytes: [u8; DRAWN],
@@ -108,7 +109,7 @@ impl Buffered {
         self.bytes[self.at..].as_chunks().0
     }
 
-    /// Marks a number of values as used.
+    /// Marks the next drawn numbers as used, as many as given.
     #[inline(always)]
     fn pass(&mut self, numbers: usize) {
         self.at += 8 * numbers;

@@ -6,8 +6,8 @@
 
 use crate::{RunSeed, Simulator, cascade::HIGHEST_ORDER};
 
-/// Largest number of samples of a restored operator: eight hours at 1 kHz. Its random numbers are drawn again, and an
-/// invalid larger number must not exhaust the memory.
+/// Largest accepted index of a sample in a saved state: eight hours at 1 kHz. The random numbers up to this sample are
+/// drawn again, and an invalid larger index must not exhaust the memory.
 const MOST_SAMPLES: f64 = 3e7;
 
 /// Returns the index of the next sample from a saved state; `None` if it is not valid.
@@ -15,7 +15,7 @@ pub(crate) fn saved_sample(k: f64) -> Option<usize> {
     ((0.0..=MOST_SAMPLES).contains(&k) && k.fract() == 0.0).then_some(k as usize)
 }
 
-/// Running operator.
+/// Running operator of a scenario of the thesis.
 #[derive(Debug, Clone)]
 pub struct OperatorRun {
     simulator: Simulator,
@@ -24,7 +24,7 @@ pub struct OperatorRun {
     noise: Vec<f64>,
     operator: [f64; 2],
     remnant: [f64; HIGHEST_ORDER],
-    /// Ring of the last responses, with the response of sample k at index k.
+    /// Ring of the last responses, in which the response of sample k has the index k modulo the length.
     memory: Vec<f64>,
     /// Index of the next sample.
     k: usize,
@@ -85,8 +85,9 @@ impl OperatorRun {
         numbers
     }
 
-    /// Continues from the saved state ([`OperatorRun::saved`]) of an operator with the same scenario and run, with
-    /// bit-identical results. Returns false, without any change, if the numbers belong to another operator.
+    /// Restores the state that [`OperatorRun::saved`] returned for an operator with the same scenario and run, so that
+    /// it continues with bit-identical results. Returns false, without any change, if the numbers belong to another
+    /// operator.
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let Some(([k], rest)) = numbers.split_first_chunk::<1>() else {
             return false;

@@ -1,7 +1,8 @@
 //! Random streams that belong to a run, not to a thread.
 //!
 //! A run is identified by (seed, cell, replication). These three numbers are the key of a ChaCha8 generator. Any run
-//! can therefore be repeated alone, in any order and on any number of threads, and no two runs share a stream.
+//! can therefore be repeated alone, and runs can be computed in any order and on any number of threads; no two runs
+//! share a stream.
 
 use rand_chacha::{
     ChaCha8Rng,
@@ -21,7 +22,8 @@ pub struct RunSeed {
     pub replication: u64,
 }
 
-/// Last eight bytes of the key. Other uses of (seed, cell, replication) have another tag and therefore another stream.
+/// Last eight bytes of the key of the generator. Other uses of (seed, cell, replication) have another tag and therefore
+/// another stream.
 const REMNANT: u64 = u64::from_le_bytes(*b"remnant\0");
 const UNIFORM: u64 = u64::from_le_bytes(*b"uniform\0");
 
@@ -38,7 +40,7 @@ impl RunSeed {
         normal_deviates(self.generator(REMNANT), noise);
     }
 
-    /// Returns uniform random numbers in `[0, 1)`, for callers that draw people, or phases of a run.
+    /// Returns uniform random numbers in `[0, 1)`, for drawing people or the phases of a run.
     pub fn uniform(&self, n: usize) -> Vec<f64> {
         self.uniform_of(UNIFORM, n)
     }
@@ -53,7 +55,7 @@ impl RunSeed {
     /// Returns uniform random numbers in `[0, 1)` from a separate stream of the run.
     pub(crate) fn uniform_of(&self, tag: u64, n: usize) -> Vec<f64> {
         let mut generator = self.generator(tag);
-        // The 53 highest bits give a number in [0, 1).
+        // The 53 highest bits of each random number give a number in [0, 1).
         (0..n)
             .map(|_| (generator.next_u64() >> 11) as f64 / (1u64 << 53) as f64)
             .collect()

@@ -5,16 +5,16 @@
 //! `e = f_t - x`, `u = y(k - tau_e/Ts) + n`, `n = K_n z`,
 //!
 //! where y is the response of the operator without delay, x the output of the controlled element, and z the output of
-//! the remnant cascade for unit variance. Each block is then advanced exactly by one sample, for a held input: the
-//! operator is driven by e, the controlled element by u, and the cascade by one normal deviate. The hold delays the
-//! response by one more sample, so that `nk = tau_e/Ts + 1`. The remnant is not delayed. A changing delay has its value
-//! at the sample at which the response arrives: if the delay increases, parts of the response are repeated; if it
-//! decreases, parts are skipped.
+//! the remnant cascade for unit variance. Operator, controlled element and cascade are then each advanced exactly by
+//! one sample, for a held input: the operator is driven by e, the controlled element by u, and the cascade by one
+//! normal deviate. The hold delays the response by one more sample, so that `nk = tau_e/Ts + 1`. The remnant is not
+//! delayed. A changing delay has its value at the sample at which the response arrives: if the delay increases, parts
+//! of the response are repeated; if it decreases, parts are skipped.
 //!
-//! Operator and controlled element are in controllable canonical form (the states are the output of `1/den` and its
-//! rate). The gains of the operator are in its output matrix; those of the controlled element are placed according to
-//! [`Realisation`]. For changing parameters, the matrices at each sample are those of the continuous model with the
-//! parameter values at that sample.
+//! Operator and controlled element are in controllable canonical form (the states are the output of `1/den` and the
+//! rate of this output). The gains of the operator are in its output matrix; those of the controlled element are placed
+//! according to [`Realisation`]. For changing parameters, the matrices at each sample are those of the continuous model
+//! with the parameter values at that sample.
 
 use std::ops::Range;
 
@@ -37,7 +37,7 @@ use crate::{
 pub struct Simulator {
     scenario: ResolvedScenario,
     forcing_deg: Vec<f64>,
-    /// One entry if nothing changes, otherwise one entry per sample.
+    /// True parameters: one entry if nothing changes, otherwise one entry per sample.
     parameters: Vec<TrueParameters>,
     pub(crate) matrices: Vec<Matrices>,
     pub(crate) cascade: Cascade,
@@ -54,8 +54,8 @@ pub(crate) struct Matrices {
     pub delay: usize,
 }
 
-/// Held system by rows, `[a x_0 + b x_1 + g u, d x_1 - c x_0 - h u]`, bit-identical to [`HeldStates::step`]. If both
-/// rows were sums, the compiler would pack the states into one register, and each sample would also wait for the
+/// Held system with two states, `[a x_0 + b x_1 + g u, d x_1 - c x_0 - h u]`, bit-identical to [`HeldStates::step`]. If
+/// both rows were sums, the compiler would pack the states into one register, and each sample would also wait for the
 /// shuffles.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Rows {
@@ -258,7 +258,8 @@ impl Simulator {
         }
     }
 
-    /// Compiled in two versions, so that constant matrices stay in registers.
+    /// As [`Simulator::pass`], compiled separately for constant and for changing parameters, so that constant matrices
+    /// stay in registers.
     #[inline(always)]
     fn pass_through<R: Number, const M: usize, const CHANGES: bool>(
         &self,
@@ -376,7 +377,7 @@ struct LoopState<R> {
     operator: [R; 2],
     element: [R; 2],
     remnant: [R; HIGHEST_ORDER],
-    /// Ring of the last responses, with the response of sample k at index k.
+    /// Ring of the last responses, in which the response of sample k has the index k modulo the length.
     memory: Vec<R>,
 }
 
@@ -391,7 +392,7 @@ impl<R: Number> LoopState<R> {
     }
 
     /// True if all values of a lane were finite. A value that is not finite remains in the states, since its product
-    /// with zero is not finite either.
+    /// with any coefficient, even zero, is not finite either.
     fn is_finite(&self, lane: usize) -> bool {
         let states = self.operator.iter().chain(&self.element).chain(&self.remnant);
         states.chain(&self.memory).all(|state| state.lane(lane).is_finite())
@@ -403,7 +404,7 @@ impl Signals {
         let Self { e, u, x, n } = self;
         for values in [e, u, x, n] {
             if values.capacity() < samples {
-                // Zeroed memory from the operating system costs nothing until it is written.
+                // New zeroed memory from the operating system costs no time until it is written.
                 *values = vec![0.0; samples];
             }
             values.resize(samples, 0.0);
@@ -411,14 +412,14 @@ impl Signals {
     }
 }
 
-/// Number of samples that are interleaved at a time.
+/// Number of samples whose signals are interleaved between the lanes at a time.
 const BLOCK: usize = 64;
 
-/// Task for a single run.
+/// Task that simulates a single run.
 struct SingleRun<'a> {
     simulator: &'a Simulator,
     noise: &'a [f64],
-    /// Memory for the signals, with the length of the run.
+    /// Buffers for the signals, as long as the run.
     into: &'a mut Signals,
 }
 
@@ -436,11 +437,11 @@ impl LaneTask for SingleRun<'_> {
     }
 }
 
-/// Task for several runs in parallel lanes.
+/// Task that simulates several runs in parallel lanes.
 struct BatchedRuns<'a> {
     simulator: &'a Simulator,
     noises: &'a [Vec<f64>],
-    /// Memory for the signals of each run, with the length of the run.
+    /// Buffers for the signals of each run, as long as the run.
     into: &'a mut [Signals],
 }
 
@@ -456,7 +457,7 @@ impl LaneTask for BatchedRuns<'_> {
         let mut finite = true;
         for (noises, into) in self.noises.chunks(width).zip(self.into.chunks_mut(width)) {
             let mut state = LoopState::at_rest(zero, self.simulator.longest_delay());
-            // Unused lanes run without remnant.
+            // The noise is set to zero, so that unused lanes run without remnant.
             noise.fill(0.0);
             for begin in (0..samples).step_by(BLOCK) {
                 let range = begin..(begin + BLOCK).min(samples);

@@ -6,8 +6,8 @@
 //! | traces | one stored point of a recursion | cell, replication, estimator, t; theta and operator |
 //! | cells | one scenario of the grid | settings and true parameters |
 //!
-//! A cell is empty if its number does not exist, such as a parameter of the operator if the model cannot be converted,
-//! or nk of a model without input.
+//! An entry is empty if its number does not exist, such as a parameter of the operator if the model cannot be
+//! converted, or nk of a model without input.
 
 use std::collections::BTreeMap;
 
@@ -52,7 +52,7 @@ impl Rows {
         }
     }
 
-    /// Starts a row: texts and real numbers are empty, whole numbers are zero.
+    /// Starts a row in which texts are empty, real numbers are NaN, and whole numbers are zero.
     pub fn begin(&mut self) {
         self.rows += 1;
         for column in &mut self.columns {

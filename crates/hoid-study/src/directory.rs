@@ -11,12 +11,12 @@ use crate::{Plan, StudyError};
 
 pub(crate) const PLAN: &str = "plan.toml";
 
-/// Path of the part that holds one table of a block.
+/// Returns the path of the part that holds one table of a block.
 pub(crate) fn part(directory: &Path, block: u64, table: &str) -> PathBuf {
     directory.join("parts").join(format!("{block:06}-{table}.parquet"))
 }
 
-/// Path of the seal of a block.
+/// Returns the path of the seal of a block.
 pub(crate) fn seal_path(directory: &Path, block: u64) -> PathBuf {
     directory.join("parts").join(format!("{block:06}-seal.json"))
 }
@@ -40,7 +40,7 @@ pub(crate) fn write_source(path: &Path, text: &str) -> Result<(), StudyError> {
     Ok(hoid_io::write_atomically(path, |file| file.write_all(text.as_bytes()))?)
 }
 
-/// Removes the partial output of a killed run: all files in `parts` that still have temporary names.
+/// Removes the partial output of a killed run: all files in `parts` that do not have the name of a part or a seal.
 pub(crate) fn sweep(parts: &Path) -> Result<(), StudyError> {
     hoid_io::make_directory(parts)?;
     let unwritable = |source| IoError::Unwritable {
@@ -78,7 +78,7 @@ pub(crate) fn remove_parts(directory: &Path) -> Result<(), StudyError> {
     })
 }
 
-/// Path of a table of a study.
+/// Returns the path of a table of a study.
 pub(crate) fn table_path(directory: &Path, table: &str, csv: bool) -> PathBuf {
     directory.join(format!("{table}.{}", if csv { "csv" } else { "parquet" }))
 }

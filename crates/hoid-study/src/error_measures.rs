@@ -167,7 +167,8 @@ impl ChangeMeasures {
         let end_s = record.time_s(record.len());
         let changes_s = scenario.schedule.changes_s(end_s);
         let first_s = changes_s.first().copied().unwrap_or(f64::INFINITY);
-        // A two-sided estimate is valid from the start; its declared changes are those of the causal estimate.
+        // Bands and declared changes are evaluated only after the start fit, also for a two-sided estimate, whose
+        // changes are declared by the causal estimate.
         let fitted_s = match trace.options().start {
             StartAt::Span(Some((_, to))) => to,
             _ => trace.updated_from_s(),

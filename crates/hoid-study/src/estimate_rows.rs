@@ -206,7 +206,7 @@ impl<'a> EstimateRows<'a> {
         if let Some(true_response) = &self.true_response {
             rows.real("response_error", true_response.error_percent(&of.polynomial_fit));
         }
-        // For a pure integration, T_I is infinite.
+        // An infinite T_I, which represents a pure integration, is not written.
         for p in of.parameters.iter().filter(|p| p.value.is_finite()) {
             let estimate = Estimate {
                 value: p.value,
@@ -218,7 +218,8 @@ impl<'a> EstimateRows<'a> {
         Ok(())
     }
 
-    /// Writes an operator with changing gains; each gain is given before (1) and after (2) the change.
+    /// Writes the fit of an operator with changing gains: the parameters of the operator before (1) and after (2) the
+    /// change, and the parameters of the fit.
     pub fn change_row(&mut self, found: &Identified<SigmoidFit>) -> Result<(), String> {
         let (fit, record) = (&found.fit, &found.data.records[0]);
         let simulated = fit.simulate(record).map_err(|error| error.to_string())?;
@@ -242,7 +243,7 @@ impl<'a> EstimateRows<'a> {
         Ok(())
     }
 
-    /// Writes the verdict on the estimate and the kinds of its findings.
+    /// Writes the verdict on the estimate and the kinds of the findings against it; notes are not written.
     pub fn verdict(&mut self, verdict: &Verdict) {
         let against = verdict
             .findings()

@@ -18,7 +18,7 @@ pub const PLANS: &[NamedPlan] = &[NamedPlan {
 }];
 
 impl NamedPlan {
-    /// Number of replications of each of these plans.
+    /// Number of replications in each of the included plans.
     pub const REPLICATIONS: u64 = 100;
 
     /// Parses the plan.

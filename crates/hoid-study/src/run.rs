@@ -158,7 +158,8 @@ pub(crate) fn write_tables(
     write_block(directory, plan_sha256, block.index, &all)
 }
 
-/// Returns the complete blocks, the blocks to be computed, and the number of each damaged block with the reason.
+/// Returns the complete blocks, the blocks to be computed (including damaged ones), and the number of each damaged
+/// block with the reason.
 fn sorted(directory: &Path, plan_sha256: &str, mine: &[Block]) -> (Vec<Block>, Vec<Block>, Vec<(u64, String)>) {
     let (mut there, mut open, mut damaged) = (Vec::new(), Vec::new(), Vec::new());
     for block in mine {
@@ -174,7 +175,7 @@ fn sorted(directory: &Path, plan_sha256: &str, mine: &[Block]) -> (Vec<Block>, V
     (there, open, damaged)
 }
 
-/// Prepares an empty directory, or reads the record of the study that it holds.
+/// Prepares an empty directory, or checks the directory of an earlier run and returns its record.
 fn prepare(plan: &Plan, directory: &Path, manifest: &RunRecord, resume: bool) -> Result<RunRecord, StudyError> {
     let shown = || directory.display().to_string();
     if let Some(found) = RunRecord::read(directory)? {
@@ -200,8 +201,9 @@ fn prepare(plan: &Plan, directory: &Path, manifest: &RunRecord, resume: bool) ->
     Ok(manifest.clone())
 }
 
-/// Prepares a directory for continuation. Partial output is removed. A directory of an earlier version, which wrote no
-/// seals, is marked as sealed, since all of its blocks are computed again.
+/// Prepares a directory for continuation: removes partial output or, if the study is complete, all parts. An incomplete
+/// directory of an earlier version, which wrote no seals, is marked as sealed, since all of its blocks are computed
+/// again.
 pub(crate) fn ready(directory: &Path, found: &RunRecord, record: &RunRecord) -> Result<(), StudyError> {
     if found.complete {
         return remove_parts(directory);

@@ -58,8 +58,8 @@ fn close(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-2 * a.abs().max(b.abs())
 }
 
-/// True values for an operator with changing gains: before (1) and after (2) the change, and the time and rate of the
-/// change.
+/// Returns a true value for an operator with changing gains: a parameter before (1) or after (2) the change, or the
+/// time or rate of the change.
 fn of_change(cell: &Cell, name: &str) -> f64 {
     let scenario = cell.resolved.scenario();
     let ends = cell.truth();
@@ -81,7 +81,8 @@ fn of_change(cell: &Cell, name: &str) -> f64 {
     }
 }
 
-/// Coefficients of D and innovation variance of the noise model of the remnant, held over each sample.
+/// Returns a coefficient of D or the innovation variance of the noise model of the remnant, which is held over each
+/// sample.
 fn of_noise_model(cell: &Cell, estimator: &EstimatorCell, k_n: f64, name: &str) -> f64 {
     let remnant = cell.resolved.scenario().remnant;
     let by_polynomials = matches!(estimator.task, Task::Fit(_))

@@ -27,8 +27,8 @@ impl Cell {
     /// Returns the true parameters before and after the change; both are equal if nothing changes.
     pub fn truth(&self) -> [TrueState; 2] {
         let scenario = self.resolved.scenario();
-        // Evaluated long before the change, and long after it or in the middle of the interval until the operator
-        // changes back.
+        // The parameters are evaluated long before the change, and long after it or in the middle of the interval until
+        // the operator changes back.
         let ends = match scenario.schedule {
             Schedule::Constant => [0.0; 2],
             Schedule::Sigmoid { .. } => [-1e9, 1e9],

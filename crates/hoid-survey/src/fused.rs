@@ -5,8 +5,8 @@
 //!
 //! `F u = B q^-nk e + eps`,
 //!
-//! with the current F, and forgets with the memory length of b. This removes the bias that coloured noise causes in the
-//! poles, but not the bias in B: the equation error `F n` is as coloured as in an ARX model.
+//! with the current F, and forgets with the memory length of b. This combination removes the bias that coloured noise
+//! causes in the poles, but not the bias in B: the equation error `F n` is as coloured as in an ARX model.
 
 use hoid_core::{
     delay::DelayLine,
@@ -112,7 +112,7 @@ pub(crate) struct FusedRecursion {
     rpem: Box<dyn Recursion>,
     rls: Rls<AnyShape, B, Gain<B>>,
     delay: DelayLine<Vec<f64>>,
-    /// The last two outputs, with the newest first.
+    /// The last two values of u, with the newest first.
     past: [f64; 2],
     theta: Vec<f64>,
 }
@@ -226,7 +226,7 @@ impl Recursion for FusedRecursion {
     fn bridge(&mut self, sample: Sample) {
         let x = self.delay.step(sample.e);
         self.rpem.bridge(sample);
-        // For an output of zero, eps is the prediction with opposite sign.
+        // With an output of zero, eps is the prediction with the opposite sign.
         let y = self.filtered(0.0);
         let predicted = -self.rls.step_without_update(x, y).innovation;
         self.store(bounded(predicted));

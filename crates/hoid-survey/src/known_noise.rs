@@ -13,7 +13,8 @@ pub(crate) const LARGEST_ND: usize = 8;
 /// Checks the requirements of a method that models how the person changes.
 ///
 /// # Errors
-/// [`IdentError::BadOption`] if the orders, the delay or the start do not suit such a method.
+/// [`IdentError::BadOption`] if the orders, the delay or the start do not suit a method that models how the person
+/// changes.
 pub(crate) fn check_model_of_change(name: &str, setup: &Setup) -> Result<(), IdentError> {
     check_operator_orders(name, setup)?;
     check_delay(&setup.orders)?;

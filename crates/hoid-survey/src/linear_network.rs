@@ -3,8 +3,8 @@
 //! WESCON 1960.
 //!
 //! The inputs are the outputs of the discretised pilot model with unit equalization: y_0 and y_1, the responses of the
-//! neuromuscular part to the delayed error and to its rate. Each is divided by its size s_i, the root mean square so
-//! far. One neuron weights them,
+//! neuromuscular part to the delayed error and to its rate. Each input is divided by its size s_i, which is its root
+//! mean square so far. One neuron weights both inputs,
 //!
 //! `u^(k) = w_0 y_0(k)/s_0 + w_1 y_1(k)/s_1`, `w_i <- w_i + (Ts/T) (y_i/s_i) (u - u^)`,
 //!

@@ -1,8 +1,8 @@
 //! A batch fit over a sliding window.
 //!
-//! The last W samples are kept. Every k samples the batch estimator fits them, starting from the last theta; between
-//! the fits theta stays constant. The estimate therefore has a rectangular memory of W samples, the initial states,
-//! bounds and other properties of the estimator, and the covariance of the fit.
+//! The last W samples are kept. Every k samples the batch estimator fits the kept samples, starting from the last
+//! theta; between the fits theta stays constant. The estimate therefore has a rectangular memory of W samples, the
+//! initial states, bounds and other properties of the estimator, and the covariance of the fit.
 //!
 //! **Wrong minima.** A search from the last theta may stay in a local minimum. The estimator therefore also searches
 //! from its own starts if there is no last theta, if the search from it does not converge, if the loss has risen by a
@@ -34,7 +34,7 @@ const COMPARISON_INTERVAL: usize = 8;
 const LOSS_RISE: f64 = 0.25;
 /// Window length divided by the smallest number of samples for a first fit.
 const FIRST_SHARE: usize = 4;
-/// Number of residuals per unknown that the first fit needs.
+/// Number of residuals per unknown (coefficient or initial state) that the first fit needs.
 const RESIDUALS_PER_UNKNOWN: usize = 5;
 
 settings! {
@@ -119,7 +119,7 @@ pub(crate) struct WindowRecursion {
     known: bool,
     covariance: Option<Vec<f64>>,
     variance: f64,
-    /// Number of innovations before the first fit.
+    /// Number of innovations so far, counted until the first successful fit.
     innovations: f64,
     since_fit: usize,
     since_comparison: usize,
@@ -164,8 +164,8 @@ impl State for WindowRecursion {
 }
 
 impl WindowRecursion {
-    /// Creates the recursion with a window of `window` samples, which is fitted every `every` samples. It starts from
-    /// theta and its covariance if these are known.
+    /// Creates the recursion with a window of `window` samples, which is fitted every `every` samples. The recursion
+    /// starts from theta and its covariance if these are known.
     ///
     /// # Errors
     /// [`IdentError`] if the options, the orders, the start or the window cannot be used.
@@ -288,7 +288,7 @@ impl WindowRecursion {
             }
             Err(failure) => {
                 self.failures += 1;
-                // The loss of the last comparison is no longer comparable.
+                // After a failure the next fit also searches from the own starts of the estimator.
                 self.since_comparison = COMPARISON_INTERVAL;
                 self.last_failure = Some(failure);
             }

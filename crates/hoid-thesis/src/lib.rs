@@ -3,8 +3,8 @@
 //! University of Technology, 2023).
 //!
 //! The text compares ARX and Box-Jenkins models of the human operator by simulation, in batch fits and recursive
-//! estimates. [`reproduce`] runs its studies, draws its tables and figures, tests its claims, and writes a page with
-//! the results:
+//! estimates. [`reproduce`] runs the studies of the text, draws its tables and figures, tests its claims, and writes a
+//! page with the results:
 //!
 //! ```no_run
 //! use hoid_thesis::{Reproduction, ReproductionEvent, reproduce};

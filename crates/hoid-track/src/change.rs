@@ -11,7 +11,7 @@ use hoid_numerics::statistics::{mean, sample_variance};
 /// A change of the person that was declared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Change {
-    /// Time from the change of the person to its declaration, s; for `adaptive` with a resolution of half a second.
+    /// Time from the change of the person to its declaration, s. For `adaptive` its resolution is half a second.
     pub seconds_ago: f64,
     /// For `adaptive`, -ln p of the change test; for `multiple-model`, the logarithm of the odds of a change within the
     /// last four seconds.
@@ -38,7 +38,7 @@ pub struct Change {
     pub of_operator: bool,
 }
 
-/// Number of standard errors beyond which a quantity counts as changed.
+/// Change of a quantity, in standard errors, beyond which the quantity counts as changed.
 const CHANGED: f64 = 2.0;
 /// Names of the quantities of [`Change::z`].
 const QUANTITIES: [&str; 6] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", REMNANT, "tau_e"];
@@ -62,7 +62,8 @@ impl Change {
     }
 }
 
-/// The published baseline: thresholds of k standard deviations of the tracking error and of its rate before the change.
+/// The published baseline: an alarm if the tracking error or its rate is more than k standard deviations from its mean
+/// before the change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorThreshold {
     /// Mean and standard deviation of the error and of its rate, the latter per second.
@@ -72,8 +73,8 @@ pub struct ErrorThreshold {
 }
 
 impl ErrorThreshold {
-    /// Computes the levels from the error of a span without a change; `None` for fewer than three samples, or for
-    /// values that are not finite.
+    /// Computes the means and standard deviations from the error of a span without a change; `None` for fewer than
+    /// three samples, or for values that are not finite.
     pub fn new(error: &[f64], sample_time: SampleTime) -> Option<Self> {
         let ts = sample_time.s();
         let rate: Vec<f64> = error.windows(2).map(|w| (w[1] - w[0]) / ts).collect();
@@ -108,13 +109,12 @@ mod tests {
     #[test]
     fn the_baseline_is_the_distance_in_standard_deviations() {
         let ts = SampleTime::HUNDREDTH;
-        // Mean 0, variance 8/7; rates +-200 and 0.
+        // Mean of the error 0, variance 8/7; its rates are +-200.
         let error = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0];
         let mut baseline = ErrorThreshold::new(&error, ts).unwrap();
         let deviation = (8.0_f64 / 7.0).sqrt();
         assert!((baseline.step(3.0) - 3.0 / deviation).abs() < 1e-12);
-        // The rate of 1 in 0.01 s: its mean is -200/7, its deviation sqrt(6/7 * ... ) by
-        // definition.
+        // Rates of the error: their mean is -200/7, and their standard deviation follows from the definition.
         let rates = [-200.0, 200.0, -200.0, 200.0, -200.0, 200.0, -200.0];
         let mean = rates.iter().sum::<f64>() / 7.0;
         let spread = (rates.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>() / 6.0).sqrt();

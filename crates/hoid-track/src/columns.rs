@@ -11,12 +11,12 @@ use crate::{OPERATOR_COLUMNS, OpenLoop, Response, Trace};
 pub type Columns = Vec<(String, Vec<f64>)>;
 
 impl Trace {
-    /// Returns the operator of every row.
+    /// Returns for every row the operator, or the reason why there is none.
     pub fn operators(&self) -> Vec<Result<OperatorEstimate, NotConvertible>> {
         (0..self.len()).map(|row| self.operator(row)).collect()
     }
 
-    /// Returns the names of the operator's columns: those of every trace, and the delay if it is tracked.
+    /// Returns the names of the operator's columns: the columns of every trace, and `tau_e` if the delay is tracked.
     pub fn operator_columns(&self) -> Vec<&'static str> {
         let mut names = OPERATOR_COLUMNS.to_vec();
         let method = &self.options().method;
@@ -67,7 +67,7 @@ impl Trace {
     }
 }
 
-/// Returns a parameter of an operator by its name.
+/// Returns a parameter of an operator by its name; `None` if there is no operator or no parameter of this name.
 pub fn value_of(operator: &Result<OperatorEstimate, NotConvertible>, name: &str) -> Option<Estimate> {
     let rows = operator.as_ref().ok()?.rows();
     rows.into_iter().find(|(n, _, _)| *n == name).map(|(_, _, e)| e)

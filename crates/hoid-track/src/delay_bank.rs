@@ -4,7 +4,7 @@
 //! and Filtering Theory*, 1970, section 8.8).
 //!
 //! With the a-priori innovation eps_k of the recursion with the delay k, and the innovation variance sigma^2 of the
-//! reported recursion, the logarithm of the evidence is
+//! reported recursion, the logarithm of the evidence for the delay k is
 //!
 //! `L_k(t) = gamma L_k(t-1) - eps_k(t)^2/(2 sigma^2)`,  `gamma = 1 - Ts/T`,
 //!
@@ -38,9 +38,9 @@ const MEMORY_S: f64 = 10.0;
 const LEAD: f64 = 2.0;
 /// Divisor of the evidence in the weights of the delays.
 const EVIDENCE_DIVISOR: f64 = 3.0;
-/// Limit on an innovation in the evidence, in standard deviations.
+/// Limit on the magnitude of an innovation in the evidence, in standard deviations.
 const LARGEST: f64 = 5.0;
-/// Standard deviation of the delay about the delay of the start, before there is any evidence, s.
+/// Prior standard deviation of the delay about the delay of the start, s.
 const BEFORE_S: f64 = 0.03;
 /// Largest number of tracked delays.
 const MOST: usize = 128;
@@ -53,10 +53,10 @@ pub(crate) struct DelayBank {
     sample_time_s: f64,
     /// Factor gamma by which the evidence decays per sample.
     decay: f64,
-    /// L_k minus the largest of them.
+    /// L_k of each delay, minus the largest of these values.
     evidence: Vec<f64>,
     best: usize,
-    /// Innovations of the last sample.
+    /// Innovation of each recursion at the last sample.
     innovations: Vec<f64>,
 }
 
@@ -112,7 +112,7 @@ impl DelayBank {
         })
     }
 
-    /// Returns the recursion that is reported.
+    /// Returns the recursion whose estimate is reported.
     fn reported(&self) -> &dyn Recursion {
         &*self.members[self.best]
     }

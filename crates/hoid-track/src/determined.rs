@@ -35,22 +35,22 @@ fn determined(method: &Method, operator: &OperatorEstimate) -> Vec<Determined> {
 }
 
 impl Tracker {
-    /// Returns for each parameter of the current operator whether it is determined; parameters without a standard error
-    /// are omitted.
+    /// Returns each parameter of the current operator, and whether it is determined; parameters without a standard
+    /// error are omitted.
     pub fn determined(&self, operator: &OperatorEstimate) -> Vec<Determined> {
         determined(&self.options().method, operator)
     }
 }
 
 impl Trace {
-    /// Returns for each parameter of the operator of a row whether it is determined; parameters without a standard
+    /// Returns each parameter of the operator of a row, and whether it is determined; parameters without a standard
     /// error are omitted.
     pub fn determined(&self, operator: &OperatorEstimate) -> Vec<Determined> {
         determined(&self.options().method, operator)
     }
 
-    /// Returns columns that show for each parameter whether it is determined (1) or not (0), such as `K_e_determined`.
-    /// They are empty for methods that need a start fit.
+    /// Returns for each parameter of the operator a column, such as `K_e_determined`, with 1 in each row in which the
+    /// parameter is determined and 0 in the others. There are no columns for methods that need a start fit.
     pub fn determined_columns(
         &self,
         operators: &[Result<OperatorEstimate, hoid_model::NotConvertible>],
@@ -88,7 +88,7 @@ mod tests {
             zeta_nm: e(0.25, 0.05),
             tau_e_s: Estimate::fixed(0.2),
         };
-        // Before the first sample omega is known to 3.3 rad/s, zeta to .125.
+        // Before the first sample the standard deviation of omega is 3.3 rad/s, that of zeta .125.
         let found = determined(&Method::adaptive(), &operator);
         let expected = [
             ("K_e", false),

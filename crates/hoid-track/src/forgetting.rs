@@ -7,7 +7,7 @@ use hoid_ident::{
     settings::{Bounds, Kind, Setting, Settings, Value},
 };
 
-/// Default rate of the normalised gradient.
+/// Default rate of the rule normalised gradient.
 const DEFAULT_RATE: f64 = 0.1;
 
 /// Names of the rules.
@@ -23,7 +23,7 @@ const WORDS: [&str; 6] = [
 /// Rule of forgetting of a recursion.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum ForgettingRule {
-    /// One factor for each parameter; the scalar factor if all memories are equal.
+    /// One forgetting factor for each parameter; a scalar factor if all memories are equal.
     #[default]
     Exponential,
     /// Random walk: standard deviation of the drift of each parameter in one second, in the unit of the parameter.
@@ -31,7 +31,7 @@ pub enum ForgettingRule {
     RandomWalk(BTreeMap<String, f64>),
     /// Sliding rectangular window, as long as the shortest memory.
     Window,
-    /// Variable factor, which gives the shortest memory while the innovations are as large as expected.
+    /// Variable forgetting factor, which gives the shortest memory while the innovations are as large as expected.
     Variable,
     /// Directional forgetting with the shortest memory.
     Directional,

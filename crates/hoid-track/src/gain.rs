@@ -16,13 +16,13 @@ use hoid_ident::IdentError;
 use crate::{forgetting::ForgettingRule, setup::Setup, shared_options::WindupGuard, start::StartState};
 
 /// Limit of the variance of an unexcited parameter in P, as a multiple of its level with the excitation of the start
-/// fit: after a silence, the gain corresponds to about three times the typical standard error.
+/// span: after a silence, the gain corresponds to about three times the typical standard error.
 const LARGEST_VARIANCE_GROWTH: f64 = 10.0;
 /// Limit of the variance of an unexcited parameter in P if the start covariance does not come from a fit, as a multiple
 /// of its start value.
 pub const ROOM_WITHOUT_FIT: f64 = 1e4;
-/// Growing memory of a start without a fit: additional forgetting at the first sample, and the factor by which it
-/// decays per sample.
+/// Growing memory of a start without a fit: additional forgetting at the first sample, and the factor by which the
+/// additional forgetting decays per sample.
 const EARLY_FORGETTING: f64 = 0.01;
 const EARLY_SHARE: f64 = 0.9993;
 /// Smallest factor of variable forgetting: a memory of ten samples.
@@ -140,9 +140,9 @@ impl<const N: usize> Gain<N> {
     }
 }
 
-/// A gain whose covariance can be scaled.
+/// A gain whose covariance P can be scaled.
 pub trait Scaled {
-    /// Multiplies P by a factor; false if there is no P.
+    /// Multiplies P by a factor; returns false if the gain has no P.
     fn scale(&mut self, factor: f64) -> bool;
 }
 
@@ -195,7 +195,7 @@ impl<const N: usize> Adaptation<N> for Gain<N> {
     }
 }
 
-/// Returns the error bars at the start, with capacity for N parameters and the errors of K filters.
+/// Returns the error bars at the start of a recursion, with capacity for N parameters and K filters.
 ///
 /// # Errors
 /// [`IdentError::BadOption`] for a memory that is too short.

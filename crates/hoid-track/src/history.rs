@@ -2,11 +2,11 @@
 
 use hoid_core::state::{State, visit_all};
 
-/// Largest magnitude of a value in a recursion. Its fourth power, and therefore the covariances of filtered signals,
-/// are still finite.
+/// Largest magnitude of a value in a recursion. The fourth power of such a value is finite, and therefore so are the
+/// covariances of filtered signals.
 const LARGEST: f64 = 1e60;
 
-/// Limits a value to 1e60; NaN, which products of large numbers may give, becomes zero.
+/// Limits the magnitude of a value to 1e60; NaN, which products of large numbers may give, becomes zero.
 pub fn bounded(x: f64) -> f64 {
     if x.is_nan() { 0.0 } else { x.clamp(-LARGEST, LARGEST) }
 }
@@ -74,7 +74,7 @@ mod tests {
         }
     }
 
-    /// Restored from numbers that were changed.
+    /// The newest values remain within the buffer after the history was restored from numbers that were altered.
     #[test]
     fn the_newest_ones_are_within() {
         let mut past = History::new(3);

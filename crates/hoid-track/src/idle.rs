@@ -9,19 +9,20 @@
 use hoid_model::Record;
 use hoid_numerics::statistics::{upper_median, upper_quantile};
 
-/// Share of its later size within which a signal is idle.
+/// Distance from the median of the first second, as a share of the later size of the signal, within which a signal is
+/// idle.
 const SHARE: f64 = 0.02;
-/// Shortest head, s.
+/// Shortest idle head, s.
 const LEAST_S: f64 = 1.0;
-/// Quantile that defines the size of a signal.
+/// Quantile of the distance from the median that defines the size of a signal.
 const SIZE: f64 = 0.9;
-/// Largest change, in steps of the resolution, that counts as constant.
+/// Largest distance, in steps of the resolution, of an idle value from the median of the first second.
 const STEPS: f64 = 1.01;
-/// Largest step of a resolution, as a share of the size.
+/// Largest step of a resolution, as a share of the size of the signal.
 const COARSE: f64 = 0.2;
 
-/// Returns the number of samples at the start of a record in which neither e nor u moves; 0 for a short head, and all
-/// samples if neither ever moves.
+/// Returns the number of samples at the start of a record in which neither e nor u moves; 0 if they last less than a
+/// second, and all samples if neither signal ever moves.
 pub fn idle_head(record: &Record) -> usize {
     let second = (1.0 / record.sample_time().s()).round().max(1.0) as usize;
     let still = |signal: &[f64]| {
@@ -105,7 +106,7 @@ mod tests {
             assert!((1490..1540).contains(&head), "{head}");
             let (from, to) = default_start_span(&idle);
             assert!((from - 15.0).abs() < 0.5 && (to - from - third).abs() < 0.2);
-            // Half a second is not reported, and e alone is not idle.
+            // An idle head of half a second is not reported, nor one in which only e is idle.
             assert_eq!(idle_head(&with_head(&record, &noise[..50], &offset[..50])), 0);
             let moving: Vec<f64> = (0..1500).map(|k| (f64::from(k) * 0.02).sin()).collect();
             assert_eq!(idle_head(&with_head(&record, &moving, &offset)), 0);

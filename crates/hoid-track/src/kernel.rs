@@ -1,5 +1,5 @@
-//! The recursions of the real-time kernel behind the common interface, which adds capacity for the parameters, the
-//! delay line, and the covariance in units of the parameters.
+//! The recursions of the real-time kernel with the interface of all recursions, which adds capacity for the parameters,
+//! the delay line, and the covariance in units of the parameters.
 
 use hoid_core::{
     adaptation::Adaptation,
@@ -30,7 +30,7 @@ pub enum Kernel {
     PredictionError(Regressor),
 }
 
-/// Error for more parameters than there is capacity for.
+/// Returns the error for more parameters than the kernel has capacity for.
 pub fn too_many(parameters: usize) -> IdentError {
     IdentError::BadOption {
         option: "the orders of a recursion".to_owned(),
@@ -60,7 +60,7 @@ impl<'a> Plan<'a> {
     }
 
     /// Builds a recursion of the kernel with the smallest capacity that is sufficient for its parameters. If the orders
-    /// are those of the operator, they are part of its type.
+    /// are those of the operator, the recursion is compiled for these orders.
     ///
     /// # Errors
     /// [`IdentError`] for options that contradict each other, or a start that the recursion cannot use.
@@ -165,7 +165,7 @@ fn delay(nk: usize) -> DelayLine<Vec<f64>> {
     DelayLine::new(vec![0.0; nk])
 }
 
-/// Writes the covariance in the units of the parameters.
+/// Writes the covariance in the units of the parameters, `variance` times `spread`, by rows.
 pub fn scaled<const N: usize>(spread: &[[f64; N]; N], variance: f64, parameters: usize, into: &mut [f64]) {
     for i in 0..parameters {
         for j in 0..parameters {

@@ -5,7 +5,7 @@
 //! `theta(t) = theta(t-1) + P(t) psi(t) eps(t)`,
 //!
 //! and forgets the past, so that it can follow changes (L. Ljung, *System Identification*, 1999, chapter 11). The
-//! methods differ in psi, in the parameters theta, and in their prior for the change.
+//! methods differ in psi, in the parameters theta, and in their prior for the change of the person.
 //!
 //! ```
 //! use hoid_model::scenario::{Condition, Scenario};

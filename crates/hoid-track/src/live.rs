@@ -94,8 +94,8 @@ impl Live {
         })
     }
 
-    /// Starts from a record at the rate of the stream instead of the warm-up; returns the result of the search for open
-    /// orders.
+    /// Starts from a record at the rate of the stream instead of a warm-up; returns the result of the search for open
+    /// orders, if there was one.
     ///
     /// # Errors
     /// [`IdentError`] for a record of another rate, and the errors of the start fit.
@@ -191,7 +191,7 @@ impl Live {
         self.decimator.as_ref().map(Decimator::done)
     }
 
-    /// Returns the time from the last tracked sample to the last sample of the stream, s.
+    /// Returns the time from the last sample that the tracker received to the last sample of the stream, s.
     pub fn behind_s(&self) -> f64 {
         let samples = self.decimator.as_ref().map_or(0, Decimator::lag_samples);
         samples as f64 * self.sample_time.s()
@@ -210,7 +210,7 @@ impl Live {
         (orders, numbers)
     }
 
-    /// Restores the state that [`Live::saved`] returned into a recursion built from the same request.
+    /// Restores the state that [`Live::saved`] returned; the recursion must have been built from the same request.
     ///
     /// # Errors
     /// [`IdentError::BadStart`] for numbers of another recursion, and for numbers that were altered or truncated.
@@ -246,7 +246,7 @@ mod tests {
     use super::*;
     use crate::Method;
 
-    /// The first seconds of a run of C1 at 1000 Hz, each sample of the run held.
+    /// The first seconds of a run of C1 at 1000 Hz, each sample of the run repeated.
     fn fast(length_s: f64) -> Record {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();

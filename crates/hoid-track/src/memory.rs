@@ -31,7 +31,7 @@ impl Memory {
         }
     }
 
-    /// Returns the length in samples of a window as long as the memory.
+    /// Returns the length, in samples, of a window that is as long as the memory.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] for an infinite memory, or one not longer than one sample.
@@ -45,7 +45,7 @@ impl Memory {
             Self::Seconds(t) => t / sample_time.s(),
             Self::Infinite => f64::INFINITY,
         };
-        // A window of 1e9 samples would not fit in memory.
+        // A window of more than 1e9 samples would not fit in memory.
         if samples > 1.0 && samples <= 1e9 {
             Ok(samples)
         } else {
@@ -58,7 +58,7 @@ impl Memory {
     }
 }
 
-/// Parses `256` samples, `2.56s`, or `inf`.
+/// Parses `256` (samples), `2.56s`, or `inf`.
 impl Value for Memory {
     const KIND: Kind = Kind::Memory;
 
@@ -180,7 +180,7 @@ impl MemoryOptions {
     }
 }
 
-/// True when `key` is the name, or the letter of its polynomial.
+/// True if `key` is the name of the parameter, or the letter of its polynomial.
 fn is_named(name: &str, key: &str) -> bool {
     name == key || (key.len() == 1 && name.starts_with(key) && name[1..].bytes().all(|b| b.is_ascii_digit()))
 }

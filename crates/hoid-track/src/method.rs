@@ -35,7 +35,7 @@ pub struct About {
     pub source: &'static str,
     /// Supported structures. Box-Jenkins is the default if it is among them, otherwise the first structure.
     pub structures: &'static [Structure],
-    /// Defaults, as text, of options that this method shares with other methods.
+    /// Defaults that the method sets for options shared with other methods, as text.
     pub defaults: &'static [(&'static str, &'static str)],
 }
 
@@ -43,7 +43,7 @@ pub struct About {
 pub trait Boxed: fmt::Debug + Send + Sync {
     /// Returns a copy.
     fn boxed(&self) -> Box<dyn RecursiveMethod>;
-    /// True if the other method is the same, with the same options.
+    /// True if the other method is the same method with the same options.
     fn is_same(&self, other: &dyn RecursiveMethod) -> bool;
     /// Returns the method as [`Any`], for comparison with other methods.
     fn as_any(&self) -> &dyn Any;
@@ -68,12 +68,12 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     /// Returns name and description of the method.
     fn about(&self) -> About;
 
-    /// Returns the earlier name of the method, if that name is still accepted.
+    /// Returns the earlier name of the method; `None` if no earlier name is accepted.
     fn earlier_name(&self) -> Option<&'static str> {
         None
     }
 
-    /// Default memory length of a parameter.
+    /// Returns the default memory length of a parameter.
     fn default_memory(&self, parameter: &str) -> Memory;
 
     /// Builds the recursion.
@@ -101,12 +101,12 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         Ok(())
     }
 
-    /// Default order of the noise model; `None` for the order that follows from the structure.
+    /// Returns the default order nd of the noise model; `None` for the order that follows from the structure.
     fn default_nd(&self) -> Option<usize> {
         None
     }
 
-    /// True for a method that estimates the parameters of the operator.
+    /// True for a method that estimates the physical parameters of the operator.
     fn is_physical(&self) -> bool {
         false
     }
@@ -117,7 +117,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         false
     }
 
-    /// True for a method that needs no start fit and learns from the first sample on.
+    /// True for a method that needs no start fit and updates its estimate from the first sample on.
     fn starts_itself(&self) -> bool {
         false
     }
@@ -140,7 +140,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         Ok(Vec::new())
     }
 
-    /// True for a method that fits its stored samples repeatedly: it needs no start coefficients and no warm-up.
+    /// True for a method that repeatedly fits its stored samples: it needs no start coefficients and no warm-up.
     fn fits_anew(&self) -> bool {
         false
     }
@@ -150,38 +150,38 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         None
     }
 
-    /// Options of the gain, if the method uses the gain of the kernel.
+    /// Returns the options of the gain; `None` if the method does not use the gain of the kernel.
     fn gain(&self) -> Option<&GainOptions> {
         None
     }
 
-    /// Memory lengths of the parameters, if the method has any.
+    /// Returns the memory lengths of the parameters; `None` if the method has none.
     fn memories(&self) -> Option<&MemoryOptions> {
         self.gain().map(|gain| &gain.memories)
     }
 
-    /// Rule of forgetting.
+    /// Returns the rule of forgetting.
     fn forgetting(&self) -> ForgettingRule {
         self.gain()
             .map_or(ForgettingRule::Exponential, |gain| gain.forgetting.clone())
     }
 
-    /// P at the start as a multiple of the unit matrix; `None` for the covariance of the start fit.
+    /// Returns the multiple of the unit matrix that is P at the start; `None` if P comes from the start fit.
     fn covariance(&self) -> Option<f64> {
         self.gain().and_then(|gain| gain.covariance)
     }
 
-    /// Limit on an innovation in the update, in standard deviations of the innovation.
+    /// Returns the limit on an innovation in the update, in standard deviations of the innovation.
     fn limit(&self) -> f64 {
         f64::INFINITY
     }
 
-    /// Limit of P where nothing excites a parameter; `None` if the limit follows from the start.
+    /// Returns the limit of P where nothing excites a parameter; `None` if the limit follows from the start.
     fn windup_guard(&self, _structure: Structure) -> Option<WindupGuard> {
         self.gain().and_then(|gain| gain.windup_guard)
     }
 
-    /// The choice of a guard; `None` if nothing was specified and the default is to have none.
+    /// Returns the choice of a guard; `None` if neither the user nor the method specifies one: there is then no guard.
     fn guard(&self) -> Option<GuardChoice> {
         None
     }
@@ -191,17 +191,17 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         self.guard() == Some(GuardChoice::Yes)
     }
 
-    /// Polynomials that are kept stable.
+    /// Returns the polynomials that are kept stable.
     fn stable(&self) -> Stable {
         Stable::Predictor
     }
 
-    /// Bounds of the physical parameters.
+    /// Returns the bounds of the physical parameters.
     fn bounds(&self) -> BTreeMap<String, Constraint> {
         BTreeMap::new()
     }
 
-    /// Range of the tracked delay tau_e, s.
+    /// Returns the range of the tracked delay tau_e, s; `None` if the delay is not tracked.
     fn track_delay_s(&self) -> Option<(f64, f64)> {
         None
     }
@@ -211,12 +211,12 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         false
     }
 
-    /// Channel of the external signal that the method uses.
+    /// Returns the name of the channel of the external signal that the method uses.
     fn reference_channel(&self) -> Option<&str> {
         None
     }
 
-    /// Prior knowledge of the person before the first sample, for methods with that option.
+    /// Returns the prior knowledge of the person before the first sample; `None` for methods without that option.
     fn person_prior(&self) -> Option<&PersonPrior> {
         None
     }
@@ -234,7 +234,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     /// Sets the options whose defaults depend on the record.
     fn prepare(&mut self, _record: &Record) {}
 
-    /// Removes the options of parameters that do not exist.
+    /// Removes the settings of parameters that are not known.
     fn retain(&mut self, _known: &dyn Fn(&str) -> bool) {}
 }
 
@@ -279,7 +279,7 @@ pub fn check_operator_orders(name: &str, setup: &Setup) -> Result<(), IdentError
     Ok(())
 }
 
-/// Checks that the delay contains at least the one sample of the hold.
+/// Checks that the delay contains at least the one sample of the zero-order hold.
 ///
 /// # Errors
 /// [`IdentError::BadOption`].

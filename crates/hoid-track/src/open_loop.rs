@@ -31,12 +31,12 @@ pub enum NoCrossover {
     NoEstimate,
     /// The gain of the open loop does not fall through one.
     NeverFalls,
-    /// The standard error is more than half of the crossover.
+    /// The standard error of the crossover is more than half of the crossover.
     NotDetermined,
 }
 
 impl NoCrossover {
-    /// Returns the reason in words.
+    /// Returns the reason as text.
     pub fn words(self) -> &'static str {
         match self {
             Self::NoEstimate => "there is no estimate yet",
@@ -50,8 +50,8 @@ impl OpenLoop {
     /// Number of values in a packed crossover and margin.
     pub(crate) const NUMBERS: usize = 4;
 
-    /// Computes crossover and phase margin of an estimate; `value` gives its response, and `whole` its response with
-    /// the covariance.
+    /// Computes crossover and phase margin of an estimate; `value` returns its response at a frequency, and `whole` the
+    /// response with its covariance.
     pub(crate) fn of(
         value: impl Fn(f64) -> Option<[f64; 2]>,
         whole: impl Fn(f64) -> Option<Response>,
@@ -69,7 +69,7 @@ impl OpenLoop {
         let found = Crossover::lowest(open_loop, sample_time).ok_or(NoCrossover::NeverFalls)?;
         let there = whole(found.omega_rad_s).ok_or(NoCrossover::NoEstimate)?;
         let [re, im] = there.value;
-        // dY/Y for a unit change of the real part and of the imaginary part.
+        // dY/Y for a unit change of the real part of Y, and for one of the imaginary part.
         let moved =
             [Complex64::new(1.0, 0.0), Complex64::new(0.0, 1.0)].map(|d| found.moved_by(d / Complex64::new(re, im)));
         let estimate = |value: f64, of: usize| {
@@ -87,7 +87,7 @@ impl OpenLoop {
         }
     }
 
-    /// Packs values and variances, for averaging; NaN if there is no crossover.
+    /// Packs the values and variances of crossover and margin, for averaging; NaN if there is no crossover.
     pub(crate) fn packed(found: Result<Self, NoCrossover>) -> [f64; Self::NUMBERS] {
         let Ok(found) = found else {
             return [f64::NAN; Self::NUMBERS];
@@ -97,7 +97,7 @@ impl OpenLoop {
         [a, b, c, d]
     }
 
-    /// Unpacks the numbers of [`OpenLoop::packed`].
+    /// Unpacks the numbers of [`OpenLoop::packed`]; `None` if there is no crossover.
     pub(crate) fn unpacked(numbers: &[f64]) -> Option<Self> {
         let &[a, b, c, d] = numbers else { return None };
         a.is_finite().then_some(Self {
@@ -122,7 +122,7 @@ mod tests {
         operator.response(omega) * Complex64::from_polar((half.sin() / half).powi(2), -half)
     }
 
-    /// The same operator and covariance as a batch fit of the family give the same measures.
+    /// Crossover and margin are the same as for a batch fit of the family with the same operator and covariance.
     #[test]
     fn measures_are_those_of_a_batch_fit() {
         let element = ContinuousTransferFunction::new(&[90.0], &[1.0, 6.0, 0.0]).unwrap();
@@ -184,7 +184,7 @@ mod tests {
             };
             OpenLoop::of(|_| Some([gain, 0.0]), whole, &element, TS)
         };
-        // A gain over an integrator crosses at the gain, whose error is that of the crossover.
+        // With a gain and an integrator, the crossover in rad/s equals the gain, and so does its error.
         let found = with(2.0, 0.01).unwrap();
         assert!((found.crossover_rad_s.value - 2.0).abs() < 1e-9);
         assert!((found.crossover_rad_s.standard_error.unwrap() - 0.1).abs() < 1e-6);
@@ -196,7 +196,7 @@ mod tests {
             Err(NoCrossover::NoEstimate)
         );
         assert!(OpenLoop::unpacked(&OpenLoop::packed(Err(NoCrossover::NeverFalls))).is_none());
-        // Without a covariance there is a value without an error.
+        // Without a covariance, the crossover has a value but no standard error.
         assert_eq!(with(2.0, f64::NAN).unwrap().crossover_rad_s.standard_error, None);
     }
 }

@@ -92,7 +92,7 @@ impl TrackOptions {
         Some(span.unwrap_or_else(|| default_start_span(record)))
     }
 
-    /// Range of tau_e in s if it is one of the estimated parameters.
+    /// Returns the range of tau_e in s; `None` unless tau_e is one of the estimated parameters.
     pub(crate) fn delay_parameter_s(&self) -> Option<(f64, f64)> {
         let method = &self.method;
         method.track_delay_s().filter(|_| method.delay_is_parameter())

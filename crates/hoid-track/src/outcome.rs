@@ -12,7 +12,7 @@ pub struct Counts {
     pub held: u64,
     /// Number of restarts by the guard.
     pub restarts: u64,
-    /// Number of steps that stability or a bound shortened.
+    /// Number of steps of the estimate that stability or a bound shortened.
     pub shortened: u64,
 }
 
@@ -23,8 +23,8 @@ pub struct Outcome {
     pub innovation: Option<f64>,
     /// True if e or u was faulty.
     pub skipped: bool,
-    /// True if the guard held the sample back, or kept the estimate constant.
+    /// True if the guard held the sample back, or kept the estimate constant at it.
     pub held: bool,
-    /// True if stability or a bound shortened the step.
+    /// True if stability or a bound shortened the step of the estimate.
     pub shortened: bool,
 }

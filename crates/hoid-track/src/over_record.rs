@@ -14,7 +14,7 @@ use crate::{
     two_sided::Causal,
 };
 
-/// Tracks a record and returns the estimate after every `every`-th sample.
+/// Tracks a record and returns the trace, which has a row for every `every`-th sample.
 ///
 /// # Errors
 /// [`IdentError`] if the options contradict each other or the record, or if the start fit fails.
@@ -22,7 +22,7 @@ pub fn track(record: &Record, options: &TrackOptions, every: usize) -> Result<Tr
     track_from(record, options, every, None)
 }
 
-/// As [`track`], with a known fit by [`TrackOptions::start_estimator`] to the start span, so that several methods with
+/// As [`track`], with a given fit of the start span by [`TrackOptions::start_estimator`], so that several methods with
 /// the same start need this fit only once.
 ///
 /// # Errors
@@ -36,7 +36,7 @@ pub fn track_from(
     track_with(record, options, every, start, &mut |_, _| {})
 }
 
-/// Tracks as [`track_from`]; `each` is called with the tracker and the number of the sample after every sample.
+/// As [`track_from`]; after every sample, `each` is called with the tracker and the index of the sample.
 pub(crate) fn track_with(
     record: &Record,
     options: &TrackOptions,
@@ -145,7 +145,7 @@ pub(crate) fn track_with(
     Ok(trace)
 }
 
-/// Samples at which a trace has rows.
+/// Returns the indices of the samples at which a trace has rows.
 fn kept_rows(samples: usize, every: usize) -> Vec<usize> {
     let kept = |k: &usize| (k + 1).is_multiple_of(every) || k + 1 == samples;
     (0..samples).filter(kept).collect()

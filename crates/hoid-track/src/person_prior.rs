@@ -22,7 +22,7 @@ pub enum PersonPrior {
 }
 
 impl PersonPrior {
-    /// Returns the fit, if the prior is a fit.
+    /// Returns the earlier fit; `None` if the prior is not a fit.
     pub fn fit(&self) -> Option<&FittedOperator> {
         match self {
             Self::Fit(fit) => Some(fit),
@@ -30,7 +30,7 @@ impl PersonPrior {
         }
     }
 
-    /// Checks that the samples have the sample time and the units of the fit.
+    /// Checks that the samples have the sample time and the units of the earlier fit.
     ///
     /// # Errors
     /// [`IdentError::BadStart`].
@@ -42,7 +42,7 @@ impl PersonPrior {
             })
     }
 
-    /// Returns the start of the estimate as text.
+    /// Returns a description of the start of the estimate.
     pub(crate) fn as_text(&self) -> String {
         match self {
             Self::Population => "the defaults for people".to_owned(),
@@ -64,7 +64,7 @@ impl PersonPrior {
         }
     }
 
-    /// Returns centre and spread of a named parameter.
+    /// Returns the centre and the spread of a named parameter; `None` if the prior does not name it.
     pub(crate) fn named(&self, parameter: &str) -> Option<(f64, f64)> {
         let Self::Named(prior) = self else { return None };
         let entry = prior.entries().iter().find(|entry| entry.parameter == parameter)?;

@@ -65,7 +65,7 @@ impl TrackPlan {
         self.ranges.combinations().is_ok_and(|all| all.len() == 1)
     }
 
-    /// Returns the options; before [`TrackPlan::choose`] these have the largest orders of the ranges.
+    /// Returns the options; before [`TrackPlan::choose`] their orders are the largest of the ranges.
     pub fn options(&self) -> &TrackOptions {
         &self.options
     }
@@ -80,7 +80,8 @@ impl TrackPlan {
         &self.ranges
     }
 
-    /// Searches the open orders on a record; does nothing if no order is open. `each` is called after every candidate.
+    /// Searches the open orders on a record; returns the options with the chosen orders and the result of the search.
+    /// If no order is open, nothing is searched. `each` is called after every candidate.
     ///
     /// # Errors
     /// The errors of the search.
@@ -98,8 +99,8 @@ impl TrackPlan {
         Ok((self.with_orders(choice.fit.orders()), Some(choice)))
     }
 
-    /// Returns the options for orders within the ranges. Options of coefficients that do not exist with these orders
-    /// are omitted.
+    /// Returns the options with orders within the ranges. Settings of coefficients that do not exist with these orders
+    /// are removed.
     pub fn with_orders(&self, orders: Orders) -> TrackOptions {
         let mut options = TrackOptions {
             orders,
@@ -111,7 +112,7 @@ impl TrackPlan {
     }
 }
 
-/// Error for start coefficients that are given while orders are searched.
+/// Returns the error for start coefficients that are given while orders are searched.
 pub fn of_one_model() -> IdentError {
     IdentError::BadStart {
         reason: "a start applies to a single model, but a range of orders or delays is searched; give nk and the \
@@ -120,7 +121,8 @@ pub fn of_one_model() -> IdentError {
     }
 }
 
-/// Ranges of a method that does not search: the default orders, or those nearest to them within the ranges.
+/// Returns ranges of one value each, for a method that does not search: the default orders, or those nearest to them
+/// within `ranges`.
 fn default_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime) -> OrderRanges {
     let known = method.person_prior().and_then(PersonPrior::delay_s);
     let nk = sample_time.nk(known.unwrap_or(DEFAULT_DELAY_S));
@@ -140,8 +142,8 @@ fn default_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime
 }
 
 /// Returns the search ranges: the defaults of structure and method, replaced by the named orders. If nk is not named,
-/// the delay lies within the tracked range. If no order other than nk is named, open orders follow from the names of
-/// the start coefficients, such as f1 or b0.
+/// it lies within the range of the tracked delay, if there is one. If no order other than nk is named, the open orders
+/// follow from the names of the start coefficients, such as f1 or b0.
 ///
 /// # Errors
 /// [`IdentError::BadOption`] for a name that is not an order.
@@ -165,7 +167,7 @@ pub fn ranges_of(
     Ok(narrowed(default.with(named)?, delay, of_start, sample_time))
 }
 
-/// Narrows ranges by additional knowledge.
+/// Narrows the ranges to the tracked delay and to the orders that follow from the names of the start coefficients.
 fn narrowed(
     mut ranges: OrderRanges,
     track_delay_s: Option<(f64, f64)>,
@@ -217,7 +219,7 @@ fn check(options: &TrackOptions, sample_time: SampleTime) -> Result<(), IdentErr
     Ok(())
 }
 
-/// True for the name of a parameter, or the letter of its polynomial.
+/// True if `key` is the name of a parameter, or the letter of its polynomial.
 fn is_known(names: &[String], key: &str) -> bool {
     let is = |rest: &str| rest.bytes().all(|b| b.is_ascii_digit());
     names.iter().any(|n| n.strip_prefix(key).is_some_and(is))

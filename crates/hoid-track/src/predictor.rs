@@ -48,7 +48,7 @@ impl Predictor {
         })
     }
 
-    /// Takes a sample and returns its prediction error eps for theta, in the order of
+    /// Takes a sample and returns its prediction error eps for theta, whose coefficients are in the order of
     /// [`Orders::parameter_names`].
     pub fn step(&mut self, theta: &[f64], e: f64, u: f64) -> f64 {
         let theta = padded(theta);
@@ -60,7 +60,7 @@ impl Predictor {
     /// Takes a sample whose output is missing; returns the prediction that replaces it.
     pub fn bridge(&mut self, theta: &[f64], e: f64) -> f64 {
         let theta = padded(theta);
-        // eps is the output minus its prediction.
+        // eps is the output minus its prediction, and the output here is zero.
         let prediction = -self.predict(&theta, e, 0.0);
         self.kernel.bridge(&theta);
         self.correct(&theta);
@@ -78,7 +78,7 @@ impl Predictor {
         }
     }
 
-    /// Resets the filters.
+    /// Sets the filters to rest.
     pub fn reset(&mut self) {
         self.kernel.reset();
         self.delay = DelayLine::new(vec![0.0; self.nk]);
@@ -110,7 +110,7 @@ mod tests {
         let wave = |t: usize, k: f64| (k * t as f64).sin() + 0.3 * (2.7 * k * t as f64).cos();
         let e: Vec<f64> = (0..300).map(|t| wave(t, 0.31)).collect();
         let u: Vec<f64> = (0..300).map(|t| wave(t, 0.17)).collect();
-        // A u - (B/F) q^-nk e, then D/C of it.
+        // Reference: A u - (B/F) q^-nk e, filtered by D/C.
         let (a, b, c, d, f) = (&theta[..1], &theta[1..3], &theta[3..5], &theta[5..6], &theta[6..]);
         let (mut w, mut v, mut batch) = (vec![0.0; 300], vec![0.0; 300], vec![0.0; 300]);
         fir(b, orders.nk, &e, &mut w);
@@ -124,7 +124,7 @@ mod tests {
         let mut predictor = Predictor::new(orders).unwrap();
         for (t, expected) in batch.iter().enumerate() {
             let eps = predictor.step(&theta, e[t], u[t]);
-            // Rounding errors of 300 samples.
+            // The tolerance allows for the rounding errors of 300 samples.
             assert!((eps - expected).abs() < 1e-11, "{t}: {eps} {expected}");
         }
         predictor.reset();

@@ -61,7 +61,7 @@ pub trait Recursion: State + Send + Sync {
     fn change_odds(&self) -> Option<f64> {
         None
     }
-    /// Returns the change that was declared at the last sample.
+    /// Returns the change that was declared at the last sample, if there was one.
     fn change(&self) -> Option<Change> {
         None
     }
@@ -73,11 +73,12 @@ pub trait Recursion: State + Send + Sync {
     fn response(&self, _omega_rad_s: f64) -> Option<Response> {
         None
     }
-    /// Returns the real and imaginary part of this response, without its covariance.
+    /// Returns the real and imaginary part of the response at a frequency in rad/s, without covariance, if it differs
+    /// from that of the polynomials.
     fn response_value(&self, _omega_rad_s: f64) -> Option<[f64; 2]> {
         None
     }
-    /// Multiplies the covariance of the gain by a factor; returns false if there is none.
+    /// Multiplies the covariance in the gain, P, by a factor; returns false if there is none.
     fn scale_covariance(&mut self, _factor: f64) -> bool {
         false
     }

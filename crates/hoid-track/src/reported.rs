@@ -51,7 +51,7 @@ impl Reported {
         reported
     }
 
-    /// Sets K_e, K_e_dot, omega_nm and zeta_nm.
+    /// Sets K_e, K_e_dot, omega_nm and zeta_nm, from which the coefficients and the Jacobian follow.
     pub fn set(&mut self, eta: [f64; OPERATOR]) {
         let (values, by) = held_operator(eta, self.sample_time_s);
         let p = self.theta.len();
@@ -60,7 +60,7 @@ impl Reported {
         self.by = by;
     }
 
-    /// Sets the first coefficients of the noise polynomial D; missing coefficients are zero.
+    /// Sets the coefficients of the noise polynomial D; coefficients missing in `d` become zero.
     pub fn set_noise(&mut self, d: &[f64]) {
         let p = self.theta.len();
         for (i, place) in self.theta[2..p - 2].iter_mut().enumerate() {
@@ -100,7 +100,7 @@ impl Reported {
         }
     }
 
-    /// Replaces the covariance of d by the covariance of a tracked noise model.
+    /// Replaces the covariance of d in `into` by the covariance of a tracked noise model.
     pub fn set_covariance_of_noise<const D: usize>(&self, of_d: &[[f64; D]; D], into: &mut [f64]) {
         let p = self.theta.len();
         let nd = p - OPERATOR;
@@ -110,7 +110,7 @@ impl Reported {
         }
     }
 
-    /// Returns the operator, with the given T_L in s and its variance.
+    /// Returns the operator with the covariance of eta; `lead` is T_L in s, `variance` its variance.
     pub fn operator(
         &self,
         eta: [f64; OPERATOR],

@@ -55,7 +55,7 @@ impl Response {
         Estimate::with_variance(degrees * im.atan2(re), degrees * degrees * self.along([-im, re]))
     }
 
-    /// Variance of the response along the direction `[a, b]`, a vector as long as H, divided by |H|^4.
+    /// Returns the variance of the response along the direction `[a, b]`, a vector as long as H, divided by |H|^4.
     fn along(&self, [a, b]: [f64; 2]) -> f64 {
         let c = &self.covariance;
         let square = self.value[0] * self.value[0] + self.value[1] * self.value[1];
@@ -66,7 +66,7 @@ impl Response {
     pub(crate) fn relative_covariance(&self) -> Option<[[f64; 2]; 2]> {
         let [re, im] = self.value;
         let (real, imaginary) = (self.along([re, im]), self.along([-im, re]));
-        // The variance along the sum of both directions contains the covariance twice.
+        // The variance along the sum of both directions contains twice the covariance.
         let both = self.along([re - im, im + re]);
         let cross = 0.5 * (both - real - imaginary);
         [real, imaginary, cross]
@@ -75,7 +75,7 @@ impl Response {
             .then_some([[real, cross], [cross, imaginary]])
     }
 
-    /// Real and imaginary part of the response of polynomials theta with these orders.
+    /// Returns the real and imaginary part of the response of polynomials with the coefficients theta and these orders.
     pub(crate) fn value_of_polynomials(
         orders: &Orders,
         theta: &[f64],
@@ -85,7 +85,7 @@ impl Response {
         let o = orders;
         let (sin, cos) = (-omega_rad_s * sample_time.s()).sin_cos();
         let sum = |first: [f64; 2], of: &[f64]| {
-            // Horner's scheme in q^-1, with the constant term `first`.
+            // Horner's scheme in q^-1, with the constant coefficient `first`.
             let inner = of.iter().rev().fold([0.0; 2], |sum, c| {
                 let [re, im] = times(sum, [cos, sin]);
                 [re + c, im]
@@ -98,13 +98,14 @@ impl Response {
             sum([1.0, 0.0], &theta[..o.na]),
             sum([1.0, 0.0], &theta[first_f..first_f + o.nf]),
         );
-        // B has no constant term of its own: b_0 is at the delay.
+        // B has no constant coefficient of its own: b_0 is multiplied by q^-nk.
         let b = sum([0.0; 2], &theta[first_b..first_b + o.nb]);
         let (sin, cos) = (-omega_rad_s * sample_time.s() * (o.nk as f64 - 1.0)).sin_cos();
         over(times(b, [cos, sin]), times(a, f))
     }
 
-    /// Returns the response of polynomials theta with these orders; `covariance` is that of theta by rows.
+    /// Returns the response of polynomials with the coefficients theta and these orders; `covariance` is that of theta,
+    /// by rows.
     pub(crate) fn of_polynomials(
         orders: &Orders,
         theta: &[f64],
@@ -245,7 +246,7 @@ mod tests {
         };
         let (gain, phase) = (response.gain_db(), response.phase_deg());
         assert!((gain.value - 20.0).abs() < 1e-12 && (phase.value + 90.0).abs() < 1e-12);
-        // The imaginary part is along H, the real part across.
+        // The imaginary part is along H, the real part is perpendicular to H.
         assert!((gain.standard_error.unwrap() - DB * 0.01).abs() < 1e-12);
         assert!((phase.standard_error.unwrap() - 0.02_f64.to_degrees()).abs() < 1e-12);
         assert!(at(&THETA, None).gain_db().standard_error.is_none());
@@ -256,7 +257,7 @@ mod tests {
             value: [3.0, 4.0],
             covariance: [[0.04, 0.01], [0.01, 0.09]],
         };
-        // M C M' with M = [[3, 4], [-4, 3]]/25.
+        // The expected covariance is M C M' with M = [[3, 4], [-4, 3]]/25.
         let [[a, b], [_, c]] = oblique.relative_covariance().unwrap();
         for (found, expected) in [(a, 2.04), (b, 0.53), (c, 1.21)] {
             assert!((found - expected / 625.0).abs() < 1e-15, "{found} {expected}");

@@ -1,7 +1,7 @@
 //! The state of a tracker as numbers, so that it can continue elsewhere: in another process, or after a restart.
 //!
 //! The numbers are the start, from which gains and bounds are computed, all numbers that change ([`hoid_core::state`]),
-//! and a seal that detects damage. A restored tracker continues with identical results. It does not contain the start
+//! and a seal that detects damage. A restored tracker continues with identical results, but does not contain the start
 //! fit.
 
 use hoid_core::state::{State, visit_all};
@@ -71,7 +71,7 @@ impl Tracker {
         sealed(numbers)
     }
 
-    /// Restores the tracker that [`Tracker::saved`] returned, from its options and these numbers.
+    /// Restores a tracker from its options and the numbers that [`Tracker::saved`] returned.
     ///
     /// # Errors
     /// [`IdentError::BadStart`] for numbers of another tracker, and for numbers that were altered or truncated; the
@@ -131,14 +131,15 @@ mod tests {
     use super::*;
     use crate::{Method, TrackOptions};
 
-    /// Each number in turn, sealed again after the change: no index, length or difference of counters ends the process.
+    /// Changes each number in turn and seals the numbers again: no index, length or difference of counters ends the
+    /// process.
     fn each_number_may_be_anything(with: &[(&str, &str)], saved_at: usize, to: usize) {
         let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();
         let span = record.span(0.0, 20.0).unwrap();
         let options = TrackOptions::default_for(Method::rpem(), 29).with(with).unwrap();
         let mut tracker = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();
-        // A gap, within which the tracker is saved.
+        // A gap in the samples, within which the tracker is saved.
         let step = |tracker: &mut Tracker, k: usize| {
             let gap = (2300..2360).contains(&k);
             tracker.step(record.input()[k], if gap { f64::NAN } else { record.output()[k] })

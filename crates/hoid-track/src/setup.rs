@@ -32,7 +32,7 @@ pub struct Setup {
     pub structure: Structure,
     /// The orders.
     pub orders: Orders,
-    /// Start.
+    /// Start of the recursion.
     pub start: StartAt,
     /// Limits of the search in start fits and in fits of windows.
     pub search: SearchOptions,
@@ -56,7 +56,7 @@ pub struct Setup {
     pub bounds: BTreeMap<String, Constraint>,
     /// Range of the tracked delay tau_e, s.
     pub track_delay_s: Option<(f64, f64)>,
-    /// Range of tau_e in s if it is one of the estimated parameters.
+    /// Range of tau_e in s; `None` unless tau_e is one of the estimated parameters.
     pub delay_parameter_s: Option<(f64, f64)>,
 }
 
@@ -81,8 +81,8 @@ impl Setup {
     }
 }
 
-/// Orders of the polynomials: if the delay is a parameter, it may lie between two samples, and B has one more
-/// coefficient.
+/// Returns the orders of the polynomials: if the delay is a parameter, it may lie between two samples, and B has one
+/// more coefficient.
 pub(crate) fn polynomial_orders(orders: Orders, with_delay: bool) -> Orders {
     match with_delay {
         true => Orders { nb: 3, ..orders },
@@ -90,7 +90,7 @@ pub(crate) fn polynomial_orders(orders: Orders, with_delay: bool) -> Orders {
     }
 }
 
-/// Names of the estimated parameters.
+/// Returns the names of the estimated parameters.
 pub(crate) fn parameter_names(orders: &Orders, is_physical: bool, with_delay: bool) -> Vec<String> {
     if !is_physical {
         return orders.parameter_names();

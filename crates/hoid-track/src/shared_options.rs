@@ -15,11 +15,11 @@ use crate::{forgetting::ForgettingRule, memory::MemoryOptions};
 pub enum WindupGuard {
     /// No limit: equations 5.26 and 31 of the thesis unchanged.
     Off,
-    /// Growth up to this multiple of their initial value.
+    /// The variances in P grow up to this multiple of their initial values.
     Bound(f64),
 }
 
-/// Parses `off`, or the bound.
+/// Parses `off`, or the bound as a number.
 impl Value for WindupGuard {
     const KIND: Kind = Kind::NumberOrOff;
 
@@ -62,7 +62,7 @@ settings! {
         pub windup_guard: Option<WindupGuard> = None,
     }
     groups {
-        /// Memories.
+        /// Memory lengths of the parameters.
         pub memories: MemoryOptions,
         /// Rule of forgetting.
         pub forgetting: ForgettingRule,
@@ -78,15 +78,15 @@ impl GainOptions {
         }
     }
 
-    /// Returns the guard against windup; `None` if it follows from the start. It is off for the recursion of the
-    /// thesis: P at the start is given, P forgets exponentially, and innovations are not limited.
+    /// Returns the guard against windup; `None` if it follows from the start. Unless it is given, it is off with the
+    /// settings of the thesis: P at the start is given, P forgets exponentially, and innovations are not limited.
     pub fn windup_guard(&self, limit: f64) -> Option<WindupGuard> {
         let of_the_text =
             self.covariance.is_some() && self.forgetting == ForgettingRule::Exponential && limit == f64::INFINITY;
         self.windup_guard.or(of_the_text.then_some(WindupGuard::Off))
     }
 
-    /// Removes the memories of parameters that do not exist.
+    /// Removes the memories and drifts of parameters that are not known.
     pub fn retain(&mut self, known: &dyn Fn(&str) -> bool) {
         self.memories.memory_of.retain(|key, _| known(key));
         if let ForgettingRule::RandomWalk(drift) = &mut self.forgetting {
@@ -96,7 +96,7 @@ impl GainOptions {
 }
 
 settings! {
-    /// Stability of the polynomials.
+    /// Options for the stability of the polynomials.
     pub struct StabilityOptions {
         /// Polynomials kept stable: predictor (C and F), or noise (D too)
         pub stable: Stable = Stable::Predictor,

@@ -12,14 +12,14 @@ use crate::{
 };
 use hoid_ident::{Choice, IdentError};
 
-/// Chooses the options for a record of the warm-up; also returns the result of the search.
+/// Chooses the options for a record of the warm-up; also returns the result of the search for orders, if there was one.
 pub type Choose<'a> = &'a dyn Fn(&Record) -> Result<(TrackOptions, Option<Choice>), IdentError>;
 
-/// Divisor of the length of the warm-up that gives the number of additional samples after a failed fit.
+/// After a failed fit, the warm-up is extended by its length divided by this number.
 const RETRY_DIVISOR: usize = 4;
-/// Maximum number of samples that a continued warm-up keeps, as a multiple of its length.
+/// Maximum number of samples that an extended warm-up keeps, as a multiple of the length of the warm-up.
 const MAX_KEPT_LENGTHS: usize = 2;
-/// Index of the number of kept samples in a saved warm-up.
+/// Index, in the numbers of a saved warm-up, of the number of kept samples.
 const COUNT: usize = 4;
 /// Longest run of faulty samples within a warm-up, s; after a longer one the warm-up restarts.
 const LONGEST_FAULT_S: f64 = 1.0;
@@ -33,14 +33,14 @@ pub enum Stage {
     Tracking(Box<Tracker>),
 }
 
-/// Result of a sample.
+/// Result of a sample of a live recursion.
 #[derive(Debug, Default)]
 pub struct LiveOutcome {
-    /// Outcome of the tracker, once there is one.
+    /// Outcome of the tracker; `None` if the tracker did not receive a sample.
     pub outcome: Option<Outcome>,
-    /// Options and result of the search for a start fit that was made at this sample.
+    /// Options of the tracker and result of the search for orders, if the warm-up ended at this sample.
     pub started: Option<(TrackOptions, Option<Choice>)>,
-    /// True if no sample of the lower rate was completed: the recursion did not advance.
+    /// True if no sample of the decimated stream was completed, so that the recursion did not advance.
     pub between: bool,
 }
 
@@ -66,7 +66,7 @@ impl Stage {
         }
     }
 
-    /// Restores the recursion that [`Stage::saved`] returned, with its plan.
+    /// Restores a recursion from its plan and the state that [`Stage::saved`] returned.
     ///
     /// # Errors
     /// [`IdentError::BadStart`] for numbers of another recursion, and for numbers that were altered or truncated; the
@@ -134,11 +134,11 @@ pub struct WarmUp {
     samples: VecDeque<Sample>,
     /// Number of samples since the collection started.
     pub collected: usize,
-    /// Number of samples at which the fit is tried.
+    /// Number of collected samples at which the fit is tried next.
     pub needed: usize,
     /// Reason why the last start fit failed or the collection restarted.
     pub trouble: Option<String>,
-    /// Number of consecutive faulty samples at the end.
+    /// Number of consecutive faulty samples up to the last sample.
     faulty: usize,
 }
 
@@ -179,8 +179,8 @@ impl WarmUp {
         sealed(numbers)
     }
 
-    /// Restores the warm-up that [`WarmUp::saved`] returned. `None` for other numbers, and for numbers that were
-    /// altered or truncated.
+    /// Restores a warm-up from the numbers that [`WarmUp::saved`] returned. `None` for other numbers, and for numbers
+    /// that were altered or truncated.
     pub fn restored(sample_time: SampleTime, numbers: &[f64]) -> Option<Self> {
         let mut warm_up = Self::new(0, sample_time);
         let numbers = opened(numbers)?;
@@ -228,7 +228,8 @@ impl WarmUp {
         self.collected = self.collected.saturating_add(1);
     }
 
-    /// Excludes the idle head and extends the warm-up by as many samples; returns false if there is no idle head.
+    /// Excludes the idle head of the collected samples and extends the warm-up by as many samples; returns false if
+    /// there is no idle head.
     fn leave_out_idle(&mut self) -> bool {
         let Ok(record) = self.record() else { return false };
         let idle = idle_head(&record);
@@ -293,13 +294,14 @@ mod tests {
         (0..3).for_each(|_| warm_up.collect(sample));
         let numbers = warm_up.saved();
         assert_eq!(WarmUp::restored(sample_time, &numbers).unwrap().saved(), numbers);
-        // Changed and sealed again: room for 1e15 samples would end the process.
+        // The number of kept samples is changed, and the numbers are sealed again: memory for 1e15 samples would end
+        // the process.
         for kept in [4.0, 1e15, f64::INFINITY, f64::NAN] {
             let mut changed = opened(&numbers).unwrap().to_vec();
             (changed[0], changed[COUNT]) = (1e15, kept);
             assert!(WarmUp::restored(sample_time, &sealed(changed)).is_none());
         }
-        // A length of any size is one that is never reached.
+        // A warm-up length of any size is accepted, although it may never be reached.
         let mut changed = opened(&numbers).unwrap().to_vec();
         changed[0] = f64::INFINITY;
         let mut restored = WarmUp::restored(sample_time, &sealed(changed)).unwrap();

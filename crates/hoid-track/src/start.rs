@@ -33,7 +33,8 @@ const LONGEST_SAMPLE_TIME_S: f64 = FASTEST_SHARE * std::f64::consts::PI / SLOWES
 /// Factor by which the roots of an unstable noise model are moved inwards until it is stable.
 const ROOT_SHRINK_FACTOR: f64 = 0.99;
 
-/// Checks that the sample time leaves a range between the bounds of omega_nm; the limit is the same for all methods.
+/// Checks that the upper bound of omega_nm at the sample time is above the lower bound; the limit is the same for all
+/// methods.
 ///
 /// # Errors
 /// [`IdentError::BadOption`] above [`LONGEST_SAMPLE_TIME_S`].
@@ -91,7 +92,7 @@ impl StartState {
         }
     }
 
-    /// Start with a given theta.
+    /// Computes the start from a given theta.
     fn given(setup: &Setup, theta: &[f64], sample_time: SampleTime) -> Result<Self, IdentError> {
         let names = setup.orders.parameter_names();
         if theta.len() != names.len() || theta.iter().any(|t| !t.is_finite()) {
@@ -141,7 +142,7 @@ impl StartState {
         }
     }
 
-    /// Start with the batch fit of a record.
+    /// Computes the start from the batch fit of a record.
     fn fitted(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Self, IdentError> {
         let FittedStart {
             values,
@@ -237,7 +238,7 @@ fn multiple(size: f64, p: usize) -> Vec<f64> {
     matrix
 }
 
-/// Makes the noise model as stable as the options require.
+/// Moves the roots of the noise model inwards until it is as stable as the options require.
 fn stabilised(setup: &Setup, mut values: Vec<f64>) -> Vec<f64> {
     let o = &setup.orders;
     if setup.stable == Stable::Predictor || o.nd == 0 {
@@ -297,8 +298,8 @@ fn polynomial_fit(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result
     }
 }
 
-/// Returns the Box-Jenkins fit if its physical parameters exist and are within the bounds, otherwise the grey-box fit,
-/// for which this is always true, with a noise model of the requested order.
+/// Returns the Box-Jenkins fit if its physical parameters exist and are within the bounds; otherwise the grey-box fit,
+/// whose parameters always exist and are limited to the bounds, with a noise model of the requested order.
 fn fit_physical(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<FittedStart, IdentError> {
     if setup.delay_parameter_s.is_none()
         && let Some(start) = from_box_jenkins(setup, record, known)?
@@ -441,7 +442,7 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<FittedStart, IdentErr
         }
         for i in 0..p {
             // Parameters that the grey box did not have, or kept fixed, are unknown: the standard deviation of a
-            // coefficient is set to about 1, that of a gain to the size of the gain.
+            // coefficient is set to at least 1, that of a physical parameter to at least its own size.
             if covariance[i * p + i] == 0.0 {
                 let size = if i < operator { eta[i] * eta[i] } else { 1.0 };
                 covariance[i * p + i] = size.max(variance);

@@ -9,7 +9,7 @@ use hoid_model::{Channel, Orders, Record, Structure};
 /// D with its covariance.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct StartNoise {
-    /// Coefficients after the leading 1.
+    /// Coefficients of D after the leading 1.
     pub d: Vec<f64>,
     /// Covariance of the coefficients, by rows.
     pub covariance: Vec<f64>,
@@ -18,7 +18,7 @@ pub(crate) struct StartNoise {
 }
 
 impl StartNoise {
-    /// Fits D of order nd to the residual of the operator of this fit in a record; `None` if the record is too short or
+    /// Fits D of order nd to the residual of the operator of a fit in a record; `None` if the record is too short or
     /// constant, or if the fit has another sample time.
     pub fn of(fit: &Fit, record: &Record, nd: usize) -> Option<Self> {
         let simulated = fit.simulate(record).ok()?;
@@ -70,7 +70,7 @@ mod tests {
             .unwrap();
         let noise = StartNoise::of(&fit, &span, 4).unwrap();
         assert_eq!((noise.d.len(), noise.covariance.len()), (4, 16));
-        // The batch twin: the normal equations hold for the residuals of D on the residual.
+        // Batch computation for comparison: the residuals of D satisfy the normal equations.
         let w = fit.simulate(&span).unwrap();
         let v: Vec<f64> = span.output()[w.first..]
             .iter()

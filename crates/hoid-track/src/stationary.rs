@@ -20,8 +20,8 @@
 //!   covariance and innovation variance keep their values of that time for the whole span.
 //! - The estimate is updated again once both signals move and the filters have settled ([`crate::guard`]).
 //!
-//! Without stationary spans, the results are identical to those without this watch. At sample times below 40 us,
-//! signals are not watched.
+//! Without stationary spans, the results are identical to those without this watch. At sample times below 40 us, there
+//! is no watch.
 
 use hoid_core::state::{State, visit_all};
 use hoid_model::SampleTime;
@@ -33,15 +33,16 @@ use crate::{
 
 /// Share of its typical size within which a signal is stationary.
 const SHARE: f64 = 0.02;
-/// Shortest stationary span of both signals, and of one signal, that carries no information, s, and its smallest number
-/// of samples.
+/// Shortest stationary span of both signals, and of one signal, that carries no information, s, and the smallest number
+/// of samples of a stationary span.
 pub(crate) const BOTH_S: f64 = 1.0;
 const ONE_S: f64 = 5.0;
 const LEAST: u64 = 20;
-/// Number of blocks after which the size of a signal is known, and largest number of blocks over which it is averaged.
+/// Number of blocks after which the typical size of a signal is known, and largest number of blocks over which the size
+/// is averaged.
 const KNOWN_AFTER: u32 = 10;
 const AVERAGED: u32 = 60;
-/// Largest number of samples between two snapshots.
+/// Largest number of samples between two stored states.
 const MOST: u64 = 1 << 17;
 /// e and u.
 const CHANNELS: usize = 2;
@@ -98,13 +99,14 @@ impl BufferedSample {
 /// Duration of the stationary span of a signal, and its typical size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Channel {
-    /// Value at which the span started, number of samples since then, and number of latest samples with the same value.
+    /// Value at which the span started, number of samples since then, and number of times that the last value was
+    /// repeated.
     value: f64,
     stationary_samples: u64,
     same: u64,
     last: f64,
-    /// Largest step in the previous block and in this one, and whether the signal jumped by more than these at the
-    /// start of the span and at the start of the repeated value.
+    /// Largest step in the previous block and in this one, and whether the signal made a larger step at the start of
+    /// the span and at the start of the repeated value.
     steps: [f64; 2],
     jumped: [bool; 2],
     tolerance: f64,
@@ -153,9 +155,9 @@ impl Channel {
         self.largest = self.largest.max((x - self.first).abs());
     }
 
-    /// Returns the number of samples of a stationary span that must be undone, for a span of at least `least` samples,
-    /// and true if the signal jumped at its start, so that the sample before it must also be undone. If nearly all
-    /// samples have the same value, only these are counted.
+    /// Returns the number of samples of the current stationary span that must be undone, and true if the signal jumped
+    /// at its start, so that the sample before it must also be undone. `least` is the shortest span without
+    /// information; if the last value was repeated for three quarters of this length, only its repetitions are counted.
     fn samples_to_undo(&self, least: u64) -> (u64, bool) {
         if 4 * self.same >= 3 * least {
             (self.same, self.jumped[1])
@@ -183,8 +185,8 @@ impl Channel {
 /// The stationarity watch of a recursion.
 #[derive(Debug, Clone)]
 pub(crate) struct StationaryWatch {
-    /// Numbers of samples: in a stationary span of both signals and of one signal without information, in a block, and
-    /// until the filters have settled.
+    /// Numbers of samples: shortest stationary span of both signals, and of one signal, without information; in a
+    /// block; until the filters have settled.
     both: u64,
     one: u64,
     block: u64,
@@ -290,7 +292,7 @@ impl StationaryWatch {
         }
     }
 
-    /// Returns the channel that has been constant for too long, and the number of samples that must be undone.
+    /// Returns the channel whose stationary span carries no information, and the number of samples that must be undone.
     #[inline]
     fn stationary_channel(&self) -> Option<(GuardChannel, u64)> {
         let [e, u] = self.channels.map(|channel| channel.stationary_samples);
@@ -321,7 +323,7 @@ impl StationaryWatch {
         }
     }
 
-    /// Restores the recursion to its state before the last `stood` samples, after which these only update the filters.
+    /// Restores the recursion to its state before the last `stood` samples; these samples then update only the filters.
     #[cold]
     fn begin_pause(
         &mut self,
@@ -369,7 +371,7 @@ impl StationaryWatch {
         Guarded { outcome, held: true }
     }
 
-    /// True while a stationary span may still belong to the pause, or has half the length of a new span.
+    /// True while one or both signals have been stationary for half of the time after which they carry no information.
     fn stationary_soon(&self) -> bool {
         let [e, u] = self.channels.map(|channel| channel.stationary_samples);
         2 * e.min(u) >= self.both || 2 * e >= self.one || 2 * u >= self.one

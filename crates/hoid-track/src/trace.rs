@@ -1,4 +1,4 @@
-//! The estimate at every sample.
+//! The estimate at the samples of a run.
 
 use hoid_model::{
     Finding, NotConvertible, Orders, PolynomialModel, SampleTime, Structure,
@@ -22,17 +22,19 @@ pub struct Trace {
     pub(crate) sample_time: SampleTime,
     /// Time of each row, s.
     pub(crate) times_s: Vec<f64>,
-    /// theta by rows.
+    /// theta of each row, row after row.
     pub(crate) theta: Vec<f64>,
-    /// Covariance of theta, the upper triangle of each row; NaN if there is none.
+    /// Upper triangle, by rows, of the covariance of theta in each row of the trace; NaN if there is none.
     pub(crate) covariance: Vec<f64>,
     /// Operator of each row, for a recursion in physical parameters.
     pub(crate) operator: Vec<OperatorEstimate>,
     /// Delay of each row, if it is tracked.
     pub(crate) delays: Vec<Delay>,
-    /// Responses at each frequency of the options, for methods whose response is not that of the polynomials.
+    /// Responses of each row at the frequencies of the options, for methods whose response is not that of the
+    /// polynomials.
     pub(crate) responses: Vec<f64>,
-    /// Crossover and margin for such methods, or the reason why there are none.
+    /// Crossover and margin of each row, for methods whose response is not that of the polynomials, and the reason in
+    /// rows without a crossover.
     pub(crate) open_loops: Vec<f64>,
     pub(crate) no_crossover: Vec<Option<NoCrossover>>,
     pub(crate) innovation: Vec<f64>,
@@ -62,7 +64,7 @@ pub struct Trace {
     pub(crate) response_is_known: bool,
     /// Number of samples between two rows.
     pub(crate) every: usize,
-    /// Length of the moving average in rows, 1 for none.
+    /// Length of the moving average in rows; 1 if there is no moving average.
     pub(crate) averaged: usize,
     /// Time from which the estimate was updated, s.
     pub(crate) updated_from_s: f64,
@@ -72,7 +74,7 @@ pub struct Trace {
 pub const OPERATOR_COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
 
 impl Trace {
-    /// An empty trace, with capacity for `rows` rows.
+    /// Returns an empty trace, with capacity for `rows` rows.
     pub(crate) fn empty(options: TrackOptions, sample_time: SampleTime, rows: usize, every: usize) -> Self {
         let p = options.polynomial_orders().parameters();
         Self {
@@ -107,7 +109,7 @@ impl Trace {
         }
     }
 
-    /// Replaces the estimate of each row.
+    /// Replaces the estimate of each row by a two-sided estimate.
     pub(crate) fn replace(&mut self, rows: Vec<TwoSided>) {
         let p = self.options.polynomial_orders().parameters();
         self.theta.clear();
@@ -227,7 +229,7 @@ impl Trace {
         )
     }
 
-    /// Orders of the polynomials of a row, with its delay.
+    /// Returns the orders of the polynomials of a row, with the delay of the row.
     fn orders_of(&self, row: usize) -> Orders {
         let orders = self.options.polynomial_orders();
         self.delays
@@ -303,7 +305,7 @@ impl Trace {
         &self.innovation_variance
     }
 
-    /// Returns the number of steps that stability or a bound had shortened, up to each row.
+    /// Returns for each row the number of steps up to this row that stability or a bound shortened.
     pub fn steps_shortened(&self) -> &[u64] {
         &self.shortened
     }
@@ -325,13 +327,13 @@ impl Trace {
         self.counts
     }
 
-    /// Returns the events found by the guard, and its actions.
+    /// Returns the faulty spans that the guard found, each with the action of the guard.
     pub fn faults(&self) -> &[TrackFault] {
         &self.faults
     }
 
-    /// Returns the number of samples that the guard had held back, or during which it kept the estimate constant, up
-    /// to each row.
+    /// Returns for each row the number of samples up to this row that the guard held back, or during which it kept the
+    /// estimate constant.
     pub fn held(&self) -> &[u64] {
         &self.held
     }
@@ -366,7 +368,7 @@ impl Trace {
         self.every
     }
 
-    /// Returns the length of the moving average in rows, 1 for none.
+    /// Returns the length of the moving average in rows; 1 if there is no moving average.
     pub fn averaged(&self) -> usize {
         self.averaged
     }
@@ -432,7 +434,7 @@ impl Trace {
     }
 }
 
-/// Returns the operator of a theta, with standard errors if there is a covariance.
+/// Returns the operator with the coefficients theta, with standard errors if there is a covariance.
 pub(crate) fn operator_of(
     structure: Structure,
     orders: Orders,
@@ -458,12 +460,12 @@ pub(crate) fn operator_of(
     })
 }
 
-/// Length of the upper triangle of a p x p matrix.
+/// Returns the number of elements in the upper triangle of a p x p matrix.
 pub(crate) fn packed_len(p: usize) -> usize {
     p * (p + 1) / 2
 }
 
-/// Appends the upper triangle by rows.
+/// Appends the upper triangle of a p x p matrix by rows.
 pub(crate) fn pack(whole: &[f64], p: usize, into: &mut Vec<f64>) {
     for i in 0..p {
         into.extend_from_slice(&whole[i * p + i..(i + 1) * p]);
@@ -483,8 +485,8 @@ fn unpack(packed: &[f64], p: usize) -> Vec<f64> {
     whole
 }
 
-/// Mean of each column over the last `rows` rows, or over fewer rows at the start. NaN affects only the means that
-/// contain it.
+/// Returns the mean of each column over the last `rows` rows, or over fewer rows at the start. Only the means over a
+/// row with NaN are NaN.
 fn causal_mean(values: &[f64], width: usize, rows: usize) -> Vec<f64> {
     if width == 0 {
         return Vec::new();
@@ -519,7 +521,7 @@ fn causal_mean(values: &[f64], width: usize, rows: usize) -> Vec<f64> {
     means
 }
 
-/// Refuses a trace without any row.
+/// Checks that the number of samples between two rows is at least one.
 pub(crate) fn check_every(every: usize) -> Result<(), IdentError> {
     if every > 0 {
         return Ok(());

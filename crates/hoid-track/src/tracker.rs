@@ -26,13 +26,13 @@ use crate::{
 
 /// Frequency at which the sign of a response is examined, rad/s.
 const LOW_RAD_S: f64 = 0.5;
-/// Frequencies at which the error of the response is examined, rad/s, and the largest standard error of a known
-/// response, dB.
+/// Frequencies at which the error of the response is examined, rad/s, and the standard error in dB below which a
+/// response is known.
 const KNOWN_AT_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
 const KNOWN_DB: f64 = 2.0;
-/// Range of the phase of people at [`LOW_RAD_S`], deg: a lag and a delay give -110, two leads 70.
+/// Range of the phase of people's responses at [`LOW_RAD_S`], deg: a lag and a delay give -110, two leads 70.
 const PHASES_DEG: (f64, f64) = (-120.0, 75.0);
-/// Smallest distance of an implausible phase from this range, in standard errors.
+/// Smallest distance, in standard errors, of an implausible phase from the range of people's phases.
 const IMPLAUSIBLE_DISTANCE: f64 = 2.0;
 /// Quantile of the normal distribution for 95 %.
 const NORMAL: f64 = 1.96;
@@ -151,7 +151,8 @@ impl Tracker {
         }
     }
 
-    /// Returns the outcome of a sample that a guard has examined.
+    /// Updates the counts and returns the outcome of a sample that a guard or the watch for constant signals has
+    /// examined.
     #[inline]
     fn guarded(&mut self, guarded: Guarded, skipped: bool) -> Outcome {
         let taken = guarded.outcome.filter(|_| !guarded.held);
@@ -168,7 +169,7 @@ impl Tracker {
         }
     }
 
-    /// Returns the event of the guard at the last sample.
+    /// Returns the event that the guard reported at the last sample.
     pub fn event(&self) -> Option<GuardEvent> {
         let of_guard = self.guard.as_ref().and_then(|guard| guard.event());
         of_guard.or_else(|| self.stationary.as_ref()?.event())
@@ -184,7 +185,7 @@ impl Tracker {
                 .is_some_and(|stationary| stationary.is_paused())
     }
 
-    /// Returns the seconds since the last restart by the guard, if there was one.
+    /// Returns the time since the last restart by the guard, s; `None` if there was none.
     pub fn since_restart_s(&self) -> Option<f64> {
         self.guard.as_ref()?.since_restart_s()
     }
@@ -236,7 +237,7 @@ impl Tracker {
         }
     }
 
-    /// Orders of the polynomials, with the current delay.
+    /// Returns the orders of the polynomials, with the current delay.
     fn orders(&self) -> Orders {
         let orders = self.options.polynomial_orders();
         let delay = self.recursion.delay();
@@ -307,8 +308,8 @@ impl Tracker {
     }
 
     /// Returns the finding that the current response is implausible for a person. With a controlled element, the loop
-    /// that both would form is examined ([`LoopShape::doubt`]); without a controlled element, the sign of the response
-    /// at low frequencies.
+    /// that it forms with the response is examined ([`LoopShape::doubt`]); without a controlled element, the sign of
+    /// the response at low frequencies.
     pub(crate) fn response_finding(&self) -> Option<Finding> {
         if let Some(element) = &self.options.controlled_element {
             let reach = match self.open_loop()? {
@@ -386,7 +387,7 @@ fn largest_nk(options: &TrackOptions, sample_time: SampleTime) -> usize {
     options.orders.nk.max((latest.ceil() as usize).saturating_add(1))
 }
 
-/// Builds the watch for constant signals; `None` if the option `guard` is given, with either value.
+/// Builds the watch for constant signals; `None` if the option `guard` is given, whether yes or no.
 pub(crate) fn stationary_watch(options: &TrackOptions, sample_time: SampleTime) -> Option<Box<StationaryWatch>> {
     if options.method.guard().is_some() {
         return None;
@@ -394,7 +395,7 @@ pub(crate) fn stationary_watch(options: &TrackOptions, sample_time: SampleTime) 
     StationaryWatch::new(largest_nk(options, sample_time), sample_time).map(Box::new)
 }
 
-/// Builds the guard of a recursion at its start, if the options ask for one.
+/// Builds the guard of a recursion at its start; `None` if the options do not require one.
 pub(crate) fn guard_of(
     options: &TrackOptions,
     recursion: &mut dyn Recursion,

@@ -9,9 +9,9 @@ use crate::setup::Setup;
 pub struct Causal {
     /// Components of the recursion.
     pub setup: Setup,
-    /// Magnitude beyond which a sample counts as faulty.
+    /// Magnitude of e or u beyond which a sample counts as faulty.
     pub largest: f64,
-    /// The samples at which a trace has rows, in ascending order.
+    /// Indices of the samples at which a trace has rows, in ascending order.
     pub rows: Vec<usize>,
     /// The operator at the end of the causal run.
     pub last: Option<OperatorEstimate>,

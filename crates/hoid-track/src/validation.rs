@@ -10,9 +10,9 @@
 //! `VAF = max(0, 1 - sum (u - w)^2/sum u^2) 100 %`,
 //!
 //! and from a grid of `P_0 = p I` the p is chosen whose trace explains most of the second run. An estimate that follows
-//! the remnant of the first run explains less of the second run, which has another remnant; an estimate that is too
-//! stiff explains less after a change of the person. The runs are aligned at their first samples, so that changes of
-//! the task must occur at the same time in both runs.
+//! the remnant of the first run explains less of the second run, which has another remnant; an estimate that changes
+//! too slowly explains less after a change of the person. The runs are aligned at their first samples, so that changes
+//! of the task must occur at the same time in both runs.
 //!
 //! [`track_validated`] follows the proposal literally: P is updated during the run. At regular times the current model
 //! and the model of one interval earlier are both simulated over the last few seconds of the second run; if the current
@@ -20,9 +20,9 @@
 //!
 //! `P <- P max(least, ((1 - VAF_before)/(1 - VAF_now))^power)`,
 //!
-//! so that the estimate changes less until the reduction has been forgotten; if the current model explains more, P is
-//! left unchanged. The share that the remnant leaves unexplained is the same for both models, so that noise does not
-//! penalise a correct model.
+//! so that the estimate changes less until this reduction of P has been forgotten; if the current model explains more,
+//! P is left unchanged. The share of the second run that the remnant leaves unexplained is the same for both models, so
+//! that noise does not penalise a correct model.
 //!
 //! No mean is removed for the VAF. The first 2 s are excluded, since the simulation starts at rest and the person does
 //! not.
@@ -42,15 +42,15 @@ use crate::{
 pub const COVARIANCES: [f64; 9] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0];
 /// Time after which the initial state of the simulation has decayed, s.
 const SETTLING_S: f64 = 2.0;
-/// Shortest span that is compared, s.
+/// Shortest span of the second run that is compared, s.
 const SHORTEST_S: f64 = 5.0;
-/// Name of the option that is chosen.
+/// Name of the option that the second run determines.
 const COVARIANCE: &str = "covariance";
 
-/// An initial covariance chosen by a second run.
+/// An initial covariance that was chosen by prediction of a second run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CovarianceChoice {
-    /// Each p that was tried, in ascending order, with the VAF of the second run for its trace, %.
+    /// Each p that was tried, in ascending order, and the VAF in % with which its trace explains the second run.
     pub candidates: Vec<(f64, f64)>,
     /// The chosen p.
     pub covariance: f64,
@@ -61,7 +61,7 @@ pub struct CovarianceChoice {
 }
 
 impl CovarianceChoice {
-    /// VAF of the chosen p, %.
+    /// Returns the VAF of the chosen p, %.
     pub fn vaf(&self) -> f64 {
         let taken = self.candidates.iter().find(|(p, _)| *p == self.covariance);
         taken.map_or(f64::NAN, |(_, vaf)| *vaf)
@@ -174,7 +174,7 @@ fn check_method(options: &TrackOptions) -> Result<(), IdentError> {
 /// covariances explain the same, the smaller one is chosen.
 ///
 /// # Errors
-/// [`IdentError`] for a method without such a covariance, or if a covariance is given; also as [`track_from`] and
+/// [`IdentError`] for a method without such a covariance, or if a covariance is given; the errors of [`track_from`] and
 /// [`Trace::vaf_of`].
 pub fn choose_covariance(
     record: &Record,
@@ -228,7 +228,7 @@ pub struct CovarianceUpdates {
     pub interval_s: f64,
     /// Length of the span of the second run that is simulated, s.
     pub window_s: f64,
-    /// Smallest factor of P.
+    /// Smallest factor by which P is multiplied.
     pub least: f64,
     /// Power of the ratio of the unexplained shares; 0 leaves P unchanged.
     pub power: f64,
@@ -276,7 +276,7 @@ pub fn track_validated(
     let unexplained = |theta: &[f64], end: usize| -> f64 {
         let first = end.saturating_sub(window);
         let from = first.saturating_sub(settling);
-        // The input before this span that still acts within it is needed too.
+        // The simulation also needs the input before this span that still acts within it.
         let begin = from.saturating_sub(o.nk + o.nb);
         let w = simulated(&o, &e[begin..end], from - begin, |_| theta);
         let error: f64 = (first..end).map(|k| (u[k] - w[k - begin]).powi(2)).sum();

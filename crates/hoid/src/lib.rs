@@ -1,14 +1,14 @@
 //! Human-operator identification: estimates a model of how a person controls a machine from the tracking error e and
 //! the control output u.
 //!
-//! A pilot, driver or surgeon closes a control loop. In a given task they behave approximately like a linear operator
-//! with a remnant,
+//! A pilot, driver or surgeon closes a control loop. In a given task, people behave approximately like a linear
+//! operator with a remnant,
 //!
 //! `u = K_e (T_L s + 1) e^(-tau_e s) omega_nm^2/(s^2 + 2 zeta_nm omega_nm s + omega_nm^2) e + n`,
 //!
 //! and hoid estimates its parameters with standard errors: in batch, by the prediction error method on a Box-Jenkins
-//! model `u = (B/F) q^-nk e + (1/D) eps`, and recursively, sample by sample. Both work on recorded and on simulated
-//! runs.
+//! model `u = (B/F) q^-nk e + (1/D) eps`, and recursively, sample by sample. Batch and recursive methods work on
+//! recorded and on simulated runs.
 //!
 //! This crate re-exports the other crates. The prelude contains the items that most programs need. From a file to a
 //! report (feature `report`):
@@ -116,7 +116,7 @@ pub mod prelude {
     pub use hoid_track::{Memory, Method, Sample, StartAt, Trace, TrackOptions, Tracker, track};
 }
 
-/// The Rust examples of the book; `python/tests/test_book.py` runs its other code blocks.
+/// The Rust examples of the book; `python/tests/test_book.py` runs the other code blocks of the book.
 #[cfg(doctest)]
 mod book {
     #[doc = include_str!("../../../docs/src/methods/grey-box.md")]

@@ -44,7 +44,7 @@ pub trait BatchEstimator: Sized + 'static {
         false
     }
 
-    /// Names of its inputs besides the error.
+    /// Returns the names of the inputs besides the error.
     fn further_inputs(&self) -> Vec<&str> {
         Vec::new()
     }
@@ -63,13 +63,13 @@ pub trait BatchEstimator: Sized + 'static {
         Setting::new("structure", OPERATOR)
     }
 
-    /// Returns a printed setting that no option sets.
+    /// Returns a setting that is printed although no option sets it, if there is one.
     fn beside_options(&self) -> Option<Setting> {
         None
     }
 
-    /// Fits recordings that have been repaired and decimated; removes means or level from them if the fit is made
-    /// without these.
+    /// Fits recordings that have been repaired and decimated. If the fit is made without means or level, they are
+    /// removed from the recordings.
     ///
     /// # Errors
     /// [`AnalysisError`] if the fit fails.
@@ -118,7 +118,7 @@ impl<E: BatchEstimator> Identification<E> {
     }
 }
 
-/// Returns the registry settings of options.
+/// Returns the registry entry of each option.
 fn known<E: 'static>(options: Vec<AnalysisOption<E>>) -> Vec<hoid_ident::settings::Setting> {
     options.into_iter().map(|option| option.setting).collect()
 }

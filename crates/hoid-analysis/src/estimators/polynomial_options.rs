@@ -21,7 +21,7 @@ pub struct Polynomials {
     /// Structure, initial states, search, constraints, loss and focus. Its orders and start are replaced by the fields
     /// below.
     pub template: Estimator,
-    /// Orders by name, given or as a range for a search; all other orders are those of the operator.
+    /// Orders by name, each a number or a range to search; an order without an entry is that of the operator.
     pub orders: NamedOrders,
     /// Shortest and longest dead time in s; replaces the order nk.
     pub delay_s: Option<(f64, f64)>,
@@ -59,8 +59,8 @@ impl Polynomials {
     }
 }
 
-/// Names of the options that only the prediction error method has, and of the options that only instrumental variables
-/// have.
+/// Returns the names of the options that only the prediction error method has, and of the options that only
+/// instrumental variables have.
 pub(super) fn names_of_methods() -> [Vec<&'static str>; 2] {
     [by_prediction(), by_instruments()].map(|options| options.iter().map(|option| option.setting.name).collect())
 }

@@ -197,17 +197,19 @@ impl BatchEstimator for Polynomials {
         let mut verdict = fit.verdict(records, choice.as_ref())?;
         let steps = records.iter().all(steps_from_level_to_level);
         if steps {
-            // Such data determine only the response after the steps, so this finding does not apply.
+            // Step tests determine only the response after the steps, so a finding on the influence of one stretch does
+            // not apply.
             let others = verdict.findings().iter().filter(|finding| finding.kind != "stretch");
             verdict = Verdict::of(others.cloned().collect());
         }
-        // The second fit uses the prediction error method with a squared loss.
+        // The second fit uses the prediction error method with a squared loss; for other methods and losses it is not
+        // made.
         let is_asked_again =
             how.method.is_none() && estimator.loss == Loss::Quadratic && !steps && fit.rounding().is_none();
         if with.faults != FaultHandling::Keep && is_asked_again {
             let element = with.controlled_element.as_ref();
             verdict = verdict.append(second_opinion::of_polynomials(&estimator, &fit, records, element));
-            // If no level was estimated, its effect on the result is checked.
+            // If no level was estimated, the effect of a level on the result is checked.
             if level.is_kept() && !data.were_detrended() {
                 verdict = verdict.append(second_opinion::of_level(&estimator, &fit, records));
             }

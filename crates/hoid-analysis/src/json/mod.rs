@@ -1,8 +1,8 @@
 //! Conversion of results to JSON objects, the interface to other programs, and back.
 //!
 //! All results have the same envelope: `hoid` (the version), `kind`, `records`, `data` (faults and warnings of the
-//! records), `settings` (each with its value, whether given by the user or not) and `verdict`; the other keys depend on
-//! the kind. The complete numbers of a batch fit, with which it can predict again without its recordings, are in
+//! records), `settings` (the value of each setting, and whether the user gave it) and `verdict`; the other keys depend
+//! on the kind. The complete state of a batch fit, with which it can predict again without its recordings, is in
 //! `state` ([`state`]). The objects are values of `serde_json`, which keep the order of keys.
 //!
 //! | file | kind |
@@ -129,7 +129,7 @@ pub fn orders(o: &Orders) -> Value {
     json!({"na": o.na, "nb": o.nb, "nc": o.nc, "nd": o.nd, "nf": o.nf, "nk": o.nk})
 }
 
-/// Returns the operator, or the reason why the model represents none.
+/// Returns the operator or the reason why there is none; null for a model whose orders are not those of an operator.
 pub fn operator(found: &Result<OperatorEstimate, NotConvertible>) -> Value {
     match found {
         Ok(o) => {
@@ -141,7 +141,7 @@ pub fn operator(found: &Result<OperatorEstimate, NotConvertible>) -> Value {
             }
             Value::Object(map)
         }
-        // A model of other orders does not represent an operator.
+        // A model with the orders of no operator is not expected to represent one, so no reason is given.
         Err(NotConvertible::OtherOrders { .. } | NotConvertible::PolesInBoth { .. }) => Value::Null,
         Err(reason) => json!({"convertible": false, "reason": reason.to_string()}),
     }

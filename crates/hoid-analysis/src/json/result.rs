@@ -24,7 +24,7 @@ pub(super) const POLYNOMIAL: &str = "polynomial";
 
 /// A fit that can be written as JSON.
 pub trait BatchAnswer: Answers + Serialize + DeserializeOwned {
-    /// Name of its estimator in the registry.
+    /// Name of the estimator of this fit in the registry.
     const ESTIMATOR: &'static str;
 
     /// Returns the JSON object, without the state.
@@ -76,7 +76,7 @@ struct FoundIn {
     level: Option<Estimate>,
 }
 
-/// A quality issue with all its fields; the printed form contains fewer.
+/// A quality issue with all its fields; the JSON object for users contains fewer fields.
 #[derive(Serialize, Deserialize)]
 struct Issue(#[serde(with = "IssueFields")] QualityIssue);
 

@@ -149,7 +149,7 @@ impl Tracked {
     }
 }
 
-/// Returns gain and phase at frequencies in rad/s in each row that has an estimate.
+/// Returns gain and phase at each of the frequencies in rad/s; null at a frequency without an estimate.
 pub fn responses(at_rad_s: &[f64], of: impl Fn(usize, f64) -> Option<Response>) -> Value {
     let each = at_rad_s.iter().enumerate().map(|(place, omega)| {
         let response = of(place, *omega);

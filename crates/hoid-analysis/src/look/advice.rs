@@ -18,9 +18,9 @@ pub struct Advice {
     pub trial: Option<TrialChoice>,
     /// Sampling frequency, Hz.
     pub sampling_hz: Option<f64>,
-    /// Start of the span of whole periods, s.
+    /// Start of the span of whole periods or of the requested span, s; `None` for the start of the record.
     pub from_s: Option<f64>,
-    /// End of the span of whole periods, s.
+    /// End of the span of whole periods or of the requested span, s; `None` for the end of the record.
     pub to_s: Option<f64>,
     /// Number of samples by which the output was recorded late.
     pub late_samples: Option<f64>,
@@ -37,7 +37,7 @@ impl Look {
         if !self.roles.are_certain() {
             return None;
         }
-        // If one of them differs from its default, both are given: the command is then easier to read.
+        // If the column of e or u differs from its default, both columns are given: the command is then easier to read.
         let (input, output) = (&self.roles.input, &self.roles.output);
         let default = input.column == "e" && output.column == "u";
         let named = |role: &Role| (!default).then(|| role.column.clone());

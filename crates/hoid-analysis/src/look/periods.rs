@@ -11,7 +11,8 @@ use hoid_numerics::statistics::variance;
 
 use super::options::LookOptions;
 
-/// Maximum part of a record, in s and as a fraction, that a span may leave out at either end.
+/// Maximum part of a record that a span may leave out at either end: in s, and as a fraction of the record; the smaller
+/// one applies.
 const MOST_CUT_S: f64 = 20.0;
 const MOST_CUT_SHARE: f64 = 0.4;
 /// Minimum number of lines of an excitation, since people can predict a single sine.

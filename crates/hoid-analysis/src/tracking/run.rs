@@ -30,7 +30,7 @@ pub struct Tracking {
     pub moving_average_s: Option<f64>,
     /// Number of samples of the recording per row of the trace.
     pub every: usize,
-    /// Treatment of a high sampling rate.
+    /// Decimation of recordings at a high sampling rate.
     pub rate: Decimation,
     /// True if the second run controls reductions of P during the run; false if it determines only the initial P.
     pub update_covariance: bool,

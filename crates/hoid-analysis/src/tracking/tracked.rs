@@ -128,7 +128,7 @@ impl Tracked {
         OutputTable { comments, columns }
     }
 
-    /// True if the coefficients represent an operator.
+    /// True if the structure of the tracked model can represent an operator.
     pub fn has_operator(&self) -> bool {
         self.operators.iter().any(|o| {
             !matches!(

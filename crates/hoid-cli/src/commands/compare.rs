@@ -60,7 +60,8 @@ pub fn run(args: &CompareArgs) -> Result<(), CliError> {
     CliError::of_verdict(&found.verdict)
 }
 
-/// Analyses recordings in a subdirectory of the results, or in a temporary directory that is removed afterwards.
+/// Analyses recordings and returns the estimates. The results of the runs are written to the directory of `--out`, or
+/// to a temporary directory that is removed afterwards.
 fn of_recordings(comparing: &Comparing, path: &Path, args: &CompareArgs) -> Result<GroupEstimates, CliError> {
     let manifest = Manifest::read(path)?;
     let removed;
@@ -150,7 +151,7 @@ fn differences(found: &Comparison, verbose: bool) -> Rows {
         .iter()
         .filter_map(|d| Some(d.effect_size.as_ref()?.name.as_str()))
         .collect();
-    // If all rows have the same kind of effect size, the header names it.
+    // If all rows have the same kind of effect size, the header contains the name of that kind.
     let size = sizes.first().filter(|name| sizes.iter().all(|other| other == *name));
     let mut header = vec!["quantity"];
     header.extend(several.then_some("factor"));

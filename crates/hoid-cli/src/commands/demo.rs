@@ -63,7 +63,7 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Computes traces of the whole run: of the default method without prior information, and of the two methods of the
+/// Computes traces of the whole run with the default method, without prior information, and with the two methods of the
 /// thesis, which start from the batch fit before the change.
 fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, CliError> {
     let (_, from, to) = SPANS[0];
@@ -87,7 +87,8 @@ fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, Cl
         .collect()
 }
 
-/// Returns the RMS relative error of each trace, from the first update of the estimate on.
+/// Returns a table of the RMS relative error of each trace, evaluated from the end of the first span on, or from the
+/// first update of the estimate if that is later.
 fn errors_over_time(record: &Record, traces: &[(String, Trace)]) -> String {
     let mut rows = text::table(&[
         "tracked by",

@@ -213,7 +213,7 @@ fn sizes(found: &ExperimentDesign) -> String {
     format!("rms of e {e}, of u {u}{other}.\n")
 }
 
-/// Returns a sentence with the number of runs that the requested quantities need.
+/// Returns a sentence with the number of runs needed to reach the accepted errors of the requested quantities.
 fn needed(found: &ExperimentDesign) -> String {
     if found.wanted.is_empty() {
         return String::new();
@@ -231,7 +231,7 @@ fn needed(found: &ExperimentDesign) -> String {
     needed
 }
 
-/// Formats the number of people and runs needed for a difference, and the table of the power.
+/// Formats the number of people and runs needed to detect a difference, and the table of the power of the test.
 fn difference(plan: &DifferencePlan) -> String {
     let sought = &plan.request.sought.name;
     let unit = match sought.as_str() {

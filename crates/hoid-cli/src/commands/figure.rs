@@ -28,7 +28,7 @@ fn format_of(path: &Path) -> Result<FigureFormat, CliError> {
     Ok(format)
 }
 
-/// Writes a figure, with the given width on paper, if any.
+/// Writes a figure, scaled to a width on paper if one is given.
 ///
 /// # Errors
 /// Errors of the conversion to the format and of writing.

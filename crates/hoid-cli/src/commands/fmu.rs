@@ -66,7 +66,7 @@ fn of_tracker(args: &FmuArgs) -> Result<Unit, CliError> {
         None => {}
         Some(file) if is_fit_file(file) => {
             let text = read_settings(Path::new(file))?;
-            // A unit that could not start in a simulator is reported here.
+            // An error that would prevent the unit from starting in a simulator is reported here.
             let fit = parse_fit(&text, file)?.operator()?;
             method.start_from(fit).map_err(|error| wrong(file, &error))?;
             settings = (settings.with_fit(text)).with("prior", FmuStart::Text("fit".to_owned()));
@@ -92,7 +92,7 @@ fn of_operator(operator: &OperatorChoice, seed: i32) -> Result<Unit, CliError> {
         ),
         OperatorChoice::File(file) => (read_settings(file)?, file.display().to_string(), vec![file.clone()]),
     };
-    // A unit that could not start in a simulator is reported here.
+    // An error that would prevent the unit from starting in a simulator is reported here.
     let step_s = match parse_any_scenario(&text, &source, &source)? {
         AnyScenario::Reference(scenario) => {
             Simulator::new(&scenario)?;

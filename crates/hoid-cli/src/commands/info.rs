@@ -34,7 +34,7 @@ pub fn run(args: &InfoArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Returns the faults of e and u, if the file contains both and they form a record.
+/// Returns the faults of e and u; empty if the file does not contain a valid record of both.
 fn faults_of(look: &Look) -> Vec<Fault> {
     let seen = look.seen.as_ref().ok();
     let repaired = seen.and_then(|seen| repair(&seen.record, FaultHandling::Report).ok());
@@ -45,7 +45,7 @@ fn faults_of(look: &Look) -> Vec<Fault> {
 fn looks_like(look: &Look, file: &str) -> String {
     let role = |role: &Role| format!("{} ({})", role.column, role.why);
     let mut rows = vec![("input", role(&look.roles.input)), ("output", role(&look.roles.output))];
-    // The table above already gives the units of the columns that it lists.
+    // The printed table of columns already gives the units that it found.
     let beside = |path: &str| look.survey.columns.iter().any(|c| c.path == path && !c.unit.is_empty());
     let units: Vec<String> = look
         .units()

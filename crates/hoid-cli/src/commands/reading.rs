@@ -73,7 +73,7 @@ fn preparation(args: &ReadArgs) -> Result<Preparation, CliError> {
         units: by_channel("--unit", &prepare.unit)?,
         scale: by_channel("--scale", &prepare.scale)?,
         offset: by_channel("--offset", &prepare.offset)?,
-        // Decimation follows the search for faults, since its filter would hide them.
+        // Decimation is done after the search for faults, since its filter would hide faults.
         rate: prepare.new_fs.map_or(NewRate::Kept, NewRate::Hz),
         run_in_s: prepare.run_in.unwrap_or(0.0),
         detrend: args.detrend,
@@ -81,7 +81,7 @@ fn preparation(args: &ReadArgs) -> Result<Preparation, CliError> {
     })
 }
 
-/// Returns the argument for each channel; a channel that is given twice is an error.
+/// Returns the values of an option by channel; a channel that is given twice is an error.
 pub fn by_channel<T: Clone>(option: &str, typed: &[(String, T)]) -> Result<BTreeMap<String, T>, CliError> {
     let mut all = BTreeMap::new();
     for (name, value) in typed {

@@ -84,8 +84,8 @@ fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Runs a plan or a group in a directory, with a progress bar for the given number of units. An interrupt stops it so
-/// that it can be resumed.
+/// Runs a plan or a group in a directory, with a progress bar for the given number of units. An interrupt stops the
+/// run, which can then be resumed.
 pub fn with_progress(
     name: &str,
     directory: &Path,

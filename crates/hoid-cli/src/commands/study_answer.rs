@@ -1,6 +1,6 @@
 //! Summary of a study: relative bias of the operator's parameters, as a table that fits onto one screen.
 //!
-//! Each row is an estimator in a cell: the share of estimates that could be converted to an operator, and for each
+//! Each row is for one estimator in one cell: how many of its estimates could be converted to an operator, and for each
 //! parameter the median of `100 (estimate - true) / true` with its Monte Carlo error. The median is used because single
 //! estimates of a poor model may have arbitrarily large errors.
 
@@ -38,14 +38,14 @@ pub fn answer(tables: &[PathBuf]) -> Result<String, CliError> {
     Ok(words(&read_table(summary)?))
 }
 
-/// One estimator in one cell.
+/// Results of one estimator in one cell.
 #[derive(Default)]
 struct Row {
     cell: String,
     estimator: String,
     /// Number of estimates.
     all: f64,
-    /// Share of estimates that failed or could not be converted to an operator.
+    /// Share of estimates that failed; `not_convertible` is the share that could not be converted to an operator.
     failed: f64,
     not_convertible: f64,
     /// Share of estimates with a trustworthy verdict; `None` if the estimator gives no verdict.

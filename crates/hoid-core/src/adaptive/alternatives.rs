@@ -2,19 +2,19 @@
 //!
 //! The covariance of an estimate describes one mode of the likelihood. For poles and delay the likelihood has several
 //! modes, and the response of people below 10 rad/s carries little information about which mode is right. The operators
-//! found by trials from other starting points therefore widen the reported errors, each with the weight
-//! `w = exp(-deficit/TEMPERATURE_NATS) f^2`. Here `deficit` is the evidence of the estimate minus that of the operator,
-//! and f the fraction of the currently replayed samples to which the operator was fitted. The scatter about the
-//! estimate is `sum w d d'/(1 + sum w)`, where d is the difference from the estimate. The evidence is tempered, since
-//! it assumes that the model is right (P. Grunwald and T. van Ommen, *Bayesian Analysis* 12 (2017) 1069-1103). The
-//! factor f^2 removes results that later samples have superseded.
+//! rejected in trials from other starting points therefore widen the reported errors, each with the weight
+//! `w = exp(-deficit/TEMPERATURE_NATS) f^2`. Here `deficit` is the evidence of the estimate minus that of the rejected
+//! operator, and f is the fraction of the currently replayed samples that had been read at the time of the trial. The
+//! scatter about the estimate is `sum w d d'/(1 + sum w)`, where d is the difference between the operator and the
+//! estimate. The evidence is tempered, since it assumes that the model is right (P. Grunwald and T. van Ommen,
+//! *Bayesian Analysis* 12 (2017) 1069-1103). The factor f^2 removes results that later samples have superseded.
 
 use super::sizes::{PARAMETERS, STARTS};
 
 /// Deficit of evidence, in nats, at which the weight of an alternative has fallen to 1/e.
 const TEMPERATURE_NATS: f64 = 3.0;
 
-/// Result of a trial from another starting point.
+/// Operator rejected in a trial from another starting point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Alternative {
     operator: [f64; PARAMETERS],
@@ -25,7 +25,7 @@ struct Alternative {
 
 crate::state!([] Alternative { operator, deficit, samples, known });
 
-/// Results of the trials from all starting points.
+/// Operators rejected in the last trial from each starting point.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Alternatives {
     all: [Alternative; STARTS],
@@ -43,7 +43,7 @@ impl Alternatives {
         }; STARTS],
     };
 
-    /// Stores the result of the trial from a starting point: its operator, its deficit of evidence, and the number of
+    /// Stores the operator rejected in the trial from a starting point, with its deficit of evidence and the number of
     /// samples read by then.
     pub fn put(&mut self, start: usize, operator: [f64; PARAMETERS], deficit: f64, samples: u64) {
         if let Some(place) = self.all.get_mut(start) {
@@ -56,8 +56,8 @@ impl Alternatives {
         }
     }
 
-    /// Returns the scatter of the alternatives about an operator. `samples` is the current number of samples, of which
-    /// the last `window` are replayed.
+    /// Returns the weighted scatter of the alternatives about an operator. `samples` is the current number of samples,
+    /// of which the last `window` are replayed.
     pub fn scatter(&self, about: &[f64; PARAMETERS], samples: u64, window: u64) -> [[f64; PARAMETERS]; PARAMETERS] {
         let mut scatter = [[0.0; PARAMETERS]; PARAMETERS];
         let mut weights = 1.0;

@@ -21,10 +21,11 @@
 //!
 //! (K. J. Åström and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 3.2; the triangle hold of G. F.
 //! Franklin, J. D. Powell and M. Workman, *Digital Control of Dynamic Systems*, 1998, section 6.3). The recursion is
-//! exact for a piecewise linear error and any delay. Except for aliases, the response to a sampled sine is the
+//! exact for a piecewise linear error and any delay. Apart from aliasing, the response to a sampled sine is the
 //! operator's response multiplied by that of the hold, `(sin(omega Ts/2)/(omega Ts/2))^2`.
 //!
-//! Each r_i is divided by its gain at [`REFERENCE`], so that all gains are in units of |Y| at that frequency.
+//! Each r_i is divided by its gain at [`REFERENCE`], so that all gains of the numerator are in units of |Y| at that
+//! frequency.
 
 use super::{
     f64x2::F64x2,
@@ -37,7 +38,7 @@ pub const REFERENCE: f64 = 2.0;
 
 /// Number of filter states.
 const N: usize = SIGNALS - 1;
-/// Size of the matrix exponential: filter states, a step and a ramp.
+/// Size of the matrix exponential: the filter states, plus one state for a step and one for a ramp.
 const M: usize = N + 2;
 type Square = [[f64; M]; M];
 
@@ -133,7 +134,7 @@ impl Basis {
     fn discretise(&mut self) {
         let Point { tau, omega, zeta, lag } = self.point;
         let ts = self.sample_time;
-        // Rounding must not shorten a delay of whole samples by one sample.
+        // The small offset prevents rounding from shortening a delay of whole samples by one sample.
         let whole = libm::floor(tau / ts + 1e-9);
         let delta = (tau - whole * ts).max(0.0);
         let (a, p, q) = (1.0 / lag, 2.0 * zeta * omega, omega * omega);
@@ -177,9 +178,9 @@ impl Basis {
         (self.delay, self.part) = (whole as usize, part);
     }
 
-    /// Returns a filter at another point, with the same lag and scale, that continues the slow mode: in the states of
-    /// either filter, `g = 1/(s + a) e` is `Q^2 z_0`. The fast modes start at rest and settle within a few multiples of
-    /// `1/(zeta omega)`. `error` is the current delayed error.
+    /// Returns a filter at another point, with the same lag and scale, whose slow mode `g = 1/(s + a) e` continues that
+    /// of this filter; in the states of either filter, g is `Q^2 z_0`. The fast modes start at rest and settle within a
+    /// few multiples of `1/(zeta omega)`. `error` is the current delayed error. Returns `None` for an invalid point.
     pub fn moved(&self, point: Point, error: f64) -> Option<Self> {
         let sound = point.omega > 0.0 && point.zeta > 0.0 && point.tau >= 0.0 && point.lag == self.point.lag;
         if !sound {
@@ -276,8 +277,8 @@ impl Basis {
         r
     }
 
-    /// Returns the weights of the signals in `sum_i theta_i (r_i + sum_j c_j dr_i/dj)`, where `state` contains the
-    /// gains theta and the corrections c.
+    /// Returns the weights of the signals in the response `sum_i theta_i (r_i + sum_j c_j dr_i/dj)`, where `state`
+    /// contains the gains theta and the corrections c.
     pub fn weights(&self, state: &[f64; STATES]) -> Signals {
         let Point { omega, zeta, .. } = self.point;
         let (p, q) = (2.0 * zeta * omega, omega * omega);
@@ -294,13 +295,13 @@ impl Basis {
         weights
     }
 
-    /// Returns the factors that convert gains from the units of this basis to those of `to`.
+    /// Returns the factors that convert gains from the units of this basis to those of the basis `to`.
     pub(super) fn units_of(&self, to: &Self) -> [f64; GAINS] {
         core::array::from_fn(|i| self.scale[i] / to.scale[i])
     }
 
-    /// Converts a state to the coordinates of the basis `to`: the gains are converted to its units, and the corrections
-    /// are taken relative to its point.
+    /// Converts a state to the coordinates of the basis `to`: the gains are converted to the units of `to`, and the
+    /// corrections are taken relative to the point of `to`.
     pub(super) fn carried(&self, to: &Self, state: &[f64; STATES]) -> [f64; STATES] {
         let mut carried = *state;
         for (s, unit) in carried.iter_mut().zip(self.units_of(to)) {
@@ -319,8 +320,8 @@ impl Basis {
         self.z = [0.0; N];
     }
 
-    /// Returns the frequency response of each r_i at a frequency in rad/s, with natural frequency, damping and delay of
-    /// `at`.
+    /// Returns the frequency response of each r_i at a frequency in rad/s, with the natural frequency, damping and
+    /// delay of the point `at`.
     pub fn response(&self, omega_rad_s: f64, at: Point) -> [Complex; GAINS] {
         let w = omega_rad_s;
         let square = at.omega * at.omega;
@@ -341,9 +342,9 @@ impl Basis {
         })
     }
 
-    /// Returns the matrix that maps the gains to K_e and K_e_dot of the gain and lead nearest to `N(s)/(s + a)` at the
-    /// given frequencies in rad/s. The fit is by least squares in `K_e + K_e_dot j omega`; it is linear in the gains
-    /// and independent of poles and delay.
+    /// Returns the matrix that maps the gains to K_e and K_e_dot of the gain and lead nearest to `N(s)/(s + a)`, where
+    /// N is the numerator, at the given frequencies in rad/s. The fit is by least squares in `K_e + K_e_dot j omega`;
+    /// it is linear in the gains and independent of poles and delay.
     pub fn gain_and_lead(&self, at_rad_s: &[f64]) -> [[f64; GAINS]; 2] {
         let (a, count) = (1.0 / self.point.lag, at_rad_s.len() as f64);
         let squares: f64 = at_rad_s.iter().map(|w| w * w).sum();
@@ -378,8 +379,9 @@ fn product(a: &Square, b: &Square) -> Square {
     core::array::from_fn(|i| core::array::from_fn(|j| (0..M).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
-/// Returns the matrix exponential, computed by scaling to a norm below 1/4, the Taylor series to order 14, and
-/// squaring. The truncation error is below 1e-20 (C. Moler and C. Van Loan, *SIAM Review* 45 (2003) 3-49).
+/// Returns the matrix exponential. The matrix is scaled to a norm below 1/4, its Taylor series is summed to order 14,
+/// and the result is squared repeatedly. The truncation error is below 1e-20 (C. Moler and C. Van Loan, *SIAM Review*
+/// 45 (2003) 3-49).
 fn exponential(m: &Square) -> Square {
     let norm = m
         .iter()

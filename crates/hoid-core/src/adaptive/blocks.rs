@@ -1,16 +1,14 @@
 //! Normal equations over blocks of half a second, used by the change detector.
 //!
-//! After the whitening filter, with the regressors r of gains and level, the regressors of the dynamics
-//! `q_j = sum_i theta_i dr_i/dj`, both at the current estimate, and the corrections p of the dynamics at that sample,
-//! to first order
-//! dynamics, to first order
+//! Let r be the whitened regressors of gains and level, `q_j = sum_i theta_i dr_i/dj` the whitened regressors of the
+//! dynamics, both at the current estimate, and p the corrections of the dynamics at a sample. To first order,
 //!
 //! `y + q' p = r' x + q' p_1 + eps`,
 //!
 //! where x are the unknown gains and level, and p_1 the unknown corrections. Each sample is weighted by the reciprocal
 //! of the variance of eps, so the sums are in units of that variance. Each output is limited to a number of standard
-//! deviations about its prediction. The dynamics have a weak prior at their current value, the same for all spans: two
-//! spans without information about the dynamics then do not differ.
+//! deviations about its prediction. The dynamics have a weak prior at their current value, the same for all spans, so
+//! that two spans without information about the dynamics do not differ in them.
 
 use hoid_numerics::{cholesky, products::dot};
 
@@ -24,24 +22,24 @@ const RIDGE: f64 = 1e-3;
 /// Row of one sample in the normal equations.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
-    /// Regressors of gains and level, followed by those of the dynamics.
+    /// Regressors of gains and level, followed by the regressors of the dynamics.
     pub x: [f64; STATES],
-    /// Limited output plus `q' p`.
+    /// Output, with its innovation limited, plus `q' p`.
     pub y: f64,
-    /// Innovation without the limit.
+    /// Innovation before limiting.
     pub innovation: f64,
     /// Variance of eps.
     pub variance: f64,
 }
 
-/// Sums over one block that form its normal equations.
+/// Sums over one block from which its normal equations are formed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Block {
     products: [f64; PRODUCTS],
     with_output: [f64; STATES],
     square: f64,
     pub samples: f64,
-    /// Sum of the squares of the innovations without the limit.
+    /// Sum of the squares of the innovations before limiting.
     power: f64,
 }
 
@@ -66,7 +64,7 @@ pub(super) struct Solution {
 }
 
 impl Block {
-    /// Adds one sample.
+    /// Adds the row of one sample to the sums.
     #[inline(always)]
     pub fn add(&mut self, row: &Row) {
         let Row { x, y, .. } = row;
@@ -101,7 +99,8 @@ impl Block {
         })
     }
 
-    /// Adds a normal prior of the dynamics with the given mean and standard deviations.
+    /// Returns the block with a normal prior of the dynamics, of the given mean and standard deviations, added to its
+    /// sums.
     pub fn with_prior(mut self, mean: [f64; DYNAMICS], deviations: [f64; DYNAMICS]) -> Self {
         let mut diagonal = 0;
         for i in 0..STATES {
@@ -118,7 +117,7 @@ impl Block {
         self
     }
 
-    /// Mean square of the innovations without the limit.
+    /// Mean square of the innovations before limiting.
     pub fn innovation_variance(&self) -> f64 {
         self.power / self.samples.max(1.0)
     }

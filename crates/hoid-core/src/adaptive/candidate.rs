@@ -9,9 +9,9 @@
 //! `evidence` is the sum of the log predictive densities of the blocks (A. P. Dawid, *J. Royal Statistical Society* A
 //! 147 (1984) 278-292). It is the criterion by which candidates are compared over the same data. Each block is
 //! predicted from earlier blocks only, so additional parameters give no advantage. The density is Student's, with a
-//! running innovation variance and as many degrees of freedom as the block has samples, so that an unpredicted change
-//! does not dominate. Old evidence is forgotten, so that the evidence measures the quality of the current estimate
-//! rather than the speed of initial convergence.
+//! running innovation variance and as many degrees of freedom as the block has samples, so that a change that was not
+//! predicted does not dominate the sum. Old evidence is forgotten, so that the sum measures the quality of the current
+//! estimate rather than the speed of initial convergence.
 
 use super::{
     basis::{Basis, Complex, Point, Regressors},
@@ -29,13 +29,13 @@ use crate::state::{State, visit_all};
 
 /// Magnitude of a signal beyond which the filters are reset.
 pub(super) const LARGEST: f64 = 1e100;
-/// `RANGE` limits the basis point (omega in rad/s, zeta, tau in s), and `LARGEST_STEP` limits its change in one step
-/// (relative for omega and zeta, in s for tau).
+/// `RANGE` limits the basis point (omega in rad/s, zeta, tau in s), and `LARGEST_STEP` limits the change of the basis
+/// point in one step (relative for omega and zeta, in s for tau).
 const RANGE: [[f64; 2]; DYNAMICS] = [[3.0, 35.0], [0.05, 1.4], [0.01, 0.85]];
 const LARGEST_STEP: [[f64; 2]; DYNAMICS] = [[-0.3, 0.4], [-0.4, 0.6], [-0.05, 0.05]];
 /// Longest delay in s.
 pub(super) const LONGEST_DELAY_S: f64 = 0.9;
-/// Frequencies in rad/s at which K_e and K_e_dot are fitted to the numerator.
+/// Frequencies in rad/s at which K_e and K_e_dot are fitted to the numerator of the operator.
 pub(super) const NEAR_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
 /// Initial time in s during which blocks do not count as evidence.
 const UNSETTLED_S: f64 = 2.0;
@@ -45,7 +45,7 @@ const BURST_S: f64 = 1.28;
 const LEVEL_S: f64 = 20.0;
 /// Time constant in s with which evidence is forgotten.
 const EVIDENCE_S: f64 = 20.0;
-/// Interval in s at which the noise model is solved if there are no replays.
+/// Interval in s between updates of the whitening filter if there are no replays.
 const NOISE_UPDATE_S: f64 = 1.28;
 /// Squared innovation, in innovation variances, above which the weight of a sample in the noise model is reduced.
 const CLIP_VARIANCES: f64 = 100.0;
@@ -60,7 +60,7 @@ pub(super) struct Whitened {
     pub level: f64,
 }
 
-/// One pass over the data; see the module documentation.
+/// One pass over the data, described in the module documentation.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Candidate {
     basis: Basis,
@@ -81,7 +81,7 @@ pub(super) struct Candidate {
     predictive_variance: [f64; 2],
     pub evidence: f64,
     samples: u64,
-    /// Number of samples until the filter D no longer contains a predicted output.
+    /// Number of further samples that are not used because the filter D contains predicted outputs.
     predicted: u64,
     pub blocks: LastBlocks,
     /// Index of the sample at which the candidate started.
@@ -155,8 +155,8 @@ impl Candidate {
         }
     }
 
-    /// Makes the candidate compute the residuals of the noise model with the states of these segments instead of the
-    /// mean of the mixture.
+    /// Makes the candidate compute the residuals for the noise model with the states of the given segments instead of
+    /// the mean of the mixture.
     pub fn with_guide(mut self, guide: Segments) -> Self {
         self.guide = guide;
         self
@@ -169,7 +169,7 @@ impl Candidate {
         self
     }
 
-    /// Makes the candidate continue without the guide.
+    /// Makes the candidate continue without the guide, so that the noise model uses the mean of the mixture.
     pub fn clear_guide(&mut self) {
         self.guide = Segments::NONE;
     }
@@ -194,7 +194,7 @@ impl Candidate {
         self.now = self.basis.step([error(l), error(l + 1), error(l + 2)]);
     }
 
-    /// Step 2: returns `y = D u`, the signals filtered by D, and `D(1)`, the factor of the level.
+    /// Step 2: returns `y = D u`, the signals of the basis filtered by D, and `D(1)`, the factor of the level.
     #[inline(always)]
     pub fn whitened(&self, u: f64) -> Whitened {
         let (mut y, mut z, mut level) = (u, paired(&self.now), 1.0);
@@ -231,8 +231,8 @@ impl Candidate {
             return false;
         }
         if self.predicted > 0 {
-            // D filters the last p outputs. A predicted output lacks the noise v. Until that output has left the
-            // filter, the innovation has the variance of v instead of that of eps, so these samples are not used.
+            // D filters the last p outputs. A predicted output lacks the noise v and increases the innovations while it
+            // is in the filter. After n consecutive predictions, n samples are therefore not used, at most p.
             self.predicted -= 1;
             self.blocks.pass_over();
             return true;
@@ -259,7 +259,8 @@ impl Candidate {
         true
     }
 
-    /// Output with its innovation limited to a number of standard deviations (P. J. Huber, *Robust Statistics*, 1981).
+    /// Returns the output with its innovation limited to `limit` standard deviations (P. J. Huber, *Robust Statistics*,
+    /// 1981).
     #[inline(always)]
     fn limited(&self, y: f64, innovation: f64, limit: f64) -> f64 {
         let most = limit * libm::sqrt(self.predictive_variance[0]);
@@ -269,13 +270,14 @@ impl Candidate {
         y - innovation + innovation.max(-most).min(most)
     }
 
-    /// Row of the sample in the normal equations of the detector.
+    /// Returns the row of the sample in the normal equations of the detector.
     #[inline(always)]
     fn row(&self, white: &Whitened, innovation: f64, limit: f64) -> Row {
         let Regressors { x, by } = self.basis.regressors(&white.signals);
         let state = self.mixture.mean();
         let (mut row, mut shift) = ([0.0; STATES], 0.0);
-        // Linearised about the current state: dy/dtheta_i = r_i + sum_j c_j dr_i/dj, dy/dc_j = sum_i theta_i dr_i/dj.
+        // The response is linearised about the current state: dy/dtheta_i = r_i + sum_j c_j dr_i/dj, dy/dc_j = sum_i
+        // theta_i dr_i/dj.
         for i in 0..GAINS {
             row[i] = x[i];
             for j in 0..DYNAMICS {
@@ -284,7 +286,8 @@ impl Candidate {
             }
         }
         row[GAINS] = white.level;
-        // The products theta_i c_j appear in both derivatives; adding H_c c once makes y = H x exact at the state.
+        // The products theta_i c_j appear in both derivatives; H_c c is added once to y so that y = H x is exact at the
+        // state.
         for j in LINEAR..STATES {
             shift += row[j] * state[j];
         }
@@ -296,8 +299,8 @@ impl Candidate {
         }
     }
 
-    /// Step 10: updates the noise model with `v = u - level - w' z` at the current and the preceding samples, for the
-    /// gains of the guide or, without a guide, the current gains.
+    /// Step 10: updates the noise model with `v = u - level - w' z` at the current and the preceding samples, computed
+    /// with the gains of the guide or, without a guide, with the current gains.
     #[inline(always)]
     fn take_residual(&mut self, u: f64) {
         let order = self.noise.order();
@@ -316,8 +319,8 @@ impl Candidate {
         for ((v, u), z) in v[1..=order].iter_mut().zip(&self.outputs).zip(self.past.newest_first()) {
             *v = left(*u, z);
         }
-        // After a change, v contains the unmodelled part of the response. The weight `min(1, c sigma^2/eps^2)` limits
-        // the contribution of such a sample to the sums of D.
+        // After a change of the operator, v contains the unmodelled part of the response. The weight
+        // `min(1, c sigma^2/eps^2)` limits the contribution of samples with a large residual to the sums of D.
         let eps = v[0] + self.d.iter().zip(&v[1..]).map(|(d, v)| d * v).sum::<f64>();
         let excess = eps * eps / (CLIP_VARIANCES * self.predictive_variance[0]);
         self.noise.update(&v, eps, 1.0 / excess.max(1.0));
@@ -340,16 +343,16 @@ impl Candidate {
         }
         *rests_on = (*rests_on + n).min(LEVEL_S / ts).max(n);
         *predictive_variance = (*predictive_variance + n / *rests_on * (energy / n - *predictive_variance)).max(least);
-        // The variance in the predictive density follows the block energies with a memory that grows to at most
-        // LEVEL_S.
+        // The variance in the predictive density follows the mean energy of the blocks with a memory that grows to at
+        // most LEVEL_S.
         let left = self.mixture.update([&early, &late], &self.basis, prior, &self.scales);
         if settled {
             self.volatility.take(left, n);
         }
     }
 
-    /// Replaces D by the candidate's own noise model at regular intervals. Without replays there is no next candidate
-    /// that could use this noise model.
+    /// At regular intervals, replaces D by the candidate's own noise model and updates the dispersion. Without replays
+    /// there is no next candidate that could use this noise model.
     pub fn update_whitening(&mut self) {
         let every = (libm::round(NOISE_UPDATE_S / self.scales.sample_time).max(1.0)) as u64;
         if self.samples.is_multiple_of(every) {
@@ -368,9 +371,9 @@ impl Candidate {
         self.past.push(&self.now);
     }
 
-    /// Stores a sample whose output is a prediction or a value at a limit of the stick.
+    /// Stores, for the whitening filter, a sample whose output is a prediction or was recorded at a limit of the stick.
     pub fn store_prediction(&mut self, u: f64) {
-        // Counts consecutive predictions, up to the order of D.
+        // Each prediction causes one later sample not to be used, up to the order of D.
         self.predicted = (self.predicted + 1).min(self.noise.order() as u64);
         self.store(u);
     }
@@ -380,8 +383,8 @@ impl Candidate {
         &self.d[..self.noise.order()]
     }
 
-    /// Basis point plus the corrections of a state; each correction is limited to the largest step, and the result to
-    /// the range of the basis.
+    /// Returns the basis point plus the corrections of a state; each correction is limited to the largest step, and the
+    /// resulting point to the range of the basis.
     pub fn corrected(&self, state: &[f64; STATES]) -> Point {
         let at = self.basis.point();
         let of = [at.omega, at.zeta, 1.0];
@@ -394,7 +397,7 @@ impl Candidate {
         Point { omega, zeta, tau, ..at }
     }
 
-    /// Basis point plus the current corrections.
+    /// Returns the basis point plus the current corrections, within the same limits.
     pub fn point(&self) -> Point {
         self.corrected(self.mixture.mean())
     }
@@ -407,7 +410,7 @@ impl Candidate {
         [gain(0), gain(1), omega, zeta, tau]
     }
 
-    /// Frequency response that belongs to each gain, at a frequency in rad/s and at the current point.
+    /// Frequency responses by which the gains are multiplied, at a frequency in rad/s and at the current point.
     pub fn responses(&self, omega_rad_s: f64) -> [Complex; GAINS] {
         self.basis.response(omega_rad_s, self.point())
     }
@@ -445,8 +448,8 @@ impl Candidate {
         (of(&h), by)
     }
 
-    /// Returns a state in the coordinates of another basis, with corrections of zero if the points of the two bases are
-    /// far apart.
+    /// Returns a state in the coordinates of another basis; if the points of the two bases are far apart, the
+    /// corrections are set to zero.
     pub fn carried(&self, to: &Basis, state: &[f64; STATES]) -> [f64; STATES] {
         let mut carried = self.basis.carried(to, state);
         let [omega, _, tau] = [carried[LINEAR], carried[LINEAR + 1], carried[LINEAR + 2]];

@@ -1,11 +1,11 @@
 //! Difference between two spans of data: two least-squares solutions, with a covariance estimated from their scores.
 //!
-//! The noise model whitens, but it estimates the spectrum in the frequency band of manual control from few data: 16
-//! lags at 100 Hz cover 0.16 s, whereas people act within seconds. Where that spectrum is wrong by a factor,
-//! `sigma^2 A^-1` is wrong by the same factor. The covariance of the score `g = b - A x` is therefore estimated as well
-//! (the sandwich of P. J. Huber, *Proc. Fifth Berkeley Symposium* 1 (1967) 221-233; H. White, *Econometrica* 48 (1980)
-//! 817-838). With the scores `g_k` of stretches of one second, which are nearly independent (W. K. Newey and K. D.
-//! West, *Econometrica* 55 (1987) 703-708),
+//! The noise model whitens the residuals, but it estimates the spectrum in the frequency band of manual control from
+//! few data: 16 lags at 100 Hz cover 0.16 s, whereas people act within seconds. Where that spectrum is wrong by a
+//! factor, `sigma^2 A^-1` is wrong by the same factor. The covariance of the score `g = b - A x` is therefore estimated
+//! from the data as well (the sandwich of P. J. Huber, *Proc. Fifth Berkeley Symposium* 1 (1967) 221-233; H. White,
+//! *Econometrica* 48 (1980) 817-838). With the scores `g_k` of stretches of one second, which are nearly independent
+//! (W. K. Newey and K. D. West, *Econometrica* 55 (1987) 703-708),
 //!
 //! `S = sum_k g_k g_k' / (1 - (N + 3)/K)`, `W_i = w n_i/n S + (1 - w) sigma^2 A_i`,
 //!
@@ -25,10 +25,10 @@ use super::{blocks::Block, sizes::STATES};
 
 type Matrix = [[f64; STATES]; STATES];
 
-/// Number of blocks per score.
+/// Number of blocks over which each score is summed.
 const BLOCKS_PER_SCORE: usize = 2;
-/// Weight w of the empirical covariance of the scores. `MODEL_ONLY` is the weight for the covariance of the noise model
-/// alone.
+/// Weight w of the covariance estimated from the scores. `MODEL_ONLY` is the weight at which only the covariance given
+/// by the noise model is used.
 pub(super) const EMPIRICAL_SHARE: f64 = 2.0 / 3.0;
 pub(super) const MODEL_ONLY: f64 = 0.0;
 /// Lower limit of the divisor of S.
@@ -41,7 +41,7 @@ pub struct Contrast {
     pub difference: [f64; STATES],
     /// Covariance of the difference.
     pub covariance: Matrix,
-    /// State of the past, relative to the basis.
+    /// State of the past, with corrections relative to the point of the basis.
     pub before: [f64; STATES],
     /// Covariance of the state of the past.
     pub covariance_before: Matrix,
@@ -114,7 +114,7 @@ impl Contrast {
         Some(trace / STATES as f64)
     }
 
-    /// Returns the same contrast with both covariances multiplied by a factor.
+    /// Returns this contrast with both covariances multiplied by a factor.
     pub(super) fn times(&self, factor: f64) -> Self {
         Self {
             covariance: self.covariance.map(|row| row.map(|c| factor * c)),

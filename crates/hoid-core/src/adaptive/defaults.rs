@@ -20,7 +20,7 @@ pub const LAG_S: f64 = 3.0;
 pub const OMEGA_RAD_S: f64 = 11.0;
 /// Damping ratio of the neuromuscular system.
 pub const ZETA: f64 = 0.25;
-/// Prior standard deviations of omega and zeta (relative) and of a delay that is not given (in s).
+/// Prior standard deviations of omega and zeta (relative) and of the delay (in s) if no delay is given.
 pub const SPREAD: [f64; DYNAMICS] = [0.3, 0.5, 0.1];
 /// Prior standard deviation of a given delay in s.
 pub const GIVEN_DELAY_S: f64 = 0.02;
@@ -31,7 +31,7 @@ pub const ORDER: usize = 16;
 pub const LIMIT: f64 = 8.0;
 /// Time in s after which the estimate starts.
 pub const HOLD_S: f64 = 1.0;
-/// Span of the replays in s.
+/// Span in s of the data that are replayed.
 pub const REPLAYED_S: f64 = 100.0;
 
 /// Default prior of the changes of the operator.
@@ -54,7 +54,7 @@ const NOISE_MEMORY_S: f64 = 100.0;
 /// Limit of an innovation in the change detector, in standard deviations.
 const DETECTOR_LIMIT: f64 = 3.5;
 /// Starting points of the first estimate: delay in s relative to that of the person, natural frequency in rad/s, and
-/// damping ratio. A given delay is not changed.
+/// damping ratio. If the delay is given, all starting points have this delay.
 const STARTING_POINTS: [[f64; 3]; STARTS] = [
     [0.0, OMEGA_RAD_S, ZETA],
     [0.1, 11.0, 0.3],
@@ -67,21 +67,22 @@ const STARTING_POINTS: [[f64; 3]; STARTS] = [
 ];
 /// Shortest delay of a starting point in s.
 const SHORTEST_DELAY_S: f64 = 0.03;
-/// Spans of the detector in s: `PRESENT_S` are the short and the long present, `PAST_S` the shortest and the longest
-/// past, and `REFRACTORY_S` is the time after a change in which no other change is declared.
+/// Spans of the detector in s: `PRESENT_S` contains the lengths of the short and the long present, `PAST_S` the
+/// smallest and the largest length of the past, and `REFRACTORY_S` is the time after a change in which no other change
+/// is declared.
 const PRESENT_S: [f64; 2] = [4.0, 8.0];
 const PAST_S: [f64; 2] = [15.0, 40.0];
 const REFRACTORY_S: f64 = 8.0;
 /// Threshold in nats for an accepted rate of one false alarm per hour; `SLOPE` is its decrease per unit of the
-/// logarithm of the rate. By chance alone, one of the 7200 blocks in an hour exceeds 8.9 nats, but people vary more. In
-/// 3.8 hours of recordings of three pilots without a change, the statistic exceeded 12.5 nats 2.6 times per hour and
-/// 11.0 nats 3.9 times per hour.
+/// logarithm of the rate. By chance alone, one of the 7200 blocks in an hour exceeds 8.9 nats, but people vary more
+/// than the model. In 3.8 hours of recordings of three pilots without a change, the statistic exceeded 12.5 nats 2.6
+/// times per hour and 11.0 nats 3.9 times per hour.
 const THRESHOLD: f64 = 12.5;
 const SLOPE: f64 = 2.2;
 /// Prior standard deviation of a change of the delay in s.
 const DELAY_CHANGE_S: f64 = 0.05;
 
-/// Operator and settings before the first sample.
+/// Operator and settings assumed before the first sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DefaultOperator {
     /// Delay, natural frequency, damping and lag of the operator.
@@ -97,8 +98,8 @@ pub struct DefaultOperator {
 }
 
 impl DefaultOperator {
-    /// Returns the defaults with a delay in s for an error that is interpolated linearly between samples. For a held
-    /// error, add half a sample to the delay.
+    /// Returns the defaults with a delay in s, for an error that is interpolated linearly between samples. If the error
+    /// is held over each sample, add half a sample to the delay.
     pub fn with_delay(tau: f64) -> Self {
         Self {
             point: Point {
@@ -114,7 +115,7 @@ impl DefaultOperator {
         }
     }
 
-    /// Returns the threshold of the detector.
+    /// Returns the threshold of the detector in nats for the accepted number of false alarms.
     fn threshold(&self) -> f64 {
         (THRESHOLD - SLOPE * libm::log(self.false_alarms)).max(1.0)
     }

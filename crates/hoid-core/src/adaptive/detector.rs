@@ -8,14 +8,14 @@
 //! `T = d' C^-1 d`
 //!
 //! has a chi-square distribution with `nu = 6` degrees of freedom if there is no change (G. C. Chow, *Econometrica* 28
-//! (1960) 591-605). It is computed for a short and for a long present, since small changes need more data than large
-//! changes. One second between past and present is left out, since a change need not coincide with the border of a
-//! block.
+//! (1960) 591-605). T is computed for a short and for a long present, since the detection of small changes needs more
+//! data than that of large changes. One second between past and present is left out, since a change need not coincide
+//! with the border of a block.
 //!
-//! **Normalisation.** Some operators vary more than others. T is therefore divided by the square root of c, its level
-//! relative to a chi-square without a change. c is estimated from the mean of `ln T`, whose expected value for a
-//! chi-square is `ln 2 + psi(nu/2)`; c is at least one, and its prior counts as half a minute of blocks. The statistic
-//! is reported as its log significance in nats, with `x = T/(2 sqrt c)`
+//! **Normalisation.** Some operators vary more than others. T is therefore divided by the square root of c, the level
+//! of T relative to a chi-square in the absence of a change. c is estimated from the mean of `ln T`, whose expected
+//! value for a chi-square is `ln 2 + psi(nu/2)`; c is at least one, and its prior counts as half a minute of blocks.
+//! The statistic is reported as its log significance in nats, with `x = T/(2 sqrt c)`
 //!
 //! `-ln P(chi^2 > 2x) = x - ln (1 + x + .. + x^(nu/2-1)/(nu/2-1)!)`
 //!
@@ -26,7 +26,7 @@
 //! (R. E. Quandt, *J. American Statistical Association* 53 (1958) 873-880).
 //!
 //! The blocks are those of the live candidate (`last_blocks`), with its noise model and basis. From four seconds after
-//! a gap, the data after the gap are compared with those before it.
+//! a gap, the data recorded after the gap are compared with those recorded before it.
 
 use super::{
     blocks::Block,
@@ -42,17 +42,18 @@ const MEAN_LOG: f64 = 0.115_931_515_658_412_45;
 const OPERATOR: usize = GAINS + DYNAMICS;
 /// Indices of the tested parameters in the state: all states except the level.
 const OPERATOR_STATES: [usize; OPERATOR] = [0, 1, 2, LINEAR, LINEAR + 1, LINEAR + 2];
-/// Number of pairs of degrees of freedom.
+/// Number of pairs of degrees of freedom of the statistic.
 const PAIRS: u32 = OPERATOR as u32 / 2;
 /// Number of blocks left out between past and present.
 const GUARD_BLOCKS: usize = 2;
-/// Minimum number of blocks in a present after a gap.
+/// Minimum number of blocks in a present that starts after a gap.
 const LEAST_AFTER_GAP: usize = 4;
-/// Weight, in blocks, of the prior of the level of a statistic; the prior is the level of a chi-square.
+/// Weight, in blocks, of the prior for the level of a statistic; the prior is the level of a chi-square.
 const PRIOR_BLOCKS: f64 = 60.0;
 /// Maximum number of blocks, in addition to the prior, in the mean that estimates the level of a statistic.
 const LEVEL_MEMORY: f64 = 240.0;
-/// Largest amount by which one logarithm may exceed the level, so that a change does not count as normal variation.
+/// Largest amount by which the logarithm of a statistic may exceed its mean level in the update of that level, so that
+/// a change does not count as normal variation.
 const LARGEST_LOG_STEP: f64 = 3.0;
 
 /// Settings of the change detector.
@@ -72,7 +73,7 @@ pub struct Detection {
     pub refractory: u64,
 }
 
-/// Statistic and its level without a change.
+/// Statistic, with its level in the absence of a change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Statistic {
     level: f64,
@@ -91,7 +92,7 @@ impl Statistic {
         }
     }
 
-    /// Ratio of the statistic so far to a chi-square, at least one.
+    /// Mean ratio of the statistic so far to a chi-square, at least one.
     fn scale(&self) -> f64 {
         libm::exp(self.level - mean_log(PAIRS)).max(1.0)
     }
@@ -162,7 +163,7 @@ impl Detector {
     pub(super) fn test(&mut self, last: &LastBlocks, dynamics: [f64; DYNAMICS]) {
         self.declared = false;
         self.since += 1;
-        // Blocks from before the last declared change belong to another operator and are not used.
+        // Blocks recorded before the last declared change belong to another operator and are not used.
         let known = last
             .all()
             .len()
@@ -182,7 +183,7 @@ impl Detector {
         }
     }
 
-    /// Statistic T for a present; `None` if there are too few blocks.
+    /// Statistic T for a given length of the present; `None` if there are too few blocks.
     fn wald_statistic(&self, blocks: &[Block], fresh: usize, dynamics: [f64; DYNAMICS], present: usize) -> Option<f64> {
         let Detection {
             recent, least, most, ..
@@ -200,9 +201,9 @@ impl Detector {
 
     /// Locates the change at the block border with the smallest residual sum of squares. The difference is reported
     /// with the covariance given by the noise model, multiplied by a dispersion. The dispersion is the mean ratio of
-    /// the covariance estimated from the scores to that of the noise model, for the difference between the two halves
-    /// of the past. The covariance from the scores alone is too uncertain to distinguish gains from a delay, and the
-    /// scores of the present contain the change.
+    /// the covariance estimated from the scores to that given by the noise model, for the difference between the two
+    /// halves of the past. The covariance from the scores alone is too uncertain to distinguish gains from a delay, and
+    /// the scores of the present contain the change.
     fn locate_change(&mut self, blocks: &[Block], dynamics: [f64; DYNAMICS], recent: usize) {
         let mut best: Option<Contrast> = None;
         self.ago = recent.min(blocks.len().saturating_sub(1));
@@ -230,7 +231,7 @@ impl Detector {
         Contrast::between(sides, empirical_share, |sum| sum.with_prior(dynamics, deviations))
     }
 
-    /// Returns the time in s from the last declared change to its declaration.
+    /// Returns the time in s between the last declared change and its declaration.
     pub fn ago_s(&self) -> f64 {
         self.ago as f64 * BLOCK_S
     }
@@ -247,7 +248,7 @@ impl Detector {
         self.statistics.iter().fold(1.0, |most, s| s.scale().max(most))
     }
 
-    /// Returns the difference between present and past at the last declared change, with all parameters free.
+    /// Returns the difference between present and past at the last declared change, computed with all parameters free.
     pub fn contrast(&self) -> &Contrast {
         &self.declared_contrast
     }
@@ -257,12 +258,12 @@ impl Detector {
         self.innovation_variances
     }
 
-    /// True if a change was declared at the last sample.
+    /// True if a change was declared at the newest sample.
     pub fn declared(&self) -> bool {
         self.declared
     }
 
-    /// Returns the parameters that changed at the last declared change, and the sizes of their changes.
+    /// Returns the parameters that differ at the last declared change, and the sizes of their changes.
     pub fn difference(&self) -> &Difference {
         &self.difference
     }

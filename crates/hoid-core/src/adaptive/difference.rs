@@ -1,10 +1,10 @@
 //! Selection of the parameters that changed, in groups, from the difference between present and past.
 //!
 //! Between past and present, gains, level and dynamics differ by d, with the covariance C (`contrast`) and `W = C^-1`.
-//! The data do not distinguish all components: a longer delay has nearly the same effect as a combined change of the
-//! gains, and a few seconds of data hardly separate the two. Each group (the gains; natural frequency and damping; the
-//! delay) is therefore treated as either changed or unchanged; the level always counts as changed. For the set S of the
-//! components that changed,
+//! The data do not distinguish all components of d: a longer delay has nearly the same effect as a combined change of
+//! the gains, and a few seconds of data hardly separate the two. Each group (the gains; natural frequency and damping;
+//! the delay) is therefore treated as either changed or unchanged; the level always counts as changed. For the set S of
+//! the components that changed,
 //!
 //! `d_S = (W_SS)^-1 (W d)_S`, with the covariance `(W_SS)^-1`,
 //!
@@ -19,9 +19,10 @@ use super::{
     sizes::{GAINS, LINEAR, STATES},
 };
 
-/// Penalty per parameter.
+/// Penalty per changed parameter.
 const PENALTY: f64 = 4.0;
-/// Number of sets of the groups (gains, neuromuscular system, delay); each group is one bit.
+/// Number of possible sets of changed groups (gains, neuromuscular system, delay); each group is one bit of the index
+/// of the set.
 const SETS: usize = 8;
 const GAINS_BIT: usize = 1;
 const SYSTEM_BIT: usize = 2;
@@ -50,7 +51,7 @@ impl Difference {
         let w = cholesky::scaled_inverse(&factor, STATES, 1.0);
         let mut best = None;
         let mut least = f64::MAX;
-        // All sets except the empty one.
+        // The loop covers all sets of groups except the empty set.
         for set in 1..SETS {
             let is_in = |i: usize| match i {
                 0..GAINS => set & GAINS_BIT > 0,

@@ -1,7 +1,7 @@
 //! Pair of f64 numbers for one vector register.
 //!
 //! Every processor with vector registers can operate on two f64 numbers at an address that is a multiple of 16 bytes.
-//! The operations are those on scalars, so the results are bit-identical on every machine.
+//! Each number of the pair is computed as by a scalar operation, so the results are bit-identical on every machine.
 
 use core::ops::{Add, AddAssign, Div, Mul, Sub, SubAssign};
 
@@ -19,7 +19,7 @@ impl crate::state::State for F64x2 {
 impl F64x2 {
     pub const ZERO: Self = Self::both(0.0);
 
-    /// Returns a pair with the same number twice.
+    /// Returns a pair that contains the same number twice.
     #[inline(always)]
     pub const fn both(x: f64) -> Self {
         Self([x; 2])

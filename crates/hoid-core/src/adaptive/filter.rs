@@ -31,9 +31,9 @@ const TRUST_DEVIATIONS: [f64; DYNAMICS] = [0.15, 0.3, 0.03];
 /// Initial part of a replay, in s, that does not update the estimate: the filters start at rest, but the recorded
 /// signals do not.
 const AT_REST_S: f64 = 2.0;
-/// Time in s after which constant signals no longer update the estimate.
+/// Time in s for which the signals must be constant before their samples no longer update the estimate.
 const STILL_S: f64 = 0.1;
-/// Time in s that the filters need to settle after a span of constant signals.
+/// Time in s in which the filters settle after a span of constant signals.
 const SETTLING_S: f64 = 2.0;
 
 /// Adaptive recursion. E is the memory for past samples.
@@ -46,7 +46,8 @@ pub struct AdaptiveFilter<E> {
     live: Candidate,
     started: bool,
     trial: Candidate,
-    /// 0: no replay; 1: replay from the estimate; 2 or more: replay from another starting point.
+    /// Stage of the replay: 0 for no replay, 1 for a replay from the estimate, 2 or more for a replay from another
+    /// starting point.
     replay_stage: u64,
     /// Index of the next sample of the replay.
     next_sample: u64,
@@ -55,14 +56,14 @@ pub struct AdaptiveFilter<E> {
     detector: Detector,
     history: History<E>,
     saturation: Saturation,
-    /// Sums of the squares of e, of u, and of `D u` with the prior D. The last sum gives an upper bound for the
-    /// innovation variance: the variance for an operator that does not respond to e.
+    /// Sums of the squares of e, of u, and of `D u` with the prior D. The third sum gives an upper bound for the
+    /// innovation variance, namely the variance for an operator that does not respond to e.
     powers: [f64; 3],
     restarts: u64,
     age: u64,
     /// Number of samples in the current or last span of constant signals.
     constant_samples: u64,
-    /// Number of samples since the end of that span.
+    /// Number of samples since the end of that span of constant signals.
     settling: u64,
     /// Number of samples that advanced the filters without updating the estimate.
     passed: u64,
@@ -95,9 +96,9 @@ impl<E: AsMut<[f64]>> State for AdaptiveFilter<E> {
 }
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
-    /// Builds the recursion at rest. `memory` holds [`memory_needed`] numbers for full replays. With fewer numbers the
-    /// replays are shorter, and with [`least_memory`], the minimum, there are none. Returns `None` for invalid numbers
-    /// or too little memory.
+    /// Builds the recursion at rest. If `memory` has [`memory_needed`] numbers, the replays have their full length.
+    /// With fewer numbers the replays are shorter, and with [`least_memory`], the minimum, there are none. Returns
+    /// `None` for invalid numbers or too little memory.
     pub fn new(prior: AdaptivePrior, memory: E) -> Option<Self> {
         let ts = prior.sample_time;
         if !prior.is_valid() || prior.person.tau > LONGEST_DELAY_S || memory.as_ref().len() < least_memory(ts) {
@@ -147,7 +148,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         })
     }
 
-    /// Makes the recursion start immediately from an earlier estimate of the person. Returns `None` for invalid
+    /// Makes the recursion start immediately from an earlier estimate of the operator. Returns `None` for invalid
     /// numbers.
     pub fn with_initial_estimate(mut self, known: &InitialEstimate) -> Option<Self> {
         if !known.is_valid() || !known.apply_to_noise(&mut self.prior_noise, self.prior.sample_time) {
@@ -205,7 +206,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             }
             None => {
                 // With replays, the basis changes from one replay to the next, and each replay has a trust region about
-                // its point. Without replays, the corrections have the full prior for people.
+                // its point. Without replays, the corrections have the full prior for a person.
                 let dynamics = match self.replays_anything() {
                     true => trust_region(point),
                     false => variances(&self.prior),
@@ -237,8 +238,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.saturation.update(u);
         self.detector.pass_over();
         if let Some(end) = end {
-            // When a limit is first recognised, a previous sample with the same output was already at this limit. The
-            // correction takes effect in the next replay.
+            // When a limit is first recognised, the previous sample, which had the same output, was already at this
+            // limit. Its correction takes effect in the next replay.
             self.history.revise_previous(u, end);
             return self.pass(u, end);
         }
@@ -248,7 +249,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.powers[0] += e * e;
         self.powers[1] += u * u;
         if !self.started {
-            // For earlier samples the whitening filter does not yet contain enough outputs.
+            // At the first samples the whitening filter does not yet contain enough outputs.
             if self.history.samples() > self.prior.order as u64 {
                 let y = self.live.whitened(u).y;
                 self.powers[2] += y * y;
@@ -284,7 +285,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// True while neither signal has changed for longer than `STILL_S`, and afterwards until the filters have settled.
+    /// True once neither signal has changed for longer than `STILL_S`, and afterwards until the filters have settled.
     /// The estimate is then not updated: the recorder has stopped or the person is resting, and the innovation variance
     /// would tend to zero.
     #[inline(always)]
@@ -355,7 +356,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.live.store(u);
     }
 
-    /// Step 12: tests the last blocks for a change.
+    /// Step 12: tests the last blocks of the live candidate for a change.
     fn test_for_change(&mut self) {
         let dynamics = core::array::from_fn(|j| self.live.mixture.mean()[LINEAR + j]);
         self.detector.test(&self.live.blocks, dynamics);
@@ -405,8 +406,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         &self.alternatives
     }
 
-    /// Number of samples of the record, excluding those that did not update the estimate. Samples without information
-    /// do not make old results obsolete.
+    /// Number of samples of the record, excluding those that did not update the estimate, since samples without
+    /// information do not make old results obsolete.
     pub(super) fn informative_samples(&self) -> u64 {
         self.history.samples().saturating_sub(self.passed)
     }
@@ -420,7 +421,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.live.point()
     }
 
-    /// Returns the frequency response that belongs to each gain, at a frequency in rad/s and at the current point.
+    /// Returns the frequency responses by which the gains are multiplied, at a frequency in rad/s and at the current
+    /// point.
     pub fn responses(&self, omega_rad_s: f64) -> [Complex; GAINS] {
         self.live.responses(omega_rad_s)
     }
@@ -474,7 +476,7 @@ fn store(candidate: &mut Candidate, sample_use: Use, u: f64) {
     }
 }
 
-/// Output with which the filters are advanced.
+/// Output that the filters receive for a sample: measured, predicted, or beyond a limit of the stick.
 fn through_filters(saturation: &Saturation, sample_use: Use, u: f64, predicted: f64) -> f64 {
     match sample_use {
         Use::Missing => predicted,
@@ -494,12 +496,12 @@ fn trust_region(point: Point) -> [f64; DYNAMICS] {
     [omega * point.omega, zeta * point.zeta, tau].map(|s| s * s)
 }
 
-/// Returns the number of past errors that must be stored for the longest delay, with the sample time in s.
+/// Returns the number of past errors that must be stored for the longest delay. The sample time is in s.
 pub fn errors_needed(sample_time: f64) -> usize {
     libm::ceil(LONGEST_DELAY_S / sample_time) as usize + 4
 }
 
-/// Returns the minimum length of the memory, with the sample time in s.
+/// Returns the minimum length of the memory in numbers. The sample time is in s.
 pub fn least_memory(sample_time: f64) -> usize {
     3 * errors_needed(sample_time)
 }
@@ -507,7 +509,7 @@ pub fn least_memory(sample_time: f64) -> usize {
 /// Maximum number of samples in a replay.
 const MOST_REPLAYED: f64 = 12_000.0;
 
-/// Returns the length of the memory for replays over `seconds`, with the sample time in s.
+/// Returns the length of the memory, in numbers, for replays over `seconds`. The sample time is in s.
 pub fn memory_needed(sample_time: f64, seconds: f64) -> usize {
     let samples = (seconds / sample_time).clamp(0.0, MOST_REPLAYED);
     3 * (2 * errors_needed(sample_time) + libm::ceil(samples) as usize)

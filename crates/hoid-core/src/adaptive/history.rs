@@ -4,7 +4,7 @@
 
 use crate::state::State;
 
-/// Indices of the rings.
+/// Index of the ring of errors; the constants below are those of the other rings.
 const ERRORS: usize = 0;
 const OUTPUTS: usize = 1;
 const USES: usize = 2;
@@ -72,7 +72,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
         self.samples
     }
 
-    /// Index of a sample of a ring in the memory; `None` if there is no memory.
+    /// Index, in the memory, of a sample in a ring; `None` if there is no memory.
     #[inline(always)]
     fn place(&self, ring: usize, sample: u64) -> Option<usize> {
         let capacity = self.capacity();
@@ -92,7 +92,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
             .map_or(0.0, |place| self.memory.as_ref()[place])
     }
 
-    /// Stores the error of a new sample; [`History::complete`] adds its output and its use.
+    /// Stores the error of a new sample; [`History::complete`] adds the output and the use of the sample.
     #[inline(always)]
     pub fn push(&mut self, error: f64) {
         self.put(ERRORS, self.samples, error);
@@ -107,7 +107,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
         self.put(USES, newest, sample_use.number());
     }
 
-    /// Changes the use of the last sample but one if its output was `u` and it updated the estimate.
+    /// Changes the use of the sample before the newest one if its output was `u` and it updated the estimate.
     pub fn revise_previous(&mut self, u: f64, sample_use: Use) {
         if let Some(previous) = self.samples.checked_sub(2)
             && self.output(previous) == (u, Use::Update)

@@ -1,14 +1,16 @@
-//! Hypothesis: the operator last changed when the hypothesis was born, and has since drifted slowly or not at all.
+//! Hypothesis about the time of the last change: the operator changed when the hypothesis was born, and has since
+//! drifted slowly or not at all.
 //!
 //! Each hypothesis is an extended Kalman filter for `x = [gains, level, corrections]` that processes one block of
-//! samples at a time ([`super::moments`]). With x^ and P before the block, and the innovation variance `sigma^2`,
+//! samples at a time ([`super::moments`]). With the estimate x^ and its covariance P before the block, and the
+//! innovation variance `sigma^2`,
 //!
 //! `P+ = (I + P A/sigma^2)^-1 P`, `x+ = x^ + P+ b/sigma^2`,
 //! `ln Lambda = -1/2 ln det(I + P A/sigma^2) - (E - b' P+ b/sigma^2)/(2 sigma^2) + ..`
 //!
 //! (Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001,
 //! section 7.2, information form). `(I + P A/sigma^2)^-1 P` needs no inverse of P, which is singular if the three gains
-//! are restricted to a gain with a lead.
+//! are restricted to those of a gain with a lead.
 //!
 //! Each hypothesis has its own innovation variance, so that a change of the remnant can be part of a change. Since this
 //! variance is estimated, the part of the block energy common to all hypotheses has a Student density with the degrees
@@ -24,7 +26,7 @@ use super::{
 
 pub(super) type Covariance = [[f64; STATES]; STATES];
 
-/// Segment before a change: its last block, and the state at its end.
+/// Segment that ended with a change: its last block, and the state at its end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Segment {
     pub until: u64,
@@ -51,13 +53,13 @@ pub(super) struct Hypothesis {
 
 crate::state!([] Hypothesis { state, covariance, variance, residuals, log_weight, born, class, segments, changes });
 
-/// Residual of a block.
+/// Residual energy of a block for a hypothesis, with the other quantities in its likelihood.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BlockResidual {
     /// `E - b' P+ b/sigma^2`: the sum of the squared innovations, whitened by their covariance `S = H P H' + sigma^2`,
     /// times sigma^2.
     pub energy: f64,
-    /// Number of skipped samples of the block, and the residual energy charged for them.
+    /// Number of samples of the block that the hypothesis skipped, and the residual energy charged for them.
     pub passed: [f64; 2],
     /// `ln det(I + P A/sigma^2)`.
     log_determinant: f64,
@@ -93,12 +95,12 @@ impl Hypothesis {
         libm::exp(self.log_weight)
     }
 
-    /// Segments before the last change, the oldest first.
+    /// Segments between earlier changes, the oldest first.
     pub fn segments(&self) -> &[Segment] {
         &self.segments[..self.changes.min(SEGMENTS)]
     }
 
-    /// Child hypothesis, which assumes that the operator changed in the given block.
+    /// Returns the child hypothesis, which assumes that the operator changed in the given block.
     pub fn child(&self, block: u64) -> Self {
         let mut child = *self;
         let changes = self.changes.min(SEGMENTS);
@@ -114,7 +116,8 @@ impl Hypothesis {
         child
     }
 
-    /// Step 6: gain and update for a block, where each sample counts as `1/dispersion` of an independent sample.
+    /// Step 6: computes the gain and updates state and covariance with a block, in which each sample counts as
+    /// `1/dispersion` of an independent sample.
     pub fn update(&mut self, moments: &Moments, basis: &Basis, dispersion: f64) -> BlockResidual {
         // The block is linearised about the predicted state, since the response is bilinear in gains and corrections.
         let about = moments.about(basis, &self.state);
@@ -128,7 +131,8 @@ impl Hypothesis {
             })
         });
         (0..STATES).for_each(|i| matrix[i][i] += 1.0);
-        // Solving (I + P A/sigma^2) P+ = P also gives the determinant of this matrix, which is that of S/sigma^2.
+        // Solving (I + P A/sigma^2) P+ = P also gives the determinant of I + P A/sigma^2, which equals that of
+        // S/sigma^2.
         let mut after = self.covariance;
         let log_determinant = elimination::solve_any(&mut matrix, &mut after);
         // Rounding makes P+ slightly asymmetric, and without this correction the asymmetry would grow from block to

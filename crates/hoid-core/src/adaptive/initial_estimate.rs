@@ -1,8 +1,8 @@
 //! Initial estimate from an earlier fit of the person, with its covariance.
 //!
 //! Gains and corrections start at the fitted values with their covariance and are updated from the first sample. The
-//! noise model starts as if it had already been estimated from a span of the remnant of the fit, so that it need not be
-//! estimated in the first seconds.
+//! noise model starts as if it had already been estimated from the remnant of the fit, so that it need not be estimated
+//! in the first seconds.
 
 use super::{
     noise::{Lags, NoiseModel},
@@ -39,7 +39,7 @@ impl InitialEstimate {
             && self.unit.is_finite()
     }
 
-    /// Sets a noise model to the remnant of the fit, if known; returns false if its numbers are not valid.
+    /// Initialises a noise model with the remnant of the fit, if known; returns false if its numbers are not valid.
     pub(super) fn apply_to_noise(&self, noise: &mut NoiseModel, sample_time: f64) -> bool {
         match &self.remnant {
             Some((lags, seconds)) => noise.set_prior(lags, self.variance, seconds / sample_time),

@@ -1,4 +1,5 @@
-//! Last blocks of a candidate, with one noise model and in one basis: the data used by the change detector.
+//! Last blocks of a candidate, all with the same noise model and in the same basis: the data used by the change
+//! detector.
 //!
 //! If samples are unused for a quarter of a second or longer (for example, because the signals do not change), the
 //! incomplete block and the block before it are dropped, since samples just before such a gap may already be faulty.
@@ -10,7 +11,7 @@ use super::blocks::{Block, EMPTY, Row};
 pub const BLOCKS: usize = 96;
 /// Length of a block in s.
 pub const BLOCK_S: f64 = 0.5;
-/// Time in s from which unused samples count as a gap, and (`SKIPPED_S`) the time that is skipped after a gap.
+/// Time in s from which unused samples count as a gap; `SKIPPED_S` is the time that is skipped after a gap.
 const GAP_S: f64 = 0.25;
 const SKIPPED_S: f64 = 2.0;
 
@@ -70,7 +71,7 @@ impl LastBlocks {
         self.closed = true;
     }
 
-    /// Passes over a sample without information that is not faulty.
+    /// Passes over a sample that carries no information but is not faulty, such as an output at a limit of the stick.
     pub fn pass_over(&mut self) {
         self.closed = false;
     }
@@ -82,7 +83,7 @@ impl LastBlocks {
         let samples = |seconds: f64| (seconds / BLOCK_S * self.samples_of_block as f64) as u64;
         let (long, to_skip) = (samples(GAP_S).max(1), samples(SKIPPED_S));
         if self.gap == long {
-            // Drops the incomplete block and the one before it.
+            // Drops the incomplete block and the block before it.
             self.open = EMPTY;
             self.count = self.count.saturating_sub(1);
             self.fresh = 0;

@@ -2,22 +2,23 @@
 //!
 //! After each block the likeliest hypothesis of each class has a child, which assumes that the operator changed in this
 //! block. The child has the estimate of its parent before the block, with the covariance of a jump added to that of the
-//! gains (A. S. Willsky and H. L. Jones, *IEEE Trans. Automatic Control* 21 (1976) 108-112). It starts with the
-//! probability of the class times the hazard, the prior probability of a change since the last birth, and is then
+//! gains (A. S. Willsky and H. L. Jones, *IEEE Trans. Automatic Control* 21 (1976) 108-112). The initial probability of
+//! the child is that of the class times the hazard, the prior probability of a change since the last birth; it is then
 //! weighted by its likelihood like all other hypotheses (R. P. Adams and D. J. C. MacKay, *Bayesian online changepoint
 //! detection*, 2007, algorithm 1; P. Andersson, *International Journal of Control* 42 (1985) 1175-1193). If there is no
 //! free slot, the least likely of the hypotheses that are old enough is pruned. Between changes the estimate therefore
 //! uses all data since the last change.
 //!
-//! **Samples that a child skips.** For up to p samples after a change, a whitening filter D of order p computes
-//! `D (theta r)` with gains theta that differ within its window, whereas the model computes theta `D r`. With a steep
-//! remnant the difference amounts to hundreds of innovations, which no gains explain. A child therefore skips the block
-//! of its birth and the first p samples of the next block.
+//! **Samples that a child skips.** For up to p samples after a change, a whitening filter D of order p contains
+//! responses with the gains before and after the change: it computes `D (theta r)`, whereas the model computes theta
+//! `D r`. With a steep remnant the difference amounts to hundreds of innovations, which no gains explain. A child
+//! therefore skips the block of its birth and the first p samples of the next block.
 //!
-//! **Classes.** The numerator is either free or restricted to a gain with a lead, `(K_e + K_e_dot s)(s + a)`: the same
-//! filter, with a covariance that allows no other direction of the gains. For both forms the gains drift either slowly
-//! (steady) or fast (wandering) between changes. A child has the class of its parent, except that a hypothesis with a
-//! gain and a lead may also have a child with a free numerator. The best hypothesis of each class is never pruned.
+//! **Classes.** The numerator is either free or restricted to a gain with a lead, `(K_e + K_e_dot s)(s + a)`; the
+//! restricted form uses the same filter, with a covariance that allows no other direction of the gains. In both forms
+//! the gains drift either slowly (steady) or fast (wandering) between changes. A child has the class of its parent,
+//! except that a hypothesis with a gain and a lead may also have a child with a free numerator. The best hypothesis of
+//! each class is never pruned.
 //!
 //! **Estimate.** The estimate is the mean of the mixture. Its covariance includes the spread of the means of the
 //! hypotheses (Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking and Navigation*,
@@ -44,7 +45,7 @@ pub struct ChangePrior {
     /// Standard deviation of the drift of the gains over one second, for steady and for wandering hypotheses.
     pub drift: [f64; 2],
     /// Standard deviation of the additional drift over one second just after a change, and the time constant in s with
-    /// which it decays.
+    /// which this drift decays.
     pub settling: [f64; 2],
     /// Standard deviation of the drift of the level of u over one second, relative to the root mean square of u.
     pub level: f64,
@@ -80,20 +81,20 @@ impl ChangePrior {
     }
 }
 
-/// Time in s before which no hypothesis is born, since the start has not settled.
+/// Time in s before which no hypothesis is born, since the filters and the estimate have not settled.
 const FIRST_BIRTH_S: f64 = 3.0;
-/// Factor that multiplies the probability of a class with gain and lead if its best hypothesis has a child with a free
-/// numerator.
+/// Factor that multiplies the probability of a class with gain and lead when its best hypothesis has a child with a
+/// free numerator.
 const FORM_SWITCH: f64 = 0.3;
 /// Lower limit of a log probability.
 const LEAST_LOG_WEIGHT: f64 = -60.0;
-/// Prior standard deviation of the gains relative to the ratio of u to e.
+/// Prior standard deviation of the gains relative to the ratio of the magnitudes of u and e.
 const INITIAL_GAIN_DEVIATION: f64 = 2.0;
 
 /// Scales of the signals and of the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct NoiseScales {
-    /// Ratio of u to e, followed by the root mean square of u.
+    /// Ratio of the magnitudes of u and e, followed by the root mean square of u.
     pub unit: f64,
     pub size: f64,
     /// Initial innovation variance.
@@ -117,7 +118,7 @@ pub(super) struct Mixture {
 crate::state!([] Mixture { hypotheses, count, blocks, mean });
 
 impl Mixture {
-    /// Returns a mixture with one hypothesis of each class at the prior. `dynamics` are the prior variances of the
+    /// Returns a mixture with one hypothesis of each class, all at the prior. `dynamics` are the prior variances of the
     /// corrections.
     pub fn new(prior: &ChangePrior, basis: &Basis, scales: &NoiseScales, dynamics: [f64; DYNAMICS]) -> Self {
         let mut p = [[0.0; STATES]; STATES];
@@ -132,7 +133,7 @@ impl Mixture {
         })
     }
 
-    /// Returns a mixture with one hypothesis of each class at a known estimate.
+    /// Returns a mixture with one hypothesis of each class, all at a known estimate.
     pub fn at(prior: &ChangePrior, state: [f64; STATES], covariance: Covariance, variance: f64) -> Self {
         Self::of(prior, |_| (state, covariance, variance))
     }
@@ -183,7 +184,7 @@ impl Mixture {
         let mut left = [BlockResidual::ZERO; HYPOTHESES];
         let (mut common, mut best) = (f64::INFINITY, self.mean);
         for (h, left) in self.all_mut().iter_mut().zip(&mut left) {
-            // Step 5, P_j + Q_j: a random walk of the gains, which is faster just after a change, while people are
+            // Step 5, P_j + Q_j: a random walk of the gains, which is faster just after a change, while the gains are
             // still settling.
             let age = (blocks - h.born.min(blocks)) as f64 * seconds;
             let mut drift = prior.drift[h.class % 2] * prior.drift[h.class % 2];
@@ -204,15 +205,16 @@ impl Mixture {
                 (common, best) = (left.energy, h.state);
             }
         }
-        // A newborn hypothesis skips its early samples. It is charged the residual energy of the best hypothesis for
-        // them, so that skipping gives it neither an advantage nor a disadvantage.
+        // A newborn hypothesis skips its early samples. It is charged the residual energy that the best hypothesis has
+        // at these samples, so that skipping gives it neither an advantage nor a disadvantage.
         let of_early = early.energy(basis, &best);
         for (_, left) in self.all().iter().zip(&mut left).filter(|(h, _)| newborn(h)) {
             left.passed = [early.samples, of_early];
             left.energy += of_early;
             common = common.min(left.energy);
         }
-        // The memory is half the time since the start, so that the large residuals of the start are forgotten.
+        // The memory of the variance is half the time since the start, so that the large residuals of the start are
+        // forgotten.
         let [longest, shortest] = prior.variance.map(|seconds| seconds / scales.sample_time);
         let memory = longest.min((0.5 * blocks as f64 * moments.samples).max(shortest));
         // The variance must stay positive even if the prediction is perfect.
@@ -319,8 +321,8 @@ impl Mixture {
             let mut child = parent.child(self.blocks);
             let every = if wanders { 2.0 } else { 1.0 };
             child.class = class;
-            // The probability mu of the class times the hazard H = seconds/between (AM, equation 5, for a geometric run
-            // length).
+            // The initial probability of the child is the probability mu of the class times the hazard H =
+            // seconds/between (AM, equation 5, for a geometric run length).
             child.log_weight = libm::log(share.max(1e-12) * (every * seconds / prior.mean_interval_s).min(0.5));
             inflate_gains(
                 &mut child.covariance,
@@ -339,7 +341,7 @@ impl Mixture {
         self.normalise();
     }
 
-    /// Free slot or, if there is none, the slot of the least likely hypothesis that is old enough and not the best of
+    /// Index of a free slot or, if there is none, of the least likely hypothesis that is old enough and not the best of
     /// its class.
     fn free_slot(&mut self, prior: &ChangePrior) -> Option<usize> {
         if self.count < HYPOTHESES {
@@ -390,8 +392,8 @@ impl Mixture {
         self.all().iter().map(|h| h.weight() * h.variance).sum()
     }
 
-    /// Returns the segments of the likeliest hypothesis: the states before each of its changes, the oldest first,
-    /// followed by the current state.
+    /// Returns the segments of the likeliest hypothesis: the states before each of the changes that it assumes, the
+    /// oldest first, followed by the current state.
     pub fn segments(&self) -> Segments {
         let mut segments = Segments::NONE;
         if let Some(best) = self.likeliest(|_| true) {
@@ -407,8 +409,8 @@ impl Mixture {
     }
 
     /// Replaces the prior of the corrections. The old prior is normal with mean zero and variances `was`, the new one,
-    /// that of people, is normal with `mean` and variances `is`: `P' = (I + P D)^-1 P`, `D = 1/is - 1/was`, `x' = x +
-    /// P' (mean/is - D x)`. In information form this subtracts the old prior and adds the new one.
+    /// that of people, is normal with `mean` and variances `is`: `P' = (I + P D)^-1 P`, `D = 1/is - 1/was`,
+    /// `x' = x + P' (mean/is - D x)`. In information form this subtracts the old prior and adds the new one.
     pub fn replace_prior(&mut self, was: [f64; DYNAMICS], is: [f64; DYNAMICS], mean: [f64; DYNAMICS]) {
         for h in self.all_mut() {
             let mut matrix: Covariance = [[0.0; STATES]; STATES];
@@ -466,7 +468,7 @@ impl Segments {
         }
     }
 
-    /// Returns the segments for a start that is `later` blocks later, with the states converted by `to`.
+    /// Returns the segments for a candidate that starts `later` blocks later, with the states converted by `to`.
     pub fn carried(mut self, later: u64, to: impl Fn(&[f64; STATES]) -> [f64; STATES]) -> Self {
         for segment in &mut self.all {
             *segment = Segment {
@@ -477,7 +479,7 @@ impl Segments {
         self
     }
 
-    /// Returns the state of the segment that contains a block.
+    /// Returns the state of the segment that contains a block, or `None` if no segment contains it.
     pub fn at(&self, block: u64) -> Option<&[f64; STATES]> {
         let all = &self.all[..self.count.min(SEGMENTS + 1)];
         all.iter()
@@ -486,8 +488,8 @@ impl Segments {
     }
 }
 
-/// Directions of a gain K and of a lead K_dot in the space of the gains: `n_0 = K a`, `n_1 = K + K_dot a`, `n_2 =
-/// K_dot`, each divided by the scale of its response. K_dot is in units of K at 2 rad/s.
+/// Directions of a gain K and of a lead K_dot in the space of the gains: `n_0 = K a`, `n_1 = K + K_dot a`,
+/// `n_2 = K_dot`, each divided by the scale of its response. K_dot is in units of K at 2 rad/s.
 fn gain_and_lead(basis: &Basis) -> [[f64; GAINS]; 2] {
     let (a, [s0, s1, s2]) = (1.0 / basis.point().lag, basis.scale());
     [
@@ -496,8 +498,8 @@ fn gain_and_lead(basis: &Basis) -> [[f64; GAINS]; 2] {
     ]
 }
 
-/// Adds a variance to the gains (`Q_j`, the jump of a child, or the prior): along gain and lead, or in all directions
-/// if the class has a free numerator.
+/// Adds variances to the covariance of the gains (for `Q_j`, the jump of a child, or the prior): along gain and lead,
+/// or in all directions if the class has a free numerator.
 fn inflate_gains(p: &mut Covariance, basis: &Basis, class: usize, [gain, lead]: [f64; 2]) {
     if class >= 2 {
         for (i, size) in [gain, lead, lead].into_iter().enumerate() {

@@ -13,7 +13,7 @@
 //!    zeta and tau.
 //! 2. **Whitening** (`candidate`). `y = D u` is the measurement and `H = D [dz/dx]` its row; filtering by D turns the
 //!    coloured noise v into white noise.
-//! 3. **Innovation** (`candidate`). `nu = y - H x^`, with the mean x^ of step 8 before the sample. The innovation
+//! 3. **Innovation** (`candidate`). `nu = y - H x^`, where x^ is the mean of step 8 before the sample. The innovation
 //!    updates D and sigma^2.
 //! 4. **Measurement sums** (`moments`). Over a block of 0.32 s, `A = sum H' H`, `b = sum H' nu`, `E = sum nu^2`.
 //! 5. **Prediction** ([`mixture`], `hypothesis`). Hypothesis j assumes no change since its birth: `P_j <- P_j + Q_j`.
@@ -24,14 +24,14 @@
 //!    `ln Lambda_j = -1/2 ln det(I + P_j A/sigma_j^2) - (E - b' P_j b/sigma_j^2)/(2 sigma_j^2) + ..`
 //! 8. **Mixture** ([`mixture`]; BLK section 1.4.16). `x^ = sum_j mu_j x^_j`,
 //!    `P = sum_j mu_j (P_j + (x^_j - x^)(x^_j - x^)')`.
-//! 9. **Births and pruning** ([`mixture`]; AM algorithm 1, WJ). The best hypothesis of each class has a child. Its
-//!    probability is that of the class times the hazard `H = block/mean time between changes`, and the covariance of a
-//!    jump is added to P_j.
+//! 9. **Births and pruning** ([`mixture`]; AM algorithm 1, WJ). The best hypothesis of each class has a child. The
+//!    initial probability of the child is that of the class times the hazard `H = block/mean time between changes`, and
+//!    the covariance of a jump is added to P_j.
 //! 10. **Noise** ([`noise`], `volatility`). D is an autoregression of the residuals, fitted by least squares. The
-//!     spread of the block energies gives the number of samples that count as one independent sample.
+//!    spread of the block energies gives the number of samples that count as one independent sample.
 //! 11. **Replay** (`filter`). A second candidate reads the record again with the new basis point and D, and replaces
-//!     the first candidate when it has caught up. This amounts to a batch prediction-error fit, repeated at a bounded
-//!     cost per sample.
+//!    the first candidate when it has caught up. The replays amount to a batch prediction-error fit, repeated at a
+//!    bounded cost per sample.
 //! 12. **Change test** ([`detector`], [`contrast`], [`difference`]). Least-squares fits before and after a possible
 //!     change give `T = d' C^-1 d` (Wald; G. C. Chow, *Econometrica* 28 (1960) 591-605; H. White, *Econometrica* 48
 //!     (1980) 817-838).
@@ -48,13 +48,14 @@
 //!
 //! **Time per step.** No step reads more than [`REPLAYED`] stored samples, so the number of operations is bounded. For
 //! two minutes of data at 50 to 200 Hz, the longest step takes 77 us without replays, at the end of a block. With
-//! replays over 100 s it takes 193 to 339 us. The mean is 1 to 2 us without and 28 to 80 us with replays (one core of a
-//! shared server: `cargo xtask slow step-time`).
+//! replays over 100 s the longest step takes 193 to 339 us. The mean is 1 to 2 us without and 28 to 80 us with replays
+//! (one core of a shared server: `cargo xtask slow step-time`).
 //!
-//! Outputs at a limit of the stick are censored samples (`saturation`). Other poles and delays that predict u about as
-//! well widen the reported errors (`alternatives`). The estimate starts either after one second, during which the ratio
-//! of output to error sets the scale of the prior of the gains, or from an earlier fit ([`initial_estimate`]).
-//! [`AdaptiveFilter`] needs no operating system; its memory is an array that the caller owns.
+//! Outputs at a limit of the stick are censored samples (`saturation`). Operators with other poles and delays that
+//! predict u about as well as the estimate widen the reported errors (`alternatives`). The estimate starts either after
+//! one second, during which the ratio of output to error sets the scale of the prior of the gains, or from an earlier
+//! fit ([`initial_estimate`]). [`AdaptiveFilter`] needs no operating system; its memory is an array that the caller
+//! owns.
 //! ```
 //! use hoid_core::adaptive::{AdaptiveFilter, least_memory, defaults::DefaultOperator};
 //!

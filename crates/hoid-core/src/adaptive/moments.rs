@@ -1,4 +1,4 @@
-//! Step 4: the second moments of a block, which are a sufficient statistic for its likelihood.
+//! Step 4: the second moments of a block, which are a sufficient statistic for the likelihood of a hypothesis.
 //!
 //! After the whitening filter, a sample consists of the signals of the basis and the level, `z` (seven numbers), and
 //! the output y. The response in a state x (gains, level, corrections) is `w(x)' z`. It is bilinear in gains and
@@ -11,7 +11,8 @@
 //!
 //! `A = T' (sum z z') T`, `b = T' sum z nu`, `E = sum nu^2`
 //!
-//! (information, score and energy, each multiplied by sigma^2). `H = z' T` is the measurement row of a sample.
+//! (information, score and energy; the information and the score are multiplied by sigma^2). `H = z' T` is the
+//! measurement row of a sample.
 
 use super::{
     basis::Basis,
@@ -33,7 +34,7 @@ crate::state!([] Moments { products, samples });
 /// Gauss-Newton model of a block about a state.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct About {
-    /// Information, followed by the score, both multiplied by the innovation variance.
+    /// Information matrix, followed by the score, both multiplied by the innovation variance.
     pub information: [[f64; STATES]; STATES],
     pub score: [f64; STATES],
     /// Sum of the squared residuals at the state.
@@ -61,7 +62,7 @@ impl Moments {
         self.samples += 1.0;
     }
 
-    /// Sums over these samples and those of `others`.
+    /// Returns the sums over the samples of `self` and of `others`.
     pub fn with(&self, others: &Self) -> Self {
         Self {
             products: core::array::from_fn(|i| core::array::from_fn(|j| self.products[i][j] + others.products[i][j])),
@@ -87,7 +88,7 @@ impl Moments {
             c[i] = with_output - response;
             energy += w[i] * (response - 2.0 * with_output);
         }
-        // Rounding can make a vanishing energy negative.
+        // If the energy is nearly zero, rounding can make it negative.
         (c, energy.max(0.0))
     }
 
@@ -122,7 +123,7 @@ pub(super) fn weights(basis: &Basis, state: &[f64; STATES]) -> [f64; INPUTS] {
 }
 
 /// Derivatives of the weights `w` with respect to each element of the state. They are exact, because the weights are
-/// linear in the gains and linear in the corrections.
+/// bilinear in gains and corrections.
 fn derivatives(basis: &Basis, state: &[f64; STATES], w: &[f64; INPUTS]) -> [[f64; INPUTS]; STATES] {
     let mut t = [[0.0; INPUTS]; STATES];
     for i in 0..GAINS {

@@ -7,9 +7,9 @@
 //! seconds, with unknown gains, are forgotten.
 //!
 //! The prior of the coefficients is normal. Its mean is the model of a typical remnant, and its standard deviation is
-//! `PRIOR_DEVIATION`. This prior adds `sigma^2/PRIOR_DEVIATION^2` to the diagonal of the sums (ridge), where sigma^2 is
-//! the variance of eps. The ridge scales with eps and not with v: the spectrum of a remnant with more than two poles
-//! falls to a very small fraction of its power, and D has to follow it there.
+//! `PRIOR_DEVIATION`. This prior adds `sigma^2/PRIOR_DEVIATION^2` to the diagonal of the sums (a ridge), where sigma^2
+//! is the variance of eps. The ridge scales with the variance of eps and not with that of v: the spectrum of a remnant
+//! with more than two poles falls to a very small fraction of its power, and D has to follow it there.
 //!
 //! D is used only as an FIR filter, so its inverse need not be stable.
 
@@ -18,11 +18,11 @@ use hoid_numerics::{cholesky, elimination};
 use super::{defaults::ORDER, f64x2::F64x2, sizes::LARGEST_ORDER};
 
 const WIDTH: usize = LARGEST_ORDER + 1;
-/// Number of pairs of lags, rounded up.
+/// Number of pairs of adjacent lags, rounded up.
 const PAIRS: usize = WIDTH.div_ceil(2);
-/// One number for each lag, from lag zero.
+/// Array with one number for each lag, from lag zero.
 pub type Lags = [f64; WIDTH];
-/// Time constants of the prior remnant in s.
+/// Time constants, in s, of the remnant assumed as the prior.
 const DEFAULT_TIME_CONSTANTS_S: [f64; 2] = [0.3, 0.06];
 /// Prior standard deviation of the coefficients.
 const PRIOR_DEVIATION: f64 = 10.0;
@@ -79,8 +79,8 @@ impl NoiseModel {
         })
     }
 
-    /// Sets the sums as if they came from `samples` samples with this variance of eps and these autocovariances of v
-    /// relative to it. Returns false for invalid numbers.
+    /// Sets the sums as if they came from `samples` samples with the given variance of eps and the given
+    /// autocovariances of v, which are relative to that variance. Returns false for invalid numbers.
     pub(super) fn set_prior(&mut self, lags: &Lags, variance: f64, samples: f64) -> bool {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         if !(positive(variance) && lags[0] > 0.0 && lags.iter().all(|c| c.is_finite()) && positive(samples)) {
@@ -114,12 +114,13 @@ impl NoiseModel {
         1.0 + self.d().iter().sum::<f64>()
     }
 
-    /// Adds the last residuals v, the newest first, with a weight; eps is their innovation for the current D.
+    /// Adds the last residuals v, the newest first, with a weight; eps is the innovation that the current D computes
+    /// from them.
     #[inline(always)]
     pub fn update(&mut self, v: &[f64; WIDTH], eps: f64, weight: f64) {
         self.samples += 1.0;
         let memory = (0.5 * self.samples).clamp(self.shortest, self.longest.max(self.shortest));
-        // lambda = 1 - 1/memory gives an exponential window of this memory length.
+        // With lambda = 1 - 1/memory, the exponential window has the length `memory`.
         let lambda = 1.0 - 1.0 / memory;
         self.weight = lambda * self.weight + weight;
         self.squares = lambda * self.squares + weight * eps * eps;
@@ -134,7 +135,7 @@ impl NoiseModel {
             self.fade = 1.0;
         }
         let weight = weight / self.fade;
-        // The default order is passed as a constant, so that its loops have a constant length.
+        // The default order is passed as a constant, so that the loops over the lags have a constant length.
         match self.order {
             ORDER => self.add(v, weight, ORDER),
             order => self.add(v, weight, order),
@@ -215,7 +216,7 @@ impl NoiseModel {
     #[inline(always)]
     fn solve_of<const N: usize>(&mut self, p: usize) {
         let ridge = self.ridge();
-        // Normal equations S d = -s_0 with the ridge on both sides: (S + r I) d = r d_prior - s_0.
+        // The ridge is on both sides of the normal equations S d = -s_0: (S + r I) d = r d_prior - s_0.
         let mut d = [0.0; N];
         for (i, d) in d.iter_mut().enumerate().take(p) {
             *d = ridge * self.prior_d.get(i).copied().unwrap_or(0.0) - self.product(0, i + 1);

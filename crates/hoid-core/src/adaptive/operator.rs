@@ -1,6 +1,6 @@
 //! Reported operator: its parameters and their covariance, computed from gains and corrections.
 //!
-//! K_e and K_e_dot belong to the gain and lead nearest to the numerator at [`NEAR_RAD_S`], by least squares in
+//! K_e and K_e_dot are those of the gain and lead nearest to the numerator at [`NEAR_RAD_S`], by least squares in
 //! `K_e + K_e_dot j omega = Y e^{j tau omega} (1 - omega^2/omega_nm^2 + 2 j zeta omega/omega_nm)`; this is exact for an
 //! operator with a gain and a lead. K_e and K_e_dot are linear in the state, so their covariance is `M P M'`, where M
 //! maps the state to them and P is the covariance of the mixture ([`super::mixture`]). The scatter of other operators
@@ -13,22 +13,23 @@ use super::{
     sizes::{DYNAMICS, GAINS, LINEAR, PARAMETERS, STATES},
 };
 
-/// In the first seconds the noise model is uncertain, and the standard errors are too small. After t seconds they are
-/// multiplied by `1 + SETTLING_S/t`. The value was chosen on virtual people with another seed than those of the test
-/// (`tests/first_seconds.rs` of `hoid-track`).
+/// Time constant in s of a correction of the standard errors, which are too small in the first seconds because the
+/// noise model is uncertain. After t seconds they are multiplied by `1 + SETTLING_S/t`. The value was chosen on virtual
+/// people with another seed than those of the test (`tests/first_seconds.rs` of `hoid-track`).
 const SETTLING_S: f64 = 4.0;
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// Returns K_e, K_e_dot, omega_nm in rad/s, zeta_nm, and tau_e in s.
     pub fn operator(&self) -> [f64; PARAMETERS] {
         let [k_e, k_e_dot, omega, zeta, tau] = self.live().operator();
-        // The error is held over each sample; half a sample of the delay belongs to this zero-order hold.
+        // The error is held over each sample; half a sample of the delay is due to this zero-order hold and is
+        // subtracted.
         let hold = 0.5 * self.sample_time();
         [k_e, k_e_dot, omega, zeta, (tau - hold).max(0.0)]
     }
 
     /// Returns the covariance of [`AdaptiveFilter::operator`], including the scatter of other operators that predict u
-    /// about as well.
+    /// about as well as the estimate.
     pub fn operator_covariance(&self) -> [[f64; PARAMETERS]; PARAMETERS] {
         let mut rows = [[0.0; STATES]; PARAMETERS];
         for (row, gains) in rows.iter_mut().zip(self.gain_and_lead()) {
@@ -44,10 +45,10 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         core::array::from_fn(|i| core::array::from_fn(|j| own[i][j] + scatter[i][j]))
     }
 
-    /// Returns T_L in s and its variance. Each hypothesis has the lead time T that minimises `E (K_e_dot - T K_e)^2`.
-    /// T_L is the mean of these lead times, and its variance is computed from that of `K_e_dot - T_L K_e` with the
-    /// covariance of the mixture. A single T for the mixture would be far too short if unlikely hypotheses, such as
-    /// those of the last second, leave K_e undetermined.
+    /// Returns T_L in s and its variance. Each hypothesis has the lead time T that minimises the expected value of
+    /// `(K_e_dot - T K_e)^2`. T_L is the mean of these lead times, and its variance is computed from that of
+    /// `K_e_dot - T_L K_e` with the covariance of the mixture. A single T for the mixture would be far too short if
+    /// unlikely hypotheses, such as those born in the last second, leave K_e undetermined.
     pub fn lead_time(&self) -> [f64; 2] {
         let map = self.gain_and_lead();
         let pair = |state: &[f64; STATES]| map.map(|row| (0..GAINS).map(|k| row[k] * state[k]).sum::<f64>());

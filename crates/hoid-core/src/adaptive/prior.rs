@@ -20,8 +20,8 @@ pub struct AdaptivePrior {
     pub order: usize,
     /// Memory of the noise model in s.
     pub noise_memory: f64,
-    /// Time in s after which the estimate starts. The ratio of u to e over this time sets the scale of the prior of the
-    /// gains.
+    /// Time in s after which the estimate starts. The ratio of the magnitudes of u and e over this time sets the scale
+    /// of the prior of the gains.
     pub hold: f64,
     /// Prior of the changes of the operator.
     pub changes: ChangePrior,

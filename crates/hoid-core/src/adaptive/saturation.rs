@@ -1,23 +1,24 @@
 //! Censored samples: outputs at a limit of the stick.
 //!
-//! An output at a limit shows only that the intended output was at least as large. If it were used as measured, it
-//! would bias the gains towards zero and add an error to the residuals with which the following samples are filtered.
-//! Such samples therefore do not update the estimate. The filters receive the predicted output if it lies beyond the
-//! limit, and the limit otherwise (for regression with censored outputs see J. Tobin, *Econometrica* 26 (1958) 24-36).
+//! An output at a limit shows only that the intended output was at or beyond this limit. If it were used as measured,
+//! it would bias the gains towards zero and add an error to the residuals with which the following samples are
+//! filtered. Such samples therefore do not update the estimate. The filters receive the predicted output if it lies
+//! beyond the limit, and the limit otherwise (for regression with censored outputs see J. Tobin, *Econometrica* 26
+//! (1958) 24-36).
 //!
-//! The stick is at a limit if two consecutive samples are equal and no output has been larger in that direction. From
+//! The stick is at a limit if two consecutive outputs are equal and no output has been farther in that direction. From
 //! then on, a single sample at the limit is enough. When a limit is first reached, the first of the two samples is
 //! recognised as a limit only in a replay.
 
 use super::history::Use;
 
-/// Limits of the stick that have been reached.
+/// Limits of the stick, as far as u has reached them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Saturation {
     lowest: f64,
     highest: f64,
     last: f64,
-    /// Whether the lower and the upper limit of the stick are known, since u has stayed there.
+    /// True for the lower and for the upper limit if u has stayed there, so that the limit is known.
     known: [bool; 2],
 }
 
@@ -34,7 +35,7 @@ impl Saturation {
         }
     }
 
-    /// Returns the limit at which the stick is, or `None` if it is not at a limit.
+    /// Returns the limit that an output has reached, or `None` if it is not at a limit.
     #[inline(always)]
     pub fn end(&self, u: f64) -> Option<Use> {
         let [low, high] = self.known;
@@ -46,8 +47,8 @@ impl Saturation {
         }
     }
 
-    /// Returns the output that replaces an output at a limit in the filters: the prediction, but not inside the limit,
-    /// and at most one range of the stick beyond it.
+    /// Returns the output that replaces an output at a limit in the filters: the prediction, limited to the interval
+    /// from the limit to one range of the stick beyond it.
     #[inline(always)]
     pub fn beyond(&self, end: Use, u: f64, predicted: f64) -> f64 {
         let range = self.highest - self.lowest;

@@ -1,6 +1,6 @@
-//! Last signals of a basis, the newest first, stored without being moved at each sample.
+//! Last signals of a basis, the newest first, stored so that no signal is moved when a sample is added.
 //!
-//! The ring is stored as two consecutive copies, so that its numbers are contiguous from any start.
+//! The ring is stored twice in succession, so that its signals are contiguous from any start.
 
 use super::{
     f64x2::F64x2,
@@ -49,7 +49,7 @@ impl SignalHistory {
 }
 
 impl PartialEq for SignalHistory {
-    /// Equality does not depend on the position at which the ring starts.
+    /// True if the signals are equal, regardless of the position at which each ring starts.
     fn eq(&self, other: &Self) -> bool {
         self.newest_first() == other.newest_first()
     }
@@ -57,7 +57,7 @@ impl PartialEq for SignalHistory {
 
 impl State for SignalHistory {
     /// Rotates the ring so that it starts at position zero, and then visits the signals, the newest first. The saved
-    /// numbers do not depend on the former position.
+    /// numbers thus do not depend on the position at which the ring started.
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         self.twice[..LARGEST_ORDER].rotate_left(self.newest);
         self.newest = 0;

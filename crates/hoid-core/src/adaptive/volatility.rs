@@ -1,11 +1,12 @@
 //! Dispersion of the power of the innovations in time.
 //!
 //! For a remnant of constant power the block energies are chi-square: the logarithm of the energy of n samples has the
-//! variance 2/n. People who act in pulses have innovations in bursts, with a variance tens of times larger. A
-//! likelihood that treats their samples as independent is too sharp and splits the data of a constant operator into
-//! many segments. Each sample therefore counts as `1/c` of a sample, the quasi-likelihood of overdispersed data (R. W.
-//! M. Wedderburn, *Biometrika* 61 (1974) 439-447), with `c = v^POWER`, where v is the variance of the log energies
-//! divided by its value for constant power. Differences between successive blocks remove slow drifts of the power:
+//! variance 2/n. People who act in pulses have innovations in bursts, and the variance of the log energies is tens of
+//! times larger. A likelihood that treats their samples as independent is too sharp and splits the data of a constant
+//! operator into many segments. Each sample therefore counts as `1/c` of a sample, the quasi-likelihood of
+//! overdispersed data (R. W. M. Wedderburn, *Biometrika* 61 (1974) 439-447), with `c = v^POWER`, where v is the
+//! variance of the log energies divided by its value for constant power. Differences between successive blocks remove
+//! slow drifts of the power:
 //!
 //! `v = (pi/2) (mean |ln E_k - ln E_{k-1}|)^2/(4/n)`,
 //!
@@ -17,7 +18,7 @@
 
 /// Exponent of the dispersion `c = v^POWER`.
 const POWER: f64 = 0.3;
-/// Weight of the prior v = 1, in differences of log energies.
+/// Weight of the prior v = 1, as a number of differences of log energies.
 const PRIOR_DIFFERENCES: f64 = 4.0;
 /// Largest value of v.
 const LARGEST: f64 = 1000.0;
@@ -25,7 +26,7 @@ const LARGEST: f64 = 1000.0;
 /// Running mean of the absolute differences of the log energies, scaled to 1 for a constant power.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Volatility {
-    /// Number of blocks per energy.
+    /// Number of blocks over which one energy is summed.
     blocks: u64,
     taken: u64,
     energy: f64,
@@ -63,7 +64,7 @@ impl Volatility {
         let log = libm::log(self.energy);
         if log.is_finite() {
             if self.started {
-                // E|N(0, 2 var)| = sqrt(4 var/pi). With var = 2/n and this scale, the mean of the steps is sqrt(v).
+                // E|N(0, 2 var)| = sqrt(4 var/pi). With var = 2 v/n and this scale, the mean of the steps is sqrt(v).
                 let step = log - self.last;
                 self.steps += step.abs() * libm::sqrt(0.125 * core::f64::consts::PI * self.samples);
                 self.differences += 1.0;

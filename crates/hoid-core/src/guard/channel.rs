@@ -1,4 +1,4 @@
-//! Guard of one signal: limits for its next sample.
+//! Guard of one signal, which checks whether its next sample is plausible.
 //!
 //! **Prediction.** With `nabla x(t) = x(t) - x(t-1)`, the polynomial of degree j-1 through the last j samples
 //! extrapolates to a value that differs from x(t) by exactly `r_j(t) = nabla^j x(t)` (Newton's backward formula). The
@@ -9,12 +9,12 @@
 //! **Scale.** q_j is the 99 % quantile of `|r_j|`, estimated by stochastic approximation on a logarithmic scale (H.
 //! Robbins and S. Monro, *Annals of Mathematical Statistics* 22 (1951) 400-407):
 //!
-//! `q <- q (1 + g (1 - p))` where `|r| > q`, else `q <- q (1 - g p)`, with p = .01, g = .05.
+//! `q <- q (1 + g (1 - p))` if `|r| > q`, else `q <- q (1 - g p)`, with p = .01, g = .05.
 //!
 //! The size of an outlier does not matter: one sample changes q by at most 5 %. A quantile in the tail is used instead
-//! of the median, because the u of a person rests and moves in pulses, and the limit must accept the tails of its
-//! distribution. p_j is the 90 % quantile, computed in the same way with g = .02. Samples at which the signal stays
-//! constant carry no information about its motion and do not affect the quantiles.
+//! of the median, because the u of a person rests and moves in pulses, and the limit must accept the tails of the
+//! distribution of its differences. p_j is the 90 % quantile, computed in the same way with g = .02. Samples at which
+//! the signal stays constant carry no information about its motion and do not affect the quantiles.
 //!
 //! **Outliers.** A sample is held back if `|r_j| > max(m_j q_j, floor)` with
 //!
@@ -22,11 +22,11 @@
 //!
 //! averaged over about the last 20 s, since the ratio of two tracked quantiles is noisy. In a tail of the form
 //! `P(|r| > x) = exp(-(x/s)^k)` (W. Weibull, *Journal of Applied Mechanics* 18 (1951) 293-297), the value exceeded with
-//! probability P is `s (-log P)^(1/k)`. The values for .1 and .01 differ by the factor `2^(1/k)`, those for 1e-2 and
-//! 1e-8 by its square, `4^(1/k)`. The limit `m q` is therefore exceeded by one of 1e8 samples, both for a steady hand
-//! (k = 2: m = 2; a Gaussian tail gives 2.45) and for a hand that moves in bursts (k = 1: m = 4; k = .7: m = 7). With m
-//! = 2.5, Gaussian errors are held back above 6.4 standard deviations, which is one of 8e9 samples. The floor is a
-//! fraction of the mean magnitude of the signal, below which an outlier has no effect.
+//! probability P is `s (-log P)^(1/k)`. The values for P = .1 and .01 differ by the factor `2^(1/k)`, those for 1e-2
+//! and 1e-8 by its square, `4^(1/k)`. The limit `m q` is therefore exceeded by one of 1e8 samples, both for a steady
+//! hand (k = 2: m = 2; a Gaussian tail gives 2.45) and for a hand that moves in bursts (k = 1: m = 4; k = .7: m = 7).
+//! With m = 2.5, Gaussian errors are held back above 6.4 standard deviations, which is one of 8e9 samples. The floor is
+//! a fraction of the mean magnitude of the signal; a smaller outlier has no effect.
 //!
 //! **Held-back samples.** While samples are held back, the signal is continued with its last slope, damped with the
 //! time constant [`SLOPE_S`], if the order is 2 or more, and otherwise with its last value. After h samples, the signal
@@ -35,25 +35,26 @@
 
 /// Number of orders of the backward differences.
 pub const ORDERS: usize = 4;
-/// Probability beyond the quantile, and gain of the approximation of the quantile.
+/// Probability that an error exceeds the quantile; `GAIN` is the gain of the approximation of the quantile.
 const TAIL_PROBABILITY: f64 = 0.01;
 const GAIN: f64 = 0.05;
-/// Probability beyond the inner quantile, and gain of the approximation of the inner quantile.
+/// Probability that an error exceeds the inner quantile; `INNER_GAIN` is the gain of the approximation of the inner
+/// quantile.
 const INNER_TAIL_PROBABILITY: f64 = 0.1;
 const INNER_GAIN: f64 = 0.02;
-/// Smallest and largest limit, relative to the quantile.
+/// Smallest limit of an error, relative to the quantile; `LARGEST_TAIL_RATIO` is the largest.
 const LIMIT: f64 = 2.5;
 const LARGEST_TAIL_RATIO: f64 = 12.0;
-/// Largest mean magnitude, relative to the inner quantile, of differences that are typical of the signal. Gaussian
-/// errors have .49 and Laplacian errors .43; errors five times as large have 2.4 and 2.2.
+/// Largest mean magnitude of differences, relative to their inner quantile, at which they are typical of the signal.
+/// Gaussian errors have .49 and Laplacian errors .43; errors five times as large have 2.4 and 2.2.
 const TYPICAL: f64 = 1.3;
 /// Number of blocks over which the tails are averaged.
 const AVERAGED: u32 = 20;
-/// Ratio of the inner quantile to the outer quantile for Gaussian errors.
+/// Ratio of the inner (90 %) quantile to the 99 % quantile for Gaussian errors.
 const GAUSSIAN_INNER: f64 = 1.6449 / 2.5758;
 /// Time constant in s with which the slope of a held-back signal is damped.
 pub const SLOPE_S: f64 = 0.1;
-/// Ratio of the quantile to the mean magnitude for Gaussian errors, used for the initial quantiles.
+/// Ratio of the 99 % quantile to the mean magnitude for Gaussian errors, used for the initial quantiles.
 const QUANTILE_OVER_MEAN: f64 = 3.228;
 
 /// Guard of one signal.
@@ -64,11 +65,12 @@ pub struct ChannelGuard {
     differences: [f64; ORDERS - 1],
     /// Number of consecutive samples that were not replaced, up to [`ORDERS`].
     known: usize,
-    /// 99 % quantiles of the differences; zero if unknown.
+    /// 99 % quantiles of the magnitudes of the differences; zero if unknown.
     quantiles: [f64; ORDERS],
     /// Inner (90 %) quantiles, from which the tail is extrapolated.
     inner: [f64; ORDERS],
-    /// Mean of the squared ratio of the 99 % quantile to the inner quantile, and number of averaged blocks.
+    /// Mean of the squared ratio of the 99 % quantile to the inner quantile, and number of blocks over which it was
+    /// averaged.
     tail_ratio: [f64; ORDERS],
     averaged: u32,
     /// True once outliers are being detected.
@@ -77,10 +79,10 @@ pub struct ChannelGuard {
     resting: f64,
     /// Order of the prediction minus one.
     order: usize,
-    /// Lower bound of the limit.
+    /// Lower bound of the limit of the prediction error.
     floor: f64,
-    /// Number of held-back samples, the largest error among them, the last sample before them, and the slope of the
-    /// signal.
+    /// Number of held-back samples, the largest deviation of one of them from the continued signal, the last sample
+    /// before them, and the slope of the signal.
     held: u32,
     largest_error: f64,
     base: f64,
@@ -99,8 +101,8 @@ impl ChannelGuard {
         self.order = self.order.min(ORDERS - 1);
     }
 
-    /// Builds the guard of a signal without prior knowledge. It accepts all finite samples until
-    /// [`ChannelGuard::set_quantiles`] or [`ChannelGuard::start_detection`].
+    /// Builds the guard of a signal without prior knowledge. Until [`ChannelGuard::set_quantiles`] or
+    /// [`ChannelGuard::start_detection`] is called, the guard accepts all finite samples.
     pub fn new(sample_time: f64) -> Self {
         Self {
             last: 0.0,
@@ -122,9 +124,9 @@ impl ChannelGuard {
         }
     }
 
-    /// Sets the 99 % quantiles of the differences of order 1 to 4, known from the past of the signal, and starts the
-    /// detection of outliers. A quantile of zero or less counts as unknown. The tails are assumed to be Gaussian until
-    /// they are learnt.
+    /// Sets the 99 % quantiles of the magnitudes of the differences of order 1 to 4, known from the past of the signal,
+    /// and starts the detection of outliers. A quantile of zero or less counts as unknown. The tails are assumed to be
+    /// Gaussian until they are learnt.
     pub fn set_quantiles(&mut self, quantiles: [f64; ORDERS]) {
         self.set_tails(quantiles, quantiles.map(|q| GAUSSIAN_INNER * q));
     }
@@ -139,7 +141,7 @@ impl ChannelGuard {
     }
 
     /// Sets the initial values of unknown quantiles from the mean magnitudes of the differences. The quantiles are then
-    /// learnt; no sample counts as an outlier until [`ChannelGuard::start_detection`].
+    /// learnt; until [`ChannelGuard::start_detection`], no sample counts as an outlier.
     pub fn start_learning(&mut self, means: [f64; ORDERS]) {
         for (j, mean) in means.into_iter().enumerate() {
             if self.quantiles[j] <= 0.0 {
@@ -160,8 +162,8 @@ impl ChannelGuard {
         self.detects_outliers
     }
 
-    /// True if consecutive samples, the first of them after a jump, move like the signal: the mean magnitude of their
-    /// differences, of the order in use, is below that of a signal about three times as large.
+    /// True if consecutive samples, the first of them after a jump, move like the signal: the mean magnitude of the
+    /// prediction errors, of the order in use, is below that of a signal about three times as large.
     pub fn moves_typically(&self, samples: impl Iterator<Item = f64>) -> bool {
         let (mut past, mut count, mut sum) = ([0.0; ORDERS], 0, 0.0);
         for x in samples {
@@ -198,7 +200,7 @@ impl ChannelGuard {
         self.last
     }
 
-    /// Returns the last first difference if the order of the prediction is 2 or more, otherwise zero.
+    /// Returns the difference between the last two samples if the order of the prediction is 2 or more, otherwise zero.
     pub fn slope(&self) -> f64 {
         if self.order_in_use() > 0 {
             self.differences[0]
@@ -212,7 +214,7 @@ impl ChannelGuard {
         self.order > 0
     }
 
-    /// Sets the lower bound of the limit.
+    /// Sets the lower bound of the limit of the prediction error.
     pub fn set_floor(&mut self, floor: f64) {
         self.floor = floor;
     }
@@ -226,7 +228,7 @@ impl ChannelGuard {
         [first, second, third, third - self.differences[2]]
     }
 
-    /// Order of the prediction in use minus one, limited to orders that need no replaced samples.
+    /// Order of the prediction in use minus one, limited so that the differences contain no replaced samples.
     #[inline(always)]
     fn order_in_use(&self) -> usize {
         let most = self.known.saturating_sub(1);
@@ -244,7 +246,7 @@ impl ChannelGuard {
     #[inline(always)]
     pub fn is_outlier(&self, errors: &[f64; ORDERS]) -> bool {
         let order = self.order_in_use();
-        // The comparison is false for NaN.
+        // The comparison is false if the error is NaN.
         let within = errors[order].abs() <= self.limit(order);
         !within && (self.detects_outliers && self.known > 0 || !errors[0].is_finite())
     }
@@ -284,8 +286,8 @@ impl ChannelGuard {
         let weight = 1.0 / f64::from(self.averaged);
         for ((tail_ratio, q), p) in self.tail_ratio.iter_mut().zip(&self.quantiles).zip(&self.inner) {
             let quotient = q / p;
-            // Unknown quantiles give 0/0; the limit of such a tail is the lower bound `LIMIT`, which is about that of a
-            // Gaussian tail. `clamp` would return NaN, which no later block removes.
+            // Unknown quantiles give 0/0; the limit of a signal with such quantiles is the lower bound `LIMIT`, which
+            // is about that of a Gaussian tail. `clamp` would return NaN, which would stay in the average for ever.
             let square = match quotient.is_nan() {
                 true => LIMIT,
                 false => (quotient * quotient).clamp(LIMIT, LARGEST_TAIL_RATIO),
@@ -313,7 +315,7 @@ impl ChannelGuard {
         self.held
     }
 
-    /// Returns the largest error among the held-back samples.
+    /// Returns the largest deviation of a held-back sample from the last value of the continued signal.
     pub fn largest_error(&self) -> f64 {
         self.largest_error
     }
@@ -346,8 +348,8 @@ impl ChannelGuard {
         (x - expected).abs() <= room
     }
 
-    /// Continues from the sample with which the signal has returned, with the mean slope since the last accepted
-    /// sample.
+    /// Continues from the sample with which the signal has returned, with the mean slope since the last sample before
+    /// those held back.
     pub fn resume(&mut self, x: f64) {
         let slope = (x - self.base) / (f64::from(self.held) + 1.0);
         self.last = x;
@@ -356,7 +358,7 @@ impl ChannelGuard {
         (self.held, self.largest_error) = (0, 0.0);
     }
 
-    /// Continues from the last recorded samples of the signal, the newest last.
+    /// Continues the prediction from the given samples of the signal, the newest last.
     pub fn restart(&mut self, samples: impl Iterator<Item = f64>) {
         (self.known, self.held, self.largest_error, self.slope) = (0, 0, 0.0, 0.0);
         let mut first = true;

@@ -7,7 +7,7 @@
 //! | file | contents |
 //! |---|---|
 //! | [`channel`] | one signal: causal prediction of its next sample, scale of the prediction errors, held-back samples |
-//! | [`profile`] | both signals over a second: their size and smoothness compared with earlier data; idle, frozen and swapped channels; a model that predicts u worse than the past of u alone |
+//! | [`profile`] | both signals over a second: their magnitude and smoothness compared with earlier data; idle, frozen and swapped channels; a model that predicts u worse than the past of u alone |
 //! | [`resting`] | distinction between a resting stick and a frozen channel |
 //! | [`mod@reference`] | fixed model of the start of the recursion, with which a diverged estimate is detected |
 //!

@@ -1,10 +1,10 @@
 //! Comparison of the signals of one second with earlier data.
 //!
 //! For each block of one second, the following mean magnitudes are computed: those of e and u about their long-run
-//! means, `m_c`, those of their backward differences of order 1 to 4, `a_cj`, and that of the innovations of the
-//! recursion, `a_eps`. The long-run values M_c and A_cj follow with a time constant of 60 blocks. The values of a block
-//! are limited to between half and twice the long-run values, so that no block changes these by more than 1/60. Blocks
-//! in which a fault is found are not used.
+//! means, `m_c` for channel c; those of their backward differences of order j = 1 to 4, `a_cj`; and that of the
+//! innovations of the recursion, `a_eps`. The long-run values M_c and A_cj follow with a time constant of 60 blocks.
+//! The values of a block are limited to between half and twice the long-run values, so that no block changes these by
+//! more than 1/60. Blocks in which a fault is found are not used.
 //!
 //! | finding | rule | reason |
 //! |---|---|---|
@@ -14,7 +14,7 @@
 //! | larger | `a_c1 > 5 A_c1` and `a_c3 > 5 A_c3` for both e and u in two consecutive blocks | both signals are scaled by a factor |
 //! | rescaled | all four `a_cj/A_cj` of one channel above 3.5 and within a factor of 1.5 of each other, those of the other channel below 2, in two consecutive blocks | a unit or a gain setting was changed |
 //! | swapped | the sum over blocks of `d(own) - d(other) - 1`, at most 4 per block and never below 0, reaches 6 | e resembles the earlier u, and u the earlier e; d is the sum over both channels of `\|log a_1/A_1\| + \|log a_3/A_3\|` |
-//! | misfit | `R = a_eps/min_j a_uj` is above 4 times its long-run value and above 1.5, and a_eps is above twice its long-run value, in two consecutive blocks | the last samples of u predict it better than the model, which also uses e; earlier, the model was better |
+//! | misfit | `R = a_eps/min_j a_uj` is above 4 times its long-run value and above 1.5, and a_eps is above twice its long-run value, in two consecutive blocks | the past of u alone predicts u better than the model, which also uses e; earlier, the model was better |
 //!
 //! The sum for swapped channels is a one-sided CUSUM (E. S. Page, *Biometrika* 41 (1954) 100-115). Its terms are
 //! negative for channels that are not swapped, and at most the distance between the two profiles for swapped channels.
@@ -29,7 +29,7 @@ pub const CHANNELS: usize = 2;
 const LEARNING_BLOCKS: u32 = 10;
 /// Weight of a block once the long-run values are known.
 const WEIGHT: f64 = 1.0 / 60.0;
-/// Fraction of the typical mean difference up to which a signal counts as constant. The constants below are the limits
+/// Fraction of the long-run mean difference up to which a signal counts as constant. The constants below are the limits
 /// of the other rules.
 pub const CONSTANT_FRACTION: f64 = 1e-3;
 const FROZEN_U_BLOCKS: u32 = 3;
@@ -50,11 +50,11 @@ const LEAST_RATIO: f64 = 1.5;
 /// Ratio of the innovations to their long-run value below which there is no misfit.
 const LEAST_GROWTH: f64 = 2.0;
 const MISFIT_BLOCKS: u32 = 2;
-/// Largest distance of a block that resembles the long-run values: four times the logarithm of four.
+/// Distance of a block from the long-run values below which it resembles them: four times the logarithm of four.
 const SIMILAR_DISTANCE: f64 = 4.0 * 1.386;
 /// Distance from the long-run values above which a block is unusual.
 const UNUSUAL_DISTANCE: f64 = 4.0;
-/// Largest contribution of one logarithm to a distance.
+/// Largest contribution of the logarithm of one ratio to a distance.
 const LARGEST_LOG: f64 = 10.0;
 
 /// Sums over the samples of a block, or the means computed from them.
@@ -111,7 +111,7 @@ impl Block {
         self.samples += 1;
     }
 
-    /// Adds an innovation.
+    /// Adds the magnitude of an innovation.
     #[inline(always)]
     pub fn add_innovation(&mut self, innovation: f64) {
         self.innovation += innovation.abs();
@@ -132,13 +132,15 @@ impl Block {
         }
     }
 
-    /// Ratio R of the mean innovation to the smallest mean difference of u; `None` if either is missing.
+    /// Ratio R of the mean magnitude of the innovations to the smallest mean difference of u; `None` if either is
+    /// missing.
     fn ratio(&self) -> Option<f64> {
         let least = self.least_of_u();
         (self.innovations > 0 && least > 0.0).then(|| self.innovation / least)
     }
 
-    /// Smallest mean difference of u, which is the error of predicting u from its own past.
+    /// Smallest mean magnitude of the differences of u of order 1 to 4, which is the error of predicting u from its own
+    /// past.
     fn least_of_u(&self) -> f64 {
         self.differences[1]
             .iter()
@@ -168,7 +170,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// True for faults that can become the new normal state of the signals; frozen and idle channels cannot.
+    /// True for faults that can turn out to be a new normal state of the signals; frozen and idle channels cannot.
     pub fn may_be_the_new_level(self) -> bool {
         !matches!(self, Self::FrozenInput | Self::FrozenOutput | Self::Idle)
     }
@@ -251,13 +253,14 @@ impl Profile {
             && self.misfits == 0
     }
 
-    /// True if the means of a block differ from the long-run values by more than a factor of e, in the mean of the
-    /// logarithms.
+    /// True if the mean differences of a block differ from the long-run values by more than a factor of e, in the mean
+    /// of the absolute logarithms of their ratios.
     pub fn is_unusual(&self, block: &Block) -> bool {
         self.is_known() && self.distance(block, [0, 1]) > UNUSUAL_DISTANCE
     }
 
-    /// True if the means of a block are within a factor of four of the long-run values, in the mean of the logarithms.
+    /// True if the mean differences of a block are within a factor of four of the long-run values, in the mean of the
+    /// absolute logarithms of their ratios.
     pub fn resembles(&self, block: &Block) -> bool {
         self.is_known() && self.distance(block, [0, 1]) < SIMILAR_DISTANCE
     }
@@ -281,7 +284,7 @@ impl Profile {
             let bounded = if known { within(found, [least, most]) } else { found };
             *typical += weight * (bounded - *typical);
         };
-        // If the squares of a signal underflow, the ratio is not defined.
+        // If the squares of a signal underflow, the ratio R is not defined.
         let sound = |ratio: &f64| ratio.is_finite() && block.innovation.is_finite();
         if let Some(ratio) = block.ratio().filter(sound) {
             let known = self.ratios >= LEARNING_BLOCKS;
@@ -318,7 +321,7 @@ impl Profile {
         }
     }
 
-    /// Returns the minimum duration, in blocks, of a fault that was just reported.
+    /// Returns the minimum time, in blocks, for which a fault that was just reported has lasted.
     pub fn duration_blocks(&self, trouble: Fault) -> u32 {
         match trouble {
             Fault::FrozenOutput => self.frozen_u.max(trouble.blocks()),
@@ -332,7 +335,7 @@ impl Profile {
         if !self.is_known() {
             return None;
         }
-        // A channel that has never moved (there is no input, or it was not recorded) is not frozen.
+        // A channel that has never moved (because there is no input, or because it was not recorded) is not frozen.
         let below = |found: f64, share: f64, typical: f64| typical > 0.0 && found <= share * typical;
         let still = |c: usize| {
             below(
@@ -400,13 +403,14 @@ impl Profile {
         ends
     }
 
-    /// Distance of a block from the long-run values, where channel c is compared with channel `of[c]`.
+    /// Distance of a block from the long-run values, where channel c of the block is compared with the long-run values
+    /// of channel `of[c]`.
     fn distance(&self, block: &Block, of: [usize; CHANNELS]) -> f64 {
         let mut sum = 0.0;
         for (c, typical) in of.into_iter().enumerate() {
             for j in [0, 2] {
                 let (found, typical) = (block.differences[c][j], self.typical.differences[typical][j]);
-                // Two values of zero do not differ.
+                // If the values are equal, as two zeros are, their distance is zero.
                 let log = if found == typical {
                     0.0
                 } else {

@@ -10,16 +10,16 @@
 //! distribution, and gives little weight to a few outliers. Relative to those of a fixed model, the innovations of a
 //! sound recursion are larger by half its effective number of parameters divided by its memory: .2 % for memories of 2
 //! to 5 s and white innovations. They are larger by several per cent for a few seconds at a time if the order of the
-//! noise model is too low for the remnant, and by more for an unsteady person. Only the part beyond [`DRIFT`] counts.
-//! The one-sided cumulative sum (E. S. Page, *Biometrika* 41 (1954) 100-115) reports a diverged estimate when it
-//! reaches [`DIVERGED`].
+//! noise model is too low for the remnant, and by more for an unsteady person. Only the part of the logarithm beyond
+//! [`DRIFT`] counts. The one-sided cumulative sum (E. S. Page, *Biometrika* 41 (1954) 100-115) reports a diverged
+//! estimate when it reaches [`DIVERGED`].
 //!
 //! After a change of the person, an estimate that has followed the change predicts u better than the initial model, and
 //! the sum stays at zero.
 
 /// Highest order of a polynomial of the model.
 pub const MAX_ORDER: usize = 16;
-/// Increase of the log mean magnitude of the innovations that is tolerated.
+/// Tolerated increase of the logarithm of the mean magnitude of the innovations over that of the fixed model.
 pub const DRIFT: f64 = 0.2;
 /// Cumulative sum above which the estimate is reported as diverged.
 pub const DIVERGED: f64 = 40.0;
@@ -79,7 +79,7 @@ impl ReferenceModel {
         let sum = |c: &[f64; MAX_ORDER], past: &[f64; MAX_ORDER], n: usize| -> f64 {
             c[..n].iter().zip(&past[..n]).map(|(c, x)| c * x).sum()
         };
-        // The first coefficient of B multiplies x(t) itself.
+        // The first coefficient of B multiplies x(t) itself, the others multiply past values.
         let mut w = -sum(f, ws, nf);
         if nb > 0 {
             w += b[0] * x;
@@ -98,7 +98,7 @@ impl ReferenceModel {
         eps
     }
 
-    /// Discards the errors of the current block.
+    /// Discards the innovations of the current block.
     pub fn skip_block(&mut self) {
         (self.sum, self.samples) = (0.0, 0);
     }

@@ -16,14 +16,15 @@
 //! is more than twice as long with probability `2/((n+1)(n+2))`. The minimum of 8 s applies while only a few rests have
 //! been observed.
 //!
-//! The caller checks the other conditions of a rest: e must move during it, and the innovations must not be larger than
-//! is typical.
+//! The caller checks the other conditions of a rest: e must move during the rest, and the innovations must not be
+//! larger than is typical.
 
 /// Number of stored values.
 pub const ATOMS: usize = 4;
 /// Minimum duration of a rest in s.
 const LEAST_S: f64 = 0.1;
-/// Minimum number of rests at a value, and minimum fraction of the time, for which the value counts as an atom.
+/// Minimum number of rests at a value for it to count as an atom; `SHARE` is the minimum fraction of the time spent
+/// there.
 const RESTS: u32 = 3;
 const SHARE: f64 = 0.05;
 /// A rest at an atom is accepted if it is shorter than `ACCEPTED_REST_S` seconds or than `LONGEST_REST_FACTOR` times
@@ -61,7 +62,7 @@ pub struct Resting {
 crate::state!([] Resting { tolerance, atoms, samples, value, constant_samples, rejected });
 
 impl Resting {
-    /// Returns an empty list of rests.
+    /// Returns an empty list of rests, with the sample time in s.
     pub fn new(sample_time: f64) -> Self {
         Self {
             sample_time,
@@ -79,7 +80,7 @@ impl Resting {
         self.tolerance = tolerance;
     }
 
-    /// Takes a sample of u. NaN ends a constant span.
+    /// Takes a sample of u. A NaN ends a constant span.
     #[inline]
     pub fn take(&mut self, u: f64) {
         self.samples += 1;
@@ -94,13 +95,13 @@ impl Resting {
         }
     }
 
-    /// Marks the current constant span as no rest, so that it is not learnt.
+    /// Marks the current constant span as not being a rest, so that it is not learnt.
     pub fn reject(&mut self) {
         self.rejected = true;
     }
 
-    /// Learns the constant span that has just ended. If the list is full, its value replaces the value with the
-    /// shortest total duration.
+    /// Learns the constant span that has just ended. If the list of atoms is full and does not contain the value of the
+    /// span, this value replaces the atom with the shortest total duration.
     fn learn(&mut self) {
         let place = self.place().unwrap_or_else(|| {
             let least = (0..ATOMS).min_by_key(|i| self.atoms[*i].samples).unwrap_or(0);
@@ -116,13 +117,13 @@ impl Resting {
         atom.longest = atom.longest.max(constant_samples);
     }
 
-    /// Index of the current value in the list of atoms.
+    /// Index of the current value in the list of atoms; `None` if the list does not contain it.
     fn place(&self) -> Option<usize> {
         let known = |atom: &Atom| atom.rests > 0 && (atom.value - self.value).abs() <= self.tolerance;
         self.atoms.iter().position(known)
     }
 
-    /// True while u is constant because the person is resting.
+    /// True while u is constant because the person is resting at an atom.
     pub fn is_rest(&self) -> bool {
         let Some(place) = self.place() else {
             return false;

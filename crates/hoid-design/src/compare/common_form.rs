@@ -2,9 +2,9 @@
 //! form.
 //!
 //! People are independent, so the evidence for a form is the sum of its criteria over people and conditions, each
-//! relative to the best form of that person (K. P. Burnham and D. R. Anderson, *Model Selection and Multimodel
-//! Inference*, 2002, section 2.6). The common form is the simplest form within 2 of the smallest sum. A form that the
-//! data of most people leave open is not considered, because its parameters would not be determined.
+//! relative to the best form for the same person and condition (K. P. Burnham and D. R. Anderson, *Model Selection and
+//! Multimodel Inference*, 2002, section 2.6). The common form is the simplest form within 2 of the smallest sum. A form
+//! that the data of most people leave open is not considered, because its parameters would not be determined.
 
 use hoid_ident::family::{LEAST_WEIGHT, NO_EVIDENCE};
 use hoid_model::{Finding, Form};
@@ -49,7 +49,7 @@ pub(super) fn common_form(people: &[&[FormEvidence]]) -> Option<CommonForm> {
 }
 
 impl CommonForm {
-    /// Returns the note about a comparison in this form.
+    /// Returns the note that a comparison uses this form.
     pub(super) fn finding(&self, best: &str) -> Finding {
         Finding::note(
             "common-form",

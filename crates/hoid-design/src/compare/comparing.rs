@@ -494,7 +494,8 @@ fn known_of(e: &PersonEstimate) -> EstimatedValue {
     known(e.value, e.standard_error)
 }
 
-/// Returns one finding for each missing estimate, with the quantities concerned.
+/// Returns one finding for each person, condition and reason for which estimates are missing, with the quantities
+/// concerned.
 fn missing(result: &Comparison) -> Vec<Finding> {
     let mut all: Vec<(String, Vec<String>)> = Vec::new();
     for out in &result.left_out {

@@ -59,7 +59,7 @@ pub struct Difference {
     pub to: String,
     /// For an interaction, the factor whose effect differs, and its two levels.
     pub effect: Option<[String; 3]>,
-    /// Names of the people, each with the number of their group; all numbers are the same in comparisons within people.
+    /// Names of the people, each with the index of their group; all indices are the same in comparisons within people.
     pub people: Vec<(String, usize)>,
     /// The difference with its confidence interval, t and p-value.
     #[serde(flatten)]
@@ -74,7 +74,7 @@ pub struct Difference {
     /// ([`bayes_factor`](super::bayes_factor)).
     #[serde(default)]
     pub bayes_factor: Option<f64>,
-    /// Standard deviation of the difference between people, excluding the errors of their estimates.
+    /// Standard deviation, over people, of the difference, excluding the errors of their estimates.
     pub tau: f64,
     /// Share of tau^2 in the total variance of a typical estimate (I^2).
     pub i_squared: Option<f64>,

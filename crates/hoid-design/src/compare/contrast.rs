@@ -143,7 +143,7 @@ impl Resolved {
     }
 }
 
-/// Returns the conditions that are compared: those of all factors whose members are conditions.
+/// Returns the conditions that are compared: those that are members of a level of every factor over conditions.
 pub(super) fn conditions_of(factors: &[Resolved], group: &GroupEstimates) -> Vec<String> {
     let counts = |condition: &String| {
         let mut over = factors.iter().filter(|factor| !factor.of_people);

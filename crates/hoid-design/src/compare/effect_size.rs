@@ -8,9 +8,9 @@
 //! Both effect sizes use unweighted estimates, one per person (J. Cohen, *Statistical Power Analysis*, 1988, sections
 //! 2.2 and 2.3; L. V. Hedges, *J. Educ. Stat.* 6 (1981) 107-128). `J(m) = Gamma(m/2)/(sqrt(m/2) Gamma((m-1)/2))`
 //! removes the bias of small groups. The 95 % confidence intervals follow from inversion of the noncentral t
-//! distribution (J. H. Steiger and R. T. Fouladi, 1997): t has the noncentrality `delta = d sqrt(n)`, or `d sqrt(n_1
-//! n_2/(n_1 + n_2))` for two groups, and the ends of the interval are the two values of delta for which t is the .975
-//! and the .025 quantile.
+//! distribution (J. H. Steiger and R. T. Fouladi, 1997): t has the noncentrality `delta = d sqrt(n)`, or
+//! `d sqrt(n_1 n_2/(n_1 + n_2))` for two groups, and the ends of the interval are the two values of delta for which t
+//! is the .975 and the .025 quantile.
 //!
 //! With the density `f(s)` of `s = sqrt(chi^2_nu/nu)`, the distribution is `P(T <= t) = int Phi(t s - delta) f(s) ds`,
 //! computed by Simpson's rule over the range in which f is not negligible.
@@ -41,7 +41,8 @@ pub fn d_z(differences: &[f64]) -> Option<EffectSize> {
     of("d_z", mean(differences) / deviation, n.sqrt(), n - 1.0, 1.0)
 }
 
-/// Returns Hedges' g of the second group of people relative to the first.
+/// Returns Hedges' g of the second group of people relative to the first; `None` if the groups are too small or do not
+/// vary.
 pub fn hedges_g(first: &[f64], second: &[f64]) -> Option<EffectSize> {
     let (n1, n2) = (first.len() as f64, second.len() as f64);
     if n1 < 1.0 || n2 < 1.0 {
@@ -66,7 +67,7 @@ fn of(name: &str, d: f64, root: f64, dof: f64, correction: f64) -> Option<Effect
     })
 }
 
-/// Returns J(m), which removes the bias of small groups; `None` for one degree of freedom.
+/// Returns J(m), which removes the bias of small groups; NaN for one degree of freedom or fewer.
 fn correction(m: f64) -> f64 {
     if m <= 1.0 {
         return f64::NAN;

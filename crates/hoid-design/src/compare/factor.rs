@@ -1,7 +1,7 @@
 //! Factors: the variables in which conditions or people differ.
 //!
 //! A factor has levels, and a level has members: conditions (`axis:roll=C1_roll,C2_roll;pitch=C1_pitch,C2_pitch`) or
-//! people (`training:yes=P1,P4;no=P2,P3`). It varies **within** people if each person is in all of its levels, and
+//! people (`training:yes=P1,P4;no=P2,P3`). It varies **within** people if people are in several of its levels, and
 //! **between** people if each person is in only one of them. By default the conditions are the levels of the factor
 //! `condition`.
 
@@ -19,9 +19,9 @@ pub const CONDITION: &str = "condition";
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Variation {
-    /// Each person is in all levels of the factor.
+    /// People are in several levels of the factor.
     Within,
-    /// Each person is in exactly one level of the factor.
+    /// Each person is in only one level of the factor.
     Between,
 }
 
@@ -44,7 +44,7 @@ pub struct Level {
 pub struct Factor {
     /// Name of the factor.
     pub name: String,
-    /// Levels of the factor; if empty, those of the manifest, or the conditions.
+    /// Levels of the factor; if empty, the levels in the manifest, or the conditions.
     pub levels: Vec<Level>,
 }
 

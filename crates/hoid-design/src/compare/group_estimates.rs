@@ -59,7 +59,7 @@ pub struct GroupEstimates {
 }
 
 impl GroupEstimates {
-    /// Returns the path of a manifest whose recordings are still to analyse: `place` itself, or the manifest in a
+    /// Returns the path of a manifest whose recordings have not been analysed yet: `place` itself, or the manifest in a
     /// directory without results.
     pub fn recordings(place: &Path) -> Option<PathBuf> {
         if place.is_file() {

@@ -18,11 +18,11 @@
 //! - **beta** is `(X'W X)^-1 X'W y`, with the covariance `s^2 (X'W X)^-1`, `s^2 = y'P y/(n - p)`, and Student's
 //!   interval with n - p degrees of freedom (J. Hartung and G. Knapp, *Stat. Med.* 20 (2001) 3875-3889; for regression,
 //!   G. Knapp and J. Hartung, *Stat. Med.* 22 (2003) 2693-2710). If all errors are equal and X is a column of ones,
-//!   this is the one-sample t test for any tau^2. s^2 is not limited to one or more, since this would understate what
-//!   few people show.
+//!   this is the one-sample t test for any tau^2. s^2 is not limited to one or more, since this limit would make the
+//!   intervals for few people too wide.
 //! - **Q** is `y'P y` at tau^2 = 0, which is chi-squared with n - p degrees of freedom if all people are the same, and
-//!   `I^2 = tau^2/(tau^2 + v)` with the typical variance `v = (n - p)/tr P` at zero (J. P. T. Higgins and S. G.
-//!   Thompson, *Stat. Med.* 21 (2002) 1539-1558).
+//!   `I^2 = tau^2/(tau^2 + v)` with the typical variance `v = (n - p)/tr P`, where P is evaluated at tau^2 = 0 (J. P.
+//!   T. Higgins and S. G. Thompson, *Stat. Med.* 21 (2002) 1539-1558).
 //!
 //! If the standard errors are not known, all `v_i` are zero, tau^2 is the sample variance, and Q is missing.
 
@@ -292,7 +292,7 @@ impl Model {
         let heights: Vec<f64> = grid.iter().map(|tau| height(*tau)).collect::<Option<_>>()?;
         let best = (0..grid.len()).max_by(|a, b| heights[*a].total_cmp(&heights[*b]))?;
         let rises = slope(grid[best])? > 0.0;
-        // At the ends of the grid there is no neighbour on that side.
+        // A maximum at an end of the grid has a neighbour on one side only.
         if (best == 0 && !rises) || (best + 1 == grid.len() && rises) {
             return Some(grid[best]);
         }

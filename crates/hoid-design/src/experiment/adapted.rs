@@ -3,12 +3,12 @@
 //! **Crossover model** (D. T. McRuer and H. R. Jex, *IEEE Trans. Human Factors in Electronics* 8 (1967) 231-249):
 //! people adapt lead and lag so that `|H P|` falls by 20 dB per decade near the crossover frequency. With
 //! `s = d ln|P|/d ln omega` at 3 rad/s, the operator has to add the slope `p = -1 - s`; a lead adds `x^2/(1 + x^2)`,
-//! `x = T_L omega`, and a lag subtracts as much. If no form is given, it is a lead for p above .3, a lag for p below
-//! -.3, and otherwise a gain. Time constants are limited to the range found in people.
+//! `x = T_L omega`, and a lag subtracts as much. Unless a form is given, the form is a lead for p above .3, a lag for p
+//! below -.3, and otherwise a gain. Time constants are limited to the range found in people.
 //!
-//! **Gain**: it gives the largest crossover frequency up to 5 rad/s with a phase margin of at least 40 deg (the middle
-//! of the range of 20 to 65 deg in the same source). If the delay does not allow this margin, it gives the crossover
-//! frequency with the largest margin, which must be at least 15 deg.
+//! **Gain**: the gain gives the largest crossover frequency up to 5 rad/s with a phase margin of at least 40 deg (the
+//! middle of the range of 20 to 65 deg in the same source). If the delay does not allow this margin, the gain gives the
+//! crossover frequency with the largest margin, which must be at least 15 deg.
 //!
 //! **Neuromuscular system and delay**: the medians of [`OperatorPrior::population`]; for people who differ from the
 //! typical person, one parameter is a spread above or below its median. The gain is adapted separately for each of
@@ -78,7 +78,7 @@ pub(super) fn population(
         for sign in [-1.0, 1.0] {
             let value = entry.centre * (sign * entry.spread).exp();
             let name = format!("{} = {value:.2}", entry.parameter);
-            // A person whose delay is too long to control this element is left out.
+            // A person who cannot control this element, for example because of a long delay, is left out.
             others.extend(named(name, NeuromuscularValues::with(Some((&entry.parameter, value)))).ok());
         }
     }
@@ -102,7 +102,7 @@ fn form_of(element: &ContinuousTransferFunction) -> Form {
     }
 }
 
-/// Returns the time constant of a lead that adds this slope at 3 rad/s, limited to `longest_s`.
+/// Returns the time constant of a lead that adds this slope at 3 rad/s, at least .1 s and at most `longest_s`.
 pub(super) fn time_constant(slope: f64, longest_s: f64) -> f64 {
     let x = (slope.max(0.0) / (1.0 - slope).max(1e-9)).sqrt();
     (x / NEAR_CROSSOVER_RAD_S).clamp(SHORTEST_S, longest_s)

@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 
 use super::{DesignedLine, DifferencePlan, Enters, Expected, ExpectedResponse, RequestedQuantity, Task};
 
-/// Expected errors with a name: for another person, or for another forcing function of the same duration.
+/// Expected errors for another person, or for another forcing function of the same duration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NamedExpected {
     /// Name of the person or of the forcing function.

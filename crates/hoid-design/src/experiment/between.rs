@@ -1,10 +1,11 @@
-//! The standard deviation of a difference between people, which determines how many people are needed to detect it.
+//! The standard deviation, over people, of the difference between two conditions, which determines how many people are
+//! needed to detect the difference.
 //!
 //! | source | standard deviation b of the difference between two conditions |
 //! |---|---|
 //! | a number | that fraction of the quantity |
-//! | a comparison (`hoid compare --json`) | tau of its differences within people, which excludes the errors of the estimates; the root mean square of several such differences |
-//! | the result of a group with several conditions | the same, from a comparison of the conditions |
+//! | a comparison (`hoid compare --json`) | tau of its difference within people, which excludes the errors of the estimates; if there are several differences, the root mean square of their tau |
+//! | the result of a group with several conditions | tau as for a comparison, after the conditions have been compared |
 //! | the population of one condition (`hoid group --pool`) | sigma between its people, as an upper bound |
 //!
 //! If rho is the correlation of two conditions over people, b is `sigma sqrt(2 (1 - rho))`, which is at most sigma if
@@ -23,7 +24,7 @@ use serde_json::Value;
 use super::{DesignError, People};
 use crate::compare::{Comparing, Comparison, GroupEstimates, Quantity, Variation};
 
-/// Source of the spread of a difference between people.
+/// Source of the standard deviation, over people, of a difference between conditions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Between {
     /// A fraction of the quantity.
@@ -59,7 +60,7 @@ impl fmt::Display for Between {
     }
 }
 
-/// A spread in the unit of the quantity, with a text that names its source.
+/// A standard deviation over people, in the unit of the quantity, with a text that names its source.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Spread {
     pub value: f64,
@@ -67,8 +68,9 @@ pub(super) struct Spread {
 }
 
 impl Between {
-    /// Returns the spread of a quantity with this value. If no source is given, the spread comes from the people of the
-    /// design if they provide one; otherwise it is the default fraction.
+    /// Returns the standard deviation, over people, of a difference in the quantity with this name and value. If no
+    /// source is given, it comes from the people of the design if they provide it; otherwise it is the default fraction
+    /// of the value.
     ///
     /// # Errors
     /// [`DesignError::NoSpread`] if a file does not provide a spread.

@@ -30,7 +30,7 @@ pub(super) struct Given<'a> {
 }
 
 impl Given<'_> {
-    /// Returns the given controlled element, for people whose source does not name one.
+    /// Returns the given controlled element, for people whose source does not specify one.
     pub fn element(&self, people: &str) -> Result<ContinuousTransferFunction, DesignError> {
         let missing = || DesignError::NoElement {
             people: people.to_owned(),

@@ -4,14 +4,14 @@
 //!
 //! `sigma^2 = b^2 + 2 (w^2 + s^2)/r`
 //!
-//! where b is the standard deviation of the true difference between people, w the standard deviation of a person from
+//! where b is the standard deviation, over people, of the true difference, w the standard deviation of one person from
 //! run to run, and s the expected error of one run (`information`). The power of the paired t test is computed in
 //! `power`. More runs reduce the effect of w and s; only more people reduce the effect of b.
 //!
 //! **Defaults.** The spread from run to run is 6 % (in three recorded people the gain varied by 4 to 9 %). The spread
-//! between people is 10 % (the crossover of three recorded people fell by .31 to .78 rad/s from one element to another,
-//! a standard deviation of 10 % of its mean). A spread is relative to the quantity; for the phase margin it is the
-//! spread that results from this spread of the gain.
+//! of the difference over people is 10 % (the crossover of three recorded people fell by .31 to .78 rad/s from one
+//! element to another, a standard deviation of 10 % of its mean). A spread is relative to the quantity; for the phase
+//! margin it is the spread that results from this spread of the gain.
 //!
 //! **Answer.** If the number of runs is not given, the number with the lowest total cost is chosen, where each person
 //! costs as much as four runs (instruction and training) in addition to their own runs.
@@ -63,10 +63,10 @@ pub struct DifferenceRequest {
     pub power: f64,
     /// Significance level of the test.
     pub alpha: f64,
-    /// Standard deviation of the difference between people. If `None`, it comes from the people of the design if they
+    /// Standard deviation, over people, of the difference. If `None`, it comes from the people of the design if they
     /// provide it; otherwise it is [`BETWEEN_PEOPLE`].
     pub between_people: Option<Between>,
-    /// Relative standard deviation of a person from run to run.
+    /// Standard deviation of one person from run to run, relative to the quantity.
     pub run_to_run: f64,
 }
 
@@ -74,9 +74,9 @@ pub struct DifferenceRequest {
 pub const POWER: f64 = 0.8;
 /// Default significance level of the test.
 pub const ALPHA: f64 = 0.05;
-/// Default relative standard deviation of the difference between people.
+/// Default standard deviation, over people, of the difference, relative to the quantity.
 pub const BETWEEN_PEOPLE: f64 = 0.1;
-/// Default relative standard deviation of a person from run to run.
+/// Default standard deviation of one person from run to run, relative to the quantity.
 pub const RUN_TO_RUN: f64 = 0.06;
 
 impl DifferenceRequest {
@@ -114,11 +114,11 @@ pub struct DifferencePlan {
     pub size: f64,
     /// Expected error of one run.
     pub error_of_run: f64,
-    /// Standard deviation of a person from run to run, in the unit of the quantity.
+    /// Standard deviation of one person from run to run, in the unit of the quantity.
     pub run_to_run: f64,
-    /// Standard deviation of the difference between people, in the unit of the quantity.
+    /// Standard deviation, over people, of the difference between the conditions, in the unit of the quantity.
     pub between_people: f64,
-    /// Source of the standard deviation between people.
+    /// Source of `between_people`, in words.
     pub between_source: String,
     /// Numbers of people in the table.
     pub people: Vec<usize>,
@@ -136,7 +136,7 @@ const PEOPLE: [usize; 8] = [4, 6, 8, 10, 12, 16, 20, 30];
 const COST_OF_PERSON: usize = 4;
 
 impl DifferenceRequest {
-    /// Plans people and runs; `of_run` contains the expected errors of one run.
+    /// Plans the numbers of people and runs; `of_run` contains the expected errors of one run.
     ///
     /// # Errors
     /// [`DesignError::OutOfRange`] for an option out of range, [`DesignError::NotThere`] for an unknown quantity.
@@ -235,7 +235,7 @@ impl DifferenceRequest {
     }
 }
 
-/// Returns the index of the row with the given number of runs, otherwise of the row with the lowest cost.
+/// Returns the index of the row with the given number of runs or, if there is none, of the row with the lowest cost.
 fn answer(rows: &[RunsAndPeople], runs: Option<usize>) -> usize {
     if let Some(place) = rows.iter().position(|row| Some(row.runs) == runs) {
         return place;

@@ -127,7 +127,7 @@ pub enum DesignError {
         /// The problem with the source.
         reason: String,
     },
-    /// A group has several conditions, and the condition given is missing or unknown.
+    /// The given condition is not one of the group, or no condition is given although the group has several.
     #[error("the group has several conditions, and the given one is {found}: choose one (--condition) of {expected}")]
     Condition {
         /// The condition given.
@@ -135,7 +135,7 @@ pub enum DesignError {
         /// The conditions of the group.
         expected: String,
     },
-    /// The file does not provide the spread of a difference between people.
+    /// The file does not provide the standard deviation, over people, of a difference.
     #[error(
         "{path} has no spread between people of {name} ({reason}); expected a comparison that contains it (`hoid \
          compare --of {name} --json`), the result of a group with several conditions, a population.json, or a number, \

@@ -77,8 +77,8 @@ const RMS_MULTIPLE: f64 = 4.0;
 const MOST_RUNS: usize = 100;
 
 impl ExperimentDesign {
-    /// Returns an experiment for `hoid lab --config`; its condition is the scenario in a file with the name `scenario`
-    /// in the same directory. `None` if a run is not a whole number of hundredths of a second, as the lab requires.
+    /// Returns an experiment for `hoid lab --config`. Its condition is the scenario file named by `scenario`, in the
+    /// same directory. `None` if a run is not a whole number of hundredths of a second, as the lab requires.
     pub fn lab(&self, scenario: &str) -> Option<String> {
         if self.sample_s().to_bits() != SAMPLE_S.to_bits() {
             return None;

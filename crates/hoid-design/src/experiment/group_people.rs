@@ -199,7 +199,7 @@ fn of_pooled(pooled: &Pooled, place: &Path, element: &ContinuousTransferFunction
 }
 
 impl Row {
-    /// Replaces parameters by the pooled values of another row, if it contains them.
+    /// Replaces each parameter that the row `pooled` contains by its pooled value.
     fn with(mut self, pooled: &Self) -> Self {
         for (name, value) in &mut self.parameters {
             if let Some((_, better)) = pooled.parameters.iter().find(|(n, _)| n == name) {

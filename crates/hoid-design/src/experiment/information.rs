@@ -273,8 +273,8 @@ impl<'a> Loop<'a> {
         ]
     }
 
-    /// Returns crossover and margin with their gradients: with `L = H P`, `d ln|L|/d omega domega = -Re dlnH` and
-    /// `dphi = Im dlnH + d arg L/d omega domega`.
+    /// Returns crossover and margin with their gradients: with `L = B P`, `d ln|L|/d omega domega = -Re dlnB` and
+    /// `dphi = Im dlnB + d arg L/d omega domega`.
     fn margin_gradients(&self, operator: &FamilyOperator) -> [(f64, DVector<f64>); 2] {
         let omega = self.crossover_rad_s;
         let response = operator.response_and_gradient(omega);

@@ -79,12 +79,12 @@ impl Joint {
         Self { count, of_target }
     }
 
-    /// Returns the joint gradient of a quantity of B.
+    /// Converts a gradient with respect to the coordinates of B to one with respect to the joint coordinates.
     pub fn feedback(&self, own: &[f64]) -> DVector<f64> {
         DVector::from_fn(self.count, |k, _| own.get(k).copied().unwrap_or(0.0))
     }
 
-    /// Returns the joint gradient of a quantity of F.
+    /// Converts a gradient with respect to the coordinates of F to one with respect to the joint coordinates.
     fn target(&self, own: &[f64]) -> DVector<f64> {
         let mut all = DVector::zeros(self.count);
         self.of_target.iter().zip(own).for_each(|(k, g)| all[*k] = *g);
@@ -120,7 +120,7 @@ impl Joint {
             }
             let mut one = Quantity::relative(p, name_of_target(p), self.target(gradient));
             if p.coordinate == Some(Coordinate::Delay) {
-                // This delay may well be zero, so its error is absolute, in s.
+                // Relative to the present target the delay may be zero, so its error is absolute, in s.
                 one.value -= seen.preview_s;
                 one.scale = 1.0;
                 one.size = feedback.tau_e_s();

@@ -7,8 +7,8 @@
 //!
 //! **Phases.** The search starts from the phases of M. R. Schroeder (*IEEE Trans. Inf. Theory* 16 (1970) 85-89),
 //! `phi_k = -2 pi sum_{j < k} (k - j) p_j` with the relative powers p, and from others spread over the circle. From
-//! each start, the phases are changed one after the other, by an eighth of a turn and less, as long as the peak of the
-//! signal decreases; the best result is kept.
+//! each start, the phases are changed one at a time, in steps of an eighth of a turn or less, as long as the peak of
+//! the signal decreases; the best result is kept.
 
 use std::f64::consts::TAU;
 
@@ -40,7 +40,8 @@ pub(super) fn multiples((least, largest): (u32, u32), count: usize, spacing: u32
     taken
 }
 
-/// Returns the cosine and sine of each line over one period T, with 16 samples per period of the fastest line.
+/// Returns `A cos(omega t)` and `A sin(omega t)` of each line over one period T, with 16 samples per period of the
+/// fastest line, but 64 to 8192 in total.
 fn samples(lines: &[Sinusoid], period_s: f64) -> Vec<Vec<(f64, f64)>> {
     let fastest = lines.iter().map(|l| l.omega_rad_s).fold(0.0, f64::max);
     let n = ((16.0 * fastest * period_s / TAU).ceil() as usize).clamp(64, 8192);

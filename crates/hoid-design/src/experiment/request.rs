@@ -252,8 +252,8 @@ fn lines_below_remnant(lines: &[DesignedLine], is_seen: bool) -> Option<Finding>
 /// tenth.
 const MIN_LINE_TO_REMNANT: f64 = 10.0;
 
-/// Returns the person with the largest errors relative to the accepted errors; if none are given, relative to the
-/// parameters.
+/// Returns the person with the largest errors relative to the accepted errors or, if no errors are given, relative to
+/// the values of the parameters.
 fn worst<'a>(people: &'a [NamedExpected], wanted: &[RequestedQuantity]) -> Option<&'a NamedExpected> {
     let of = |person: &NamedExpected| -> f64 {
         let e = &person.expected;

@@ -110,7 +110,7 @@ impl Loop<'_> {
     }
 
     /// Returns the responses of the operator to the error and to a displayed target over the band of the lines, with
-    /// the errors that result from those of the parameters after `length_s`.
+    /// the errors that follow from those of the parameters after `length_s` seconds.
     ///
     /// # Errors
     /// [`DesignError::NotIdentifiable`] if the lines do not determine the parameters.

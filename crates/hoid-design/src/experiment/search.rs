@@ -62,8 +62,8 @@ impl Search<'_> {
         (enters, self.omega(multiple))
     }
 
-    /// Moves the lines one after the other to admissible multiples, as long as J decreases, and returns the lines with
-    /// their shares.
+    /// Moves one line at a time to an admissible multiple, as long as J decreases, and returns the lines with their
+    /// shares.
     pub fn places(
         &self,
         mut places: Vec<Place>,

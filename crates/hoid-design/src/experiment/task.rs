@@ -102,7 +102,8 @@ impl Forcing {
     /// Creates the forcing functions from lines with their points of entry.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] as for [`ForcingFunction::new`], with the lines of each point.
+    /// [`ModelError::OutOfRange`] as for [`ForcingFunction::new`], which is applied to the lines of each point of
+    /// entry.
     pub fn new(lines: Vec<(Enters, Sinusoid)>) -> Result<Self, ModelError> {
         let all = Self { lines };
         for enters in [Enters::Target, Enters::Disturbance] {

@@ -17,7 +17,7 @@ pub struct RequestedQuantity {
     pub error: f64,
 }
 
-/// Returns the name of a quantity that may be given by a synonym.
+/// Returns the standard name of a quantity, which may be given by a synonym.
 pub(super) fn known_name(name: &str) -> String {
     match name.trim() {
         "margin" => "phase_margin",

@@ -37,7 +37,7 @@ pub(super) enum Logger {
 const CATEGORY: &CStr = c"logStatusError";
 
 impl Logger {
-    /// Passes a message to the logging callback.
+    /// Passes a message with its status to the logging callback.
     ///
     /// # Safety
     /// The callback was supplied by the importer, and its environment still exists.
@@ -46,8 +46,8 @@ impl Logger {
         match self {
             Self::Nobody => {}
             Self::Two { function, environment } => {
-                // SAFETY: the strings are null-terminated and exist during the call; the format consumes exactly one of
-                // them.
+                // SAFETY: the strings are null-terminated and exist during the call; the format consumes exactly one
+                // string, the message.
                 unsafe {
                     function(
                         environment,
@@ -67,7 +67,7 @@ impl Logger {
     }
 }
 
-/// Instance of a unit, as an importer holds it.
+/// Instance of a unit; the importer holds a pointer to it.
 pub struct Component {
     instance: Instance,
     name: CString,
@@ -136,7 +136,7 @@ pub(super) unsafe fn with_instance(component: *mut Component, call: impl FnOnce(
     status
 }
 
-/// Returns an array passed by the importer; with a count of zero it is empty, regardless of the pointer.
+/// Returns an array passed by the importer; if the count is zero, the array is empty, regardless of the pointer.
 ///
 /// # Safety
 /// `pointer` points to `count` elements that do not change during the call.
@@ -166,7 +166,7 @@ pub(super) unsafe fn list_mut<'a, T>(pointer: *mut T, count: usize) -> Done<&'a 
     Ok(unsafe { slice::from_raw_parts_mut(pointer, count) })
 }
 
-/// Returns a string passed by the importer; empty for null and for invalid UTF-8.
+/// Returns a string passed by the importer; an empty string if the pointer is null or the text is not valid UTF-8.
 ///
 /// # Safety
 /// `pointer` is null or a null-terminated string that does not change during the call.
@@ -185,7 +185,7 @@ pub(super) fn folder(uri: &str) -> Option<PathBuf> {
         return Some(PathBuf::from(uri));
     };
     let path = match rest.strip_prefix("//") {
-        // The path follows the host, which is empty or this computer.
+        // The path follows the host, which is empty or refers to this computer.
         Some(rest) => rest.find('/').map_or("", |slash| &rest[slash..]),
         None => rest,
     };

@@ -2,7 +2,8 @@
 //! Co-Simulation* 2.0.4, 2022, chapters 2 and 4).
 //!
 //! Names, types and order of arguments follow `fmi2Functions.h`. A component must have been created by
-//! `fmi2Instantiate` and not freed by `fmi2FreeInstance`, and an array must have as many elements as the call states.
+//! `fmi2Instantiate` and not freed by `fmi2FreeInstance`, and an array must have as many elements as the count passed
+//! with it.
 #![allow(missing_docs, non_snake_case, clippy::missing_safety_doc)]
 
 use std::ffi::{c_char, c_int, c_uint, c_void};
@@ -25,7 +26,7 @@ pub struct Fmi2Callbacks {
     environment: *mut c_void,
 }
 
-/// Value `fmi2CoSimulation` of the type of an FMU.
+/// Value of `fmi2CoSimulation`, the type of an FMU for co-simulation.
 const CO_SIMULATION: c_int = 1;
 
 #[unsafe(no_mangle)]

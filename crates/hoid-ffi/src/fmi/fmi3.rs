@@ -3,7 +3,7 @@
 //!
 //! Names, types and order of arguments follow `fmi3FunctionTypes.h`. An instance must have been created by
 //! `fmi3InstantiateCoSimulation` and not freed by `fmi3FreeInstance`, and an array must have as many elements as the
-//! call states.
+//! count passed with it.
 #![allow(missing_docs, non_snake_case, clippy::missing_safety_doc)]
 
 use std::{
@@ -45,7 +45,7 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
     };
     // SAFETY: the strings are supplied by the importer.
     let (name, token, resources) = unsafe { three(name, token, resources) };
-    // FMI 3.0 passes a path, not a URI as FMI 2.0 does.
+    // FMI 3.0 passes the resources as a path, not as a URI, which FMI 2.0 passes.
     let folder = Some(PathBuf::from(resources)).filter(|path| !path.as_os_str().is_empty());
     // SAFETY: the logger is supplied by the importer.
     unsafe { create(name, logger, || Instance::new(token, folder.as_deref())) }

@@ -2,7 +2,7 @@
 //!
 //! Samples are taken at `t_0 + k Ts`, where t_0 is the start of the experiment. A communication step may be as long as
 //! the sample time or shorter. If it is shorter, the sample uses the inputs of the first step within the sample time. A
-//! longer step is rejected, since a sample would be lost.
+//! step longer than the sample time is rejected, since a sample would be lost.
 
 use std::{ffi::CString, fs, path::Path};
 
@@ -13,7 +13,7 @@ use super::{
     values::{Done, VariableValues},
 };
 
-/// Tolerance of times, as a fraction of the sample time.
+/// Tolerance in the comparison of times, as a fraction of the sample time.
 const TIME_TOLERANCE: f64 = 1e-6;
 
 /// Phase of an instance.
@@ -32,7 +32,7 @@ pub(super) struct Instance {
     pub(super) settings: FmuSettings,
     pub(super) variables: Vec<FmuVariable>,
     pub(super) values: Vec<FmuStart>,
-    /// String values as C strings, by value reference; empty for variables of other types.
+    /// String values as C strings, indexed by value reference; empty for variables of other types.
     texts: Vec<CString>,
     first_output: usize,
     pub(super) phase: Phase,
@@ -44,7 +44,7 @@ pub(super) struct Instance {
 }
 
 impl Instance {
-    /// Builds the instance of the unit with this token; `resources` is the folder with its settings.
+    /// Builds the instance of the unit with the given token; `resources` is the folder that contains its settings.
     pub fn new(token: &str, resources: Option<&Path>) -> Done<Self> {
         let kind = (FmuKind::ALL.into_iter().find(|kind| kind.token() == token)).ok_or_else(|| {
             format!(
@@ -120,7 +120,7 @@ impl Instance {
         }
     }
 
-    /// Error message for a variable whose type differs from that of the call.
+    /// Returns the error message for a variable whose type differs from that of the called function.
     pub fn other_type(&self, reference: u32) -> String {
         let name = self.variable(reference).map_or("?", |variable| variable.name);
         format!("{name} is of another type")
@@ -160,7 +160,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Returns the values of the parameters and inputs.
+    /// Returns the values of the parameters and inputs, by name.
     fn given(&self) -> VariableValues<'_> {
         VariableValues {
             variables: &self.variables,

@@ -38,7 +38,7 @@ impl Model {
         })
     }
 
-    /// Returns the saved state, without changing the model: numbers that are not part of the recursion, and the
+    /// Returns the saved state, without changing the model: the numbers that are not part of the recursion, and the
     /// recursion as bytes.
     pub fn saved(&mut self) -> (Vec<f64>, Vec<u8>) {
         match self {
@@ -90,7 +90,7 @@ impl Model {
         }
     }
 
-    /// True if the outputs belong to the sample that was taken, false if they belong to the next sample.
+    /// True if the outputs belong to the sample that was taken last, false if they belong to the next sample.
     pub fn outputs_of_taken_sample(&self) -> bool {
         matches!(self, Self::Tracker(_))
     }
@@ -136,7 +136,7 @@ impl TrackerModel {
         }
         let prior = given.text("prior");
         let of_unit = prior == "fit";
-        // Methods that start with the record have no prior.
+        // Some methods have no option `prior`; the default must not set it.
         if !of_unit && !["", "population"].contains(&prior) {
             options.insert("prior".to_owned(), prior.into());
         }

@@ -5,7 +5,7 @@ use hoid_sim::{FamilyOperatorRun, FamilySimulator, OperatorRun, RunSeed, Simulat
 
 use super::values::{Done, VariableValues};
 
-/// Running operator.
+/// Running operator of a scenario.
 pub(super) struct OperatorModel {
     run: Run,
     sample_time_s: f64,
@@ -78,7 +78,7 @@ impl OperatorModel {
         }
     }
 
-    /// Restores a saved state. Returns false if the numbers belong to another operator.
+    /// Restores a saved state. Returns false if the state belongs to another operator.
     pub fn restore(&mut self, saved: &[f64]) -> bool {
         match &mut self.run {
             Run::Reference(run) => run.restore(saved),

@@ -1,8 +1,8 @@
-//! Saved state of an instance, to return to it or to continue elsewhere with bit-identical results (FMI 2.0.4, section
-//! 2.1.8; FMI 3.0.1, section 2.2.10).
+//! Saved state of an instance, with which the instance can return to an earlier time or another instance can continue
+//! with bit-identical results (FMI 2.0.4, section 2.1.8; FMI 3.0.1, section 2.2.10).
 //!
-//! An importer holds a state in its serialised form (`packed`). The description contains the token of the unit, the
-//! phase and times of the experiment, and the values of all variables. The data are those of the tracker, or the
+//! A state is held by the importer in its serialised form (`packed`). The description contains the token of the unit,
+//! the phase and times of the experiment, and the values of all variables. The data are those of the tracker, or the
 //! numbers of the operator. 64-bit floating-point numbers are stored in the description as their bit patterns, since
 //! JSON has no NaN.
 
@@ -23,7 +23,7 @@ use crate::packed::{opened, packed};
 
 const MAGIC: [u8; 8] = *b"hoidfmu\x01";
 
-/// Saved state, as an importer holds it.
+/// Saved state in serialised form, held by the importer.
 pub struct State(Vec<u8>);
 
 impl Instance {
@@ -103,7 +103,7 @@ fn of_value(value: &FmuStart) -> Value {
     }
 }
 
-/// Converts a JSON value to the type of `of`.
+/// Converts a JSON value to a value of the same type as `of`.
 fn to_value(of: &FmuStart, value: &Value) -> Option<FmuStart> {
     Some(match of {
         FmuStart::Real(_) => FmuStart::Real(f64::from_bits(value.as_u64()?)),
@@ -185,7 +185,7 @@ macro_rules! states {
                 // SAFETY: guaranteed by the FMI standard.
                 let place = unsafe { held(state) }?;
                 if !place.is_null() {
-                    // SAFETY: the pointer came from `into_handle`, and is null from now on.
+                    // SAFETY: the pointer came from `into_handle`, and is replaced by null.
                     drop(unsafe { Box::from_raw(std::mem::replace(place, std::ptr::null_mut())) });
                 }
                 Ok(())

@@ -5,7 +5,7 @@ use hoid_io::fmu::{FmuStart, FmuVariable};
 /// Result of an action, or the reason why it failed.
 pub(super) type Done<T = ()> = Result<T, String>;
 
-/// Values by the names of their variables.
+/// Values of variables, by name.
 pub(super) struct VariableValues<'a> {
     pub variables: &'a [FmuVariable],
     pub values: &'a [FmuStart],

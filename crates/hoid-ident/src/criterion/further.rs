@@ -65,7 +65,7 @@ impl Criterion<'_> {
         }
     }
 
-    /// Computes the filtered signals of the further inputs; shifted, they are columns of psi.
+    /// Computes the filtered signals of the further inputs, whose shifts are columns of psi.
     pub(super) fn whiten_further(&self, theta: &[f64], ws: &mut Workspace) {
         let parts = Polynomials::split(&self.orders, theta);
         let from = ws.pad + self.first_regressed();

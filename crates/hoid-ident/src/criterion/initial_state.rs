@@ -5,13 +5,13 @@ use hoid_model::Orders;
 /// Assumptions about the time before a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum InitialState {
-    /// Input, output and innovations were zero.
+    /// Input, output and innovations were zero before the record.
     Zero,
     /// No assumption: the initial states of each record are estimated together with the parameters.
     #[default]
     Estimate,
-    /// The noise was also stationary before the record (the unconditional sum of squares of Box and Jenkins); nothing
-    /// is assumed about the response to the input.
+    /// The noise was stationary before the record, as it is in the record (the unconditional sum of squares of Box and
+    /// Jenkins); nothing is assumed about the response to the input.
     Backcast,
 }
 

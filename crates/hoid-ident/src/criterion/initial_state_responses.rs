@@ -8,7 +8,7 @@
 //!
 //! With a stationary past ([`crate::criterion::stationary_noise`]) the states of the noise model have a known
 //! covariance `sigma^2 L L'`. They equal `L z`, where z has the covariance `sigma^2 I` and counts as additional
-//! residuals. For these states G has the rows `[I; G L]`.
+//! residuals. The columns of G for these states, G_n, are then replaced by `[I; G_n L]`.
 //!
 //! A level of u, the constant that is not a response to e, also enters linearly, through `-(D/C) 1`, and is eliminated
 //! together with the states. The response to the level does not decay, so that its basis vector is as long as the
@@ -24,15 +24,16 @@ use crate::{
 /// Orthonormal basis of the responses to the initial states of a record, and the map from this basis to the states.
 #[derive(Debug, Default)]
 pub(crate) struct InitialStateResponses {
-    /// Basis vectors. The first `prior_rows` elements belong to z, the others to the residuals from the first residual
-    /// on. Beyond the end of a vector the elements are zero.
+    /// Basis vectors. The first `prior_rows` elements belong to the states z of stationary noise, the others to the
+    /// residuals from the first residual on. Beyond the end of a vector the elements are zero.
     q: Vec<Vec<f64>>,
-    /// `G[:, kept[k]] = sum over l <= k of Q_l r[k][l]`.
+    /// Coefficients of the retained columns of G in this basis: `G[:, kept[k]] = sum over l <= k of Q_l r[k][l]`.
     r: Vec<Vec<f64>>,
     kept: Vec<usize>,
     /// Impulse response of 1/F for each input.
     h: Vec<Vec<f64>>,
-    /// Index of the input, and of the state, for each state of a `1/F`. The states of the noise model follow.
+    /// For each state of a filter `1/F`: the index of the input, and the index of the state within the filter. In G
+    /// these states come first, before those of the noise model.
     of_inputs: Vec<(usize, usize)>,
     /// Index of the level among the columns of G.
     level: Option<usize>,
@@ -57,8 +58,8 @@ pub(crate) struct InitialHistory<'a> {
 }
 
 impl InitialStateResponses {
-    /// Computes the responses of the first `rows` residuals to the nf initial values of w of each input and to the
-    /// states of the noise model.
+    /// Computes an orthonormal basis of the responses of the first `rows` residuals to the initial values of w of each
+    /// input, to the states of the noise model, and to the level, if u has one.
     ///
     /// Any free response of 1/F is a combination of copies of its impulse response `h` that start at the first nf
     /// samples. This basis remains linearly independent even for f_nf = 0.
@@ -125,7 +126,7 @@ impl InitialStateResponses {
         };
         for (index, column) in columns.into_iter().enumerate() {
             let mut whole = vec![0.0; prior_rows];
-            // A state of the noise model also has a row of the identity matrix.
+            // With a stationary past, the column of each noise state starts with a column of the identity matrix.
             if let Some(z) = index
                 .checked_sub(free.of_inputs.len())
                 .and_then(|state| whole.get_mut(state))

@@ -105,8 +105,8 @@ impl Criterion<'_> {
 }
 
 impl Objective for Criterion<'_> {
-    /// True if theta is finite and all roots of C and of each F are inside the unit circle; with a stationary past also
-    /// the poles of the noise model.
+    /// True if theta is finite and all roots of C and of each F are inside the unit circle. With a stationary past, the
+    /// poles of the noise model must be inside as well.
     fn is_feasible(&self, theta: &[f64]) -> bool {
         let parts = Polynomials::split(&self.orders, theta);
         theta.iter().all(|v| v.is_finite())

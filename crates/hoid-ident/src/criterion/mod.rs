@@ -30,9 +30,9 @@
 //! ([`stationary_noise`]). The residuals start nd samples earlier, and the r states of the noise model count as
 //! additional residuals z. Without an input, A replaces D, and the residuals start at the first sample of the record.
 //!
-//! **Several inputs.** `A u = sum_i (B_i/F_i) q^-nk_i e_i + (C/D) eps`: each input has its own s, w, B and F. Its
-//! columns of psi follow from its own signals by the formulas for `b_j` and `f_j` above, and the past values of each w
-//! are unknown ([`further`]). Ljung, 1999, section 4.2 (eq. 4.35).
+//! **Several inputs.** `A u = sum_i (B_i/F_i) q^-nk_i e_i + (C/D) eps`: each input has its own w, B and F. Its columns
+//! of psi follow from its own signals by the formulas for `b_j` and `f_j` above, and the past values of each w are
+//! unknown ([`further`]). Ljung, 1999, section 4.2 (eq. 4.35).
 //!
 //! **Weights** multiply the squared residuals; the robust loss uses them.
 //!

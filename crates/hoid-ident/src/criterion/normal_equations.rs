@@ -84,7 +84,8 @@ impl Criterion<'_> {
         columns
     }
 
-    /// Adds the products of these columns and the residuals, with the weights of the record, to the normal equations.
+    /// Adds the products of these columns of psi with each other and with the residuals to the normal equations, with
+    /// the weights of the record if it has any.
     pub(super) fn accumulate(
         &self,
         states: &EliminatedStates,

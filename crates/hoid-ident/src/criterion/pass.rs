@@ -1,13 +1,13 @@
 //! A pass over a record for one theta, in spans if the record is long.
 //!
 //! The terms of the normal equations are sums over time, and every signal in them is the output of a causal filter. The
-//! head of a long record (32 768 samples) is therefore processed like a short record. The rest is processed in spans
-//! that fit into the processor cache, each preceded by the last samples of the previous span. The memory needed and the
-//! time per sample then do not grow with the length of the record.
+//! head of a long record (its first 32 768 samples) is therefore processed in the same way as a short record. The rest
+//! is processed in spans that fit into the processor cache, each preceded by the last samples of the previous span. The
+//! memory needed and the time per sample then do not grow with the length of the record.
 //!
-//! The initial states affect only the start of the record. Their responses must have decayed within the head
-//! ([`have_decayed`](crate::criterion::initial_state_responses::InitialStateResponses::have_decayed)).
-//! If a pole is so close to the unit circle that they have not, the record is processed as a whole. Records with
+//! The initial states affect only the start of the record. The responses to them must have decayed within the head
+//! ([`have_decayed`](crate::criterion::initial_state_responses::InitialStateResponses::have_decayed)). If a pole is so
+//! close to the unit circle that the responses have not decayed, the record is processed as a whole. Records with
 //! weights (one per sample), with further inputs, or with a stationary past (whose columns are whitened one by one) are
 //! also processed as a whole. The sums over spans differ from the sum over the whole record only by rounding.
 
@@ -67,7 +67,7 @@ impl Criterion<'_> {
     ) -> Option<EliminatedStates> {
         let Data { e, u, .. } = self.data[record];
         let plain = self.weights.is_none() && self.initial != InitialState::Backcast && self.further.is_empty();
-        // With longer lags the head could contain no residuals.
+        // A head that is not longer than the lags would contain no residuals.
         let least = 2 * (self.first + self.orders.nk) + SPAN;
         if !plain || u.len() < 2 * head || head < least {
             return None;
@@ -146,7 +146,7 @@ impl Criterion<'_> {
 }
 
 impl Workspace {
-    /// Copies the last samples of a span, whose length is given, to the front of the workspace.
+    /// Copies the last samples of a span of this length to the front of the workspace.
     fn carry_over_tail(&mut self, length: usize) {
         let pad = self.pad;
         let Self {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use hoid_model::Orders;
 
-/// Coefficients of the polynomials in theta.
+/// The coefficients of each polynomial, as slices of theta.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Polynomials<'t> {
     pub a: &'t [f64],

@@ -61,7 +61,7 @@ impl<'a> Criterion<'a> {
         }
     }
 
-    /// Returns the number of residuals of all records.
+    /// Returns the number of residuals that count, over all records.
     pub fn residuals(&self) -> usize {
         self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()
     }

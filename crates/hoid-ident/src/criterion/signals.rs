@@ -99,7 +99,7 @@ impl Criterion<'_> {
         let u = &data.u[samples.clone()];
         let (w, v) = (&mut ws.w[from..to], &mut ws.v[from..to]);
         match *parts.b {
-            // An operator has two coefficients of B: one pass computes w and v.
+            // With two coefficients of B, the common case, one pass computes w and v.
             [b0, b1] => {
                 let inputs = ws.s[from..to].iter().zip(&ws.s[from - 1..to - 1]).zip(u);
                 for ((w, v), ((s0, s1), u)) in w.iter_mut().zip(&mut *v).zip(inputs) {
@@ -168,8 +168,8 @@ impl Criterion<'_> {
         }
     }
 
-    /// Computes `(D/C) u`. With a stationary past it copies u unchanged, because each shift is truncated at the first
-    /// residual before it is whitened.
+    /// Computes the signal `(D/C) u` for the columns of A. With a stationary past it is a copy of u, because each shift
+    /// of u is truncated at the first residual before it is whitened.
     fn filter_output(&self, parts: &Polynomials<'_>, data: Data<'_>, ws: &mut Workspace) {
         if self.orders.na == 0 {
             return;
@@ -197,7 +197,7 @@ impl Criterion<'_> {
         divide(parts.f, &data.e[..pad + n - from], &mut ws.s[from..]);
     }
 
-    /// Computes `(D/C) s`. With a stationary past it copies s unchanged.
+    /// Computes the signal `(D/C) s` for the columns of B. With a stationary past it is a copy of s.
     fn whiten_input(&self, parts: &Polynomials<'_>, ws: &mut Workspace) {
         if self.orders.nb == 0 {
             return;

@@ -36,8 +36,8 @@ pub(crate) struct StationaryNoise {
 }
 
 impl StationaryNoise {
-    /// Returns the initial state of `(C/D) eps` for innovations of unit variance; `None` if D has a root on or outside
-    /// the unit circle.
+    /// Returns the state equations of `(C/D) eps` and the covariance of its initial state for innovations of unit
+    /// variance; `None` if D has a root on or outside the unit circle.
     pub fn of(c: &[f64], d: &[f64]) -> Option<Self> {
         let r = c.len().max(d.len());
         let coefficient = |p: &[f64], i: usize| p.get(i).copied().unwrap_or(0.0);
@@ -70,7 +70,7 @@ impl StationaryNoise {
         column
     }
 
-    /// Computes `(1/2) y' dP y` with respect to the coefficients of C and of D at the least squares z. This is the
+    /// Returns `(1/2) y' dP y` with respect to the coefficients of C and of D, at the least squares z. This is the
     /// contribution of the penalty to the descent `psi' eps`.
     pub fn descent(&self, z: &[f64], nc: usize, nd: usize) -> (Vec<f64>, Vec<f64>) {
         // The noise model has no states.
@@ -89,7 +89,7 @@ impl StationaryNoise {
         )
     }
 
-    /// Computes `L^-T z`; elements without variance remain zero.
+    /// Returns `L^-T z`; elements of states without variance are zero.
     fn solve_transposed(&self, z: &[f64]) -> DVector<f64> {
         let r = z.len();
         let mut y = DVector::zeros(r);

@@ -29,8 +29,8 @@ thread_local! {
     static LAST_WORKSPACE: Cell<Option<Workspace>> = const { Cell::new(None) };
 }
 
-/// Workspace for one fit, reused by the next fit on the same thread: allocating new pages for each fit takes a quarter
-/// of the time of a study. The contents are overwritten before they are read.
+/// Workspace for one fit, reused by the next fit on the same thread: allocating new memory pages for each fit would
+/// take a quarter of the time of a study. The contents are overwritten before they are read.
 #[derive(Debug, Default)]
 pub(crate) struct Borrowed(Workspace);
 

@@ -14,9 +14,9 @@ use super::{
 };
 use crate::{Choice, Fit, IdentError};
 
-/// Residuals with a power below this share of the power of u are only rounding errors of the data.
+/// Residuals are only rounding errors of the data if their power is below this share of the power of u.
 const ROUNDING: f64 = 1e-22;
-/// Minimum number of residuals per unknown; with fewer residuals the results of a fit carry no information.
+/// Minimum number of residuals per unknown; with fewer residuals a fit carries no information.
 const FEWEST_RESIDUALS: usize = 5;
 /// Significance level of the test of b against zero.
 const LEVEL: f64 = 0.05;
@@ -26,7 +26,7 @@ impl Fit {
     /// orders, if any. The kinds of findings are listed in the [module](super).
     ///
     /// # Errors
-    /// As [`Fit::residuals`].
+    /// The errors of [`Fit::residuals`].
     pub fn verdict(&self, records: &[Record], choice: Option<&Choice>) -> Result<Verdict, IdentError> {
         let mut all: Vec<Finding> = search_finding(self.termination).into_iter().collect();
         all.extend(choice.and_then(delay_at_end));
@@ -49,7 +49,7 @@ impl Fit {
     }
 
     /// Returns the power of the residuals as a share of the power of u if the residuals are only rounding errors of the
-    /// data.
+    /// data, otherwise `None`.
     pub fn rounding(&self) -> Option<f64> {
         let share = self.loss / self.output_variance;
         (share < ROUNDING).then_some(share)
@@ -70,7 +70,7 @@ impl Fit {
         })
     }
 
-    /// Returns findings about the system from e to u that need no record.
+    /// Returns the findings about the system from e to u that can be made without the records.
     fn system_findings(&self) -> Vec<Finding> {
         let mut all = Vec::new();
         if !self.model.is_stable() {
@@ -89,7 +89,7 @@ impl Fit {
                 all.extend(pole_findings(&operator, self.model.sample_time()));
                 return all;
             }
-            // These models are not intended to be operators.
+            // Models of these orders or forms are not intended to be operators.
             Err(
                 NotConvertible::OtherOrders { .. }
                 | NotConvertible::PolesInBoth { .. }
@@ -146,8 +146,8 @@ impl Fit {
 
     fn residual_findings(&self, measures: &ResidualMeasures) -> Vec<Finding> {
         if self.instrumented {
-            // Instrumental variables do not require white residuals, and in a closed loop these residuals are
-            // correlated with e.
+            // Instrumental variables do not require white residuals, and in a closed loop the residuals are correlated
+            // with e.
             let note = |finding: Finding| {
                 let words = format!(
                     "{}; instrumental variables do not require white residuals",
@@ -169,8 +169,8 @@ impl Fit {
     }
 }
 
-/// Returns a finding if the delay is at the end of the range that was searched with the other orders of the chosen
-/// model.
+/// Returns a finding if the delay is at an end of the range of delays that was searched with the other orders of the
+/// chosen model.
 fn delay_at_end(choice: &Choice) -> Option<Finding> {
     let chosen = choice.fit.orders();
     let same = |o: &Orders| Orders { nk: chosen.nk, ..*o } == chosen;

@@ -21,7 +21,7 @@ impl GreyBoxFit {
     /// listed in the [module](super).
     ///
     /// # Errors
-    /// As [`crate::Fit::residuals`].
+    /// The errors of [`crate::Fit::residuals`].
     pub fn verdict(&self, records: &[Record]) -> Result<Verdict, IdentError> {
         let mut all: Vec<Finding> = search_finding(self.termination()).into_iter().collect();
         let layout = &self.layout;

@@ -1,9 +1,9 @@
-//! Test of whether the error responds to the output, as in a closed loop.
+//! Test of whether the error e responds to the output u, as in a closed loop.
 //!
 //! In a closed loop every change of u affects e. The test asks whether the last [`LATEST_S`] of u improve the
 //! prediction of e from earlier errors and outputs (C. W. J. Granger, *Econometrica* 37 (1969) 424-438). A component
 //! that is common to both signals, such as a forcing function, can be predicted from these earlier samples; the
-//! component of u alone cannot.
+//! remaining part of u cannot.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -16,13 +16,14 @@ const LATEST_S: f64 = 0.25;
 /// Result of the test of whether e responds to u.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoopResponse {
-    /// Probability of at least this share by chance, if e does not respond to u.
+    /// Probability that chance alone gives a share at least as large, if e does not respond to u.
     pub p_value: f64,
-    /// Share of the variance of e left unexplained by earlier samples that the latest outputs explain.
+    /// Of the variance of e that earlier samples do not explain, the share that the latest outputs explain.
     pub share: f64,
 }
 
-/// Tests the samples `from..`. `None` if there are too few data, a value is not a number or a signal is constant.
+/// Tests whether e responds to u in the samples from `from` on. `None` if there are too few data, a value is not a
+/// number or a signal is constant.
 pub fn answer(e: &[f64], u: &[f64], from: usize, sample_time_s: f64) -> Option<LoopResponse> {
     let thin = thinning(sample_time_s);
     let latest = (LATEST_S / (thin as f64 * sample_time_s)).round().max(1.0) as usize;

@@ -6,15 +6,15 @@
 //! | kind | observation |
 //! |---|---|
 //! | `not-converged`, `border` | termination of the search |
-//! | `delay-at-bound`, `parameter-at-bound` | the delay is at the end of its range; another parameter is at a bound |
+//! | `delay-at-bound`, `parameter-at-bound` | the delay is at an end of its range; another parameter is at a bound |
 //! | `unstable` | the model from e to u is unstable |
-//! | `gain`, `undetermined-parameter` | values within two standard errors of zero |
-//! | `not-convertible` | coefficients that do not correspond to any operator |
+//! | `gain`, `undetermined-parameter` | a gain or another parameter is within two standard errors of zero |
+//! | `not-convertible` | the coefficients do not correspond to any operator |
 //! | `neuromuscular-lag` | the two poles do not describe a neuromuscular system |
-//! | `not-constant` | parameters that change within a record or from one record to the next |
+//! | `not-constant` | parameters change within a record or from one record to the next |
 //! | `residuals-not-white`, `structure`, `leverage` | properties of the residuals |
 //! | `no-response` | no response beyond chance |
-//! | `other-input`, `inputs-together` | inputs in addition to the error |
+//! | `other-input`, `inputs-together` | inputs other than the error |
 //! | `controlled-element` | the recorded loop does not have the given controlled element |
 //! | `exact-fit`, `no-change`, `change-point` | information; the result remains valid |
 //!
@@ -30,7 +30,7 @@
 //! | `second_opinion` | second fits without outlying samples or without slow components |
 //! | `other_inputs` | test of whether u responds to a recorded target in addition to e |
 //! | `recorded_element` | test of whether the recorded loop has the given controlled element |
-//! | `whitened` | least squares with autoregressive noise, for the tests that need it |
+//! | `whitened` | least squares with autoregressive noise, used by several tests |
 //! | `fit`, `grey_box`, `sigmoid` | the verdict on each kind of fit |
 
 pub(crate) mod constancy;

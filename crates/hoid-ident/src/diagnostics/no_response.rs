@@ -12,8 +12,8 @@
 //! [`DELAYS_S`]. Surrogate records have the same spectra, but random phases of E and therefore no relation between e
 //! and u (J. Theiler et al., *Physica D* 58 (1992) 77-94). The values of T for [`SURROGATES`] such records give the
 //! distribution of T if there is no response. If u does not depend on e, T is one more draw from this distribution: the
-//! probability that it exceeds all others is 1/([`SURROGATES`] + 1), regardless of the spectra. Only the past of e
-//! counts, so that a response of e to u does not count as a response of u. If there are several records, they share b.
+//! probability that it exceeds all others is 1/([`SURROGATES`] + 1), regardless of the spectra. Only the past of e is
+//! used, so that a response of e to u does not count as a response of u. Several records have the same b.
 
 use std::f64::consts::{PI, TAU};
 
@@ -47,19 +47,20 @@ const COLUMNS: usize = 3;
 pub struct Response {
     /// T: share of the power of the whitened output that the response explains.
     pub share: f64,
-    /// Number of surrogates with a share at least as large as this one.
+    /// Number of surrogates with a share at least as large as that of the records.
     pub reached_by: usize,
     /// Number of surrogates.
     pub surrogates: usize,
 }
 
 impl Response {
-    /// Returns the probability of at least this share if there is no response.
+    /// Returns the probability of a share at least this large if u does not respond to e.
     pub fn p_value(&self) -> f64 {
         (self.reached_by + 1) as f64 / (self.surrogates + 1) as f64
     }
 
-    /// Returns the finding that there is no response, unless the records show a response.
+    /// Returns the finding that no response can be distinguished from chance; `None` if no surrogate has a share as
+    /// large as that of the records.
     pub fn finding(&self) -> Option<Finding> {
         (self.reached_by > 0).then(|| {
             Finding::undetermined(
@@ -82,13 +83,14 @@ struct Spectra {
     /// `E_k` and `U_k`, whitened.
     e: Vec<Complex64>,
     u: Vec<Complex64>,
-    /// Columns without the delay and without E: `(A_u/A_e) N G_j`.
+    /// Columns of the regression without the delay and without E: `(A_u/A_e) N G_j`.
     columns: Vec<[Complex64; COLUMNS]>,
-    /// `e^{-j omega tau}` for each delay.
+    /// `e^{-j omega tau}` for each tested delay.
     delays: Vec<Vec<Complex64>>,
 }
 
-/// Tests the records of a person. `None` if there are too few data, a value is not a number or a signal is constant.
+/// Tests whether u responds to e in the records of a person. `None` if there are too few data, a value is not a number
+/// or a signal is constant.
 pub fn response(records: &[Record]) -> Option<Response> {
     let all: Option<Vec<Spectra>> = records.iter().map(Spectra::of).collect();
     let all = all?;
@@ -97,7 +99,8 @@ pub fn response(records: &[Record]) -> Option<Response> {
     }
     let power: f64 = all.iter().flat_map(|s| &s.u).map(Complex64::norm_sqr).sum();
     let inverse = inverse_gram(&all)?;
-    // Products of columns and output for each frequency and delay; a surrogate changes only their phases.
+    // Products of columns and output for each frequency and delay; a surrogate changes only the phases of these
+    // products.
     let products: Vec<[[Complex64; COLUMNS]; DELAYS_S.len()]> = all.iter().flat_map(Spectra::products).collect();
     let mut turns = vec![Complex64::ONE; products.len()];
     let share = |turns: &[Complex64]| -> f64 {
@@ -132,8 +135,8 @@ pub fn response(records: &[Record]) -> Option<Response> {
     })
 }
 
-/// Returns by rows the inverse of `sum Re(x_i* x_j)`, which depends neither on the delay nor on the phases of E; `None`
-/// if the columns are linearly dependent.
+/// Returns the inverse of `sum Re(x_i* x_j)` by rows. This matrix depends neither on the delay nor on the phases of E.
+/// `None` if the columns are linearly dependent.
 fn inverse_gram(all: &[Spectra]) -> Option<Vec<f64>> {
     let mut gram = [0.0; COLUMNS * COLUMNS];
     for spectra in all {
@@ -210,7 +213,7 @@ fn whitened(channel: &[f64], thin: usize) -> Option<(Vec<f64>, Vec<f64>)> {
     Some((white, d))
 }
 
-/// Returns the frequency response `1 + d_1 e^{-j w} + ..`.
+/// Returns the frequency response `1 + d_1 e^{-j w} + ..` at `w = omega_ts`.
 fn filter(d: &[f64], omega_ts: f64) -> Complex64 {
     let terms = d.iter().enumerate();
     terms.fold(Complex64::ONE, |sum, (k, d)| {
@@ -218,9 +221,9 @@ fn filter(d: &[f64], omega_ts: f64) -> Complex64 {
     })
 }
 
-/// Computes `sum x_t e^{-j omega t}` in these bins.
+/// Returns the Fourier coefficients `sum x_t e^{-j omega t}` in these bins.
 fn coefficients(values: &[f64], bins: std::ops::RangeInclusive<usize>) -> Vec<Complex64> {
-    // The scale turns amplitudes of sinusoids into sums, so that the weight of a record is proportional to its length.
+    // Converts amplitudes of sinusoids to sums, so that the weight of a record is proportional to its length.
     let scale = 0.5 * values.len() as f64;
     spectrum::coefficients(values)[bins].iter().map(|x| x * scale).collect()
 }

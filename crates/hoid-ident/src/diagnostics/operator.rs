@@ -15,21 +15,21 @@ const LEAST_ERRORS: f64 = 2.0;
 /// Damping ratio above which the poles count as a lag: the faster of the two real poles is then 34 times the slower.
 const LARGEST_DAMPING: f64 = 3.0;
 
-/// True if a value is less than two standard errors from zero. A value without a standard error was given, not
-/// estimated.
+/// True if a value is less than two standard errors from zero; false for a value without a standard error, which was
+/// given and not estimated.
 pub fn is_open(e: &Estimate) -> bool {
     e.standard_error
         .is_some_and(|error| e.value.abs() < LEAST_ERRORS * error)
 }
 
-/// True if K_e and K_e_dot have opposite signs, each by two standard errors or more: a negative lead.
+/// True if K_e and K_e_dot have opposite signs and are each at least two standard errors from zero: a negative lead.
 pub fn leads_backwards(o: &OperatorEstimate) -> bool {
     let sign = |e: &Estimate| if is_open(e) { 0.0 } else { e.value.signum() };
     sign(&o.k_e) * sign(&o.k_e_dot) < 0.0
 }
 
 /// Returns findings about undetermined gains and leads, and about negative leads. Each operator has a label, such as
-/// ` of record 2`; the label of a single operator is empty. If K_e and K_e_dot of every operator are undetermined, the
+/// ` of record 2`; the label of a single operator is empty. If K_e and K_e_dot of all operators are undetermined, the
 /// only finding is that there is too little response to e.
 pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
     let mut open = Vec::new();
@@ -56,8 +56,8 @@ pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
         .collect()
 }
 
-/// Returns a finding about a negative lead. People have no negative lead; it arises if a gain and a lead are fitted to
-/// a lag.
+/// Returns a finding about a negative lead. People have no negative lead; a negative lead arises if a gain and a lead
+/// are fitted to a lag.
 fn negative_lead(negative: &[String]) -> Option<Finding> {
     (!negative.is_empty()).then(|| {
         Finding::doubt(
@@ -116,7 +116,7 @@ fn not_determined(open: &[String]) -> Option<Finding> {
     })
 }
 
-/// Returns a finding if the delay in s is at the end of its search range.
+/// Returns a finding if the delay `tau_s` is at an end of its search range.
 pub(super) fn delay_finding(tau_s: f64, (low, high): (f64, f64), of: &str) -> Option<Finding> {
     (high > low && (tau_s <= low || tau_s >= high)).then(|| {
         Finding::doubt(

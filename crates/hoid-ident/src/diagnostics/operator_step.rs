@@ -33,7 +33,7 @@ const NOISE: usize = 4;
 /// Number of parameters of the operator.
 const OPERATOR: usize = 5;
 
-/// Change of one parameter that improves the fit to a record.
+/// Change of one parameter of an operator that improves its fit to a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OperatorStep {
     /// Name of the parameter.
@@ -45,8 +45,9 @@ pub struct OperatorStep {
 }
 
 impl OperatorStep {
-    /// Returns the probability of at least this step if there is no difference, by Student's distribution. The
-    /// parameter of the operator itself has the standard error `error_of_operator`; steps up to `grid` count as zero.
+    /// Returns the probability of a step at least this large if the record agrees with the operator, by Student's
+    /// distribution. `error_of_operator` is the standard error of the parameter in the operator itself; steps up to
+    /// `grid` count as zero.
     pub fn p_value(&self, error_of_operator: f64, grid: f64) -> f64 {
         let Some(own) = self.by.standard_error else { return 1.0 };
         let t = (self.by.value.abs() - grid).max(0.0) / own.hypot(error_of_operator);
@@ -55,8 +56,8 @@ impl OperatorStep {
     }
 }
 
-/// Computes the steps of K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm and tau_e (s). `None` if the record is too short
-/// or carries no information.
+/// Computes the steps of K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm and tau_e (s) from an operator towards the fit to
+/// a record. `None` if the record is too short or carries no information.
 pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[OperatorStep; OPERATOR]> {
     let ts = record.sample_time();
     let eta = delayed_parameters(operator);
@@ -77,7 +78,7 @@ pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[
     };
     let fit = estimator.fit(std::slice::from_ref(record)).ok()?;
     let (theta, first) = (fit.model().theta(), first_residual(&orders, fit.initial_state()));
-    // Coefficients of B are at the start, those of F at the end.
+    // The coefficients of B are at the start of theta, those of F at the end.
     let places = [0, 1, 2, theta.len() - 2, theta.len() - 1];
     let mut workspace = Workspace::of_thread();
     let mut scores = |_: usize, data: Data<'_>| {

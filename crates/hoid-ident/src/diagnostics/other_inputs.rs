@@ -21,11 +21,11 @@ use crate::{
 /// Names of channels that may hold a displayed target.
 pub(super) const TARGETS: [&str; 4] = ["r", "f_t", "target", "reference"];
 /// p-value below which a response to the target is reported. The first value applies if target and disturbance have
-/// separate lines, the second if only the target excites the loop: there an error in the form of the fit looks like a
-/// response to the target.
+/// separate lines, the second if only the target excites the loop: in that case an error in the form of the fit looks
+/// like a response to the target.
 const BY_CHANCE: [f64; 2] = [1e-2, 1e-7];
 
-/// Returns a warning for each target to which the person responds.
+/// Returns a finding for each recorded target to which u responds.
 pub fn of_family(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record]) -> Vec<Finding> {
     let is_recorded = |name: &&str| {
         records.iter().all(|record| {

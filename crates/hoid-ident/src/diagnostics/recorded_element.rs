@@ -9,7 +9,7 @@
 //! between the initial and the final states (R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain
 //! Approach*, 2012, section 6.3.2). The equation is linear in the coefficients of A, B, C, `B kappa` and T, which are
 //! found by least squares at the frequencies of manual control. The delay is scanned, with the same delay for d as for
-//! u, and without a delay of d in case only u was recorded late. Rows are divided by `B h` of the previous iteration,
+//! u and, in case only u was recorded late, without a delay for d. Rows are divided by `B h` of the previous iteration,
 //! so that a residual is equivalent to a disturbance at u (C. K. Sanathanan and J. Koerner, IEEE Trans. Automatic
 //! Control 8 (1963) 56-58), and weighted by the smoothed spectrum of the residuals.
 //!
@@ -18,7 +18,7 @@
 //! | `spectra` | Fourier coefficients, and the exogenous channels of the loop |
 //! | `equations` | the least-squares fit of an element |
 //!
-//! The person responds to a disturbance that was not recorded, so that u is not independent of it. The element is
+//! If a disturbance was not recorded, the person responds to it, so that u is not independent of it. The element is
 //! therefore judged only if the recorded signals explain all but [`UNEXPLAINED`] of the power, as they do if all
 //! signals of the loop were recorded. C is free, since it equals A only if e is not scaled.
 
@@ -32,37 +32,37 @@ use spectra::{Exogenous, MOST_FREQUENCIES, Spectra};
 
 /// Largest unexplained share of the power, expressed as a disturbance at u, for which the element is judged.
 const UNEXPLAINED: f64 = 0.02;
-/// Share of the power of exact data that the step width of the delay scan leaves unexplained; smaller differences
-/// between elements do not count.
+/// Share of the power that remains unexplained for exact data because the delay is scanned in steps; smaller
+/// differences between elements do not count.
 const EXACT: f64 = 1e-4;
 /// Frequencies at which two elements are compared, rad/s: the range in which people close their loops.
 const COMPARED_RAD_S: [f64; 7] = [0.5, 0.75, 1.1, 1.6, 2.4, 3.6, 5.4];
 /// Largest difference between the logarithms of two responses that count as equal: 10 % of the gain or 6 deg.
 const EQUAL_RESPONSES: f64 = 0.1;
-/// Delay up to which e and u count as aligned, samples: a recorder may store one of them a sample before or after the
-/// other.
+/// Largest delay in samples for which e and u count as aligned: a recorder may store one of them a sample before or
+/// after the other.
 const ALIGNED_SAMPLES: f64 = 1.5;
-/// Largest degree of the given element for which the test is made.
+/// Largest number of poles of a given element that can be tested.
 const MOST_POLES: usize = 4;
 
 /// The controlled element identified from a recorded loop.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedElement {
-    /// Element that relates u to e, with the delay of the given element.
+    /// Element through which e responds to u, with the delay of the given element.
     pub element: ContinuousTransferFunction,
     /// Delay of the machine beyond that of the given element, s; negative if u was recorded late.
     pub delay_s: f64,
-    /// Share of the power at u that the element does not explain.
+    /// Share of the power that the element does not explain, expressed as a disturbance at u.
     pub unexplained: f64,
-    /// Frequency in rad/s at which the response differs most from that of the given element, apart from the delay, and
-    /// the ratio of the two responses there.
+    /// Frequency in rad/s at which the response of the element differs most from that of the given element, apart from
+    /// the delay, and the ratio of the two responses at this frequency.
     pub difference: (f64, Complex64),
     /// Largest delay for which e and u count as aligned, s.
     aligned_s: f64,
 }
 
 impl RecordedElement {
-    /// True if the element has the response of the given element, apart from a delay.
+    /// True if the identified element has the same response as the given element, apart from a delay.
     pub fn is_given(&self) -> bool {
         self.difference.1.ln().norm() <= EQUAL_RESPONSES
     }
@@ -93,8 +93,8 @@ impl RecordedElement {
 }
 
 /// Identifies the controlled element from closed-loop records. `None` if the records do not determine it because
-/// signals of the loop are missing or the records are too short. `excitation` is the channel of a target or a
-/// disturbance.
+/// signals of the loop are missing or the records are too short. `excitation` is the name of a channel with a target or
+/// a disturbance.
 pub fn recorded_element(
     records: &[Record],
     given: &ContinuousTransferFunction,
@@ -115,8 +115,8 @@ pub fn recorded_element(
             spectra.push(found);
         }
     }
-    // The candidates, in ascending complexity: a single and a double integrator with their lags, the given orders, and
-    // the given orders with one more pole.
+    // The candidates, in ascending complexity: one pole, two poles without or with a zero, the given orders, and the
+    // given orders with one more pole.
     let mut orders = vec![(0, 1), (0, 2), (1, 2), (m, n.max(1)), (m, n + 1)];
     orders.sort_by_key(|&(m, n)| (m + n, n));
     orders.dedup();
@@ -145,7 +145,7 @@ pub fn recorded_element(
     })
 }
 
-/// Returns the element with this delay, without terms that are negligible at the frequencies compared.
+/// Returns the fitted element with this delay, without terms that are negligible at the frequencies compared.
 fn transfer_function(fit: &Fitted, delay_s: f64) -> Option<ContinuousTransferFunction> {
     let without_small = |p: &[f64]| -> Vec<f64> {
         let sizes = |omega: f64| {

@@ -24,17 +24,17 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use super::whitened::{NOISE, Whitened, lags, orthogonal, thinning, whitened};
 
-/// Number of taps, and their length in s.
+/// Number of taps, and the length of a tap in s.
 pub(crate) const TAPS: usize = 6;
 pub(crate) const TAP_S: f64 = 0.15;
-/// Length of a block in s, and minimum number of blocks.
+/// Length of a block in s, and minimum number of blocks for the test.
 const BLOCK_S: f64 = 2.0;
 const FEWEST: usize = 10;
 
-/// Result of the test.
+/// Result of the test for a missing response.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ResidualResponse {
-    /// Probability of a statistic at least this large if no response is missing.
+    /// Larger of the two p-values: probability of a statistic at least this large if no response is missing.
     pub p_value: f64,
     /// The two p-values: from the variance of the model and from the scatter of blocks.
     pub each: [f64; 2],
@@ -42,8 +42,8 @@ pub struct ResidualResponse {
     pub share: f64,
 }
 
-/// Tests whether columns of the same length as e and u explain the whole response of u to e in the samples `from..`.
-/// The columns need not contain the level. `None` if there are too few data or a value is not a number.
+/// Tests whether columns of the same length as e and u explain the whole response of u to e, in the samples from `from`
+/// on. The columns need not contain the level. `None` if there are too few data or a value is not a number.
 pub fn residual_response(
     columns: &[Vec<f64>],
     e: &[f64],

@@ -22,9 +22,9 @@ const LARGEST_AUTOCORRELATION: f64 = 0.1;
 const LARGEST_CROSS_CORRELATION: f64 = 0.1;
 /// Limit of a correlation in short records, in standard errors of a correlation of white noise.
 const CHANCE_CORRELATION: f64 = 4.0;
-/// Share of one sample in the sum of squares above which it dominates the fit.
+/// Share of the sum of squares above which one sample dominates the fit.
 const LARGEST_LEVERAGE: f64 = 0.05;
-/// Limit of one squared residual in short records, as a multiple of the mean square.
+/// Limit of a squared residual in short records, as a multiple of the mean square.
 const CHANCE_LEVERAGE: f64 = 20.0;
 /// Number of lags of the autocorrelation.
 const LAGS: usize = 25;
@@ -39,11 +39,11 @@ pub(crate) struct ResidualMeasures {
     pub count: usize,
     /// Largest modulus of the autocorrelation over lags 1 to 25.
     pub autocorrelation: f64,
-    /// Largest modulus of the correlation with e at lags of 0 to 0.6 s; zero without e.
+    /// Largest modulus of the correlation with e at lags of 0 to 0.6 s; zero for a model without an input.
     pub cross_correlation: f64,
     /// Largest share of one sample in the sum of squares.
     pub leverage: f64,
-    /// Record and sample of the residual with the largest share.
+    /// Record and sample of the residual with the largest share in the sum of squares.
     pub at: (usize, usize),
 }
 

@@ -2,12 +2,12 @@
 //!
 //! | removed | cause of a difference | finding |
 //! |---|---|---|
-//! | deviations of a sample of e or u from its neighbours beyond a limit ([`crate::faults::held`]), so that no sample has a large effect on the filters of the fit | few samples | `leverage` |
+//! | deviations of a sample of e or u from its neighbours beyond a limit ([`crate::faults::held`]), so that no sample has a large effect on the filters of the fit | a few samples | `leverage` |
 //! | components slower than 20 s or, for a slow system, than ten periods of its slowest pole ([`crate::faults::without_slow`]) | a drift or a step of a sensor, which the person does not follow | `slow` |
 //!
 //! Two fits differ if a parameter, the crossover or the phase margin differs by more than three standard errors. The
 //! standard error is that of the first fit or, if larger, that of the information lost in the second fit,
-//! `sqrt(se'^2 - se^2)`. If nothing is removed, there is no second fit, because it would equal the first.
+//! `sqrt(se'^2 - se^2)`. If nothing is removed, there is no second fit, because it would be identical to the first.
 
 use std::f64::consts::TAU;
 
@@ -23,7 +23,7 @@ use crate::{
     faults::{PERIOD_S, held, without_slow},
 };
 
-/// Components slower than this number of periods of the slowest pole of a system count as slow.
+/// Components are slow if their period is longer than this number of periods of the slowest pole of a system.
 const SLOW_PERIODS: f64 = 10.0;
 /// Two fits differ if an estimate differs by more than this number of standard errors.
 const SIGNIFICANT_DIFFERENCE: f64 = 3.0;
@@ -44,7 +44,7 @@ enum Without {
 impl Without {
     const ALL: [Self; 2] = [Self::Outliers, Self::SlowComponents(PERIOD_S)];
 
-    /// Returns the records without the component; `None` if no record contains it.
+    /// Returns the records without the component; `None` if there is nothing to remove.
     fn records(self, records: &[Record]) -> Option<Vec<Record>> {
         match self {
             Self::Outliers => held(records),
@@ -52,7 +52,7 @@ impl Without {
         }
     }
 
-    /// Returns a warning if the fits differ in any of these quantities.
+    /// Returns a warning if the first and the second fit differ in any of these quantities.
     fn finding(self, pairs: impl IntoIterator<Item = ComparedEstimate>) -> Option<Finding> {
         let differ: Vec<String> = pairs
             .into_iter()
@@ -86,8 +86,8 @@ impl Without {
     }
 }
 
-/// Removes each component of `all` in turn and returns the findings; `again` fits the changed records and returns the
-/// quantities of both fits.
+/// Removes each component in `all`, one at a time, and returns the findings. `again` fits the changed records and
+/// returns the quantities of both fits.
 fn opinions(
     all: &[Without],
     records: &[Record],
@@ -145,15 +145,15 @@ pub fn of_grey_box(
 }
 
 /// Returns the findings of second fits of an operator of the family; its form and the orders of its noise model stay
-/// the same. A fit at the lines of a recorded excitation carries no information about slow components, so that only
-/// single samples are examined.
+/// the same. Only single samples are examined for a fit at the lines of a recorded excitation, which carries no
+/// information about slow components, and for a fit with several inputs.
 pub fn of_family(
     estimator: &FamilyEstimator,
     fit: &FamilyFit,
     records: &[Record],
     element: Option<&ContinuousTransferFunction>,
 ) -> Vec<Finding> {
-    // Without noise the standard errors reflect only rounding, and the end effects of the removal exceed them.
+    // Without noise the standard errors reflect only rounding, and the end effects of removing a component exceed them.
     if fit.noise_free.is_some() {
         return Vec::new();
     }
@@ -191,8 +191,8 @@ pub fn of_family(
     })
 }
 
-/// Returns the finding of a second fit without outlying samples, for an operator whose gains change once. A change
-/// found by only one of the two fits counts as a difference regardless of its size.
+/// Returns the finding of a second fit without outlying samples, for an operator whose gains change once. If only one
+/// of the two fits finds a change, this counts as a difference regardless of the size of the change.
 pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record]) -> Option<Finding> {
     let without = Without::Outliers;
     let other = SigmoidChange {
@@ -225,8 +225,8 @@ pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record
     without.finding(compared(constant(fit), constant(&other)))
 }
 
-/// Returns a warning if a level of e and u affects a polynomial fit: without the means a parameter differs by more than
-/// `LEVEL` standard errors.
+/// Returns a warning if a level of e and u affects a polynomial fit: a parameter differs by more than `LEVEL` standard
+/// errors if the means are removed.
 pub fn of_level(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Finding> {
     let without: Vec<Record> = records.iter().map(|r| r.clone().detrended(Detrend::Mean)).collect();
     let other = again(estimator, fit, &without)?;
@@ -257,7 +257,8 @@ fn again(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Fit> {
     other.fit(records).ok()
 }
 
-/// Pairs the parameters of two fits: those of the operators if both fits have one.
+/// Pairs the parameters of two fits: the parameters of the operators if both fits correspond to an operator, otherwise
+/// the coefficients.
 fn compared_parameters(fit: &Fit, other: &Fit) -> Vec<ComparedEstimate> {
     match (fit.operator(), other.operator()) {
         (Ok(one), Ok(two)) => {
@@ -273,7 +274,8 @@ fn compared(one: Vec<(String, Estimate)>, two: Vec<(String, Estimate)>) -> Vec<C
     pairs.map(|((name, first), (_, other))| (name, first, other)).collect()
 }
 
-/// Pairs the crossover and the phase margin of two fits with the same controlled element.
+/// Pairs the crossover and the phase margin of two fits with the same controlled element; empty if the element is
+/// unknown.
 fn compared_loops(fit: &Fit, other: &Fit, element: Option<&ContinuousTransferFunction>) -> Vec<ComparedEstimate> {
     let Some(element) = element else { return Vec::new() };
     let margins = |of: &Fit| {

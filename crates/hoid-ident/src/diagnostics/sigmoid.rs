@@ -16,7 +16,7 @@ impl SigmoidFit {
     /// without a change is judged.
     ///
     /// # Errors
-    /// As [`SigmoidFit::residuals`].
+    /// The errors of [`SigmoidFit::residuals`].
     pub fn verdict(&self, records: &[Record]) -> Result<Verdict, IdentError> {
         let mut all: Vec<Finding> = search_finding(self.termination()).into_iter().collect();
         all.extend(self.parameter_findings());
@@ -69,7 +69,7 @@ impl SigmoidFit {
                     "delay-at-bound",
                     format!("the delay {value:.3} s lies at an end of its search range; widen this range"),
                 )),
-                // At a bound of T_I the operator is a pure integration, or has no lag.
+                // At a bound of T_I the operator is equivalent to a pure integration, or has no lag.
                 Some(Remark::AtBound) if name == "T_I" => all.push(Finding::note(
                     "lag",
                     format!("T_I and K are not determined, only K/T_I is: T_I is at a bound, {value:.3} s"),

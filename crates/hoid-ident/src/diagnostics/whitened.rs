@@ -1,7 +1,7 @@
 //! Least squares with autoregressive noise: the white part of u that given columns do not explain.
 //!
-//! In `u = X b + level + v`, `D v = eps`, the noise model D of order [`NOISE`] and b are estimated in turn. If a limit
-//! is given, residuals are limited to this number of standard deviations.
+//! In `u = X b + level + v`, `D v = eps`, the noise model D of order [`NOISE`] and b are estimated in turn. Residuals
+//! are limited to a given number of standard deviations, which may be infinite.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,19 +9,19 @@ use nalgebra::{DMatrix, DVector};
 pub(super) const NOISE: usize = 16;
 /// Lowest rate after decimation, Hz.
 const RATE_HZ: f64 = 50.0;
-/// Standard deviations above which a residual is an outlier.
+/// Number of standard deviations above which a residual is an outlier.
 pub(super) const LIMIT: f64 = 3.5;
-/// v counts as rounding error if its power is below this share of the power of u.
+/// The unexplained part v is only rounding errors if its power is below this share of the power of u.
 const EXACT: f64 = 1e-18;
-/// Number of alternations between noise model and least squares.
+/// Number of times that the coefficients and the noise model are estimated in turn.
 const ROUNDS: usize = 3;
 
-/// Returns the decimation factor.
+/// Returns the decimation factor for this sample time.
 pub(super) fn thinning(sample_time_s: f64) -> usize {
     (1.0 / (sample_time_s * RATE_HZ) + 1e-6).floor().max(1.0) as usize
 }
 
-/// A least-squares fit of columns and a level to u.
+/// A least-squares fit of u by columns and a level.
 pub(super) struct Whitened {
     /// Coefficients of the columns, the level last.
     pub b: DVector<f64>,
@@ -29,15 +29,16 @@ pub(super) struct Whitened {
     pub v: DVector<f64>,
     /// Coefficients `d_1 ..` of the noise model of v.
     pub d: Vec<f64>,
-    /// Columns filtered by the noise model, the level last, with [`NOISE`] rows fewer than before.
+    /// Columns filtered by the noise model, the level last; the first [`NOISE`] rows are lost.
     pub x: DMatrix<f64>,
-    /// Limited residuals.
+    /// Whitened residuals `D v`, limited to the given number of standard deviations.
     pub eps: DVector<f64>,
 }
 
 impl Whitened {
-    /// Fits columns to u at these samples. `None` if a value is not a number, columns are linearly dependent, or only
-    /// rounding errors are left. Residuals are limited to `limit` standard deviations.
+    /// Fits columns and a level to u at these samples. `None` if there are too few samples, a value is not a number,
+    /// columns are linearly dependent, or only rounding errors are left. Residuals are limited to `limit` standard
+    /// deviations.
     pub fn of(columns: &[Vec<f64>], u: &[f64], samples: &[usize], limit: f64) -> Option<Self> {
         let (n, p) = (samples.len(), columns.len() + 1);
         let x = DMatrix::from_fn(n, p, |i, j| columns.get(j).map_or(1.0, |c| c[samples[i]]));
@@ -91,7 +92,7 @@ pub(super) fn lags(v: &DVector<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(v.len() - NOISE, NOISE, |i, j| v[i + NOISE - 1 - j])
 }
 
-/// Returns y with the residuals of outliers reduced to the limit.
+/// Returns y after its residuals from the least-squares solution have been limited to `limit` standard deviations.
 fn limited(x: &DMatrix<f64>, y: &DVector<f64>, limit: f64) -> Option<DVector<f64>> {
     let fit = x * solution(x, y)?;
     Some(&fit + clipped(&(y - &fit), limit))
@@ -103,7 +104,8 @@ fn clipped(eps: &DVector<f64>, limit: f64) -> DVector<f64> {
     eps.map(|v| v.max(-most).min(most))
 }
 
-/// Returns the least-squares solution with columns scaled to unit length; `None` if they are linearly dependent.
+/// Returns the least-squares solution, computed with columns scaled to unit length; `None` if the columns are linearly
+/// dependent.
 pub(super) fn solution(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<DVector<f64>> {
     let (q, r, scales) = factored(x)?;
     let mut b = r.solve_upper_triangular(&(q.transpose() * y))?;
@@ -126,7 +128,7 @@ fn factored(x: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>, Vec<f64>)> 
     (least > DEPENDENT).then_some((q, r, scales))
 }
 
-/// Diagonal element of R below which columns are linearly dependent.
+/// Diagonal element of the triangular factor R below which columns are linearly dependent.
 const DEPENDENT: f64 = 1e-10;
 
 /// Pseudorandom numbers of a fixed stream, uniform with variance 1/12.

@@ -5,27 +5,29 @@
 //! follows the excitation. For each pair of methods, the difference d of the coordinates that the data determine is
 //! compared with its covariance V: `T = d' V^-1 d`.
 //!
-//! **V** is the sum of three terms:
+//! **V**, the covariance assumed for d, is the sum of three terms:
 //!
-//! 1. and 2. The covariances of the two methods, each from all residuals or all lines together, times kappa. A
+//! 1. and 2. The covariances of the two methods, each from all residuals (times kappa) or from all lines together. A
 //!    jackknife over n runs has a rank of at most n - 1: with five runs and four coordinates, chance gives a very small
-//!    variance in some direction (H. Hotelling, *Annals of Mathematical Statistics* 2 (1931) 360-378). Since both
-//!    methods use the same records, the sum overestimates V and false alarms are rarer than the significance level.
-//! 3. In a closed loop the prediction error fit is biased if its noise model is wrong, and no scatter between runs
-//!    shows this bias. It is estimated as `sum d_k d_k'` over the differences d_k to fits with other noise models
-//!    ([`super::sensitivity`]). The bias is included in the reported errors, and is therefore no evidence against the
-//!    result.
+//!    variance in some direction (H. Hotelling, *Annals of Mathematical Statistics* 2 (1931) 360-378). Both methods use
+//!    the same records, so that their errors are correlated: the sum of the covariances overestimates the covariance of
+//!    d, and false alarms are rarer than the significance level.
+//! 3. The squared bias of the prediction error fit, in the pairs that contain it. In a closed loop this fit is biased
+//!    if its noise model is wrong, and no scatter between runs shows the bias. The squared bias is estimated as
+//!    `sum d_k d_k'` over the differences d_k from fits with other noise models ([`super::sensitivity`]). It is
+//!    included in the reported errors, and is therefore no evidence against the result.
 //!
-//! **Compared coordinates** are those that the data determine, with a prior share of at most a quarter in each method.
-//! A resonance above the lines, for example, may be determined by the prior in one method and by the data in another.
+//! **Compared coordinates** are the gain and those coordinates that the data determine, if their prior share is at most
+//! a quarter both in the fit at the lines and with instrumental variables. A resonance above the lines, for example,
+//! may be determined by the prior in one method and by the data in another.
 //!
 //! The gain is compared as `ln |Y|` in the middle of the band of manual control. Gain and lead time, or gain and lag,
 //! can compensate each other along a curve such as K T_L = constant, so that two distant points on this curve may be
 //! equivalent. A linear test of the gain itself would report a difference between them.
 //!
 //! T has a chi-square distribution with as many degrees of freedom as there are compared coordinates. For several pairs
-//! the smallest p-value is multiplied by the number of pairs (Bonferroni): at a level of 1 %, at most one in a hundred
-//! people whose operator has this form is reported.
+//! the smallest p-value is multiplied by the number of pairs (Bonferroni): at a level of 1 %, a disagreement is
+//! reported for at most one in a hundred people whose operator has this form.
 
 use hoid_model::{FamilyOperator, operator_family::Coordinate};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -72,8 +74,8 @@ pub struct Agreement {
     pub pairs: Vec<AgreementPair>,
     /// Statistic T of the pair with the least agreement.
     pub statistic: f64,
-    /// p-value of the pair with the least agreement, times the number of pairs: the probability of such a difference if
-    /// all methods are unbiased.
+    /// p-value of the pair with the least agreement, times the number of pairs, limited to one: an upper bound on the
+    /// probability of such a disagreement if all methods are unbiased.
     pub p_value: f64,
 }
 
@@ -89,7 +91,7 @@ pub struct AgreementRow {
 }
 
 impl AgreementRow {
-    /// Returns value and standard error of the estimate by a method.
+    /// Returns the value and the standard error of the estimate by a method; `None` if the method has no estimate.
     pub fn of(&self, method: AgreementMethod) -> Option<(f64, f64)> {
         self.values.iter().find(|(m, _)| *m == method).map(|(_, v)| *v)
     }
@@ -104,7 +106,7 @@ pub struct AgreementPair {
     pub statistic: f64,
     /// Probability of a statistic at least as large if both methods are unbiased.
     pub p_value: f64,
-    /// The coordinate with the largest difference, in standard errors of the difference.
+    /// The coordinate with the largest difference, and this difference in standard errors of the difference.
     pub most: (Coordinate, f64),
 }
 
@@ -119,11 +121,11 @@ impl Agreement {
 #[derive(Debug, Clone)]
 pub(super) struct Side {
     pub method: AgreementMethod,
-    /// Estimated coordinates, with the level `ln |Y|` in place of the gain as the first one.
+    /// Estimated coordinates; the first one is the level `ln |Y|` in place of the gain.
     pub coordinates: Vec<f64>,
     /// Covariance of these coordinates by rows, from all residuals or all lines.
     pub covariance: Vec<f64>,
-    /// Coordinates with the reported standard errors, with the gain itself as the first one.
+    /// Coordinates with their reported standard errors; the first one is the gain itself.
     pub reported: Vec<(f64, f64)>,
 }
 
@@ -132,7 +134,8 @@ impl Side {
     pub fn of(method: AgreementMethod, operator: &FamilyOperator, covariance: &[f64], reported: &[f64]) -> Self {
         let p = operator.coordinates().len();
         let gradient = level(operator).1;
-        // The first row is the gradient of the level; the other rows are those of the identity matrix.
+        // The covariance is transformed by a matrix whose first row is the gradient of the level; its other rows are
+        // those of the identity matrix.
         let times = |c: &[f64], i: usize, j: usize| -> f64 {
             match i {
                 0 => (0..p).map(|k| gradient[k] * c[k * p + j]).sum(),
@@ -169,8 +172,9 @@ pub(super) fn with_level(operator: &FamilyOperator) -> Vec<f64> {
     x
 }
 
-/// Tests all pairs of methods over the coordinates that count. `bias` is the squared bias of the prediction error fit,
-/// as a matrix by rows. `None` if no coordinate counts, or if fewer than two methods have errors.
+/// Tests the agreement of all pairs of methods in the coordinates for which `counts` is true. `bias` is the squared
+/// bias of the prediction error fit, as a matrix by rows. `None` if no coordinate counts, or if there are fewer than
+/// two methods.
 pub(super) fn agreement(
     all: &[Coordinate],
     sides: &[Side],
@@ -203,7 +207,8 @@ pub(super) fn agreement(
     })
 }
 
-/// Tests two methods. Also returns the difference of each coordinate, in standard errors of the difference.
+/// Tests the agreement of two methods in the coordinates with the indices `used`. Also returns the difference of each
+/// of these coordinates, in standard errors of the difference.
 fn pair(
     all: &[Coordinate],
     used: &[usize],

@@ -1,9 +1,9 @@
-//! A frequency response without a form, from a high-order ARX model.
+//! A frequency response from a high-order ARX model, without an assumption on the form of the operator.
 //!
 //! In a closed loop the direct prediction error method needs a sufficiently flexible noise model but no knowledge of
 //! the loop (L. Ljung, *System Identification*, 1999, section 13.4). A high-order ARX model is flexible enough and
-//! takes a single linear regression. If no periodic excitation was recorded, its response replaces the describing
-//! function as the source of starts for all forms.
+//! requires only one linear regression. If no periodic excitation was recorded, the response of this model replaces the
+//! describing function as the source of starts for all forms.
 
 use hoid_model::{Complex64, Orders, Record, SampleTime, Structure};
 
@@ -12,26 +12,27 @@ use crate::{Estimator, Fit, IdentError, ResponsePoint};
 
 /// Highest order of A.
 const POLES: usize = 16;
-/// Number of coefficients of A and B at which the orders are not reduced further.
+/// The orders are not reduced further if neither A nor B has more coefficients than this.
 const FEWEST: usize = 4;
 /// Maximum number of coefficients of B.
 pub(super) const MOST_GAINS: usize = 60;
 /// Innovation variance relative to the power of u below which the record may be free of noise.
 const NEARLY_NOISE_FREE: f64 = 1e-3;
-/// Ratio of two innovation variances that cannot result from different degrees of freedom and first samples alone.
+/// Ratio of the innovation variances of two models that is too large to result only from different degrees of freedom
+/// and first samples.
 const SAFETY_FACTOR: f64 = 4.0;
-/// Lowest and highest order of A of an exact operator: the neuromuscular system and up to two lags.
+/// Lowest and highest order of A in the exact ARX model of an operator: the neuromuscular system and up to two lags.
 const OWN_ORDERS: (usize, usize) = (2, 4);
-/// Number of B coefficients minus the order of A for an exact operator: one for the fractional part of the delay and
-/// one for linear interpolation.
+/// Number of B coefficients minus the order of A in the exact ARX model of an operator: one for the fractional part of
+/// the delay and one for linear interpolation.
 const FURTHER_GAINS: usize = 2;
 /// Frequency range of the response, rad/s; its points are evenly spaced on a logarithmic scale.
 const BAND_RAD_S: (f64, f64) = (0.5, 20.0);
 const POINTS: usize = 24;
-/// Duration of the longest response to an error that B describes, s.
+/// Duration of the impulse response that B can describe, s.
 const RESPONSE_S: f64 = 0.7;
 
-/// A frequency response without a form.
+/// A frequency response without an assumption on the form of the operator.
 #[derive(Debug, Clone)]
 pub(super) struct ArxResponse {
     /// Points of the response with their variances.
@@ -51,17 +52,17 @@ impl ArxResponse {
     }
 
     /// Estimates the response from records with almost no noise; `None` if there is more noise. A high-order model has
-    /// two problems here: a u without noise does not determine the coefficients of A, and B must cover the delay, which
+    /// two problems here: a noise-free u does not determine the coefficients of A, and B must cover the delay, which
     /// takes many samples at high sampling frequencies. However, an operator without noise is exactly an ARX model of
-    /// the order of the operator, with its delay in whole samples. Of both kinds of model, the one with the smallest
-    /// innovation variance is used.
+    /// the order of the operator, with its delay in whole samples. The high-order model and all models of this kind are
+    /// fitted, and the one with the smallest innovation variance is used.
     pub fn without_noise(records: &[Record], longest_delay_s: f64) -> Option<Self> {
         let (high, of_high) = regressed(records, true, MOST_GAINS).ok()?;
         if high.innovations > NEARLY_NOISE_FREE {
             return None;
         }
-        // A model whose regressors are a subset of those of the high-order model has at least the same innovation
-        // variance.
+        // If there is noise, models whose regressors are a subset of those of the high-order model are skipped, since
+        // their innovation variance cannot be smaller.
         let is_noise = high.innovations > SAFETY_FACTOR * NONE;
         let contained = |orders: &Orders| {
             let last = |orders: &Orders| orders.nk + orders.nb;
@@ -99,7 +100,7 @@ impl ArxResponse {
     }
 }
 
-/// Returns the frequencies of a response without a form, in rad/s.
+/// Returns the frequencies in rad/s at which the response of an ARX model is computed.
 pub(super) fn frequencies(ts: SampleTime) -> Vec<f64> {
     let highest = BAND_RAD_S.1.min(0.8 * ts.nyquist_rad_s());
     (0..POINTS)
@@ -119,7 +120,7 @@ pub(super) fn halved((na, nb): (usize, usize)) -> Option<(usize, usize)> {
     (na.max(nb) > FEWEST).then(|| (na.div_ceil(2).max(2), nb.div_ceil(2).max(2)))
 }
 
-/// An ARX estimator with a level: without noise, the removal of the means has a visible effect.
+/// Returns an ARX estimator that also estimates a level: without noise, an error of the removed means would be visible.
 fn with_level(orders: Orders) -> Estimator {
     Estimator {
         level: true,
@@ -132,8 +133,8 @@ fn gains(records: &[Record]) -> usize {
     (RESPONSE_S / records[0].sample_time().s()).ceil() as usize
 }
 
-/// Repeats the regression with half of the order of A, or of both orders, until the records determine the coefficients.
-/// Also returns the orders.
+/// Repeats the regression until the records determine the coefficients, each time with half the order of A or with half
+/// of both orders. Returns the response and the orders.
 fn regressed(records: &[Record], of_a_alone: bool, most_gains: usize) -> Result<(ArxResponse, Orders), IdentError> {
     let mut orders = Structure::Arx.operator_orders(1);
     (orders.na, orders.nb) = first_orders(records, 1, most_gains);

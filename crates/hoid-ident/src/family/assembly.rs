@@ -1,4 +1,4 @@
-//! Assembly of the result from the searches of the forms with a weight: operators with their errors, averaged over
+//! Assembly of the result from the searches of all forms that have a weight: operators with their errors, averaged over
 //! forms, the comparison of methods for the best form, and the verdict.
 //!
 //! The order matters: the methods are first compared with their own errors, and only then is the difference between
@@ -38,19 +38,19 @@ use crate::{
     optimize::minimise,
 };
 
-/// Result of fitting a form at the lines of the excitation.
+/// The excitation data, and the fit of the best form at the lines.
 pub(super) struct AtLines<'d> {
     pub describing: Option<&'d DescribingFunction>,
-    /// The lines of several inputs, if there are any.
+    /// Data for fits of several inputs at their lines; `None` if there is one input or if there are no lines.
     pub channels: Option<AtChannelLines<'d>>,
-    /// Further inputs in their forms.
+    /// Further inputs with a response, in the selected forms.
     pub in_form: Vec<InForm>,
     pub fit: Option<LineFit>,
     /// Reason why there is no fit, if one was requested.
     pub why_none: Option<String>,
 }
 
-/// The search of a form with a weight, other than the best form.
+/// The search of a form other than the best one, with its weight in the averages.
 pub(super) struct OtherForm<'a> {
     pub fit: PredictionFit<'a>,
     pub lines: Option<LineFit>,
@@ -62,12 +62,12 @@ pub(super) struct Chosen<'p, 'a> {
     pub fit: PredictionFit<'a>,
     pub weight: f64,
     pub lines: AtLines<'p>,
-    /// The other forms with a weight.
+    /// The other forms that have a weight.
     pub others: Vec<OtherForm<'a>>,
     /// Criteria of all compared forms.
     pub forms: Vec<FormFigures>,
     pub prediction: &'p Prediction<'a>,
-    /// Results of the comparison for the inputs in addition to the error.
+    /// Comparison of the forms of each further input.
     pub channels: Vec<ChannelFit>,
     /// The records, detrended.
     pub records: &'p [Record],
@@ -84,7 +84,7 @@ impl<'a> Chosen<'_, 'a> {
     /// Assembles the result.
     ///
     /// # Errors
-    /// The errors of the model.
+    /// The errors of the discrete-time model of an operator.
     pub fn result(self, workspace: &mut Workspace) -> Result<FamilyFit, IdentError> {
         let (fit, layout) = (&self.fit, self.fit.layout());
         let separate = if self.prediction.individual.is_empty() {
@@ -96,7 +96,8 @@ impl<'a> Chosen<'_, 'a> {
         let unseen = self.prediction.little_noise.is_none();
         let mut errors = Errors::of(fit, self.run_to_run, workspace);
         let error_ratio = errors.largest_ratio(fit);
-        // Effect of the noise model, included in the errors and in the tolerated difference between methods.
+        // Estimates with other noise models: their differences enter the errors and the tolerated difference between
+        // methods.
         let others = rivals(self.prediction, fit, self.highest_order, workspace);
         let (instrumental, no_instrumental) = match self.instrumental(separate, workspace) {
             None => (None, None),
@@ -202,8 +203,8 @@ impl<'a> Chosen<'_, 'a> {
         })
     }
 
-    /// Returns the prediction error fit that includes the lines; `None` without lines, without noise, or if the records
-    /// have separate operators.
+    /// Returns the prediction error fit that includes the lines; `None` without lines, without noise, if the records
+    /// have separate operators, or if [`with_lines`] returns none.
     fn joint(
         &self,
         fit: &PredictionFit<'a>,
@@ -222,14 +223,15 @@ impl<'a> Chosen<'_, 'a> {
         with_lines(self.prediction, fit, (lines?, &data), workspace)
     }
 
-    /// True if every further input, and another signal, has lines of its own.
+    /// True if every further input has lines of its own, and so has another signal.
     fn have_separate_lines(&self) -> bool {
         let names: Vec<String> = self.channels.iter().map(|channel| channel.name.clone()).collect();
         let lines = self.lines.channels.as_ref().map(|at| at.lines.as_ref());
         have_separate_lines(lines, &names)
     }
 
-    /// Estimates one operator for all records by refined instrumental variables with the recorded excitation.
+    /// Estimates one operator for all records by refined instrumental variables with the recorded excitation; `None`
+    /// without an excitation, without noise, with separate operators, or with further inputs.
     fn instrumental(&self, separate: usize, workspace: &mut Workspace) -> Option<Result<InstrumentalFit, IdentError>> {
         let channel = self
             .excitation
@@ -284,10 +286,10 @@ impl<'a> Chosen<'_, 'a> {
     }
 }
 
-/// Adds the bias of the fit to its errors. With a fit at the lines the bias is the difference to it. For coordinates
-/// that the lines do not determine, and without lines, it is taken from the differences to fits with other noise models
-/// ([`super::sensitivity`]). `unseen` is false with little noise; the additional variances without lines then do not
-/// apply.
+/// Adds the bias of the fit to its errors. With a fit at the lines, the bias is the difference between the two fits.
+/// For coordinates that the lines do not determine, and without lines, it is taken from the differences from fits with
+/// other noise models ([`super::sensitivity`]). `unseen` is false with little noise; the additional variances without
+/// lines then do not apply.
 fn add_bias(
     errors: &mut Errors,
     fit: &PredictionFit<'_>,
@@ -325,8 +327,8 @@ fn add_bias(
     covariances.widen(fit, &mut errors.profiles);
 }
 
-/// Compares all methods over the gain and the determined coordinates, each with a small prior share; `None` if fewer
-/// than two methods have errors.
+/// Compares all methods over the gain and the determined coordinates, as far as their prior shares at the lines and
+/// with instrumental variables are small; `None` if fewer than two methods have errors.
 fn agreement_of(
     fit: &PredictionFit<'_>,
     operator: &Estimated,
@@ -387,8 +389,8 @@ fn agreement_of(
     })
 }
 
-/// Fits a Box-Jenkins model with the same orders and delay, starting from the polynomials of the fit; `None` with
-/// several operators or several inputs.
+/// Fits a Box-Jenkins model with the orders and the delay of the fit, starting from the polynomials of the fit. `None`
+/// with several operators or several inputs, if the search fails, or if the model has no additional parameters.
 fn free_model(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> Option<FreeModel> {
     let layout = fit.layout();
     if layout.elements.iter().any(|(_, record)| record.is_some()) || !layout.channels.is_empty() {
@@ -470,7 +472,7 @@ fn constancy(fit: &PredictionFit<'_>, run_to_run: f64, workspace: &mut Workspace
     .change()
 }
 
-/// Returns the mean squared coherence over the lines.
+/// Returns the mean of the squared coherence over the lines; `None` if the coherence is unknown.
 fn coherent_share(describing: &DescribingFunction) -> Option<f64> {
     let all: Option<Vec<f64>> = describing.lines.iter().map(|line| line.coherence).collect();
     all.filter(|all| !all.is_empty()).map(|all| mean(&all))

@@ -110,8 +110,8 @@ pub struct ChannelFit {
     pub preview_s: f64,
     /// The forms that were compared, including the absence of a response.
     pub forms: Vec<ChannelForm>,
-    /// Probability of a likelihood ratio as large as that of the best form if there is no response, corrected for the
-    /// number of forms.
+    /// Probability of a likelihood ratio at least as large as that of the best form if there is no response, corrected
+    /// for the number of forms.
     pub p_value: f64,
     /// The response; `None` if none was found.
     pub response: Option<ChannelResponse>,
@@ -122,10 +122,10 @@ pub struct ChannelFit {
 pub struct ChannelForm {
     /// The form; `None` for no response.
     pub form: Option<Form>,
-    /// Loss of the prediction error fit, if there is one.
+    /// Loss of the prediction error fit; `None` if the forms were compared at the lines or the fit failed.
     pub loss: Option<f64>,
-    /// Akaike's criterion minus that of the best candidate; without lines, the likelihood is divided by the inflation
-    /// kappa.
+    /// Akaike's criterion minus that of the best candidate; without lines, the log-likelihood is divided by the
+    /// inflation kappa.
     pub criterion: Option<f64>,
 }
 
@@ -178,7 +178,7 @@ impl ChannelFit {
 }
 
 impl ChannelFit {
-    /// Creates the result of a comparison, without a response.
+    /// Creates the result of a further input from the comparison of its forms; the response is added later.
     pub(super) fn compared(asked: &SeenChannel, forms: Vec<ChannelForm>, p_value: f64) -> Self {
         Self {
             name: asked.name.clone(),

@@ -9,8 +9,8 @@
 //! at each line. The lines of d determine the response to the error; the lines of r determine the sum of the response
 //! to the error and the response to r (M. M. van Paassen and M. Mulder, *Identification of Human Operator Control
 //! Behaviour in Multiple-Loop Tracking Tasks*, IFAC Man-Machine Systems, 1998). The variance of n follows from
-//! `|u_k - sum_i Y_i x_ik|^2` over the runs, and from the same quantity in the bins next to the line, with the weights
-//! of [`super::lines`].
+//! `|u_k - sum_i Y_i x_ik|^2` over the runs, and from the same quantity in the bins next to the line; the two are
+//! combined as in [`super::lines`].
 //!
 //! The remnant also enters e, so that a single run would give a ratio of two noisy numbers; averaging over the runs
 //! before the division reduces this error.
@@ -73,7 +73,7 @@ struct Line {
     /// Fourier coefficients in the neighbouring bins of each run, divided by the coefficient of the exciting signal at
     /// the line.
     neighbours: Vec<Vec<Coefficients>>,
-    /// Variance of the mean over the runs.
+    /// Variance of n, the part of the mean of u over the runs that the responses do not explain.
     variance: f64,
 }
 
@@ -88,8 +88,9 @@ pub(super) struct ChannelLines {
 }
 
 impl ChannelLines {
-    /// Finds the lines of the channels and of the excitation in these records. The excitation is the given one, or any
-    /// channel with a common name of an excitation. `None` if no signal has lines of its own.
+    /// Finds the lines of the channels and of the excitation in these records. The excitation is the given channel or,
+    /// if none is given, any channel with one of the common names of an excitation. `None` if no signal has lines of
+    /// its own.
     pub fn of(
         records: &[Record],
         channels: &[String],
@@ -139,7 +140,7 @@ impl ChannelLines {
     ) -> Option<()> {
         let n = record.len();
         let span_s = n as f64 * record.sample_time().s();
-        // Indices of the bins for the whole record.
+        // Indices of the lines of an excitation among the frequency bins of the whole record.
         let bins = |of: &Excitation| -> Vec<usize> {
             let periods = (span_s / of.period_s()).round() as usize;
             of.harmonics().iter().map(|harmonic| harmonic * periods).collect()
@@ -217,7 +218,8 @@ impl ChannelLines {
         }
     }
 
-    /// Computes the variance of the mean over the runs at each line, given the responses to all inputs.
+    /// Computes, at each line, the variance of the part of the mean of u that the given responses to all inputs do not
+    /// explain.
     fn weigh(&mut self, responses: impl Fn(f64) -> Vec<Complex64>) {
         let of = |line: &Line| {
             let h = responses(line.omega_rad_s);
@@ -252,7 +254,7 @@ impl ChannelLines {
 pub(super) struct ChannelCriterion {
     lines: Arc<ChannelLines>,
     layout: FamilyLayout,
-    /// Index of the further input that each channel of the layout represents.
+    /// For each channel of the layout, the index of its further input.
     places: Vec<usize>,
     /// Preview of each channel of the layout, s.
     leads_s: Vec<f64>,
@@ -344,8 +346,8 @@ impl AtChannelLines<'_> {
         }
     }
 
-    /// Returns the lines with their variances. The deviations are first taken from the responses `begun`, then from the
-    /// best fit of these forms.
+    /// Returns the lines with their variances. The part of u that is not explained is computed first with the responses
+    /// `begun`, then with the best fit of these forms.
     pub fn weighed(
         &self,
         (form, channels): (Form, &[InForm]),
@@ -389,7 +391,7 @@ impl AtChannelLines<'_> {
         all
     }
 
-    /// Runs the search from the best points of a grid, and returns the best result.
+    /// Searches from the best points of a grid and returns the best result; `None` if every search fails.
     pub fn fit(&self, form: Form, channels: &[InForm]) -> Option<ChannelMinimum> {
         let criterion = self.criterion(form, channels);
         let mut starts: Vec<(f64, Vec<f64>)> = (criterion.grid().into_iter())
@@ -475,8 +477,8 @@ impl ChannelCriterion {
         Ok(all)
     }
 
-    /// Returns the mean of u at one line over the runs, and the mean input of each operator, with the response of the
-    /// hold and the phase of the preview.
+    /// Returns the mean of u at one line over the runs, and the mean input of each operator, multiplied by the response
+    /// of the hold and the phase factor of the preview.
     fn inputs(&self, line: &Line) -> (Complex64, Vec<Complex64>) {
         let n = line.runs.len() as f64;
         let omega = line.omega_rad_s;
@@ -488,8 +490,8 @@ impl ChannelCriterion {
         (u, std::iter::once(mean(0)).chain(of_channels).collect())
     }
 
-    /// Sets the gains to their best values for the other coordinates, a linear problem, and returns the value of the
-    /// criterion.
+    /// Sets the gains to their best values for the other coordinates, which is a linear problem, and returns the value
+    /// of the criterion.
     fn best_gains(&self, x: &mut [f64]) -> Option<f64> {
         let places: Vec<usize> = std::iter::once(0)
             .chain(self.layout.channels.iter().map(|c| c.place))

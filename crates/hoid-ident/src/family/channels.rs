@@ -5,11 +5,11 @@
 //! Trans. Human Factors in Electronics* 8 (1967) 231-249, section II; M. Mulder et al., *IEEE Trans. Human-Machine
 //! Systems* 48 (2018) 457-469). Each channel has a separate form, gain and delay; all channels share the neuromuscular
 //! system of the operator, which moves the hand. All responses are fitted together by prediction error: if a person in
-//! a closed loop also sees the target, `U/E` is not the response to e, neither at the lines nor at other frequencies.
+//! a closed loop also sees the target, `U/E` differs from the response to e at the lines and at all other frequencies.
 //!
 //! **Starts.** A high-order ARX model with all inputs is estimated by one linear regression and is consistent in a
 //! closed loop (L. Ljung, *System Identification*, 1999, sections 13.4 and 13.5). Each form is fitted to the responses
-//! of this model; searches from other starts end in other minima.
+//! of this model; searches from other starts may end in other minima.
 //!
 //! **Forms** of each channel are compared in [`choice`].
 //!
@@ -49,9 +49,9 @@ use crate::{
     several_inputs::SeveralInputs,
 };
 
-/// Smallest part of the power of an input that the other inputs must not explain.
+/// Fraction of the power of an input that the previous inputs must leave unexplained.
 const LEAST_OWN_PART: f64 = 1e-9;
-/// Relative increase of the diagonal of the normal matrix.
+/// Relative increase of the diagonal of the normal matrix in the regression for the ARX model.
 const RIDGE: f64 = 1e-7;
 /// Longest delay of a channel relative to the end of the preview, s.
 const LONGEST_DELAY_S: f64 = 0.8;
@@ -63,7 +63,7 @@ pub(super) struct FurtherInputs<'s> {
     /// Values of each channel in each record.
     values: Vec<Vec<Vec<f64>>>,
     leads: Vec<usize>,
-    /// The records with whole periods, before truncation by the preview, with the trend of e and u removed.
+    /// The records before truncation by the preview, so that whole periods are kept; the trend of e and u is removed.
     whole: Vec<Record>,
 }
 
@@ -175,7 +175,7 @@ impl<'s> FurtherInputs<'s> {
                     ),
                 );
             }
-            // Orthogonalised twice: the second pass removes the rounding error of the first.
+            // The projection is repeated, because the second pass removes the rounding error of the first.
             let mut left = own;
             for _ in 0..2 {
                 for known in &basis {
@@ -202,7 +202,8 @@ impl<'s> FurtherInputs<'s> {
         Ok(())
     }
 
-    /// Returns the first sample at which no channel needs samples from before the record, not counting the noise model.
+    /// Returns the first sample at which no channel needs samples from before the record; the noise model may need
+    /// further samples.
     pub fn first_regressed_sample(&self, neuromuscular: bool, sampling: (SampleTime, Intersample)) -> usize {
         let (sample_time, intersample) = sampling;
         let muscles = if neuromuscular { 2 } else { 0 };
@@ -224,7 +225,7 @@ impl<'s> FurtherInputs<'s> {
         ChannelLines::of(&self.whole, &self.names(), (excitation, period_s)).map(Arc::new)
     }
 
-    /// Returns a channel in a form.
+    /// Returns a channel in a given form, with its preview and its delay range.
     fn in_form(&self, index: usize, form: Form, (sample_time, intersample): (SampleTime, Intersample)) -> InForm {
         let lead_s = self.leads[index] as f64 * sample_time.s();
         InForm {
@@ -235,7 +236,7 @@ impl<'s> FurtherInputs<'s> {
         }
     }
 
-    /// Returns the lines with their variances, starting from the responses without a form.
+    /// Returns the lines with their variances, starting from the responses of the ARX model.
     pub fn weighed(
         &self,
         at: &AtChannelLines<'_>,
@@ -262,7 +263,7 @@ impl<'s> FurtherInputs<'s> {
         })
     }
 
-    /// Estimates the responses to e and to each channel, without a form, by one regression.
+    /// Estimates the responses to e and to each channel by one regression, without an assumption on their forms.
     ///
     /// # Errors
     /// [`IdentError::SingularRegressors`] if the records do not distinguish the inputs.
@@ -286,7 +287,7 @@ impl<'s> FurtherInputs<'s> {
             nk: 1,
             ..hoid_model::Orders::default()
         };
-        // The preview adds to the delay relative to the end of the preview.
+        // Relative to the end of the preview, the delay is longer by the preview.
         let own = |lead: &usize| InputOrders {
             nb: (nb + lead).min(2 * MOST_GAINS),
             nf: 0,
@@ -321,15 +322,16 @@ impl<'s> FurtherInputs<'s> {
         if criterion.residuals() <= 2 * criterion.parameters() {
             return None;
         }
-        // A sum of few sinusoids determines only as many combinations of its past values: the response at its lines and
-        // nothing else.
+        // An input with few lines determines only the response at these lines, and thus only few combinations of the
+        // coefficients; the ridge makes the regression regular.
         let fit = model.ridge(&criterion, RIDGE, sample_time)?;
         let omega = frequencies(sample_time);
         let of = |input| fit.frequency_response(input, &omega).iter().map(measured).collect();
         Some((0..model.inputs.len()).map(of).collect())
     }
 
-    /// Returns each channel in all its forms, the form closest to the response of the channel first.
+    /// Returns, for each channel, its candidate forms with their starting values; the form closest to the response of
+    /// the channel is first.
     ///
     /// # Errors
     /// [`IdentError::NoFiniteLoss`] if no form could be fitted to a response.

@@ -3,9 +3,9 @@
 //! Each form has a value of Akaike's criterion: `chi^2 + 2 p` at the lines of an excitation, or `n ln V/kappa + 2 p`
 //! from the prediction error, where kappa is the inflation of variances. With little noise Schwarz's criterion is used
 //! instead ([`super::comparison`]). Estimates are averaged over forms with weights that follow from the criterion
-//! ([`super::mixture`]). The reported parameters are those of the best form: the simplest form within 2 of the smallest
-//! value, since such a difference is no evidence against a form (K. P. Burnham and D. R. Anderson, *Model Selection and
-//! Multimodel Inference*, 2002, section 2.6).
+//! ([`super::mixture`]). The reported parameters are those that the best form has. The best form is the simplest form
+//! within 2 of the smallest value, since a difference of up to 2 is no evidence against a form (K. P. Burnham and D. R.
+//! Anderson, *Model Selection and Multimodel Inference*, 2002, section 2.6).
 
 use hoid_model::Form;
 
@@ -16,8 +16,8 @@ pub struct FormFigures {
     pub form: Form,
     /// Loss of the prediction error fit.
     pub loss: Option<f64>,
-    /// Akaike's criterion: `chi^2 + 2 p` at the lines, or `n ln V/kappa + 2 p`. With little noise Schwarz's criterion,
-    /// with `ln n` in place of 2.
+    /// Akaike's criterion: `chi^2 + 2 p` at the lines, or `n ln V/kappa + 2 p` without lines. With little noise,
+    /// Schwarz's criterion, which has `ln n` in place of 2.
     pub criterion: Option<f64>,
     /// Weight in averages over forms; zero for a form that the data reject or do not determine.
     pub weight: f64,
@@ -31,15 +31,16 @@ pub struct FormFigures {
     pub converged: bool,
 }
 
-/// Difference in Akaike's criterion up to which there is no evidence against a form.
+/// Difference from the smallest value of Akaike's criterion up to which there is no evidence against a form.
 pub const NO_EVIDENCE: f64 = 2.0;
-/// Weight below which a form is omitted: its contribution to a mean is smaller than the error of the mean.
+/// Weight below which a form is omitted from averages, because its contribution would be smaller than the error of the
+/// mean.
 pub const LEAST_WEIGHT: f64 = 0.02;
 /// Maximum number of forms that are averaged.
 const MOST_FORMS: usize = 4;
 
-/// Returns the index of the best form and the weight of each form, given their criteria in the order from the simplest
-/// form. A criterion of `None` excludes a form. `None` if all forms are excluded.
+/// Returns the index of the best form and the weight of each form, given their criteria with the simplest form first. A
+/// criterion of `None` excludes a form. `None` if all forms are excluded.
 pub(super) fn weigh(criteria: &[Option<f64>]) -> Option<(usize, Vec<f64>)> {
     let least = criteria.iter().flatten().copied().min_by(f64::total_cmp)?;
     let front = criteria

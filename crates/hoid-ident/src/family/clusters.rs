@@ -4,9 +4,9 @@
 //!
 //! **Clusters** are the records if there are at least five. Fewer records are divided into blocks of equal length,
 //! about eight in total and at least four seconds each, which is longer than the memory of the residuals and of the
-//! loop. Variances estimated from so few blocks are themselves uncertain. The blocks therefore determine only one
-//! number, the inflation kappa of all variances (`covariances`), which is at least one. Since a few records cannot show
-//! how people vary from run to run, the variation of the gain is added with a value from other data.
+//! loop. Variances that are estimated from so few blocks are uncertain. The blocks therefore determine only one number,
+//! the inflation kappa of all variances (`covariances`), which is at least one. Since a few records cannot show how
+//! people vary from run to run, the variation of the gain is added with a value from other data.
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -30,8 +30,8 @@ pub(super) fn freedom(clusters: usize) -> f64 {
     clusters.saturating_sub(1).max(1) as f64
 }
 
-/// Returns the 97.5 % quantile of Student's distribution for n clusters, the half-width of a 95 % interval in standard
-/// errors.
+/// Returns the 97.5 % quantile of Student's distribution for n clusters, which is half the width of a 95 % interval in
+/// standard errors.
 pub(super) fn quantile(clusters: usize) -> f64 {
     StudentsT::new(0.0, 1.0, freedom(clusters)).map_or(1.96, |t| t.inverse_cdf(0.975))
 }

@@ -1,7 +1,7 @@
 //! Comparison of the candidate forms, the basis of their weights in [`super::choice`].
 //!
 //! If an excitation was recorded, the forms are compared at its lines, otherwise by their prediction errors. All forms
-//! share one inflation kappa, so that a form does not profit from a large variance. With little noise
+//! share one inflation kappa, so that a form does not profit from a large kappa of its own. With little noise
 //! ([`super::low_noise`]) one form is assumed to be true, and a parameter costs Schwarz's `ln n` (G. Schwarz, *Annals
 //! of Statistics* 6 (1978) 461-464) instead of Akaike's 2. A form with undetermined parameters counts only if all forms
 //! have undetermined parameters.
@@ -23,7 +23,7 @@ use crate::IdentError;
 const EQUAL_CRITERIA: f64 = 0.05;
 /// Ratio of sums of squares up to which forms without noise count as equally good.
 const EQUAL_FIT_RATIO: f64 = 1.1;
-/// Number of standard errors by which a known gain differs from zero.
+/// Number of standard errors by which a gain must differ from zero to count as determined.
 const LEAST_ERRORS: f64 = 2.0;
 
 /// A form with its fits.
@@ -66,8 +66,8 @@ impl Comparison {
     }
 }
 
-/// Excludes the quadratic form if it is equivalent to the lead with a droop. The latter is the quadratic numerator over
-/// s with real zeros, so that both forms can converge to the same operator, which must count only once.
+/// Excludes the quadratic form if it is equivalent to the lead with a droop. The lead with a droop is the quadratic
+/// form with real zeros, so that both forms can converge to the same operator, which must count only once.
 fn count_once(counting: &mut [Option<f64>], tried: &[Tried<'_>]) {
     let place = |form: Form| tried.iter().position(|t| t.form == form);
     if let (Some(quadratic), Some(droop)) = (place(Form::QuadraticIntegral), place(Form::LeadDroop))
@@ -78,8 +78,8 @@ fn count_once(counting: &mut [Option<f64>], tried: &[Tried<'_>]) {
     }
 }
 
-/// Keeps only the simplest of the forms that fit equally well. Without noise, the residual of a wrong form is a
-/// multiple of the residual of the right form. Sums of squares below `equal` count as equal.
+/// Keeps only the simplest of the forms that fit equally well. Without noise, the residual of a wrong form is many
+/// times larger than that of the right form. Sums of squares below `equal` count as equal.
 fn keep_simplest(counting: &mut [Option<f64>], tried: &[Tried<'_>], equal: f64) {
     let fit = |i: usize| tried[i].fit.as_ref().ok();
     let squares = |i: usize| fit(i).map_or(f64::INFINITY, |fit| (fit.loss * fit.residuals as f64).max(equal));
@@ -144,7 +144,8 @@ fn common_inflation(tried: &[Tried<'_>]) -> f64 {
 fn criteria(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> Vec<Option<f64>> {
     let little_noise = prediction.little_noise.is_some();
     let inflation = if little_noise {
-        // The inflation of the other forms results from their misfit.
+        // The inflation of the form with the smallest loss is used, because the inflation of the other forms results
+        // from their misfit.
         let fits = tried.iter().filter_map(|t| t.fit.as_ref().ok());
         let least = fits.min_by(|a, b| a.loss.total_cmp(&b.loss));
         least.map_or(1.0, |fit| fit.inflation)

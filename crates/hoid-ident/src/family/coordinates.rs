@@ -5,9 +5,10 @@ use hoid_model::{
     operator_family::{Coordinate, Form},
 };
 
-/// Longest lead time, s. In records of people a longer lead is equivalent to a pure derivative.
+/// Longest lead time, s. In records of people a longer lead cannot be distinguished from a pure derivative.
 const LONGEST_LEAD_S: f64 = 30.0;
-/// Bounds of `1/T_I`, 1/s: the lower bound is equivalent to a pure integration, the upper bound to no lag.
+/// Bounds of `1/T_I`, 1/s: a lag at the lower bound is practically an integration, a lag at the upper bound has hardly
+/// any effect.
 pub(super) const LAG_RATE: (f64, f64) = (1e-3, 30.0);
 /// Largest droop frequency, rad/s.
 const LARGEST_DROOP: f64 = 10.0;

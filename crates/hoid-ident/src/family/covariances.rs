@@ -1,14 +1,14 @@
 //! Error bars that remain valid if the model is wrong, from the scores of runs or of blocks of runs.
 //!
-//! With `g_c = sum psi eps` and `G_c = sum psi psi'` over cluster c, one Gauss-Newton step from the estimate of all
-//! data gives the estimate without this cluster:
+//! With `g_c = sum psi eps` and `G_c = sum psi psi'` over cluster c, G as the sum of all G_c and P as the curvature of
+//! the prior, one Gauss-Newton step from the estimate of all data gives the estimate without this cluster:
 //!
 //! `eta_(c) = eta - (G + P - G_c)^-1 g_c`
 //!
 //! The covariance is the jackknife over n clusters, `(n-1)/n sum (eta_(c) - mean)^2` (the estimator CR3 of the
 //! sandwich: R. M. Bell and D. F. McCaffrey, *Survey Methodology* 28 (2002) 169-181; J. G. MacKinnon, M. O. Nielsen and
 //! M. D. Webb, *J. Econometrics* 232 (2023) 272-299). It is valid for any correlation of the residuals within a
-//! cluster, and not too small if there are few clusters. Intervals use Student's distribution with n - 1 degrees of
+//! cluster, and is not too small if there are few clusters. Intervals use Student's distribution with n - 1 degrees of
 //! freedom.
 //!
 //! **The prior** P is a measurement that no cluster contains. Its contribution `kappa sigma^2 H^-1 P H^-1`, with
@@ -52,7 +52,7 @@ impl Covariances {
         pairs.map(|at| of_eta[at]).collect()
     }
 
-    /// Adds the squared bias `d d'`, where d is the difference to another estimate.
+    /// Adds the squared bias `d d'`, where d is the difference from another estimate.
     ///
     /// The prediction error fit is biased if its noise model is wrong. No scatter between runs shows this bias, but an
     /// estimate without that noise model does. The errors are then computed from the mean squared error, variance plus
@@ -80,7 +80,7 @@ impl Covariances {
         }
     }
 
-    /// Adds `weight d^2` to the variances of the elements for which `counts` is true; d is the difference to another
+    /// Adds `weight d^2` to the variances of the elements for which `counts` is true; d is the difference from another
     /// estimate.
     pub fn add_extra_variance(
         &mut self,
@@ -96,8 +96,8 @@ impl Covariances {
         }
     }
 
-    /// Widens intervals by profile likelihood, which include only kappa. If the variances are larger, the ends are
-    /// moved outwards by the ratio of the standard errors.
+    /// Widens the intervals by profile likelihood, which allow only for kappa. If the variance of an element is larger,
+    /// the distances of the interval ends from the estimate are multiplied by the ratio of the standard errors.
     pub fn widen(&self, fit: &PredictionFit<'_>, profiles: &mut [Option<(f64, f64)>]) {
         let p = fit.parameters();
         for (i, profile) in profiles.iter_mut().enumerate() {
@@ -125,8 +125,8 @@ pub(super) fn response_errors(
     }))
 }
 
-/// Returns the differences to another estimate for the elements of the operator and of its channels that are not at a
-/// bound and that the other estimate contains.
+/// Returns the index and the difference from another estimate for each element of the operator and of its channels that
+/// is not at a bound and that the other estimate contains.
 fn differences(fit: &PredictionFit<'_>, other: &[f64]) -> Vec<(usize, f64)> {
     let elements = fit.layout().noise_begins();
     let free = fit.free().into_iter().filter(|place| *place < elements);
@@ -214,7 +214,7 @@ pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
     let scale = fit.innovation_variance * fit.inflation;
     let mut clustered: Vec<f64> = match fit.clusters.kind {
         ClusterKind::Runs => {
-            // H^-1 P H^-1, scaled like the inflated data.
+            // The contribution of the prior, H^-1 P H^-1; it is multiplied by the same inflated variance as the data.
             let mut open = vec![0.0; p * p];
             add_open_part(&mut open, 1.0, &fit.criterion.penalty, fit.eta(), &inverse);
             match over_clusters(fit) {
@@ -226,8 +226,8 @@ pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
         // H^-1 G H^-1 + H^-1 P H^-1 = H^-1, with both terms inflated.
         ClusterKind::Blocks => inverse.iter().map(|g| scale * g).collect(),
     };
-    // H^-1 L H^-1 for lines with the weight w, where L is their part of H. The scatter between runs does not include
-    // this term.
+    // The lines contribute w H^-1 L H^-1, where w is their weight and L their part of H. The scatter between runs does
+    // not include this term; for blocks, H^-1 includes it once with w = 1.
     let counted = if fit.clusters.kind == ClusterKind::Runs {
         0.0
     } else {
@@ -273,7 +273,7 @@ fn over_clusters(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
 /// the band of manual control, at least one. `None` for fewer than two clusters.
 ///
 /// The data determine the response but hardly determine some coordinates. The ratio for single coordinates would depend
-/// on these, and on the chance scatter of a few clusters.
+/// on the poorly determined ones, and on the chance scatter of a few clusters.
 pub(super) fn inflation(fit: &PredictionFit<'_>) -> Option<f64> {
     let p = fit.parameters();
     let (clustered, inverse) = (over_clusters(fit)?, inverse(fit)?);

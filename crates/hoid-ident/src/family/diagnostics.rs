@@ -1,7 +1,7 @@
 //! Findings for and against a fit of an operator of the family.
 //!
-//! Each rule yields one observation with its own kind ([`hoid_model::Finding`]). The limits are defined next to the
-//! rules; the limits for residuals are common to all fits.
+//! Each rule yields one finding of a separate kind ([`hoid_model::Finding`]). The limits are defined next to the rules;
+//! the limits for residuals are common to all fits.
 
 use hoid_model::Finding;
 
@@ -27,7 +27,7 @@ const LARGEST_EXCESS_LOSS: f64 = 0.01;
 pub(super) const LARGEST_RESPONSE_ERROR: f64 = 0.5;
 /// Damping ratio above which the two neuromuscular poles count as separate lags: no muscle is so strongly damped.
 pub(super) const MOST_DAMPED: f64 = 1.5;
-/// Weight of the best form from which the form counts as determined.
+/// Smallest weight of the best form with which the form counts as determined.
 const SETTLED_WEIGHT: f64 = 0.95;
 /// Ratio of standard errors from clusters to model-based standard errors above which a note is added.
 const NOTED_ERROR_RATIO: f64 = 1.5;
@@ -42,7 +42,7 @@ pub(super) struct DiagnosticInputs<'a> {
     pub parameters: &'a [Parameter],
     pub prior: &'a OperatorPrior,
     pub residuals: ResidualMeasures,
-    /// Power of the residual relative to the power of u, if the residual is not noise.
+    /// Power of the residual relative to the power of u if the residual is not noise; `None` if there is noise.
     pub noise_free: Option<f64>,
     /// A warning if the person changes over the records.
     pub not_constant: Option<Finding>,
@@ -59,7 +59,8 @@ pub(super) struct DiagnosticInputs<'a> {
     pub has_covariance: bool,
     /// Smallest relative standard error of the response over the band of manual control.
     pub response_error: Option<f64>,
-    /// True if separate excitations distinguish the inputs; false if only their assumed forms do.
+    /// True if there is one input, or if separate excitations distinguish the inputs; false if only their assumed forms
+    /// do.
     pub apart: bool,
     /// The forms that the data do not reject, the best one first.
     pub weighed: &'a [WeighedForm],
@@ -127,7 +128,7 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
     all
 }
 
-/// Returns a finding about forms that the data do not distinguish.
+/// Returns a finding about forms that the data do not distinguish; `None` if the form is determined.
 fn unsettled(weighed: &[WeighedForm]) -> Option<Finding> {
     let front = weighed.first().filter(|front| front.weight < SETTLED_WEIGHT)?;
     let mut all: Vec<&WeighedForm> = weighed.iter().filter(|w| w.weight >= 1.0 - SETTLED_WEIGHT).collect();
@@ -148,8 +149,8 @@ fn at_bound(parameter: &Parameter) -> bool {
     parameter.standard_error.is_none()
 }
 
-/// Formats the values without and with the prior of a parameter that the data determine but the prior shifts
-/// noticeably; `None` for other parameters.
+/// Formats how the prior changes a parameter, from the value without the prior to the value with it. `None` unless the
+/// data determine the parameter and the prior shifts it noticeably.
 fn pulled(parameter: &Parameter, prior: &OperatorPrior) -> Option<String> {
     let pull = prior.pull(parameter)?;
     let errors = pull.abs() * parameter.value / parameter.standard_error?;

@@ -25,7 +25,8 @@ pub(super) struct Errors {
     pub profiles: Vec<Option<(f64, f64)>>,
     /// 97.5 % quantile of Student's distribution, for 95 % intervals.
     quantile: f64,
-    /// Relative standard deviation of the person's gain that the scatter of these runs does not show.
+    /// Relative standard deviation of the mean gain of these runs due to the person's variation from run to run; zero
+    /// if the scatter between the runs already includes this variation.
     pub run_to_run: f64,
 }
 
@@ -65,8 +66,8 @@ impl Errors {
     }
 }
 
-/// Returns intervals by profile likelihood for elements whose interval reaches the lower end of the search range, where
-/// the criterion is not parabolic.
+/// Returns intervals by profile likelihood for each lag rate, lead and droop whose interval reaches the lower end of
+/// the search range, where the criterion is not parabolic; `None` for other elements.
 fn profiles(
     fit: &PredictionFit<'_>,
     covariances: Option<&Covariances>,
@@ -150,12 +151,12 @@ fn prior_share(fit: &PredictionFit<'_>, model_based: Option<&[f64]>, places: &[u
     let Some((i, c)) = places.iter().position(|&q| q == place).zip(model_based) else {
         return 1.0;
     };
-    // The weight is kappa sigma^2/s^2 and the covariance sigma^2 H^-1; multiplied by kappa, the latter is the posterior
-    // variance.
+    // The curvature of the prior is kappa sigma^2/s^2. The model-based covariance is sigma^2 H^-1; multiplied by kappa,
+    // it is the posterior covariance.
     let precision = penalty.curvature(fit.eta()) / fit.innovation_variance;
     let variance = c[i * places.len() + i];
     let ((low, high), x) = (fit.criterion.limits[place], fit.eta()[place]);
-    // At a bound only the bound itself is known about the element.
+    // An element at a bound has no variance; its share is set to one.
     if variance > 0.0 && low < x && x < high {
         (variance * precision).min(1.0)
     } else {
@@ -229,7 +230,7 @@ fn averaged(own: &Parameter, weighed: &[WeighedForm], record: usize, clusters: u
     Parameter::averaged(&each.collect::<Vec<_>>(), clusters)
 }
 
-/// Returns the operators of a fit in its own form, without averaging over forms.
+/// Returns the form of a fit with its weight and its operators as fitted, without averaging over forms.
 pub(super) fn in_form(
     fit: &PredictionFit<'_>,
     errors: &Errors,

@@ -223,7 +223,8 @@ impl FamilyEstimator {
         let lines = describing.map(LineData::new);
         let mut begun = Vec::new();
         let mut channel_lines = None;
-        // The response is used only for starts; if this fit fails, the lines suffice.
+        // The response of the ARX model is used only for starts; if its regression fails, the starts from the lines
+        // suffice.
         let response = if seen.is_empty() {
             match ArxResponse::of(records) {
                 Err(error) if lines.is_none() => return Err(error),
@@ -268,7 +269,7 @@ impl FamilyEstimator {
         let mut no_lines = None;
         let noise = match little_noise {
             Some(found) => {
-                // At the lines, leakage and aliasing exceed so little noise.
+                // The lines are not used, because leakage and aliasing at the lines exceed so little noise.
                 starts.iter_mut().for_each(|start| start.lines = None);
                 no_lines = lines.map(|_| TOO_LITTLE_NOISE.to_owned());
                 prediction = found;
@@ -294,7 +295,7 @@ impl FamilyEstimator {
         })
     }
 
-    /// Returns starting values for other estimators of the first form: an operator fitted to the response of a
+    /// Returns starting values of the first form, for use by other estimators: an operator fitted to the response of a
     /// high-order ARX model, and an autoregression of the rest of u. The order of the autoregression is the best order
     /// up to `highest`. `None` if the records do not determine these values.
     pub(crate) fn first_guess(&self, records: &[Record], highest: usize) -> Option<(Vec<f64>, Autoregression)> {
@@ -363,9 +364,9 @@ impl FamilyEstimator {
         })
     }
 
-    /// Handles records with little noise; `None` if there is more noise. Determines the intersample behaviour of the
-    /// error from the records, adds a level if the mean was removed, and replaces the starts by the results of output
-    /// error searches.
+    /// Returns the data and settings for records with little noise; `None` if there is more noise. Determines the
+    /// intersample behaviour of the error from the records, adds a level if the mean was removed, and replaces the
+    /// starts by the results of output error searches.
     fn with_little_noise<'a>(
         &self,
         smooth: &Prediction<'_>,
@@ -515,7 +516,8 @@ impl FamilyEstimator {
         Ok(start)
     }
 
-    /// Returns the index of the start whose residual is smallest after whitening by an autoregression of this order.
+    /// Returns the index of the form with a start whose residual is smallest after whitening by an autoregression of
+    /// this order.
     fn least_left(
         &self,
         prediction: &Prediction<'_>,
@@ -593,7 +595,7 @@ impl FamilyEstimator {
         least.map(|(_, orders)| orders).ok_or(IdentError::NoFiniteLoss)
     }
 
-    /// Searches from all starts of a form and returns the best result.
+    /// Fits a form from all its starts by prediction error and returns the best fit.
     fn best_of<'a>(
         &self,
         prediction: &Prediction<'a>,

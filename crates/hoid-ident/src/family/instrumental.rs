@@ -2,7 +2,7 @@
 //!
 //! The method is RIV-BJ ([`crate::iv`]) for `u = Y e + v`, `D v = eps`, where Y is an operator of the family instead of
 //! a ratio of free polynomials. In its nonlinear form (T. Söderström and P. Stoica, *Instrumental Variable Methods for
-//! System Identification*, 1983, ch. 6; P. C. Young, *Automatica* 52 (2015) 35-46) the estimate x is the root of
+//! System Identification*, 1983, ch. 6; P. C. Young, *Automatica* 52 (2015) 35-46) the estimate x is a root of
 //!
 //! `g(x) = Z' eps(x) + sum_i w_i g_i'(x) (m_i - g_i(x))`,  `eps(x) = D (u - Y(x) e)`,  `Z = D dY/dx xi`,
 //!
@@ -12,14 +12,14 @@
 //! decreases. A coordinate that would leave the search range is set to its bound.
 //!
 //! **The auxiliary operator** is taken from the fit at the lines. If its instruments do not lead to a root, the
-//! prediction error fit is used, and then the mean of the two. RIV-BJ usually takes the previous estimate as the
-//! auxiliary operator. If the lines end below the neuromuscular resonance, two estimates may then alternate
+//! prediction error fit is used, and then the mean of the two. In its original form, RIV-BJ takes the previous estimate
+//! as the auxiliary operator. If the lines end below the neuromuscular resonance, two estimates may then alternate
 //! indefinitely, each as the auxiliary operator of the other; this occurred for four in ten virtual people. Any
-//! auxiliary operator gives a consistent estimate. The instruments of a fixed auxiliary operator are optimal except for
-//! its error.
+//! auxiliary operator gives a consistent estimate, and the instruments from a fixed auxiliary operator are optimal
+//! except for the error of this operator.
 //!
-//! Free polynomials are less robust: the lag is below the lines and the resonance above them, so that the poles are not
-//! determined and move to the unit circle. Here the prior prevents this.
+//! With free polynomials the method is less robust: the lag is below the lines and the resonance above them, so that
+//! the poles are not determined and move to the unit circle. Here the prior prevents this.
 //!
 //! **Assumptions.** If the excitation is independent of the noise, x is consistent for any D. The method shares the
 //! excitation with the fit at the lines, but neither its weights nor its need for whole periods. It shares the samples
@@ -123,7 +123,8 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         })
     }
 
-    /// Returns the fit with the first of these auxiliary operators (given as coordinates) that leads to a root.
+    /// Returns the fit with the first of these auxiliary operators (given as coordinates) that leads to a root. If none
+    /// does, the first fit that could be computed is returned as not converged.
     ///
     /// # Errors
     /// [`IdentError::NoFiniteLoss`].
@@ -224,7 +225,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
             let begun = z[0].len();
             z.iter_mut().for_each(|column| column.resize(begun + rows, 0.0));
             for input in &self.inputs {
-                // Samples of this input in this record, as rows of Z.
+                // The samples of this record that belong to this input, as rows of Z within the record.
                 let inside = |s: usize| s.clamp(sample + first, sample + n) - sample - first;
                 let own: Range<usize> = inside(input.samples.start)..inside(input.samples.end);
                 if own.is_empty() {
@@ -264,7 +265,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         total
     }
 
-    /// Searches for the root of g with given instruments, starting at x.
+    /// Searches for a root of g with given instruments, starting at x.
     fn zero(&self, x: &[f64], held: &Instruments, workspace: &mut Workspace) -> Result<Zero, IdentError> {
         let (limits, p) = (self.limits(), x.len());
         let mut x = x.to_vec();
@@ -360,7 +361,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         let p = x.len();
         let scale = variance * self.fit.inflation;
         let inner = |i: usize| self.limits()[i].0 < x[i] && x[i] < self.limits()[i].1;
-        // A coordinate at a bound is held: its row of A is that of the identity matrix.
+        // A coordinate at a bound is held: its row and column of A are those of the identity matrix.
         let held = DMatrix::from_fn(p, p, |i, j| match (inner(i) && inner(j), i == j) {
             (true, _) => a[(i, j)],
             (false, same) => f64::from(u8::from(same)),
@@ -397,7 +398,8 @@ impl<'p, 'a> Instrumental<'p, 'a> {
     }
 }
 
-/// Returns the length of a step in standard deviations, for this metric.
+/// Returns the length of a step s in standard errors, `sqrt(s' M s/sigma^2)`, for the metric M and the variance
+/// sigma^2.
 fn length(step: &[f64], metric: &DMatrix<f64>, variance: f64) -> f64 {
     let s = DVector::from_column_slice(step);
     ((s.transpose() * metric * &s)[(0, 0)].max(0.0) / variance).sqrt()

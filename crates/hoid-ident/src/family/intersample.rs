@@ -17,8 +17,8 @@ use hoid_model::{Complex64, FamilyOperator, ModelError, SampleTime, named_choice
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Intersample {
-    /// Smooth, with the delay defined as for a held error; replaced by held or linear if data with little noise show
-    /// it.
+    /// Smooth, with the delay defined as for a held error; replaced by [`Self::Zoh`] or [`Self::Foh`] if data with
+    /// little noise show that the error is held or linear.
     #[default]
     Auto,
     /// Held until the next sample.
@@ -53,7 +53,7 @@ impl Intersample {
         }
     }
 
-    /// Returns the number of coefficients of B for a form with this order and with a numerator of this degree.
+    /// Returns the number of coefficients of B for an operator of this order whose numerator has this degree.
     pub(super) fn gains(self, order: usize, degree: usize) -> usize {
         match self {
             Self::Auto | Self::Foh => order + 2,
@@ -62,8 +62,8 @@ impl Intersample {
         }
     }
 
-    /// Returns the discrete-time model of an operator. `sample` fixes the whole samples of the delay (for a smooth
-    /// error, of the delay plus half a sample); `None` computes them from the delay.
+    /// Returns the discrete-time model of an operator. `sample` is the number of whole samples of the delay (for a
+    /// smooth error, of the delay plus half a sample); `None` computes them from the delay.
     pub(super) fn discrete(
         self,
         operator: &FamilyOperator,

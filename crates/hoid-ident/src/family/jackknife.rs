@@ -28,7 +28,8 @@ pub(super) fn jackknife(others: &[Vec<f64>]) -> Option<Vec<f64>> {
     Some(covariance)
 }
 
-/// Adds `factor H^-1 P H^-1` to the covariance, with P evaluated at x; `inverse` is `H^-1` by rows.
+/// Adds the contribution `factor H^-1 P H^-1` of the prior to the covariance, with P evaluated at x; `inverse` is
+/// `H^-1` by rows.
 pub(super) fn add_open_part(covariance: &mut [f64], factor: f64, prior: &[Penalty], x: &[f64], inverse: &[f64]) {
     let p = x.len();
     for penalty in prior {

@@ -1,10 +1,10 @@
 //! The prediction error fit with the lines of the excitation as additional measurements of the response.
 //!
 //! In a closed loop an error of the noise model biases the prediction error fit; the fit at the lines has no such bias,
-//! but larger errors. Let H_P and H_L be the responses of the two fits, and V_P and V_L the variances of these
+//! but larger errors. Let H_P and H_L be the responses of the two fits, and V_P and V_L the relative variances of these
 //! responses. Without bias the difference `d = (H_L - H_P)/H_P` has the variance `V_L - V_P`, because an efficient
 //! estimate is uncorrelated with d (J. A. Hausman, *Econometrica* 46 (1978) 1251-1271). If d also contains a bias of
-//! variance `tau^2`, the fraction s of d that minimises the mean squared error is
+//! variance `tau^2`, the estimate `H_P (1 + s d)` has the smallest mean squared error for
 //!
 //! `s = tau^2/(tau^2 + V_L - V_P)` with `tau^2 = max(0, D - (V_L - V_P))`, where D is the mean of |d|^2; hence
 //! `s = max(0, 1 - 1/q)` with `q = mean of |d|^2/(V_L - V_P)`
@@ -44,7 +44,7 @@ const FEWEST_RUNS: usize = 3;
 /// Upper bound of the fraction s.
 const LARGEST_SHARE: f64 = 0.9;
 
-/// The lines that are used together with the samples.
+/// The measurements at the lines that are fitted together with the samples.
 pub(super) enum Lines<'d> {
     /// Describing function: the response to the error as the only input.
     Response(LineData<'d>),
@@ -60,7 +60,7 @@ impl Lines<'_> {
         }
     }
 
-    /// Returns chi^2 of the lines as a criterion over the elements of eta before the noise model, with all variances
+    /// Returns chi^2 of the lines as a function of the elements of eta that precede the noise model, with all variances
     /// multiplied by `excess`.
     fn criterion(
         &self,
@@ -92,8 +92,8 @@ impl Lines<'_> {
     }
 }
 
-/// Returns the fit that includes the lines; `None` if the two fits agree, if the search fails, or with fewer than three
-/// runs.
+/// Returns the fit that includes the lines; `None` if the two fits agree within their errors, if the search fails, or
+/// with fewer than three runs.
 pub(super) fn with_lines<'a>(
     prediction: &Prediction<'a>,
     fit: &PredictionFit<'a>,
@@ -104,7 +104,7 @@ pub(super) fn with_lines<'a>(
         return None;
     }
     let layout = fit.layout();
-    // If chi^2 of the best fit is too large, the variances of the lines are too small.
+    // If chi^2 of the best fit is larger than expected, the variances of the lines are too small.
     let excess = lines.reduced_chi_squared().unwrap_or(1.0).max(1.0);
     let weight = weight(fit, lines, excess)?;
     let mut criterion = fit.criterion.clone();

@@ -29,7 +29,7 @@ pub(super) struct FamilyLayout {
     pub sample_time: SampleTime,
     /// Intersample behaviour of the error.
     pub intersample: Intersample,
-    /// Index in eta of each parameter of a record, for each record.
+    /// For each record, the index in eta of each of its parameters.
     positions: Vec<Vec<usize>>,
     limits: Vec<(f64, f64)>,
     /// Coordinate and record of each element of the operator in eta; the record is `None` for an element common to all
@@ -46,7 +46,7 @@ pub(super) struct ChannelInLayout {
     /// Bounds of the coordinates that only this channel has: all except those of the neuromuscular part.
     pub limits: Vec<(f64, f64)>,
     pub start: Vec<f64>,
-    /// Index in eta of the first of these coordinates.
+    /// Index in eta of the first coordinate that only this channel has.
     pub place: usize,
 }
 
@@ -159,7 +159,8 @@ impl FamilyLayout {
         own.iter().map(|&place| eta[place]).collect()
     }
 
-    /// Returns eta with the same operator for all records.
+    /// Returns eta with these coordinates for all records, the starting coordinates of the channels, and these
+    /// coefficients of the noise model.
     pub fn spread(&self, coordinates: &[f64], noise: &[f64]) -> Vec<f64> {
         let all = self.form.coordinates(self.neuromuscular);
         let value = |(coordinate, _): &(Coordinate, Option<usize>)| {
@@ -260,7 +261,7 @@ impl Parametrisation for FamilyLayout {
         let mut theta = found.b.clone();
         theta.extend_from_slice(noise);
         theta.extend_from_slice(&found.f);
-        // For each parameter: its derivatives, and the index in theta of the first of them.
+        // For each parameter: the derivatives of theta with respect to it, each with its index in theta.
         let mut slopes: Vec<Vec<(usize, f64)>> = Vec::new();
         let (nb, behind) = (found.b.len(), found.b.len() + noise.len());
         for i in 0..self.coordinates() {

@@ -28,7 +28,8 @@ pub struct LineFit {
     /// Number of real equations (two per line) minus the number of coordinates; with a single input, coordinates at a
     /// bound are not subtracted.
     pub degrees_of_freedom: usize,
-    /// chi^2 of each run for the fit to the other runs; `None` for fewer than three runs or several inputs.
+    /// chi^2 of each run for the fit to the other runs; `None` for fewer than three runs, for several inputs, or if one
+    /// of these fits fails.
     pub held_out: Option<Vec<f64>>,
     /// Termination of the search.
     pub termination: Termination,
@@ -149,8 +150,8 @@ pub(super) fn line_fit(
     Ok((fit, found))
 }
 
-/// Sorts the forms in the order of preference for equal fits: fewer coordinates first, and of equally many the forms of
-/// the family before alternative forms.
+/// Sorts the forms in the order of preference for equal fits: forms with fewer coordinates first; for the same number
+/// of coordinates, the forms of the family before alternative forms.
 pub(super) fn by_simplicity(forms: &mut [Form]) {
     forms.sort_by_key(|form| (form.simplicity(), *form));
 }

@@ -1,8 +1,8 @@
 //! The describing function at the lines of a periodic excitation, with variances that are reliable even for few runs.
 //!
-//! The scatter of n runs gives the variance of each line with 2(n - 1) degrees of freedom. For small n the smallest of
-//! these variances would dominate the fit. The relative variances `r_j = v_j/|H_j|^2` are therefore shrunk towards the
-//! relative variance b_j of the remnant near the line, which is computed from many bins:
+//! The scatter of n runs gives the variance v_j of the response H_j at each line, with 2(n - 1) degrees of freedom. For
+//! small n the smallest of these variances would dominate the fit. The relative variances `r_j = v_j/|H_j|^2` are
+//! therefore shrunk towards the relative variance b_j of the remnant near the line, which is computed from many bins:
 //! `r_j <- (nu r_j + nu_0 c b_j)/(nu + nu_0)` with `nu = 2(n - 1)`. The factor c is the median of `r_j/b_j`, at least
 //! one, and represents differences between runs in excess of the remnant (moderated variances; G. K. Smyth,
 //! *Statistical Applications in Genetics and Molecular Biology* 3 (2004), article 3).
@@ -19,7 +19,7 @@ const PRIOR_FREEDOM: f64 = 8.0;
 pub(super) const FEWEST_RUNS: usize = 3;
 
 /// Returns the variance of a line: the variance from the scatter of the runs, shrunk towards the variance of the
-/// remnant in neighbouring bins times `excess`.
+/// remnant in neighbouring bins times `excess`. For fewer than three runs this is the variance of the remnant alone.
 pub(super) fn moderated(runs: usize, of_runs: Option<f64>, neighbour_variance: f64, excess: f64) -> f64 {
     let nu = 2.0 * (runs as f64 - 1.0);
     match of_runs {
@@ -28,7 +28,7 @@ pub(super) fn moderated(runs: usize, of_runs: Option<f64>, neighbour_variance: f
     }
 }
 
-/// The lines of one or several runs.
+/// The describing function at the lines, with the variances used in the fit.
 #[derive(Debug, Clone)]
 pub(super) struct LineData<'d> {
     pub describing: &'d DescribingFunction,
@@ -44,7 +44,8 @@ impl<'d> LineData<'d> {
             .filter_map(|i| Some(lines[i].standard_error?.powi(2) / neighbour_variance(i)))
             .filter(|r| r.is_finite())
             .collect();
-        // A scatter between runs that is smaller than their remnant is due to chance.
+        // The factor is at least one: a scatter between runs that is smaller than the remnant explains is due to
+        // chance.
         let excess = match upper_median(&mut ratios) {
             Some(median) if runs >= FEWEST_RUNS => median.max(1.0),
             _ => 1.0,
@@ -77,14 +78,15 @@ impl<'d> LineData<'d> {
         self.points.iter().zip(&self.describing.lines).map(fewer).collect()
     }
 
-    /// Returns chi^2 of one run for an operator that was fitted without this run; `sampled` is its sampled response.
+    /// Returns chi^2 of one run for an operator that was fitted without this run; `sampled` returns the sampled
+    /// response of this operator.
     pub fn chi_squared_of_run(&self, run: usize, sampled: impl Fn(f64) -> Complex64) -> f64 {
         let n = self.runs() as f64;
         let of = |(point, line): (&MeasuredResponse, &crate::frequency::Line)| {
             let (a, b) = line.ratio.0[run];
             let whole: Complex64 = line.ratio.0.iter().map(|(_, b)| b).sum();
             let model = sampled(point.omega_rad_s);
-            // The error of a single run has n times the variance of the mean.
+            // The error of a single run has n times the variance of the mean over n runs.
             2.0 * ((a - model * b) * n / whole).norm_sqr() / (n * point.variance)
         };
         self.points.iter().zip(&self.describing.lines).map(of).sum()

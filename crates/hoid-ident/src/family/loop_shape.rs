@@ -9,7 +9,7 @@
 //!
 //! An unstable closed loop can become stable only if L passes through -1 at some frequency. The squared distance of L
 //! from -1, in standard errors, is the minimum of `(1 + L)' C_L^-1 (1 + L)` over frequency. For a loop at the stability
-//! limit it has a chi-squared distribution with two degrees of freedom.
+//! limit this distance has a chi-squared distribution with two degrees of freedom.
 
 use std::f64::consts::LN_10;
 
@@ -45,12 +45,13 @@ pub struct KnownResponse {
 pub struct LoopShape {
     /// All frequencies in rad/s at which `|L| = 1`, in ascending order, each with the phase margin in deg.
     pub crossovers: Vec<(Estimate, Estimate)>,
-    /// Frequency in rad/s at which L crosses the negative real axis closest to -1, with the gain margin in dB.
+    /// Frequency in rad/s at which L crosses the negative real axis closest to -1, with the gain margin in dB; `None`
+    /// if L does not cross this axis.
     pub gain_margin: Option<(Estimate, Estimate)>,
     /// Number of closed-loop poles in the right half plane; `None` if it cannot be determined.
     pub unstable_poles: Option<usize>,
-    /// Smallest chi-squared of a change to a loop at the stability limit; `None` without a covariance or for a loop
-    /// that is not unstable.
+    /// Smallest chi-squared of a change of the operator that brings the loop to the stability limit; `None` without a
+    /// covariance or for a loop that is not unstable.
     distance: Option<f64>,
     /// Phase margin in deg at the lowest crossover, with the phase unwrapped from low frequencies.
     followed_deg: Option<f64>,
@@ -184,10 +185,10 @@ fn distance_from_the_limit(
         let omega = at(i);
         let known = operator(omega);
         let [[a, b], [_, c]] = known.relative?;
-        // Relative change of Y that moves L to -1: (1 + L)/L.
+        // Relative change of Y that moves L to -1, except for its sign: (1 + L)/L.
         let open_loop = known.value * element.response(omega);
         let d = (Complex64::new(1.0, 0.0) + open_loop) / open_loop;
-        // For a single parameter the covariance has rank one.
+        // For a single parameter the covariance has rank one; the increased diagonal makes it regular.
         let (a, c) = (a + 1e-9 * (a + c), c + 1e-9 * (a + c));
         let distance = (c * d.re * d.re - 2.0 * b * d.re * d.im + a * d.im * d.im) / (a * c - b * b);
         distance.is_finite().then_some(distance)

@@ -1,14 +1,14 @@
-//! Recordings with little or no noise: simulations, and first attempts of new users.
+//! Recordings with little or no noise, such as simulations and the first attempts of new users.
 //!
 //! In such recordings the error of the frequency response that supplies the starts exceeds the noise. An autoregression
 //! of the residual part of u would then model the operator instead of the noise. If a form leaves a small residual, all
 //! forms are therefore first fitted by output error, `u = c + Y e + v` with v assumed white and without a prior (L.
 //! Ljung, *System Identification*, 1999, section 8.4: the estimate is consistent in a closed loop if v vanishes). The
 //! result is close to the true operator, and the fit with a noise model starts from there. Without any noise, the
-//! result is the true operator to the precision of the data, including the intersample behaviour of the error
-//! ([`Intersample`]).
+//! result equals the true operator within the precision of the data, and also shows the intersample behaviour of the
+//! error ([`Intersample`]).
 //!
-//! **Level.** Removing the means of e and u is correct for a steady state. A record is not in a steady state: the
+//! **Level.** Removing the means of e and u is correct only in a steady state, which a record does not start from: the
 //! effect of the time before its first sample remains in u as a constant. If a mean was removed, a constant c is
 //! therefore estimated for each record and eliminated together with the initial states
 //! ([`crate::criterion::Data::level`]).
@@ -29,7 +29,7 @@ const LARGEST_AT_START: f64 = 0.05;
 const LOW_NOISE_SHARE: f64 = 5e-3;
 /// Relative residual power below which the residual is rounding error and the search ends.
 const ROUNDING: f64 = 1e-25;
-/// Number of grid points for further searches of a form whose residual is not yet small, and number of rounds of such
+/// Number of grid points for further searches of a form whose residual is not yet small, and number of rounds of these
 /// searches. The second round uses the best form of the first round.
 const MORE_STARTS: usize = 4;
 const ROUNDS: usize = 2;
@@ -128,7 +128,7 @@ impl LittleNoise {
         Some(Self { ends, share, criterion })
     }
 
-    /// Replaces the starts by the results of these searches, with delays longer by `later_s`.
+    /// Replaces the starts of each form by the result of its searches, with a delay that is longer by `later_s`.
     pub fn move_to_ends(&self, starts: &mut [Starts], later_s: f64) {
         for ((_, coordinates), end) in starts.iter_mut().zip(&self.ends) {
             if let Some(end) = end {
@@ -195,9 +195,9 @@ impl Search<'_, '_> {
         best
     }
 
-    /// Returns the grid points of a form with the smallest residuals, each with its best gain. The grid is used as it
-    /// is, and also with the neuromuscular system and the delay of another operator. Since u is linear in the gain, one
-    /// step from a gain of zero gives the best gain.
+    /// Returns those grid points of a form that leave the smallest residuals, each with its best gain. The grid is used
+    /// as it is, and also with the neuromuscular system and the delay of another operator. Since u is linear in the
+    /// gain, one step from a gain of zero gives the best gain.
     fn more_starts(&self, form: Form, beside: &(Form, Vec<f64>), workspace: &mut Workspace) -> Vec<Vec<f64>> {
         let (prediction, neuromuscular) = (self.prediction, self.neuromuscular);
         let criterion = prediction.criterion((form, neuromuscular), (0, 0));

@@ -44,8 +44,8 @@ pub(super) struct Mixture {
 }
 
 impl Mixture {
-    /// Averages an estimate over forms; `None` without forms. `clusters` is the number of clusters on which the errors
-    /// are based.
+    /// Averages the estimates of a quantity over forms; `None` without forms. `clusters` is the number of clusters on
+    /// which the errors are based.
     pub fn of(components: &[Component], clusters: usize) -> Option<Self> {
         let total: f64 = components.iter().map(|c| c.weight).sum();
         if let [only] = components {

@@ -2,9 +2,9 @@
 //!
 //! `u = Y e + (C/D) eps`, where Y is an operator of the family ([`hoid_model::operator_family`]). Three differences
 //! between people and a simulation affect the parameters. People integrate slow errors, so that the operator needs a
-//! lag. Their remnant is not a first-order filter, so that the noise model must be flexible. They also vary, so that
-//! error bars must be based on the scatter between runs. Parameters that the data do not determine are reported as
-//! undetermined.
+//! lag. Their remnant does not have the spectrum of a first-order filter, so that the noise model must be flexible.
+//! They also vary, so that error bars must be based on the scatter between runs. Parameters that the data do not
+//! determine are reported as undetermined.
 //!
 //! 1. If a periodic excitation was recorded, the describing function is computed at its lines ([`crate::frequency`]),
 //!    and each form is fitted to it ([`LineFit`]). Without an excitation, the response of a high-order ARX model

@@ -73,14 +73,15 @@ impl NoiseProducts {
     }
 
     /// Returns the autoregression of this order or, if it does not exist, of the highest possible lower order, padded
-    /// with zeros. Fewer coefficients suffice to predict a smooth v without noise to rounding.
+    /// with zeros. For a smooth, noise-free v fewer coefficients predict v to rounding accuracy, and higher orders do
+    /// not exist.
     pub fn fit_up_to(&self, order: usize) -> Option<Autoregression> {
         let mut found = (0..=order).rev().find_map(|order| self.fit(order))?;
         found.d.resize(order, 0.0);
         Some(found)
     }
 
-    /// Returns the order with the smallest value of the criterion.
+    /// Returns the order with the smallest value of the criterion; `None` if no autoregression exists.
     pub fn best_order(&self, orders: impl Iterator<Item = usize>, penalty: Penalty) -> Option<usize> {
         let n = self.count as f64;
         let of_one = match penalty {

@@ -3,17 +3,18 @@
 //!
 //! The poles determine the lag and the neuromuscular system ([`super::pole_reading`]).
 //!
-//! The exact model of an operator ([`FamilyOperator::zoh`]) has fewer parameters than B has coefficients, so that
-//! estimated polynomials do not exactly correspond to an operator. The conversion finds the operator whose exact model
-//! M(x) is closest to the response H of the polynomials over the band of manual control,
+//! Apart from its poles, the exact model of an operator ([`FamilyOperator::zoh`]) has only a gain, leads and a delay,
+//! often fewer parameters than B has coefficients, so that estimated polynomials do not exactly correspond to an
+//! operator. The conversion finds the operator whose exact model M(x) is closest to the response H of the polynomials
+//! over the band of manual control,
 //!
 //! `min_x sum_j |H(omega_j) - M(omega_j, x)|^2 / |H(omega_j)|^2`.
 //!
 //! For the exact model of an operator this returns the operator itself. The covariance of x follows from the covariance
 //! of theta to first order, `dx = (J'J)^-1 J' dH`, where J contains the derivatives of M divided by |H| (the implicit
-//! function theorem without the second derivative, which vanishes if M equals H). The residual of the fit,
-//! [`FamilyConversion::mismatch`], is the distance of the polynomials from the form; if it is large, the polynomials do
-//! not have this form.
+//! function theorem without the second derivative, which vanishes if M equals H). The largest relative deviation,
+//! [`FamilyConversion::mismatch`], shows how far the polynomials are from the form; if it is large, they do not have
+//! this form.
 
 use hoid_model::{
     Complex64, FamilyOperator, Form, NotConvertible, PolynomialModel, SampleTime,
@@ -44,7 +45,7 @@ const FORMS: [Form; 6] = [
 /// Frequency range in which responses are compared, rad/s; the points are evenly spaced on a logarithmic scale.
 const BAND_RAD_S: (f64, f64) = (0.2, 30.0);
 const POINTS: usize = 30;
-/// Largest relative deviation of an operator's response from the response of the polynomials.
+/// Largest accepted relative deviation of an operator's response from the response of the polynomials.
 const LARGEST_MISMATCH: f64 = 0.1;
 /// Relative deviation up to which a form counts as exact.
 const EXACT: f64 = 1e-6;
@@ -63,7 +64,7 @@ pub struct FamilyConversion {
     pub covariance: Option<Vec<f64>>,
     /// Real poles, in ascending order of their rate.
     pub real_poles: Vec<RealPole>,
-    /// Largest `|H - M|/|H|` over .2 to 30 rad/s.
+    /// Largest `|H - M|/|H|` from 0.2 rad/s to 30 rad/s or, if lower, 0.8 times the Nyquist frequency.
     pub mismatch: f64,
 }
 
@@ -79,7 +80,7 @@ impl FamilyConversion {
 
 impl Fit {
     /// Returns the operator of the family that the polynomials of this fit represent, in the given form or, for `None`,
-    /// in the closest form.
+    /// in the simplest exact or else the closest form.
     ///
     /// # Errors
     /// As [`family_of_polynomials`].
@@ -93,7 +94,8 @@ impl Fit {
 ///
 /// # Errors
 /// [`NotConvertible`] for a nonfinite coefficient, poles in both A and F, no poles or more than three, an unstable
-/// pole, a pole on the negative real axis of z, nk = 0, or if no form is within a tenth of the response.
+/// pole, a pole on the negative real axis of z, nk = 0, a given form that does not have these poles, or if the response
+/// of the closest operator deviates by more than a tenth.
 pub fn family_of_polynomials(
     model: &PolynomialModel,
     covariance: Option<&[f64]>,
@@ -188,8 +190,8 @@ fn points(model: &PolynomialModel) -> Vec<Point> {
         .collect()
 }
 
-/// Returns the closest operator of a form with these poles, and its mismatch; `None` if the form does not have these
-/// poles.
+/// Returns the operator of a form that is closest to the polynomials with these poles, and its mismatch; `None` if the
+/// form does not have these poles.
 fn nearest(
     form: Form,
     reading: &PoleAssignment,

@@ -2,8 +2,8 @@
 //!
 //! The open loop is `L(omega) = Y(j omega) Z(omega) Y_c(j omega)`, where Z represents the intersample behaviour of the
 //! error. The crossover is the lowest frequency at which `|L|` falls below one, as for a describing function
-//! ([`crate::frequency`]); a neuromuscular resonance may raise `|L|` above one again. If the coordinates x change,
-//! omega_c and phi_m follow from the condition `|L| = 1`:
+//! ([`crate::frequency`]); a neuromuscular resonance may raise `|L|` above one again. The effects of the coordinates x
+//! on omega_c and phi_m follow from the condition `|L| = 1`:
 //!
 //! `d omega_c = -(d ln|L|/dx)/(d ln|L|/d omega)`,
 //! `d phi_m = d arg L/dx + (d arg L/d omega) d omega_c`.
@@ -68,8 +68,8 @@ impl LoopMeasures {
         }
     }
 
-    /// Returns the measures with standard errors for the person, which include a relative variation `share` of the gain
-    /// that these runs do not show.
+    /// Returns the measures with standard errors for the person, which include the relative variation `share` of the
+    /// gain that the scatter of these runs does not show.
     pub(super) fn with_run_to_run(self, share: f64) -> Self {
         let both = [self.crossover_rad_s, self.phase_margin_deg];
         let wider = |k: usize| {
@@ -98,7 +98,7 @@ impl LoopMeasures {
         }
     }
 
-    /// Returns the weighted average over forms; `None` without forms.
+    /// Returns the measures as a weighted average over forms; `None` without forms.
     pub(super) fn averaged(each: &[(f64, Self)], clusters: usize) -> Option<Self> {
         let [_, _, ..] = each else {
             return each.first().map(|(_, only)| *only);
@@ -186,7 +186,7 @@ impl Crossover {
     }
 
     /// Returns the changes of the crossover frequency in rad/s and of the phase margin in deg for a relative change
-    /// `dL/L`.
+    /// `dL/L` of the open loop.
     pub fn moved_by(&self, relative: Complex64) -> [f64; 2] {
         let by_crossover = -relative.re / self.slope.re;
         [by_crossover, (relative.im + self.slope.im * by_crossover).to_degrees()]

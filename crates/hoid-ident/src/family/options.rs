@@ -13,7 +13,7 @@ use crate::{
 
 /// Highest order of the noise model.
 pub const HIGHEST_NOISE_ORDER: usize = 24;
-/// Highest nd that is searched if nc is above zero: an ARMA model needs few coefficients.
+/// Highest nd that is searched by default if nc is above zero: an ARMA model needs few coefficients.
 const HIGHEST_BESIDE_NC: usize = 8;
 
 /// Estimator of the operator of a person, with its options.
@@ -36,9 +36,9 @@ pub struct FamilyEstimator {
     pub nd: std::ops::RangeInclusive<usize>,
     /// Further inputs that the person sees or feels, as channels of the records. Default none.
     pub channels: Vec<SeenChannel>,
-    /// Channel of the recorded disturbance or target, for the fit at its lines.
+    /// Channel of the recorded disturbance or target, which supplies the lines and the instrument.
     pub excitation: Option<String>,
-    /// Period of the excitation in s; `None` determines the period from the lines.
+    /// Period of the excitation in s; if `None`, the period is determined from the lines.
     pub period_s: Option<f64>,
     /// Coordinates that are individual to each record; all other coordinates are common to all records.
     pub individual: Vec<Coordinate>,

@@ -2,7 +2,7 @@
 //!
 //! Estimates are nearly normally distributed in the coordinates of the family, but not in the parameters: for a long
 //! lag, the error of `1/T_I` is symmetric, but that of T_I is not. Intervals are therefore computed in the coordinates
-//! and then transformed. If an interval of `1/T_I` includes zero, those of T_I and K have no upper limit.
+//! and then transformed. If an interval of `1/T_I` includes zero, the intervals of T_I and K have no upper limit.
 //!
 //! **Determined** means determined by the data. The posterior variance must be at most half of the prior variance
 //! ([`Parameter::prior_share`]), the parameter must not be at a bound of the search range, and its interval must
@@ -17,7 +17,7 @@ use hoid_model::{
 
 use super::mixture::{Component, Mixture, widened};
 
-/// Total weight of the forms with a parameter, up to which the parameter counts as undetermined.
+/// Total weight of the forms with a parameter up to which the parameter counts as undetermined.
 const LEAST_WEIGHT: f64 = 0.5;
 /// Largest ratio of the posterior to the prior variance of a determined parameter.
 const LARGEST_PRIOR_SHARE: f64 = 0.5;
@@ -60,7 +60,7 @@ impl Parameter {
         }
     }
 
-    /// Returns the value with its standard error.
+    /// Returns the value of the parameter with its standard error.
     pub fn estimate(&self) -> Estimate {
         Estimate {
             value: self.value,
@@ -68,7 +68,7 @@ impl Parameter {
         }
     }
 
-    /// Returns the weighted mean over forms of the parameters with the same name, given with the best form first.
+    /// Returns the weighted mean over forms of a parameter, given in each form with the best form first.
     pub(super) fn averaged(each: &[(Form, f64, &Self)], clusters: usize) -> Option<Self> {
         let (_, _, front) = *each.first()?;
         // A parameter at a bound has no error and is omitted from the mean.
@@ -103,8 +103,8 @@ impl Parameter {
             })
             .collect();
         let share = |of: &dyn Fn(&Self) -> f64| each.iter().map(|(_, w, p)| w / total * of(p)).sum::<f64>();
-        // As in a single form, the interval must exclude zero, and omega_nm and zeta_nm must be known within the
-        // factor.
+        // As in a single form, the interval must exclude zero, and omega_nm and zeta_nm must be known within a factor
+        // of two.
         let one_sign = interval.is_some_and(|(low, high)| low * high > 0.0);
         let known = match estimate.standard_error {
             Some(s) if matches!(front.name.as_str(), "omega_nm" | "zeta_nm") => s < LARGEST_LOG_ERROR * estimate.value,
@@ -136,7 +136,7 @@ pub(super) struct CoordinateEstimate<'a> {
     pub profile: &'a [Option<(f64, f64)>],
     /// 97.5 % quantile of Student's distribution.
     pub quantile: f64,
-    /// Relative standard deviation of the person's gain that the scatter of these runs does not show.
+    /// Relative standard deviation of the mean gain of these runs that their scatter does not show.
     pub run_to_run: f64,
 }
 
@@ -225,7 +225,7 @@ impl CoordinateEstimate<'_> {
         let interval = self.interval(i);
         match coordinate {
             Coordinate::LagRate => {
-                // At or below the lower bound of the search range, the lag is a pure integration.
+                // A rate at or below the lower bound of the search range means a pure integration.
                 let end = |rate: f64| {
                     if rate <= self.limits[i].0 {
                         f64::INFINITY
@@ -250,7 +250,7 @@ impl CoordinateEstimate<'_> {
         made
     }
 
-    /// Completes a parameter that is a product of two others: K = (K/T_I) T_I, or K_e_dot = K_e T_L.
+    /// Adds the errors of a parameter that is a product of two others: K = (K/T_I) T_I, or K_e_dot = K_e T_L.
     fn product(&self, mut made: Parameter) -> Parameter {
         let x = self.operator.coordinates();
         let p = x.len();
@@ -268,7 +268,8 @@ impl CoordinateEstimate<'_> {
             }
             return made;
         }
-        // Logarithm of the product: d ln y = dx_g/x_g +- dx_o/x_o.
+        // Change of the logarithm of the product y: d ln y = dx_g/x_g +- dx_o/x_o, with the gain x_g and the other
+        // factor x_o.
         let variance = c[gain * p + gain] / (x[gain] * x[gain])
             + c[other * p + other] / (x[other] * x[other])
             + 2.0 * sign * c[gain * p + other] / (x[gain] * x[other]);
@@ -300,7 +301,7 @@ impl CoordinateEstimate<'_> {
     /// are computed from the intervals of x_g and x_o, which may be asymmetric (G. Y. Zou and A. Donner, *Statistics in
     /// Medicine* 27 (2008) 1693-1702). With the distances a below and b above and the correlation r, the lower distance
     /// is `sqrt(a_g^2 + a_o^2 + 2 r a_g a_o)` for the sum and `sqrt(a_g^2 + b_o^2 - 2 r a_g b_o)` for the difference. A
-    /// distance is infinite if one of the intervals reaches zero.
+    /// distance is infinite if an interval end from which it is computed reaches zero.
     fn product_interval(&self, gain: usize, other: usize, sign: f64) -> Option<(f64, f64)> {
         let x = self.operator.coordinates();
         let p = x.len();

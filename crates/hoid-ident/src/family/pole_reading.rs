@@ -1,8 +1,9 @@
 //! Assignment of the poles of a discrete-time model to the lag and to the neuromuscular system.
 //!
 //! The continuous-time poles are `s_i = ln z_i / Ts`. A pair of complex poles is the neuromuscular system, and the
-//! remaining real pole is the lag. If there are three real poles, each of them may be the lag; callers try all three
-//! assignments and report the one that they use ([`RealPole`]).
+//! remaining real pole is the lag. Two real poles alone are an overdamped neuromuscular system. If there are three real
+//! poles, each of them may be the lag; callers try all three assignments and report the one that they use
+//! ([`RealPole`]).
 
 use hoid_model::{NotConvertible, SampleTime, operator_family::Coordinate, polynomial, polynomial_model::monic};
 
@@ -50,7 +51,7 @@ impl PoleAssignment {
         all
     }
 
-    /// Returns the value of a coordinate that the poles determine; zero for other coordinates.
+    /// Returns the value of a coordinate that the poles determine; zero for any other coordinate.
     pub fn coordinate(&self, wanted: Coordinate) -> f64 {
         let (omega, zeta) = self.neuromuscular.unwrap_or((1.0, 1.0));
         match wanted {
@@ -62,7 +63,7 @@ impl PoleAssignment {
     }
 }
 
-/// Returns all possible assignments of the poles of F.
+/// Returns all possible assignments of the poles, which are the roots of `1 + f_1 z^-1 + ...`.
 pub(super) fn pole_assignments(f: &[f64], sample_time: SampleTime) -> Result<Vec<PoleAssignment>, NotConvertible> {
     let other = |reason: String| NotConvertible::NotOfTheFamily { reason };
     let roots = polynomial::roots(&monic(f)).unwrap_or_default();

@@ -36,11 +36,11 @@ use crate::{
 
 /// Residual power relative to the power of u below which the residual is not noise but rounding errors of the file.
 pub(super) const NONE: f64 = 1e-8;
-/// Relative residual power below which forms count as equal: where a search without noise ends is then due to chance.
+/// Relative residual power below which forms count as equal, because chance determines where a noise-free search ends.
 pub(super) const EQUAL: f64 = 1e-18;
 /// Maximum number of rounds in which the weight kappa sigma^2 of the prior is updated.
 const ROUNDS: usize = 3;
-/// Relative change of this weight below which no further round is needed.
+/// Relative change of the weight of the prior below which no further round is needed.
 const CONVERGED: f64 = 0.05;
 
 /// The records, and the settings common to all forms.
@@ -128,7 +128,8 @@ impl<'a> Prediction<'a> {
             .collect()
     }
 
-    /// Fits a form, starting from these coordinates and from the noise model that fits best with them.
+    /// Fits a form, starting from these coordinates and from the autoregression of the part of u that they do not
+    /// explain.
     ///
     /// # Errors
     /// [`IdentError::NoFiniteLoss`], and the errors of the discrete-time model.
@@ -202,7 +203,7 @@ impl<'a> Prediction<'a> {
         found.theta.iter().all(|x| x.is_finite()).then_some(found.theta)
     }
 
-    /// Returns the prior on each element of eta, in units of one standard deviation.
+    /// Returns the terms `(g_i - m_i)^2/s_i^2` of the prior for the elements of eta, with the weight one.
     fn penalties(&self, layout: &FamilyLayout) -> Vec<Penalty> {
         let all = layout.form.coordinates(layout.neuromuscular);
         let unit = self.prior.penalties(layout.form, layout.neuromuscular);

@@ -40,7 +40,7 @@ impl PredictionFit<'_> {
         &self.minimum.theta
     }
 
-    /// Returns the minimum of the criterion: the sum of squares plus the prior.
+    /// Returns the minimum of the criterion: the sum of squares plus the prior and, if they are included, the lines.
     pub fn objective(&self) -> f64 {
         self.minimum.at.sum_of_squares
     }
@@ -60,8 +60,8 @@ impl PredictionFit<'_> {
         self.minimum.theta.len()
     }
 
-    /// Solves the linear system of `G + P` minus `less` for the elements in `free`; all other elements of the solution
-    /// are zero.
+    /// Solves `(G + P - less) x = rhs` for the elements in `free`; all other elements of x are zero. `None` if the
+    /// matrix is singular.
     pub fn solve(&self, free: &[usize], less: Option<&[f64]>, rhs: &[f64]) -> Option<Vec<f64>> {
         let p = self.parameters();
         let gram = |i: usize, j: usize| {

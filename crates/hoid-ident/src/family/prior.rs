@@ -7,8 +7,8 @@
 //! L. Ljung, *System Identification*, 1999, section 7.4).
 //!
 //! The prior share of a result is the ratio of the posterior to the prior variance
-//! ([`prior_share`](super::Parameter::prior_share)); a share of one means that the data carried no information. It
-//! determines how far the prior has shifted the estimate ([`OperatorPrior::pull`]).
+//! ([`prior_share`](super::Parameter::prior_share)); a share of one means that the data carried no information. The
+//! shift of the estimate by the prior follows from this share ([`OperatorPrior::pull`]).
 
 use std::{fmt, str::FromStr};
 
@@ -52,7 +52,7 @@ const KNOWN: [Coordinate; 5] = [
     Coordinate::LagRate,
 ];
 
-/// Returns the coordinate of a parameter that can have a prior.
+/// Returns the coordinate of a parameter; `None` if the parameter cannot have a prior.
 fn coordinate_of(parameter: &str) -> Option<Coordinate> {
     KNOWN.into_iter().find(|c| c.parameter() == parameter)
 }
@@ -145,7 +145,7 @@ impl OperatorPrior {
         Self::new(found.into_iter().filter_map(entry).collect())
     }
 
-    /// Keeps only the entries of the neuromuscular system.
+    /// Returns the prior with only the entries of the neuromuscular system.
     pub(super) fn neuromuscular_only(mut self) -> Self {
         self.entries.retain(|entry| {
             matches!(
@@ -173,7 +173,7 @@ impl OperatorPrior {
         found.is_finite().then_some(found)
     }
 
-    /// Returns the prior as measurements of the coordinates of a form, in units of one standard deviation.
+    /// Returns the terms `(g_i - m_i)^2/s_i^2` of the prior for the coordinates of a form, with the weight one.
     pub(crate) fn penalties(&self, form: Form, neuromuscular: bool) -> Vec<Penalty> {
         let coordinates = form.coordinates(neuromuscular);
         let of = |entry: &ParameterPrior| {

@@ -13,10 +13,11 @@ use crate::{SearchOptions, criterion::Workspace};
 const HALVINGS: usize = 7;
 /// Maximum number of doublings of the step towards an end.
 const DOUBLINGS: usize = 8;
-/// Maximum number of steps and tolerance of the searches; the accuracy of the interval suffices.
+/// Maximum number of steps and tolerance of the searches, which need only the accuracy of an interval.
 const SEARCH: (usize, f64) = (15, 1e-7);
 
-/// Returns the interval of one element of eta, limited to the search range; `None` if a search fails.
+/// Returns the 95 % interval of one element of eta by profile likelihood, limited to the search range; `None` if a
+/// search fails.
 pub(super) fn profile_interval(
     fit: &PredictionFit<'_>,
     place: usize,

@@ -7,7 +7,7 @@
 //!
 //! where Z represents the intersample behaviour of the error and the second sum is the prior. Source: R. Pintelon and
 //! J. Schoukens, *System Identification: A Frequency Domain Approach*, 2012, chapter 9 (the sample maximum likelihood
-//! estimator, with the errors of input and output combined into the error of their ratio).
+//! estimator; here the errors of input and output are combined into the error of their ratio).
 
 use std::borrow::Cow;
 
@@ -90,7 +90,7 @@ impl<'p> ResponseCriterion<'p> {
         }
     }
 
-    /// Returns the criterion with other points.
+    /// Returns the same criterion for other measured points.
     pub fn with_points<'q>(&self, points: &'q [MeasuredResponse]) -> ResponseCriterion<'q> {
         ResponseCriterion {
             points: Cow::Borrowed(points),
@@ -141,7 +141,7 @@ impl<'p> ResponseCriterion<'p> {
         best.map(|minimum| self.result(minimum)).ok_or(IdentError::NoFiniteLoss)
     }
 
-    /// Searches from one starting point.
+    /// Searches from one starting point; `None` if the search fails.
     pub fn fit_from(&self, start: &[f64], search: &SearchOptions) -> Option<ResponseMinimum> {
         minimise(self, start.to_vec(), search, None, &mut Workspace::default()).map(|minimum| self.result(minimum))
     }
@@ -245,8 +245,8 @@ impl Objective for ResponseCriterion<'_> {
         for point in self.points.iter() {
             let hold = self.intersample.response(point.omega_rad_s, self.sample_time);
             let model = operator.response_and_gradient(point.omega_rad_s);
-            // `variance` is E|error|^2 of the complex response, with half of it in each part. Therefore chi^2 = 2
-            // |error|^2/variance has two degrees of freedom per line.
+            // `variance` is E|dH|^2, half in the real and half in the imaginary part; the weight gives both parts unit
+            // variance.
             let weight = 2.0 / point.variance;
             let off = point.response - model.value * hold;
             let slopes: Vec<Complex64> = model.gradient.iter().map(|g| g * hold).collect();

@@ -96,8 +96,8 @@ pub struct FamilyFit {
     /// Results of the further inputs, in the order in which they were requested.
     #[serde(default)]
     pub channels: Vec<ChannelFit>,
-    /// Relative standard deviation of the person's gain that these runs do not show, for the mean over the runs. Zero
-    /// if the errors are computed from the scatter between runs, which includes this variation.
+    /// Relative standard deviation of the mean gain of these runs that their scatter does not show. Zero if the errors
+    /// are computed from the scatter between runs, which includes the person's variation from run to run.
     pub run_to_run: f64,
     /// Fit of the best form at the lines of the excitation.
     pub lines: Option<LineFit>,
@@ -140,10 +140,10 @@ pub struct FamilyFit {
     /// that of the recording.
     #[serde(default)]
     pub lead_s: f64,
-    /// Power of the residual relative to the power of u, if the residual is not noise.
+    /// Power of the residual relative to the power of u if the residual is not noise; `None` if there is noise.
     #[serde(default)]
     pub noise_free: Option<f64>,
-    /// True if there is so little noise that model errors would exceed it.
+    /// True if there is so little noise that errors of the model would exceed the noise.
     #[serde(default)]
     pub little_noise: bool,
     /// Sample time of the records.
@@ -281,13 +281,15 @@ impl FamilyFit {
         LoopShape::of(known, element, self.sample_time)
     }
 
-    /// Returns crossover frequency and phase margin of the operator fitted at the lines.
+    /// Returns crossover frequency and phase margin of the operator fitted at the lines; `None` without such a fit or
+    /// without a crossover.
     pub fn loop_measures_at_lines(&self, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let lines = self.lines.as_ref()?;
         self.measured(&lines.operator, lines.covariance.as_deref(), element)
     }
 
-    /// Returns crossover frequency and phase margin of the operator estimated by refined instrumental variables.
+    /// Returns crossover frequency and phase margin of the operator estimated by refined instrumental variables; `None`
+    /// without this operator or without a crossover.
     pub fn loop_measures_by_instruments(&self, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let found = self.instrumental.as_ref()?;
         self.measured(&found.operator, found.covariance.as_deref(), element)
@@ -307,7 +309,8 @@ impl FamilyFit {
         )
     }
 
-    /// Returns a coordinate of the operator of a record with its standard error.
+    /// Returns a coordinate of the operator of a record, with its standard error; `None` if the form does not have the
+    /// coordinate.
     pub fn coordinate(&self, record: usize, wanted: Coordinate) -> Option<Estimate> {
         let of = self.operator(record);
         let all = self.form.coordinates(self.neuromuscular);

@@ -5,11 +5,11 @@
 //! section 13.4). The scatter between runs does not show this bias, since all runs share it. The remnant of people is
 //! not an autoregression of any order. To estimate the bias, the same form is fitted with other noise models:
 //! autoregressions of a quarter, half and all of the highest order, and an ARMA model with the orders (4, 5) of a
-//! sampled sum of a drift, a broad-band signal and a resonance. Each difference to such a fit is treated as a bias and
-//! enters the covariance as its square, like the difference to the fit at the lines if an excitation was recorded. The
-//! fit at the lines is used for coordinates that the lines determine. The other noise models are used for coordinates
-//! that the prior of that fit determines. Their differences then enlarge the errors of single elements only, since the
-//! lines determine the response in the band of manual control, and thus crossover and margin.
+//! sampled sum of a drift, a broad-band signal and a resonance. Each difference from such a fit is treated as a bias,
+//! and its square is added to the covariance. If there is a fit at the lines, the difference from this fit is used
+//! instead. For coordinates that the prior determines in the fit at the lines, the other noise models are used as well.
+//! The differences from them then enlarge the errors of single elements only, since the lines determine the response in
+//! the band of manual control, and thus crossover and margin.
 //!
 //! **Without lines** the differences do not show the whole bias: above the band of the forcing function, e consists
 //! mainly of remnant, and all noise models share most of the bias. The squared differences are therefore multiplied by
@@ -30,18 +30,18 @@ use crate::criterion::Workspace;
 const ARMA_ORDERS: NoiseOrders = (4, 5);
 /// Prior share in the fit at the lines above which other noise models are also used.
 pub(super) const LARGEST_SHARE_AT_LINES: f64 = 0.25;
-/// Additional relative weight of the squared differences if there are no lines.
+/// Weight of the squared differences that is added to one if there are no lines.
 pub(super) const MORE_WITHOUT_LINES: f64 = 0.5;
 /// Additional standard deviations of parameters if there are no lines, for the bias that fits with other noise models
 /// do not show.
 pub(super) const UNSEEN_WITHOUT_LINES: [(Coordinate, f64); 2] =
     [(Coordinate::LogOmega, 0.12), (Coordinate::LogZeta, 0.2)];
-/// Maximum number of steps and tolerance of the search with another noise model. It need not converge, since only the
-/// size of the difference is used.
+/// Maximum number of steps and tolerance of the search with another noise model. The search need not converge, since
+/// only the size of the difference is used.
 const SEARCH: (usize, f64) = (25, 1e-6);
 
-/// Returns the coordinates of the operators that are fitted with other noise models in the same form; empty if there is
-/// no noise.
+/// Returns the elements of eta before the noise model for fits of the same form with other noise models; empty if there
+/// is no noise.
 pub(super) fn rivals(
     prediction: &Prediction<'_>,
     fit: &PredictionFit<'_>,

@@ -10,16 +10,16 @@
 use super::robust::quantile;
 use crate::linalg::{gram::Gram, least_squares::solve_symmetric};
 
-/// Order of the autoregression.
+/// Largest order of the autoregression; a short channel has a lower order.
 pub(super) const ORDER: usize = 16;
-/// A row does not count if a value exceeds this number of deviations of the channel.
+/// A row does not count if one of its values exceeds this number of deviations of the channel.
 const FAR: f64 = 6.0;
-/// A row does not count if its residual exceeds this number of deviations of the residuals.
+/// A row does not count if its residual exceeds this number of standard deviations of the residuals.
 const LARGEST_RESIDUAL: f64 = 4.0;
 /// Standard deviation of the additional white noise, relative to the deviation of the channel.
 pub(super) const FLOOR: f64 = 1e-3;
 const ROUNDS: usize = 3;
-/// Number of rows that is sufficient for estimating the coefficients.
+/// Number of rows that is sufficient for estimating the coefficients; of a longer channel only every k-th row is used.
 const MOST_ROWS: usize = 40_000;
 
 /// Coefficients `1, a_1 .. a_p` of the autoregression.

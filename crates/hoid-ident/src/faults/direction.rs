@@ -5,8 +5,8 @@
 //!
 //! `u(k) = sum_{i=1..P} a_i u(k-i) + sum_{j=1..L} b_j e(k-j) + c + v(k)`
 //!
-//! and likewise e on u, with P = [`OWN_LAGS`] and L = [`OTHER_LAGS`] blocks. In a closed loop such a prediction is
-//! consistent for any feedback (L. Ljung, *System Identification*, 1999, section 13.4).
+//! and likewise e on u, with P = [`OWN_LAGS`] and L = [`OTHER_LAGS`] blocks. In a closed loop a prediction from past
+//! samples is consistent for any feedback (L. Ljung, *System Identification*, 1999, section 13.4).
 //!
 //! **Exchanged.** A person responds only after a delay of a tenth of a second or more; a controlled element responds
 //! immediately. The significance of lag j is the relative increase of the loss without it: for b_1,
@@ -24,21 +24,21 @@ use crate::linalg::least_squares::solve_symmetric;
 
 /// Length of a block, s.
 const BLOCK_S: f64 = 0.05;
-/// Number of past blocks of the channel itself and of the other channel.
+/// Numbers of past blocks in the regression: of the channel itself, and of the other channel.
 const OWN_LAGS: usize = 8;
 const OTHER_LAGS: usize = 12;
-/// Relative increase of the loss without the first lag above which a response counts as immediate.
+/// Relative increase of the loss without the first lag above which a response is immediate.
 const IMMEDIATE_INCREASE: f64 = 0.1;
-/// Minimum ratio of this increase to that of the other direction.
+/// For exchanged channels, minimum ratio of the increase of the loss for u to the increase for e.
 const TIMES: f64 = 20.0;
-/// The sum of a response counts as negative if it is more than this number of standard errors below zero.
+/// The sum of the coefficients `b_j` counts as negative if it is more than this number of standard errors below zero.
 const SIGNIFICANTLY_NEGATIVE: f64 = 4.0;
 /// Minimum number of blocks for a test.
 const FEWEST: usize = 200;
 
-/// Returns a wrong direction and its statistic: the ratio of the increases of the loss for exchanged channels, the
-/// number of standard errors for a wrong sign. `None` if no fault is found or the record is too short or too slow for
-/// the test.
+/// Returns a wrong direction and its statistic: for exchanged channels the ratio of the increases of the loss, for a
+/// wrong sign the number of standard errors. `None` if no fault is found, or if the record is too short or its sample
+/// time is too long for the test.
 pub(super) fn wrong_direction(record: &Record) -> Option<(FaultKind, f64)> {
     let block = ((BLOCK_S / record.sample_time().s()).round() as usize).max(1);
     if record.input().is_empty() || record.sample_time().s() > 0.1 {
@@ -59,7 +59,7 @@ pub(super) fn wrong_direction(record: &Record) -> Option<(FaultKind, f64)> {
 
 /// Response of one channel to another.
 struct CrossResponse {
-    /// Relative increase of the loss without the first lag.
+    /// Relative increase of the loss if the first lag of the other channel is left out.
     at_once: f64,
     /// Sum of the coefficients of the other channel, in standard errors.
     sum: f64,
@@ -94,7 +94,7 @@ impl CrossResponse {
             for j in i + 1..size {
                 gram[i * size + j] = gram[j * size + i];
             }
-            // This keeps the matrix of a smooth channel regular in spite of rounding.
+            // Keeps the matrix of a smooth channel regular in spite of rounding.
             gram[i * size + i] *= 1.0 + 1e-9;
         }
         let without = |left_out: Option<usize>| -> Option<(f64, Vec<f64>)> {

@@ -2,15 +2,15 @@
 //!
 //! A *hold* is a run of equal values. A channel in full precision has no holds except at its largest or smallest value
 //! (a rail, which is treated separately), so that [`FROZEN`] equal samples already count as frozen. A quantised channel
-//! or a resting hand has holds in normal operation. There a hold is frozen if it lasts at least [`RESTING_S`] and
+//! or a resting hand has holds in normal operation. Such a hold is frozen if it lasts at least [`RESTING_S`] and
 //! [`LONGER`] times the length that nine of ten holds do not exceed, and if the other channel moves by more than half
 //! of its deviation in the meantime. Holds at the [rest](super::rest) of a stick are compared only with each other. A
 //! hold is a dropout if the channel jumps to its value and back, each time by more than twice the change that 999 of
 //! 1000 changes do not exceed.
 //!
 //! *Idle* is a stretch of [`IDLE_S`] or more in which both e and u stay within [`IDLE_RANGE`] of their deviations in
-//! each half second, such as before the start or after the end of a run. Nobody can do so while tracking, because e is
-//! never at rest.
+//! each half second, such as before the start or after the end of a run. This does not happen while a person tracks,
+//! because e is then never at rest.
 
 use std::ops::Range;
 
@@ -19,9 +19,9 @@ use super::{
     robust::{level_and_deviation, quantile, quantum},
 };
 
-/// Number of equal samples that count as frozen in full precision.
+/// Number of successive equal samples from which a channel of full precision counts as frozen.
 const FROZEN: usize = 6;
-/// A hold of a quantised channel can be frozen if it lasts this multiple of its typical hold.
+/// Minimum length of a frozen hold of a quantised channel, relative to the length that nine of ten holds do not exceed.
 const LONGER: f64 = 20.0;
 /// Minimum duration of a frozen hold of a quantised channel, s.
 const RESTING_S: f64 = 3.0;
@@ -29,7 +29,7 @@ const RESTING_S: f64 = 3.0;
 const IDLE_S: f64 = 1.5;
 /// Length of the blocks in which the range of an idle channel is examined, s.
 const BLOCK_S: f64 = 0.5;
-/// Largest range of an idle channel, relative to its deviation.
+/// Largest range of an idle channel within a block, relative to the deviation of the channel.
 const IDLE_RANGE: f64 = 0.05;
 
 /// A faulty hold of a channel.
@@ -40,7 +40,8 @@ pub(super) struct Hold {
     pub jump: Option<f64>,
 }
 
-/// Returns the faulty holds of one channel, depending on the movement of the other channel.
+/// Returns the frozen holds and dropouts of one channel. A hold of a quantised channel is frozen only if the other
+/// channel moves.
 pub(super) fn frozen(values: &[f64], other: Option<&[f64]>, sample_time_s: f64) -> Vec<Hold> {
     let n = values.len();
     let (low, high) = values
@@ -93,7 +94,7 @@ fn range_of(values: &[f64]) -> f64 {
     high - low
 }
 
-/// Returns the stretches in which all channels are idle, without the samples marked in `out`.
+/// Returns the stretches in which all channels are idle, apart from blocks with samples marked in `out`.
 pub(super) fn idle(channels: &[&[f64]], out: &[bool], sample_time_s: f64) -> Vec<Range<usize>> {
     let n = channels.first().map_or(0, |c| c.len());
     let block = ((BLOCK_S / sample_time_s).round() as usize).max(5);
@@ -119,7 +120,8 @@ pub(super) fn idle(channels: &[&[f64]], out: &[bool], sample_time_s: f64) -> Vec
     }
     let least = ((IDLE_S / sample_time_s).ceil() as usize).max(2 * block);
     let whole = |stretch: Range<usize>| {
-        // Extends the stretch sample by sample, as long as no channel leaves its range in the stretch.
+        // Extends the stretch sample by sample, as long as every channel stays close to its value in the middle of the
+        // stretch.
         let stays = |t: usize, stretch: &Range<usize>| {
             channels.iter().zip(&scales).all(|(channel, scale)| {
                 let inside = &channel[stretch.clone()];

@@ -1,4 +1,4 @@
-//! Interpolation of samples from their neighbours on both sides.
+//! Interpolation of samples from the neighbours on both sides.
 //!
 //! Let `eps = A x` be the innovations of the autoregression. The most likely values of m samples from sample s on,
 //! given all other samples, minimise `sum eps(t)^2` over all rows that contain one of the m samples (A. J. E. M.
@@ -21,8 +21,8 @@ pub(super) struct Interpolation {
 }
 
 impl Interpolation {
-    /// Computes the interpolations from the innovations of a channel; at the end of the channel for fewer than `most`
-    /// samples.
+    /// Computes the interpolations from the innovations of a channel. At the end of the channel fewer than `most`
+    /// samples are interpolated.
     pub fn new(ar: &Autoregression, eps: &[f64], start: usize, most: usize) -> Self {
         let p = ar.order();
         let n = eps.len();
@@ -50,7 +50,7 @@ impl Interpolation {
                 };
             }
             let pivot = factor[i * size + i];
-            // Samples that appear in no row cannot be determined.
+            // Samples that appear in no row of the sum cannot be determined.
             if pivot.is_nan() || pivot < 1e-9 {
                 break;
             }
@@ -64,17 +64,17 @@ impl Interpolation {
         Self { factor, y, size }
     }
 
-    /// Returns the largest number of samples that can be determined.
+    /// Returns the largest number of samples from `start` on that can be determined.
     pub fn most(&self) -> usize {
         self.y.len()
     }
 
-    /// Returns the decrease of the sum of squares if m samples are interpolated.
+    /// Returns the decrease of the sum of squares if the first m samples are interpolated.
     pub fn fall(&self, m: usize) -> f64 {
         self.y[..m].iter().map(|y| y * y).sum()
     }
 
-    /// Returns delta, the changes of m samples.
+    /// Returns delta, the change of each of the first m samples.
     pub fn change(&self, m: usize) -> Vec<f64> {
         let mut delta = vec![0.0; m];
         for i in (0..m).rev() {

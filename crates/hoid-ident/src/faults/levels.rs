@@ -1,4 +1,4 @@
-//! Jumps of a level: wraps, steps, and stretches in other units.
+//! Jumps of a channel: wraps, steps, and stretches in other units.
 //!
 //! A change from one sample to the next is *large* if it exceeds [`LARGE`] times the 99 % quantile of all changes.
 //!
@@ -14,7 +14,7 @@
 //!
 //! **Scale.** In one second the deviation from the level exceeds the median of this deviation over all seconds by the
 //! factor [`UNITS`]. For a stick with a [rest](super::rest) only the samples away from the rest count. No person
-//! increases the signal by this factor from one second to the next. The edges of the stretch are its outermost samples
+//! increases a signal by this factor from one second to the next. The edges of the stretch are its outermost samples
 //! beyond [`OUTSIDE`] deviations of the remaining samples.
 
 use std::{f64::consts::PI, ops::Range};
@@ -27,14 +27,14 @@ use super::{
 const LARGE: f64 = 6.0;
 /// Length of the spans before and after a step, s.
 const SPAN_S: f64 = 5.0;
-/// Minimum step, relative to the larger deviation in the two spans.
+/// Minimum size of a step, relative to the larger deviation in the two spans.
 const STEPPED: f64 = 6.0;
-/// Ratio of the deviation in one second to the typical deviation above which the unit has changed.
+/// A second is in another unit if its deviation exceeds the typical deviation by more than this factor.
 const UNITS: f64 = 100.0;
-/// A sample belongs to a stretch in other units if it exceeds this number of deviations of the remaining samples.
+/// A sample belongs to a stretch in another unit if it exceeds this number of deviations of the remaining samples.
 const OUTSIDE: f64 = 15.0;
 const MODULI: [f64; 7] = [360.0, 2.0 * PI, 180.0, PI, 65_536.0, 65_535.0, 4096.0];
-/// Number of large changes that must agree on an unknown modulus.
+/// Number of large changes of the same size from which this size is taken as an unknown modulus.
 const MIN_AGREEING_CHANGES: usize = 4;
 
 /// A channel that wraps around.
@@ -53,7 +53,7 @@ fn typical_change(values: &[f64]) -> f64 {
     )
 }
 
-/// Returns the modulus, the wrapped samples and the unwrapped channel; `None` if the channel does not wrap.
+/// Returns the modulus, the range of samples with wraps and the unwrapped channel; `None` if the channel does not wrap.
 pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
     let typical = typical_change(values);
     if values.len() < 100 || typical <= 0.0 {
@@ -98,7 +98,7 @@ pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
     })
 }
 
-/// Returns the steps of the level: the first sample after each step, its size, and its size in deviations.
+/// Returns the steps of the level: for each step its first sample, its size, and its size in deviations.
 pub(super) fn steps(values: &[f64], sample_time_s: f64) -> Vec<(usize, f64, f64)> {
     let span = (SPAN_S / sample_time_s) as usize;
     let typical = typical_change(values);
@@ -122,7 +122,8 @@ pub(super) fn steps(values: &[f64], sample_time_s: f64) -> Vec<(usize, f64, f64)
     found
 }
 
-/// Returns the stretches in which a channel is larger by orders of magnitude, and the ratio to its typical size.
+/// Returns the stretches in which a channel is larger by orders of magnitude, each with the ratio to the typical size
+/// of the channel.
 pub(super) fn scales(values: &[f64], sample_time_s: f64) -> Vec<(Range<usize>, f64)> {
     let block = ((1.0 / sample_time_s) as usize).max(10);
     let n = values.len();
@@ -163,7 +164,7 @@ pub(super) fn scales(values: &[f64], sample_time_s: f64) -> Vec<(Range<usize>, f
     let rest: Vec<f64> = (0..n).filter(|t| !inside(*t)).map(|t| values[t]).collect();
     let limit = OUTSIDE * level_and_deviation(&rest).1;
     let outside = |t: usize| (values[t] - level).abs() > limit;
-    // A single sample of the stretch may be small, but not ten in a row.
+    // A single sample of a stretch in another unit may be small, but not ten in a row.
     let last_outside = |mut rows: Box<dyn Iterator<Item = usize>>| {
         let (mut last, mut calm) = (None, 0);
         while calm < 10 {

@@ -2,7 +2,7 @@
 
 /// Longest fault that is bridged, s.
 pub const BRIDGED_S: f64 = 0.1;
-/// Shortest segment between cuts that is used, s.
+/// Shortest segment between two cuts that is used, s.
 pub const SHORTEST_S: f64 = 2.0;
 /// Share of spikes in a channel above which no spike is bridged.
 pub const MOST_SPIKES: f64 = 0.05;

@@ -11,21 +11,21 @@
 //! | `holds` | frozen channels, dropouts, idle stretches | lengths of runs of equal values, ranges |
 //! | `spikes` | spikes | comparison of two explanations of a large innovation: fault or push |
 //! | `interpolation` | | most likely values of samples given their neighbours, and the gain in likelihood |
-//! | `direction` | input and output exchanged, wrong sign | lags at which each channel responds to the other |
+//! | `direction` | input and output exchanged, wrong sign | lags at which one channel responds to the other |
 //! | `resistant` | | record in which no single sample can dominate a fit, for a second opinion |
 //! | `slow` | | record without drifts and steps of a sensor, for a second opinion |
 //! | `search`, `repairing`, `limits` | | order of the searches, and repair of the record |
 //! | `autoregression`, `robust` | | prediction and scales that are robust to faults |
 //!
-//! Each channel is examined separately, since its own neighbours predict a sample better than any other channel; only
-//! *idle* stretches are determined from e and u together. No model of the person is needed. Normal control activity is
-//! not a fault: the remnant of people has pulses and bursts, but these are filtered by the muscles, and the statistics
-//! for spikes distinguish such pushes from faults.
+//! Each channel is examined separately, since its own neighbours predict a sample better than any other channel. Only
+//! *idle* stretches, holds of quantised channels and the direction are judged from e and u together. No model of the
+//! person is needed. Normal control activity is not a fault: the remnant of people has pulses and bursts, but these are
+//! filtered by the muscles, and the statistics for spikes distinguish such pushes from faults.
 //!
 //! [`repair`] inspects a record and follows [`FaultHandling`](hoid_model::FaultHandling). By default it bridges faults
 //! of up to [`BRIDGED_S`], cuts the record at longer faults, and returns each segment of [`SHORTEST_S`] or more as a
 //! record. If more than [`MOST_SPIKES`] of the samples of a channel are spikes, they are reported and not bridged,
-//! because the assumptions about the channel are then invalid.
+//! because so many spikes contradict the assumptions about the channel.
 
 mod autoregression;
 mod direction;

@@ -12,17 +12,17 @@ use super::{
 };
 use crate::frequency::COMMON_EXCITATIONS;
 
-/// Sample time in s above which a person cannot be identified.
+/// Largest sample time with which a person can be identified, s.
 pub const SLOWEST_S: f64 = 0.5;
 
-/// A record after the repair, in one or more segments, with its faults and findings.
+/// A record after the repair: one or more segments, with the faults and findings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RepairedRecord {
     /// Usable segments, in order of time; the original record if nothing usable is left.
     pub segments: Vec<Record>,
     /// Faults with the action taken, in order of time.
     pub faults: Vec<Fault>,
-    /// Findings about the faults, for the verdict on any result.
+    /// Findings about the faults, for the verdict on any result from the record.
     pub findings: Vec<Finding>,
 }
 
@@ -49,7 +49,7 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
     if handling == FaultHandling::Keep {
         return Ok(untouched(Vec::new()));
     }
-    // The other statistics use fixed times in seconds and would give many false alarms at such a sample time.
+    // The statistics for faults use fixed times in seconds and would give many false alarms at a longer sample time.
     let ts = record.sample_time().s();
     if ts > SLOWEST_S {
         return Ok(untouched(vec![all_of_it(record, FaultKind::TimeUnit, ts)]));
@@ -125,8 +125,8 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
     })
 }
 
-/// Finds the spikes of channels that have the name of an excitation. The spikes are bridged: no model is fitted to such
-/// a channel, and only its lines are used.
+/// Finds the spikes of the channels that have the name of a common excitation. The spikes are bridged: no model is
+/// fitted to such a channel, and only its lines are used.
 fn excitations(others: &mut [Channel], record: &Record) -> Vec<Fault> {
     let ts = record.sample_time().s();
     let mut all = Vec::new();
@@ -159,7 +159,8 @@ fn excitations(others: &mut [Channel], record: &Record) -> Vec<Fault> {
     all
 }
 
-/// Returns the segments between cuts that have at least `shortest` samples.
+/// Returns the segments between cuts that have at least `shortest` and at least 50 samples. A record without cuts is
+/// returned whole.
 fn segments(n: usize, places: &[(FaultSpan, FaultAction)], shortest: usize) -> Vec<Range<usize>> {
     let mut out = vec![false; n];
     let mut ends = vec![false; n + 1];

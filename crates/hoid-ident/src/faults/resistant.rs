@@ -1,12 +1,12 @@
 //! A record in which no single sample can dominate a fit, for a second opinion.
 //!
-//! Each sample of e and u is limited by the values on both sides. The interpolation error
+//! Each sample of e and u is limited relative to its interpolation from both sides. The interpolation error
 //! `r(t) = sum_i a_i eps(t+i)/|a|^2` has the standard deviation `s = sigma/|a|`; a sample beyond `c s` is moved to this
 //! limit, `x(t) - r + c s sign(r)` (a two-sided version of the filter cleaner of R. D. Martin and D. J. Thomson, *Proc.
 //! IEEE* 70 (1982) 1097-1115). The sample with the largest error is moved first, and its neighbours are then examined
 //! again: an outlier affects the interpolation of its neighbours, which would otherwise be moved instead. This bounds
 //! the effect of any sample of e or u on subsequent filters, and thus its leverage on theta. c = [`LIMIT`]: in a normal
-//! channel one sample in 16 000 is moved. If a fit to this record differs from the fit to the original record, few
+//! channel one sample in 16 000 is moved. If a fit to this record differs from the fit to the original record, a few
 //! samples dominate the fit; if no sample is moved, the two fits are identical.
 
 use std::{cmp::Ordering, collections::BinaryHeap};
@@ -53,8 +53,8 @@ fn hold(values: &mut [f64], sample_time_s: f64) -> bool {
     let mut moves = 0;
     while let Some(Excess { ratio, t }) = queue.pop() {
         let (r, most_here) = (error(&eps, t), most(t));
-        // Skips outdated entries: a sample that has moved because of its neighbours is back within its limit, or is in
-        // the queue again.
+        // Skips outdated entries: a sample whose error has changed because a neighbour was moved is now within its
+        // limit, or is in the queue again.
         if r.abs() <= most_here || (r.abs() / most_here - ratio).abs() > 1e-9 * ratio {
             continue;
         }
@@ -75,7 +75,7 @@ fn hold(values: &mut [f64], sample_time_s: f64) -> bool {
     moves > 0
 }
 
-/// A sample beyond its limit, and the ratio of its error to the limit.
+/// A sample beyond its limit, with the ratio of its interpolation error to the limit.
 struct Excess {
     ratio: f64,
     t: usize,
@@ -107,7 +107,7 @@ impl PartialEq for Excess {
 
 impl Eq for Excess {}
 
-/// Returns the records with limited samples; `None` if no sample is moved.
+/// Returns all records with limited samples; `None` if no sample of any record is moved.
 pub fn held(records: &[Record]) -> Option<Vec<Record>> {
     let all: Vec<Option<Record>> = records.iter().map(resistant).collect();
     all.iter().any(Option::is_some).then(|| {

@@ -1,13 +1,13 @@
 //! The value at which a stick rests.
 //!
-//! A stick with a dead zone or breakout gives exactly one value as long as the hand force is small; the same happens if
-//! the hand works in pulses and releases the stick between them. Pilots leave the stick there for up to half of the
-//! samples, and for seconds at a time. This is normal control and not a fault of the recording.
+//! A stick with a dead zone or breakout gives exactly one value as long as the hand force is small. The same value
+//! recurs if the hand works in pulses and releases the stick between them. Pilots leave the stick there for up to half
+//! of the samples, and for seconds at a time. This is normal control and not a fault of the recording.
 //!
 //! The rest is the most frequent value, if it makes up at least [`SHARE`] of the samples, is reached at least
 //! [`VISITS`] times, and is at least [`ALONE`] times as frequent as any other value. The levels of a quantised channel
-//! have similar frequencies, and a channel that stops does so only once. The largest and the smallest value are
-//! excluded.
+//! have similar frequencies, and a channel that stops stops only once. The largest and the smallest value of the
+//! channel cannot be the rest.
 
 use std::ops::Range;
 
@@ -22,11 +22,11 @@ const ALONE: f64 = 4.0;
 pub struct Rest {
     /// Value of the signal at rest.
     pub value: f64,
-    /// Share of the samples with this value.
+    /// Share of the samples at the rest.
     pub share: f64,
-    /// Number of times that the signal reaches the value.
+    /// Number of times that the signal reaches the rest.
     pub visits: usize,
-    /// 90 % quantile of the lengths of the visits, samples.
+    /// 90 % quantile of the lengths of the visits to the rest, samples.
     pub typical_samples: f64,
 }
 

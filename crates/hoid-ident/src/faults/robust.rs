@@ -7,17 +7,17 @@
 
 use hoid_numerics::statistics::{nearest_quantile, upper_median};
 
-/// Returns the quantile, or zero if there are no values; reorders the values.
+/// Returns the `share` quantile of the values, or zero if there are no values; reorders the values.
 pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
     nearest_quantile(values, share).unwrap_or(0.0)
 }
 
-/// Returns the median, or zero if there are no values.
+/// Returns the median of the values, or zero if there are no values.
 pub(super) fn median(values: &[f64]) -> f64 {
     upper_median(&mut values.to_vec()).unwrap_or(0.0)
 }
 
-/// Returns the median and the robust deviation.
+/// Returns the median of the values and their robust deviation.
 pub(super) fn level_and_deviation(values: &[f64]) -> (f64, f64) {
     if values.is_empty() {
         return (0.0, 0.0);

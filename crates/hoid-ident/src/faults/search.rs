@@ -14,7 +14,7 @@ use super::{
     spikes,
 };
 
-/// Minimum length of a stretch between long faults in which spikes are searched for, samples.
+/// Minimum length of a stretch between long faults for it to be searched for spikes and steps, samples.
 const FEWEST: usize = 100;
 
 /// A fault and the affected samples.
@@ -28,8 +28,8 @@ pub(super) struct FaultSpan {
     pub deviations: Option<f64>,
 }
 
-/// Finds the faults of the channels of one record and returns them in order of time, each with its action. The channels
-/// are unwrapped; short faults are bridged unless all faults are `cut`.
+/// Finds the faults of the channels of one record and returns them in order of time, each with its action. Channels
+/// that wrap are unwrapped. Short faults are bridged, or cut out if `cut` is true.
 pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(FaultSpan, FaultAction)> {
     let n = values.first().map_or(0, Vec::len);
     let long = |samples: &Range<usize>| samples.len() as f64 * ts > BRIDGED_S * (1.0 + 1e-9);
@@ -158,7 +158,7 @@ fn lasting(values: &[Vec<f64>], ts: f64) -> Vec<FaultSpan> {
     all
 }
 
-/// Returns the runs of samples outside long faults that are long enough for a search.
+/// Returns the stretches of at least [`FEWEST`] samples outside long faults (`out`).
 fn stretches(out: &[bool]) -> Vec<Range<usize>> {
     let mut all: Vec<Range<usize>> = Vec::new();
     for t in (0..out.len()).filter(|t| !out[*t]) {

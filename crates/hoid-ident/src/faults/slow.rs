@@ -1,23 +1,24 @@
 //! A record without slow components, for a second opinion on a fit.
 //!
-//! A step or a drift of a sensor is not visible from neighbouring samples, and it is not a constant level. The person
-//! does not follow it, so that e has power at low frequencies to which u does not respond; the estimated gain is then
-//! too low and its error bars are too small. The least-squares line and the cosines `cos(pi k (t + 1/2)/N)`,
-//! `k = 1 .. 2 T/`[`PERIOD_S`] (all components slower than that period) are removed from both channels by the same
-//! linear operation, so that the dynamics from e to u are preserved. A second fit lacks the information of low
-//! frequencies. If nothing is wrong, it differs from the first fit by chance with the variance `var' - var` (J. A.
-//! Hausman, *Econometrica* 46 (1978) 1251-1271); if it differs by more, slow components dominate the first fit.
+//! A step or a drift of a sensor cannot be seen from neighbouring samples, and it is not removed with a constant level.
+//! The person does not follow it, so that e has power at low frequencies to which u does not respond; the estimated
+//! gain is then too low and its error bars are too small. The least-squares line and the cosines
+//! `cos(pi k (t + 1/2)/N)`, `k = 1 .. 2 T/`[`PERIOD_S`] (all components slower than that period) are removed from both
+//! channels by the same linear operation, so that the dynamics from e to u are preserved. A second fit lacks the
+//! information of low frequencies. If nothing is wrong, it differs from the first fit by chance with the variance
+//! `var' - var` (J. A. Hausman, *Econometrica* 46 (1978) 1251-1271); if it differs by more, slow components dominate
+//! the first fit.
 
 use std::f64::consts::PI;
 
 use hoid_model::{Detrend, Record};
 
-/// Components with a longer period than this are slow for a person, s.
+/// Period above which a component is slow for a person, s.
 pub const PERIOD_S: f64 = 20.0;
-/// Largest number of cosines, which limits the computing time of long records.
+/// Largest number of cosines that are removed; it limits the computing time for long records.
 const MOST: usize = 64;
 
-/// Returns the records without components slower than a period in s; `None` if all records are too short for such
+/// Returns the records without components slower than `period_s`; `None` if all records are too short for such
 /// components.
 pub fn without_slow(records: &[Record], period_s: f64) -> Option<Vec<Record>> {
     let count = |r: &Record| ((2.0 * r.len() as f64 * r.sample_time().s() / period_s) as usize).min(MOST);

@@ -4,12 +4,12 @@
 //! I. Chang, G. C. Tiao and C. Chen, *Technometrics* 30 (1988) 193-204). A *push* by the person enters the innovations:
 //! it moves the channel, which then continues with its normal dynamics. A *fault* is added only to the samples: each
 //! following innovation is off by a multiple of a coefficient of A, and the channel continues as if nothing had
-//! happened. For m samples from sample s on,
+//! happened. For m samples from sample s on, the two explanations leave:
 //!
 //! | explanation | residual sum `S = sum eps^2/sigma^2` |
 //! |---|---|
 //! | m pushes | `S` without the m largest terms |
-//! | m faulty samples | `S` after the [interpolation](super::interpolation) of them |
+//! | m faulty samples | `S` after [interpolation](super::interpolation) of the faulty samples |
 //!
 //! Each explanation has m unknowns. The faulty samples are the smallest set whose interpolation
 //!
@@ -43,16 +43,16 @@ use super::{
 const LARGE: f64 = 8.0;
 /// Square root of the minimum advantage of faults over pushes in S.
 const ROOT_OF_MIN_ADVANTAGE: f64 = 5.0;
-/// Minimum advantage of faults over pushes, as a share of the reduction of S.
+/// Minimum advantage of faults over pushes, as a share of the reduction of S by interpolation.
 const PART: f64 = 0.2;
-/// Minimum ratio of the sum that pushes leave to the sum that faults (or noise alone) leave, required if the advantage
-/// is a smaller share.
+/// Minimum ratio of the sum that pushes leave to the sum that faults (or noise alone) leave. It applies if the
+/// advantage of faults is less than the share [`PART`].
 const MIN_SUM_RATIO: f64 = 20.0;
-/// Largest innovation that may remain, as a multiple of sigma.
+/// Largest innovation that may remain after interpolation, as a multiple of sigma.
 const LARGEST_INNOVATION: f64 = 5.0;
 /// Innovation at which a search for a fault starts, as a multiple of sigma.
 const SEED: f64 = 4.0;
-/// Minimum change of a sample, relative to the deviation of the channel.
+/// Minimum change of a faulty sample by interpolation, relative to the deviation of the channel.
 const SMALLEST: f64 = 1.5;
 /// Deviation that no person reaches within a few samples, in robust deviations of the channel.
 const IMPOSSIBLE_DEVIATION: f64 = 20.0;
@@ -64,7 +64,7 @@ pub(super) struct Spike {
     pub samples: Range<usize>,
     /// Largest deviation of the samples from their interpolation, with its sign.
     pub size: f64,
-    /// Square root of the reduction of S.
+    /// Square root of the reduction of S by interpolation.
     pub deviations: f64,
 }
 
@@ -74,7 +74,7 @@ pub(super) fn find(values: &mut [f64], sample_time_s: f64) -> Vec<Spike> {
     let mut x: Vec<f64> = values.iter().map(|v| v - level).collect();
     let step = quantum(values);
     let window = ((1.0 / sample_time_s) as usize).clamp(64, 4096);
-    // Spikes have at most the length of a fault that is bridged, and at most 12 samples.
+    // A spike is at most as long as a fault that is bridged, and has at most 12 samples.
     let longest = ((super::limits::BRIDGED_S / sample_time_s).round() as usize).clamp(1, 12);
     let mut found: Vec<Spike> = Vec::new();
     for _ in 0..ROUNDS {
@@ -106,7 +106,7 @@ pub(super) fn find(values: &mut [f64], sample_time_s: f64) -> Vec<Spike> {
     joined(found)
 }
 
-/// Replaces samples by an interpolation from their neighbours.
+/// Replaces these samples by an interpolation from their neighbours.
 pub(super) fn bridge(values: &mut [f64], samples: Range<usize>) {
     let (level, deviation) = level_and_deviation(values);
     let x: Vec<f64> = values.iter().map(|v| v - level).collect();
@@ -121,7 +121,7 @@ pub(super) fn bridge(values: &mut [f64], samples: Range<usize>) {
     }
 }
 
-/// Returns the number of lags that contain 95 % of `|a|^2`.
+/// Returns the lag up to which the coefficients of the autoregression make up 95 % of `|a|^2`.
 fn reach(ar: &Autoregression) -> usize {
     let total = ar.norm().powi(2);
     let mut sum = 0.0;
@@ -132,7 +132,8 @@ fn reach(ar: &Autoregression) -> usize {
     held.unwrap_or(ar.order())
 }
 
-/// Returns the scale of the innovations around each window.
+/// Returns the scale of the innovations in each window: the largest of the scales of the window, its neighbours and the
+/// whole channel, and at least `least`.
 pub(super) fn scales(eps: &[f64], window: usize, least: f64) -> Scales {
     let sizes: Vec<f64> = eps.iter().map(|e| e.abs()).collect();
     let of = |part: &[f64]| median(part) / 0.674_489_75;
@@ -169,7 +170,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Searches the first samples in reversed time.
+    /// Searches the first samples in reversed time, bridges their spikes and returns them.
     fn search_start(&self, x: &mut [f64]) -> Vec<Spike> {
         let p = self.ar.order();
         let length = x.len().min(8 * p);
@@ -210,7 +211,7 @@ impl Search<'_> {
         found
     }
 
-    /// Returns the spike that starts at this sample, with the changes of its samples.
+    /// Returns the spike that starts at sample `start`, with the changes of its samples; `None` if there is no spike.
     fn at(&self, x: &[f64], eps: &[f64], start: usize) -> Option<(Spike, Vec<f64>)> {
         let sigma = self.sigma.at(start);
         let all = Interpolation::new(self.ar, eps, start, self.longest);
@@ -259,7 +260,7 @@ impl Search<'_> {
         None
     }
 
-    /// Updates innovations like [`apply`], for an array that starts at row `first`.
+    /// Updates the innovations as [`apply`] does, for an array that starts at row `first`.
     fn apply_from(&self, eps: &mut [f64], first: usize, start: usize, delta: &[f64]) {
         for (i, change) in delta.iter().enumerate() {
             for (lag, a) in self.ar.a.iter().enumerate() {

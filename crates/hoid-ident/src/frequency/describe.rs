@@ -12,18 +12,19 @@ use super::{
 };
 use crate::{IdentError, informative_data::common_sample_time};
 
-/// Amplitude of a line, relative to the rms of its channel, below which it is only rounding.
+/// Amplitude of a line, relative to the root sum of squares of all coefficients of its channel, up to which it is only
+/// rounding.
 const LEAST_LINE: f64 = 1e-12;
 
 /// Number of bins at non-excited frequencies from which the remnant at a line is estimated.
 const NEIGHBOURS: usize = 8;
 
-/// The describing function at one line.
+/// The describing function H at one line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
     /// Frequency of the line, rad/s.
     pub omega_rad_s: f64,
-    /// Number of the harmonic of the period at which the line lies.
+    /// Number of the harmonic of the period at which the line is.
     pub harmonic: usize,
     /// H, averaged over runs.
     pub response: Complex64,
@@ -31,8 +32,8 @@ pub struct Line {
     pub standard_error: Option<f64>,
     /// Standard deviation of the ratios of single runs, as a root mean square modulus; `None` for one run.
     pub spread: Option<f64>,
-    /// sigma computed from the remnant near the line, `N = U - H E` at the nearest non-excited bins, which contain only
-    /// remnant. It does not include differences between runs and is also defined for a single run.
+    /// Standard error sigma computed from the remnant near the line, `N = U - H E` at the nearest non-excited bins,
+    /// which contain only remnant. It does not include differences between runs and is also defined for a single run.
     pub neighbour_error: f64,
     /// Squared coherence, 0 to 1; `None` for one run, where it is always 1.
     pub coherence: Option<f64>,
@@ -67,14 +68,14 @@ impl Line {
             .map(|s| s / (std::f64::consts::SQRT_2 * self.response.norm()))
     }
 
-    /// Returns H without one of the runs.
+    /// Returns H computed from all runs except `run`.
     pub fn response_without(&self, run: usize) -> Complex64 {
         self.ratio.value(Some(run))
     }
 
     /// Returns centre and radius of the circle in the complex plane that contains the true H with this probability. The
-    /// result is exact for a circular normal remnant even if e is small relative to it. `None` for one run, or if e
-    /// does not differ from zero at this level.
+    /// result is exact for a circular normal remnant, even if e is small compared with the remnant. `None` for one run,
+    /// or if the denominator of H does not differ from zero at this level.
     pub fn confidence_circle(&self, probability: f64) -> Option<(Complex64, f64)> {
         self.ratio.confidence_disc(probability)
     }
@@ -100,7 +101,7 @@ pub struct RunSummary {
 /// A describing function, with the remnant and a summary of each run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DescribingFunction {
-    /// Lines in ascending order of frequency.
+    /// The describing function at each line, in ascending order of frequency.
     pub lines: Vec<Line>,
     /// Summaries of the runs, which are records or periods.
     pub runs: Vec<RunSummary>,
@@ -123,7 +124,7 @@ struct Run {
     e: Vec<Complex64>,
     u: Vec<Complex64>,
     reference: Option<Vec<Complex64>>,
-    /// Coefficients of the output and of the input of the controlled element.
+    /// Fourier coefficients of the output and of the input of the controlled element.
     element: Option<(Vec<Complex64>, Vec<Complex64>)>,
     rms: (f64, f64),
 }
@@ -278,7 +279,7 @@ fn runs_of(record: &Record, excitation: &Excitation, options: &DescribingOptions
 }
 
 impl Run {
-    /// Checks that no line has zero power in e, u or another channel of the averages.
+    /// Returns an error if a line has zero power in e, u or another channel of the averages.
     fn check_lines(
         &self,
         record: &Record,
@@ -318,7 +319,8 @@ fn line(runs: &[Run], harmonic: usize, omega_rad_s: f64, options: &DescribingOpt
     let (mut cross, mut power_u, mut power_d) = (Complex64::new(0.0, 0.0), 0.0, 0.0);
     for run in runs {
         let (e, u) = (at(run, &run.e), at(run, &run.u));
-        // Factors of numerator and denominator: for the mean of ratios, the inverse of the denominator.
+        // Weight of the run in numerator and denominator: D*, or 1, or for the mean of ratios the inverse of the
+        // denominator.
         let (weight, element_weight, d) = match (&options.averaging, &run.reference) {
             (Averaging::Reference { .. }, Some(reference)) => {
                 let d = at(run, reference);
@@ -380,7 +382,7 @@ fn neighbour_error(runs: &[Run], line: &Line, harmonics: &[usize]) -> f64 {
         beside.truncate(NEIGHBOURS);
         let power = |k: &usize| (run.u[*k] - line.response * run.e[*k]).norm_sqr();
         let mean = beside.iter().map(power).sum::<f64>() / beside.len() as f64;
-        // |D_i|^2, with the scaling used in the products.
+        // Squared modulus of the weight of the run in the average, such as |D_i|^2.
         let d = b.norm_sqr() / run.e[at].norm_sqr();
         squares += d * mean;
     }

@@ -33,20 +33,20 @@ const MIN_RUNS: usize = 3;
 /// Largest plausible delay; longer delays are artefacts of noise in the phase.
 const LONGEST_DELAY_S: f64 = 0.6;
 
-/// Options of a description. By default everything is determined from the records.
+/// Options of a description. By default all choices are made from the records.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DescriptionOptions {
     /// Name of the channel with the recorded disturbance or target.
     pub excitation: Option<String>,
     /// Lines of the excitation, rad/s.
     pub lines_rad_s: Option<Vec<f64>>,
-    /// Period of the excitation, s. Required if the lines are given.
+    /// Period of the excitation, s. The period is required if the lines are given.
     pub period_s: Option<f64>,
     /// Controlled element, for computing the open loop.
     pub controlled_element: Option<ContinuousTransferFunction>,
-    /// Start of the span, s.
+    /// Start of the span that is analysed, s.
     pub from_s: Option<f64>,
-    /// End of the span, s (exclusive).
+    /// End of the span that is analysed, s (exclusive).
     pub to_s: Option<f64>,
     /// Offset between the channels: `e[k]` belongs to `u[k + offset_samples]`. The offset need not be an integer.
     pub offset_samples: f64,
@@ -61,7 +61,7 @@ pub struct Description {
     pub function: DescribingFunction,
     /// Lines of the excitation, and their period.
     pub excitation: Excitation,
-    /// Name of the reference channel of the average.
+    /// Name of the reference channel of the average; `None` if the mean of the ratios is used.
     pub channel: Option<String>,
     /// Definition of a run: record or period.
     pub realisation: Realisation,
@@ -95,7 +95,8 @@ pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result
         (None, None) => Ok(r.clone()),
         _ => r.span(from_s.unwrap_or(f64::NEG_INFINITY), to_s.unwrap_or(f64::INFINITY)),
     };
-    // Only `parts` are restricted to the span: `records` are described, because an offset may need samples beyond it.
+    // Only `parts` are restricted to the span. The whole `records` are passed on, because an offset may need samples
+    // beyond the span.
     let parts = records.iter().map(cut).collect::<Result<Vec<Record>, _>>()?;
     let Some(first) = parts.first() else {
         return Err(IdentError::NoRecords);
@@ -152,7 +153,7 @@ pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result
 }
 
 /// Returns the delay of a gain-lead-delay model fitted to the lines; if the lead is negative, the delay of a model
-/// without a lead. Returns zero if this delay is not plausible.
+/// without a lead. Returns zero if the fit fails or the delay is not plausible.
 fn delay_of(function: &DescribingFunction) -> f64 {
     let fit = |lead| {
         let options = GainLeadDelayOptions {
@@ -169,7 +170,7 @@ fn delay_of(function: &DescribingFunction) -> f64 {
         .unwrap_or(0.0)
 }
 
-/// Returns the excitation, and the name of its channel if there is one.
+/// Returns the excitation and the name of its channel, which is `None` if only the lines are known.
 fn excitation_of(record: &Record, options: &DescriptionOptions) -> Result<(Excitation, Option<String>), IdentError> {
     let search = LineSearch {
         period_s: options.period_s,

@@ -1,4 +1,4 @@
-//! Descriptions with their verdicts: of simulated runs, and of signals made to be doubtful.
+//! Tests of descriptions and their verdicts: for simulated runs, and for signals with known faults.
 
 use std::f64::consts::TAU;
 
@@ -35,13 +35,13 @@ fn kinds(found: &Description) -> Vec<&'static str> {
     found.verdict.findings().iter().map(|f| f.kind).collect()
 }
 
-/// Five lines over one period of 20 s.
+/// Returns sample k of an excitation with five lines and a period of 20 s.
 fn excitation(k: usize) -> f64 {
     let wave = |h: usize| (TAU * (h * k) as f64 / PERIOD as f64 + h as f64).sin();
     HARMONICS.iter().map(|h| wave(*h)).sum()
 }
 
-/// Normal noise of a named stream, by Box and Muller over a linear congruence.
+/// Returns normal noise by the method of Box and Muller, from a linear congruential generator; `stream` is its seed.
 fn noise(stream: u64, n: usize) -> Vec<f64> {
     let mut state = stream.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x1234_5678_9ABC_DEF1;
     let mut uniform = || {
@@ -55,7 +55,7 @@ fn noise(stream: u64, n: usize) -> Vec<f64> {
         .collect()
 }
 
-/// A record over `samples` with the excitation d, an e that follows it and its own u.
+/// Returns a record of this length with the given e and u, the excitation d and a zero target r.
 fn record(samples: usize, e: impl Fn(usize) -> f64, u: impl Fn(usize) -> f64) -> Record {
     let ts = SampleTime::new(0.1).unwrap();
     let channel = |name: &str, of: &dyn Fn(usize) -> f64| Channel::new(name, "", (0..samples).map(of).collect());
@@ -88,8 +88,8 @@ fn several_runs_are_described_by_default() {
     };
     let function = describe(&records, &found.excitation, &by_hand).unwrap();
     assert_eq!(found.function, function);
-    // The delay of 0.28 s represents the lag of the neuromuscular system too, 2 zeta/omega = 0.06 s
-    // at low frequency and more near its resonance.
+    // The delay of 0.28 s also represents the lag of the neuromuscular system, 2 zeta/omega = 0.06 s at low frequency
+    // and more near its resonance.
     assert!((0.28..0.45).contains(&found.delay_s), "{}", found.delay_s);
     let margins = found.margins.as_ref().unwrap();
     assert_eq!(*margins, function.open_loop(&element).margins_with_delay(found.delay_s));
@@ -101,8 +101,8 @@ fn several_runs_are_described_by_default() {
     within(margins.crossover_rad_s, 1.5635);
     within(margins.phase_margin_deg, 76.67);
     assert_eq!(found.verdict.level, VerdictLevel::Trustworthy, "{}", found.verdict);
-    // From lead to far beyond a turn: no jumps, each phase a whole number of turns from its
-    // principal value.
+    // The phase goes from a lead to far beyond one turn. It has no jumps, and each phase differs from its principal
+    // value by whole turns.
     let phases = found.phases_deg();
     for (phase, line) in phases.iter().zip(&function.lines) {
         let turns = (phase.value - line.phase_deg().value) / 360.0;
@@ -121,7 +121,7 @@ fn one_run_is_doubtful_and_says_why() {
         (VerdictLevel::Doubtful, vec!["few-runs"])
     );
     assert!(found.phases_deg().iter().all(|p| p.standard_error.is_none()));
-    // Four periods of one run, with a little noise.
+    // Four periods of one run, with little noise.
     let rough = noise(3, 4 * PERIOD);
     let one = record(4 * PERIOD, excitation, |k| 2.0 * excitation(k) + 0.1 * rough[k]);
     let found = describe_runs(std::slice::from_ref(&one), &DescriptionOptions::default()).unwrap();
@@ -130,7 +130,7 @@ fn one_run_is_doubtful_and_says_why() {
         (found.verdict.level, kinds(&found)),
         (VerdictLevel::Trustworthy, vec!["periods-as-runs"])
     );
-    // A target of zero is passed over.
+    // The zero target r is skipped in the search for the excitation.
     assert_eq!(found.channel.as_deref(), Some("d"));
     let span = DescriptionOptions {
         from_s: Some(20.0),
@@ -144,7 +144,8 @@ fn one_run_is_doubtful_and_says_why() {
 #[test]
 fn a_person_who_does_not_follow_is_not_described() {
     let options = DescriptionOptions::default();
-    // Unrelated in 1 of 20 by chance: 400 sets of two periods, standard error 0.011.
+    // By chance 1 in 20 sets of unrelated runs is not reported as unrelated; for 400 sets of two periods the standard
+    // error is 0.011.
     let mut followed = 0;
     for stream in 0..400 {
         let u = noise(stream, 2 * PERIOD);
@@ -156,7 +157,7 @@ fn a_person_who_does_not_follow_is_not_described() {
         }
     }
     assert!((7..=33).contains(&followed), "{followed}");
-    // Lines that are lost in noise, together with others that are not.
+    // Some lines are lost in noise, others are not.
     let slow = |k: usize| (TAU * (2 * k) as f64 / PERIOD as f64).sin() + (TAU * (5 * k) as f64 / PERIOD as f64).sin();
     let runs: Vec<Record> = (0..6)
         .map(|i| {
@@ -205,7 +206,7 @@ fn the_loop_is_doubted_where_it_says_nothing() {
 fn what_is_wrong_with_the_signals_is_found() {
     let rough = noise(7, 4 * PERIOD);
     let of = |samples| record(samples, excitation, |k| 2.0 * excitation(k) + 0.1 * rough[k]);
-    // A disturbance that was measured: 0.0025 of 2.5025 are noise.
+    // A measured disturbance with noise: its share of the power is 0.0025 of 2.5025.
     let measured = Channel::new(
         "w",
         "",
@@ -222,7 +223,7 @@ fn what_is_wrong_with_the_signals_is_found() {
         "{}",
         found.verdict
     );
-    // A line that is there but not named.
+    // The excitation has a line that is not among the given lines.
     let missing = DescriptionOptions {
         excitation: Some("d".to_owned()),
         lines_rad_s: Some([2.0, 5.0, 9.0].map(|h| h * TAU / 20.0).to_vec()),
@@ -232,7 +233,7 @@ fn what_is_wrong_with_the_signals_is_found() {
     let found = describe_runs(&[of(4 * PERIOD)], &missing).unwrap();
     assert_eq!(kinds(&found), ["leakage", "periods-as-runs"]);
     assert_eq!(found.verdict.level, VerdictLevel::Doubtful);
-    // Without a channel there is no reference.
+    // Without the channel of the excitation the average has no reference.
     let alone = DescriptionOptions {
         excitation: None,
         ..missing.clone()
@@ -271,7 +272,7 @@ fn what_cannot_be_described_is_refused() {
         ..DescriptionOptions::default()
     };
     assert!(message(&[bare], &named).contains("one of e, u"));
-    // Not whole periods: the problem is reported for the channel that exists.
+    // The span is not whole periods: this is reported for the channel that exists.
     let half = record(PERIOD * 5 / 4, excitation, excitation);
     assert!(message(&[half], &options).contains("whole periods"));
     let twice = record(PERIOD, excitation, |k| 2.0 * excitation(k));

@@ -9,8 +9,8 @@
 //! | finding | severity |
 //! |---|---|
 //! | `unrelated`: the coherences of all lines together do not differ from chance | undetermined |
-//! | `low-coherence`: the coherence of single lines does not differ from chance | warning next to the crossover or at half of the lines or more, otherwise a note |
-//! | `few-runs`: no errors from one run, inaccurate errors from two runs | warning |
+//! | `low-coherence`: the coherence of single lines does not differ from chance | warning if a line next to the crossover or at least half of the lines are affected, otherwise a note |
+//! | `few-runs`: a single run gives no errors, and two runs give inaccurate errors | warning |
 //! | `periods-as-runs`: the errors are computed from the periods of one or two runs | note |
 //! | `no-reference`: the channel of the excitation is not known | note |
 //! | `no-crossover`, `large-error`: there is no crossover between the lines; a standard error is large relative to the value | warning |
@@ -33,10 +33,10 @@ use crate::IdentError;
 
 /// Significance level of the tests against chance.
 const LEVEL: f64 = 0.05;
-/// Share of the power of the excitation outside its lines above which rounding in the file cannot be the cause.
+/// Share of the power of the excitation outside its lines above which the cause cannot be rounding in the file.
 const LEAKAGE: f64 = 1e-4;
 const MUCH_LEAKAGE: f64 = 1e-2;
-/// Range of the distance between an offset and an integer number of samples in which an integer may have been meant.
+/// An offset may have been meant to be an integer number of samples if its distance from an integer is in this range.
 const NEAR_INTEGER: (f64, f64) = (1e-6, 0.05);
 
 /// Input data of the diagnostics.
@@ -55,8 +55,8 @@ pub fn chance_coherence(n: usize) -> Option<f64> {
     (n > 1).then(|| 1.0 - LEVEL.powf(1.0 / (n as f64 - 1.0)))
 }
 
-/// Returns the probability that n unrelated runs have coherences at least as large as these in total; `None` for one
-/// run.
+/// Returns the probability that the coherences of n unrelated runs, combined over all lines, are at least as large as
+/// these; `None` for one run.
 fn probability_by_chance(coherences: &[f64], n: usize) -> Option<f64> {
     let sum: f64 = coherences
         .iter()
@@ -132,7 +132,7 @@ fn of_runs(found: &DiagnosticInputs<'_>, records: usize) -> Option<Finding> {
 
 fn of_coherence(found: &DiagnosticInputs<'_>) -> Option<Finding> {
     let n = found.function.runs.len();
-    // Without the excitation, the coherence is that of u with e, which is large in any closed loop.
+    // Without the excitation, the coherence is between e and u, which is large in any closed loop.
     found.channel?;
     let least = chance_coherence(n)?;
     let lines = &found.function.lines;
@@ -150,7 +150,7 @@ fn of_coherence(found: &DiagnosticInputs<'_>) -> Option<Finding> {
     let low: Vec<usize> = (0..lines.len())
         .filter(|k| lines[*k].coherence.is_some_and(|c| c < least))
         .collect();
-    // Two runs show more than chance at a single line only if its coherence is near 1; `few-runs` already reports this
+    // With two runs the coherence of a single line exceeds chance only if it is near 1; `few-runs` already reports this
     // limit.
     if low.is_empty() || n < 3 {
         return None;

@@ -17,7 +17,7 @@ use super::{
 };
 use crate::IdentError;
 
-/// Distance of a line from a harmonic that counts as rounding, in units of the fundamental frequency.
+/// Largest distance of a line from a harmonic that counts as rounding, in units of the fundamental frequency.
 const ROUNDING: f64 = 1e-4;
 /// Minimum share of the power of a channel at its lines.
 const SHARE_OF_LINES: f64 = 0.99;
@@ -107,7 +107,7 @@ impl Excitation {
     /// Returns the lines of a forcing function with the period T in s.
     ///
     /// # Errors
-    /// As [`Excitation::new`].
+    /// The errors of [`Excitation::new`].
     pub fn of_forcing_function(forcing: &ForcingFunction, period_s: f64) -> Result<Self, IdentError> {
         let omega: Vec<f64> = forcing
             .sinusoids()
@@ -119,8 +119,8 @@ impl Excitation {
     }
 
     /// Finds the lines of a channel in a record of whole periods: all bins with at least the relative amplitude in
-    /// `search`. If the span is wrong by about one sample, its leakage is too small to be detected; if the period is
-    /// given, such a span is rejected.
+    /// `search`. If the period is given, a span that differs from whole periods by a sample is rejected; without the
+    /// period, the leakage of such a span is too small to be detected.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] if the channel does not exist or its power is not concentrated at lines, as for noise
@@ -203,7 +203,8 @@ pub(crate) fn greatest_common_divisor(a: usize, b: usize) -> usize {
     if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
 
-/// Returns the values of the channel with this name.
+/// Returns the values of a channel by its name. The error names the available channels; `what` describes the channel in
+/// the error.
 pub(super) fn channel_of<'r>(record: &'r Record, channel: &str, what: &str) -> Result<&'r [f64], IdentError> {
     match record.channel(channel) {
         Some(values) => Ok(values),

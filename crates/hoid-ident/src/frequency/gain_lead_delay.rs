@@ -22,7 +22,8 @@ pub enum LineWeights {
     /// `w_k` is the squared coherence; 1 for one run.
     #[default]
     Coherence,
-    /// `w_k = |H_k|^2/sigma_k^2`, which gives the smallest variance if the model is true. This needs several runs.
+    /// `w_k = |H_k|^2/sigma_k^2`, which gives the smallest variance if the model is true. These weights need several
+    /// runs.
     Variance,
     /// Equal weights.
     Uniform,
@@ -31,7 +32,7 @@ pub enum LineWeights {
 /// Options of [`DescribingFunction::fit_gain_lead_delay`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GainLeadDelayOptions {
-    /// True if T_L is estimated, false if it is 0. Default true.
+    /// True if T_L is estimated; if false, T_L is 0. Default true.
     pub lead: bool,
     /// Weights of the lines. Default [`LineWeights::Coherence`].
     pub weights: LineWeights,
@@ -70,14 +71,14 @@ impl GainLeadDelay {
     }
 }
 
-/// Number of scan steps per turn of the phase of the highest line.
+/// Number of steps of the delay scan per turn of the phase at the highest line.
 const STEPS_PER_TURN: f64 = 40.0;
-/// Number of golden section steps, each of which reduces the bracket by the factor 0.618: from a fortieth of a turn
-/// down to the rounding errors of the criterion.
+/// Number of golden section steps, each of which multiplies the bracket by 0.618: from a fortieth of a turn down to the
+/// rounding errors of the criterion.
 const REFINEMENTS: usize = 60;
 const MOST_STEPS: f64 = 1e5;
 
-/// K, K T_L and the criterion for one delay.
+/// The best K and K T_L for one delay, and the criterion for them.
 #[derive(Clone, Copy)]
 struct Solution {
     gain: f64,
@@ -204,7 +205,7 @@ impl Problem<'_> {
         }
     }
 
-    /// Returns the lowest point of a scan, refined by golden section search.
+    /// Returns the solution at the best delay of a scan, refined by golden section search.
     fn lowest(&self, (shortest, longest): (f64, f64), steps: usize) -> Solution {
         let step = (longest - shortest) / steps as f64;
         let mut best = self.at(shortest);

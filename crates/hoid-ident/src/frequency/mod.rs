@@ -7,8 +7,8 @@
 //!
 //! `H = sum_i U_i D_i* / sum_i E_i D_i*`
 //!
-//! has a bias only in the second order of the error of its denominator. [`Averaging`] offers both methods, and
-//! `D_i = 1` for runs that all had the same excitation.
+//! has a bias only in the second order of the error of its denominator. [`Averaging`] offers the mean of the ratios and
+//! this estimate, as well as `D_i = 1` for runs that all had the same excitation.
 //!
 //! - **Standard error**: with `N_i = U_i - H E_i`, `sigma^2 = n/(n-1) sum |N_i D_i*|^2 / |sum E_i D_i*|^2` estimates
 //!   the expectation of `|dH|^2`. The coefficients of a stationary remnant are circular: real and imaginary part each

@@ -25,24 +25,24 @@ use crate::IdentError;
 pub struct OpenLoop {
     /// Frequencies of the lines, rad/s.
     pub omega_rad_s: Vec<f64>,
-    /// L computed from the average describing function.
+    /// L at each line, computed from the average describing function.
     pub response: Vec<Complex64>,
     /// L of each run: `per_run[i][k]` is the value of run i at line k.
     pub per_run: Vec<Vec<Complex64>>,
-    /// L averaged over all runs except run i, for each i.
+    /// L at each line, computed from the averages over all runs except run i, for each i.
     without: Vec<Vec<Complex64>>,
 }
 
-/// A crossing of `|L| = 1`.
+/// A frequency at which `|L|` passes 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossover {
     /// Frequency omega_c, rad/s.
     pub omega_rad_s: f64,
-    /// Phase margin at this frequency, deg, between -180 and 180.
+    /// Phase margin at the frequency omega_c, deg, between -180 and 180.
     pub phase_margin_deg: f64,
 }
 
-/// Crossover and margins with their standard errors; a quantity is `None` if there is no such crossing between the
+/// Crossover and margins with their standard errors. A quantity is `None` if its crossing does not exist between the
 /// lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DescribingMargins {
@@ -52,11 +52,11 @@ pub struct DescribingMargins {
     pub phase_margin_deg: Option<Estimate>,
     /// Frequency at which the phase falls through -180 deg, rad/s.
     pub phase_crossover_rad_s: Option<Estimate>,
-    /// Gain margin at this frequency, dB.
+    /// Gain margin at the frequency at which the phase falls through -180 deg, dB.
     pub gain_margin_db: Option<Estimate>,
     /// Crossover of each run; `None` for a run without a crossover.
     pub per_run: Vec<Option<Crossover>>,
-    /// Standard deviation of the crossover over the runs that have one, rad/s.
+    /// Standard deviation of the crossover over the runs that have a crossover, rad/s.
     pub crossover_spread_rad_s: Option<f64>,
     /// Standard deviation of the phase margin over the runs that have a crossover, deg.
     pub phase_margin_spread_deg: Option<f64>,
@@ -68,8 +68,8 @@ impl DescribingFunction {
         self.open_loop_with(|omega| element.response(omega))
     }
 
-    /// Returns the open loop with any frequency response as a function of rad/s, such as the response of the controlled
-    /// element with its hold.
+    /// Returns the open loop with an element given by its frequency response as a function of rad/s, such as the
+    /// response of the controlled element with its hold.
     pub fn open_loop_with(&self, element: impl Fn(f64) -> Complex64) -> OpenLoop {
         let known: Vec<Complex64> = self.lines.iter().map(|l| element(l.omega_rad_s)).collect();
         self.loop_of(|k, _| known[k], |k, _| known[k])
@@ -78,7 +78,7 @@ impl DescribingFunction {
     /// Returns the open loop with the controlled element estimated from the records.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] if [`super::DescribingOptions::element`] did not name its channels.
+    /// [`IdentError::BadOption`] if [`super::DescribingOptions::element`] does not name the channels of the element.
     pub fn measured_open_loop(&self) -> Result<OpenLoop, IdentError> {
         let ratios: Vec<_> = self.lines.iter().filter_map(|l| l.element_ratio.as_ref()).collect();
         if ratios.len() < self.lines.len() {
@@ -158,8 +158,9 @@ impl OpenLoop {
 }
 
 impl Crossover {
-    /// Returns the lowest crossover of an open loop at which its magnitude falls; `None` if there is none. The response
-    /// is given at ascending frequencies in rad/s. The phase of the delay in s is removed during the interpolation.
+    /// Returns the lowest crossover of an open loop at which its magnitude falls; `None` if there is no such crossover.
+    /// The response is given at ascending frequencies in rad/s. The phase of the delay in s is removed during the
+    /// interpolation.
     pub fn of(omega_rad_s: &[f64], response: &[Complex64], delay_s: f64) -> Option<Self> {
         let mut pairs = omega_rad_s.windows(2).zip(response.windows(2));
         pairs.find_map(|(w, l)| {
@@ -181,7 +182,7 @@ impl Crossover {
     }
 }
 
-/// A crossing of -180 deg by the phase of L.
+/// A frequency at which the phase of L falls through -180 deg.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct PhaseCrossover {
     omega_rad_s: f64,
@@ -189,12 +190,13 @@ struct PhaseCrossover {
 }
 
 impl PhaseCrossover {
-    /// Returns the crossing at which the phase falls through -180 deg and the magnitude is nearest to 1.
+    /// Of the crossings at which the phase falls through -180 deg, returns the crossing with the magnitude nearest to
+    /// 1; `None` if there is no such crossing.
     fn of(omega_rad_s: &[f64], response: &[Complex64], delay_s: f64) -> Option<Self> {
         let of_pair = |(w, l): (&[f64], &[Complex64])| {
             let by_delay = |omega: f64| Complex64::from_polar(1.0, -delay_s * omega);
             let rest = (l[1] / l[0] / by_delay(w[1] - w[0])).arg();
-            // Returns the phase plus 180 deg at a fraction of the interval in log omega.
+            // Phase plus 180 deg, at a fraction of the interval between two lines in log omega.
             let ratio = (w[1] / w[0]).ln();
             let above = |part: f64| {
                 let turned = part * rest - delay_s * w[0] * ((part * ratio).exp() - 1.0);

@@ -8,10 +8,10 @@ pub enum Averaging {
     /// Mean of the ratios `U_i/E_i`. The coherence is computed between e and u.
     #[default]
     Ratios,
-    /// `sum U_i D_i* / sum E_i D_i*`, where D_i is the coefficient of this channel: a forcing function or a
-    /// disturbance. Phases may differ between runs. The coherence is computed between this channel and u.
+    /// `sum U_i D_i* / sum E_i D_i*`, where D_i is the coefficient of a forcing function or a disturbance. Phases may
+    /// differ between runs. The coherence is computed between this channel and u.
     Reference {
-        /// Name of the channel of the forcing function or disturbance.
+        /// Name of the channel with the forcing function or disturbance.
         channel: String,
     },
     /// `sum U_i / sum E_i`: every run (or period) starts at the same phase of the same excitation.
@@ -34,8 +34,8 @@ pub enum Realisation {
 pub struct MeasuredElement {
     /// Name of the channel with the output y of the controlled element.
     pub output: String,
-    /// Name of the channel of a disturbance that is added to u sample by sample, with the offset of u. `None` if there
-    /// is no disturbance. If a disturbance is left out, `Y/U` is the negative inverse of H.
+    /// Name of the channel with a disturbance that is added to u sample by sample, with the offset of u; `None` if
+    /// there is no disturbance. If a disturbance acts but is not named, `Y/U` is the negative inverse of H.
     pub disturbance: Option<String>,
 }
 
@@ -56,7 +56,7 @@ pub struct DescribingOptions {
     /// Trend removed from e and u of each run before the analysis. A mean affects the rms but not the lines; a straight
     /// line has power at all lines. Default none.
     pub detrend: Detrend,
-    /// Number of bins of the shortest run that are averaged for one value of the remnant spectrum. Default 8.
+    /// Number of bins of the shortest run that a band of the remnant spectrum covers. Default 8.
     pub smoothing_bins: usize,
     /// Channels for estimating the controlled element, if it is estimated.
     pub element: Option<MeasuredElement>,

@@ -23,7 +23,7 @@ impl Ratio {
         kept.fold((zero, zero), |(a, b), (_, term)| (a + term.0, b + term.1))
     }
 
-    /// Returns H, optionally without one of the runs.
+    /// Returns H from all runs, or from all runs except one.
     pub fn value(&self, without: Option<usize>) -> Complex64 {
         let (a, b) = self.sums(without);
         a / b
@@ -34,7 +34,7 @@ impl Ratio {
         self.0.iter().map(|(a, b)| a / b).collect()
     }
 
-    /// Returns sigma; `None` for one run.
+    /// Returns the standard error sigma; `None` for one run.
     pub fn standard_error(&self) -> Option<f64> {
         let n = self.0.len() as f64;
         let (a, b) = self.sums(None);
@@ -68,7 +68,7 @@ impl Ratio {
 }
 
 /// Returns a value with its standard error from the jackknife. There is no standard error if there is only one run, or
-/// if one of the values without a run does not exist.
+/// if a value computed without one of the runs is missing.
 pub(super) fn jackknife(value: f64, without: &[Option<f64>]) -> Estimate {
     let known: Vec<f64> = without.iter().copied().flatten().collect();
     let n = without.len();
@@ -78,7 +78,8 @@ pub(super) fn jackknife(value: f64, without: &[Option<f64>]) -> Estimate {
     Estimate::with_variance(value, squared_deviations(&known) * (n as f64 - 1.0) / n as f64)
 }
 
-/// Returns the mean with its standard error computed from the spread; there is no standard error for a single value.
+/// Returns the mean of values with its standard error, computed from their scatter; there is no standard error for a
+/// single value.
 pub(super) fn mean(values: &[f64]) -> Estimate {
     let value = statistics::mean(values);
     match deviation(values) {
@@ -87,7 +88,7 @@ pub(super) fn mean(values: &[f64]) -> Estimate {
     }
 }
 
-/// Returns the standard deviation with the divisor n - 1; `None` for fewer than two values.
+/// Returns the standard deviation of values with the divisor n - 1; `None` for fewer than two values.
 pub(super) fn deviation(values: &[f64]) -> Option<f64> {
     (values.len() > 1).then(|| sample_variance(values).sqrt())
 }

@@ -24,7 +24,7 @@ pub struct RemnantBand {
     /// One-sided power density of u at non-excited frequencies, square of the unit of u per rad/s. The integral of the
     /// density is a variance.
     pub density: f64,
-    /// Number of averaged values: non-excited bins of all runs.
+    /// Number of averaged values, i.e. of non-excited bins of all runs in the band.
     pub values: usize,
 }
 
@@ -71,13 +71,14 @@ impl Control<'_> {
 pub(super) fn spectrum(runs: &[Control<'_>], harmonics: &[usize], ts_s: f64, neighbours: usize) -> Vec<RemnantBand> {
     let widest = runs.iter().map(|r| r.width_rad_s(ts_s)).fold(0.0, f64::max);
     let band_rad_s = widest * neighbours.max(1) as f64;
-    // Sum of frequencies, sum of densities, and number of bins.
+    // For each band: sum of frequencies, sum of densities, and number of bins.
     let mut bands: Vec<(f64, f64, usize)> = Vec::new();
     for run in runs {
         let width = run.width_rad_s(ts_s);
         for k in (1..run.coefficients.len()).filter(|k| !run.is_line(*k, harmonics)) {
             let omega = k as f64 * width;
-            // The shift by half a bin assigns a frequency at an edge to the band below, regardless of rounding.
+            // The shift by half a bin assigns a frequency at the edge of two bands to the lower band, regardless of
+            // rounding.
             let band = ((omega - 0.5 * width) / band_rad_s).max(0.0) as usize;
             if bands.len() <= band {
                 bands.resize(band + 1, (0.0, 0.0, 0));
@@ -94,7 +95,7 @@ pub(super) fn spectrum(runs: &[Control<'_>], harmonics: &[usize], ts_s: f64, nei
     bands.iter().filter(|b| b.2 > 0).map(mean).collect()
 }
 
-/// Returns the share of the power of u at non-excited frequencies and the noise ratio of one run.
+/// Returns, for one run, the share of the power of u at non-excited frequencies and the noise ratio.
 pub(super) fn share_and_ratio(
     run: &Control<'_>,
     harmonics: &[usize],

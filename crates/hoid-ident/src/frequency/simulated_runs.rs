@@ -1,5 +1,5 @@
-//! Whole results on simulated runs: the exact operator without remnant, error bars and remnant with
-//! it.
+//! Tests of describing functions of simulated runs: the exact operator without remnant; error bars and remnant spectrum
+//! with remnant.
 
 use hoid_model::{
     Complex64, DiscreteTransferFunction, PolynomialModel, Record, Structure,
@@ -15,7 +15,7 @@ const PERIOD_S: f64 = 81.92;
 
 fn scenario(condition: Condition, remnant: bool) -> Scenario {
     let mut scenario = Scenario::condition(condition);
-    // Until the slowest mode of the loop has died out.
+    // The run-in lasts until the slowest mode of the loop has decayed.
     scenario.run_in_s = 100.0;
     if !remnant {
         scenario.remnant.strength = RemnantStrength::Gain {
@@ -40,7 +40,7 @@ fn lines() -> Excitation {
     Excitation::of_forcing_function(&Scenario::condition(Condition::C1).forcing, PERIOD_S).unwrap()
 }
 
-/// The operator after its hold.
+/// Returns the discrete model of the operator with its hold.
 fn operator(scenario: &Scenario) -> PolynomialModel {
     let d = scenario.initial.operator.discretise(scenario.sample_time).unwrap();
     let theta = vec![d.held.b0, d.held.b1, 0.0, d.held.f1, d.held.f2];
@@ -48,7 +48,7 @@ fn operator(scenario: &Scenario) -> PolynomialModel {
     PolynomialModel::new(Structure::BoxJenkins, orders, scenario.sample_time, theta).unwrap()
 }
 
-/// `K_c/(s (s + omega_b))` after its hold, in closed form: the residues of
+/// Returns the discrete model of `K_c/(s (s + omega_b))` with its hold, in closed form from the residues of
 /// `K_c/(s^2 (s + omega_b))`.
 fn element(scenario: &Scenario) -> DiscreteTransferFunction {
     let (c, ts) = (scenario.initial.controlled_element, scenario.sample_time.s());
@@ -86,7 +86,7 @@ fn without_remnant_the_lines_are_those_of_the_held_operator() {
                 );
                 let expected = plant.response(line.omega_rad_s);
                 assert!((line.element.unwrap() / expected - 1.0).norm() < 1e-9);
-                // One run has no spread.
+                // A single run has no spread.
                 assert_eq!((line.standard_error, line.coherence, line.spread), (None, None, None));
             }
             assert!(found.noise_ratio.value < 1e-15 && found.off_line_share.value < 1e-15);
@@ -96,14 +96,13 @@ fn without_remnant_the_lines_are_those_of_the_held_operator() {
 
 #[test]
 fn margins_between_the_lines_are_near_those_of_the_loop() {
-    // The lines around the crossover of s1 are 1.00 and 1.69 rad/s, those around that of s2 2.61
-    // and 4.07: far apart, and a straight line between them does not describe the loop.
+    // The lines next to the crossover are 1.00 and 1.69 rad/s for C1, and 2.61 and 4.07 rad/s for C2. They are so far
+    // apart that a straight line between them does not describe the loop.
     for (condition, crossover, margin) in [(Condition::C1, 1.5635, 76.67), (Condition::C2, 2.7480, 22.90)] {
         let scenario = scenario(condition, false);
         let found = describe(&runs(&scenario, 0, 1), &lines(), &DescribingOptions::default()).unwrap();
         let continuous = scenario.initial.controlled_element.transfer_function().unwrap();
-        // The hold of the operator delays by half a sample, to 1e-5 of the magnitude at these
-        // frequencies.
+        // The hold of the operator is a delay of half a sample, to within 1e-5 of the magnitude at these frequencies.
         let half_s = 0.5 * scenario.sample_time.s();
         let open_loop = found.open_loop_with(|w| continuous.response(w) * Complex64::from_polar(1.0, half_s * w));
         let delay_s = scenario.initial.operator.tau_e_s;
@@ -133,7 +132,7 @@ fn error_bars_hold_what_they_say() {
         ..DescribingOptions::default()
     };
     let (mut inside, mut without_bound) = (0, vec![0; lines.harmonics().len()]);
-    // Square of the error and its estimate at each line, relative to the truth.
+    // Squared error and its estimate at each line, relative to the true value.
     let mut squares = vec![(0.0, 0.0); lines.harmonics().len()];
     let (mut crossovers, mut errors) = (Vec::new(), Vec::new());
     for i in 0..experiments {
@@ -154,15 +153,15 @@ fn error_bars_hold_what_they_say() {
     }
     let unbounded: usize = without_bound.iter().sum();
     let checks = experiments as usize * squares.len();
-    // A region without bound is the outside of a circle far from H: the truth is in it.
+    // An unbounded region is the outside of a circle far from H, so that the true value is in it.
     let coverage = (inside + unbounded) as f64 / checks as f64;
     println!("coverage {coverage} of {checks} circles, without bound {without_bound:?}");
-    // Nearly independent: a standard error of 0.0077. Only where the remnant in e is as large as e
-    // there may be no bound.
+    // The checks are nearly independent, with a standard error of 0.0077. The region may be unbounded only where the
+    // remnant in e is as large as e.
     assert!((coverage - 0.95).abs() < 0.023 && without_bound[2..].iter().all(|n| *n == 0));
-    // At the two lowest lines the remnant in e is not a small part of it, and sigma holds to the
-    // first order only. At each of the others 80 squares with two degrees of freedom, and their
-    // estimates with eight: a standard error of 0.044 for the mean.
+    // At the two lowest lines the remnant in e is not small compared with e, and sigma is only valid to first order. At
+    // each of the other lines there are 80 squares with two degrees of freedom and 80 estimates with eight: the mean
+    // has a standard error of 0.044.
     let ratios: Vec<f64> = squares[2..]
         .iter()
         .map(|(square, variance)| square / variance)
@@ -174,8 +173,8 @@ fn error_bars_hold_what_they_say() {
     let mean = crossovers.iter().sum::<f64>() / n;
     let variance = crossovers.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / (n - 1.0);
     let ratio = (variance / (errors.iter().sum::<f64>() / n)).sqrt();
-    // 80 experiments: a standard error of 0.08 for the deviation, and of 0.04 for the jackknife of
-    // five runs.
+    // With 80 experiments the standard deviation has a relative standard error of 0.08, and the jackknife of five runs
+    // one of 0.04.
     println!("crossover {mean}, deviation/standard error {ratio}");
     assert!((ratio - 1.0).abs() < 0.27);
 }
@@ -191,12 +190,13 @@ fn the_remnant_is_found_off_the_lines() {
             "{condition}: {ratio:?}, at non-excited frequencies {:?}",
             found.off_line_share
         );
-        // For the demanded level 0.1, of which 1000 runs are within 0.003; the mean of ratios has a
-        // bias of some of their variance.
+        // The requested noise ratio is 0.1, and the mean of 1000 runs is within 0.003 of it; the mean of ratios has a
+        // bias of a fraction of their variance.
         assert!((ratio.value - 0.1).abs() < 3.0 * ratio.standard_error.unwrap() + 0.003);
         assert!(found.off_line_share.value < ratio.value);
 
-        // n = K_n z after the loop: the density of held white noise is |filter|^2 Ts/pi per rad/s.
+        // The density of the held noise n = K_n z is |filter|^2 Ts/pi per rad/s; in the closed loop the filter is
+        // divided by 1 + L.
         let filter = RemnantFilter::new(k_n, 0.06, 1).unwrap();
         let filter = filter
             .discrete(scenario.sample_time, RemnantDiscretisation::ZeroOrderHold)
@@ -205,7 +205,7 @@ fn the_remnant_is_found_off_the_lines() {
         let (mut chi_square, mut bands) = (0.0, 0);
         for band in &found.remnant_spectrum {
             let w = band.omega_rad_s;
-            // A band is 0.6 rad/s wide: below 12 rad/s the spectrum bends within it.
+            // A band is 0.6 rad/s wide: below 12 rad/s the spectrum is curved within a band.
             if w > 12.0 && w < 300.0 {
                 let open = h.response(w) * plant.response(w);
                 let density = (filter.response(w) / (1.0 + open)).norm_sqr() * 0.01 / std::f64::consts::PI;
@@ -215,8 +215,8 @@ fn the_remnant_is_found_off_the_lines() {
         }
         let normalised = chi_square / f64::from(bands);
         println!("{bands} bands: {normalised}");
-        // About 470 values of unit variance: a standard error of sqrt(2/470) = 0.065. The leak of a
-        // window without taper adds.
+        // About 470 values of unit variance give a standard error of sqrt(2/470) = 0.065, to which the leakage of a
+        // window without taper is added.
         assert!((normalised - 1.0).abs() < 0.25);
     }
 }
@@ -242,12 +242,12 @@ fn each_period_can_be_a_run() {
     let same = describe_by(Realisation::Period, Averaging::SameExcitation);
     assert_eq!((whole.runs.len(), parts.runs.len(), parts.runs[7].periods), (2, 8, 1));
     for ((a, b), c) in whole.lines.iter().zip(&parts.lines).zip(&same.lines) {
-        // The coefficients of four periods are the mean of those of each.
+        // The coefficients of four periods are the mean of the coefficients of the single periods.
         assert!((a.response / b.response - 1.0).norm() < 1e-10 && (b.response / c.response - 1.0).norm() < 1e-10);
         assert!((b.coherence.unwrap() - c.coherence.unwrap()).abs() < 1e-10);
         assert_eq!(b.per_run.len(), 8);
     }
-    // Both estimate the same ratio, from finer and coarser bins.
+    // Records and single periods estimate the same noise ratio, from finer and coarser bins.
     assert!((whole.noise_ratio.value - parts.noise_ratio.value).abs() < 0.01);
     let (fit, options) = (parts, GainLeadDelayOptions::default());
     let fit = fit.fit_gain_lead_delay(&options).unwrap();

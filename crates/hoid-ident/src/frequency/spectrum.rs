@@ -8,7 +8,7 @@
 use hoid_model::Complex64;
 use realfft::RealFftPlanner;
 
-/// Returns `X_k`, k = 0 .. N/2.
+/// Returns the Fourier coefficients `X_k`, k = 0 .. N/2.
 pub(crate) fn coefficients(values: &[f64]) -> Vec<Complex64> {
     let n = values.len();
     if n == 0 {

@@ -1,4 +1,4 @@
-//! Sinusoids whose describing function is known by hand, and input that has none.
+//! Tests with sinusoids whose describing function is known in closed form, and with invalid input.
 
 use hoid_model::{Channel, Complex64, Record, SampleTime};
 
@@ -12,8 +12,8 @@ fn record(e: Vec<f64>, u: Vec<f64>) -> Result<Record, hoid_model::ModelError> {
 
 #[test]
 fn the_controlled_element_is_found_behind_a_disturbance_and_an_offset() {
-    // y[k + 1] = 0.8 y[k] + 0.5 (u[k] + d[k]), with u and d recorded a sample late, over two
-    // periods after a long run-in.
+    // y[k + 1] = 0.8 y[k] + 0.5 (u[k] + d[k]), with u and d recorded one sample late, over two periods after a long
+    // run-in.
     let at = |k: i32, n: f64, phase: f64| (std::f64::consts::TAU * n * f64::from(k) / 100.0 + phase).sin();
     let u = |k: i32| at(k, 3.0, 0.2) - 0.7 * at(k, 7.0, 1.0);
     let d = |k: i32| 0.4 * at(k, 3.0, 2.0) + at(k, 7.0, 0.4);
@@ -83,18 +83,18 @@ fn degenerate_input_is_refused() {
     ));
     let half = Excitation::of_harmonics(&[1], 20.0).unwrap();
     assert!(matches!(error(good.clone(), &half), IdentError::NotWholePeriods { .. }));
-    // A period of less than a sample.
+    // The period is shorter than a sample.
     let short = Excitation::of_harmonics(&[1], 0.01).unwrap();
     assert!(matches!(
         error(good.clone(), &short),
         IdentError::LineBeyondNyquist { .. }
     ));
-    // NaN never becomes part of a record.
+    // A record with NaN cannot be created.
     assert!(record(vec![f64::NAN; 100], wave(3.0)).is_err());
     let alone = Record::of_output(SampleTime::new(0.1).unwrap(), Channel::new("u", "deg", wave(3.0))).unwrap();
     assert!(matches!(error(alone, &at(&[3])), IdentError::BadOption { .. }));
 
-    // The mean of the span, not of the record.
+    // The mean of the span is removed, not the mean of the record.
     let mut shifted = wave(3.0);
     shifted.extend([7.0; 50]);
     let long = record(shifted.iter().map(|v| v + 2.0).collect(), shifted).unwrap();

@@ -1,14 +1,14 @@
 //! Phase without jumps by whole turns.
 //!
-//! Between two lines the phase is known except for whole turns. The smaller change is chosen after the phase of a
-//! delay, which changes fastest, has been removed. If the error of tau is less than `pi/(omega_{k+1} - omega_k)`,
-//! `phi + omega tau` changes by less than half a turn from line to line.
+//! At each line the phase is known except for whole turns. The smaller change from one line to the next is chosen after
+//! the phase of a delay, which changes fastest, has been removed. If the error of tau is less than
+//! `pi/(omega_{k+1} - omega_k)`, `phi + omega tau` changes by less than half a turn from line to line.
 
 use std::f64::consts::PI;
 
-/// Returns phases in deg without jumps, for pairs of frequency in rad/s and phase in deg. The phase of a delay in s is
-/// removed before the unwrapping and added afterwards. The first value, without the delay, is the principal value.
-/// Values that are not finite remain unchanged.
+/// Returns phases in deg without jumps, for pairs of frequency in rad/s and phase in deg. The phase of the delay
+/// `delay_s` is removed before the unwrapping and added afterwards. The first value, before the phase of the delay is
+/// added, is the principal value. Values that are not finite remain unchanged.
 pub fn unwrapped_deg(phases: &[(f64, f64)], delay_s: f64) -> Vec<f64> {
     let mut before: Option<f64> = None;
     phases

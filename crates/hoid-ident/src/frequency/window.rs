@@ -2,7 +2,7 @@
 //!
 //! If `e[k]` corresponds to `u[k + s]`, where s need not be an integer, `U(omega) e^{j omega s Ts}` is the coefficient
 //! of u at the time of e; this is exact for periodic components. The integer part of s is realised by a shift of the
-//! samples if the record is long enough, which is exact for the other components as well.
+//! samples if the record is long enough; a shift is exact for components that are not periodic as well.
 
 use std::f64::consts::TAU;
 
@@ -20,7 +20,7 @@ pub(crate) struct Window {
     pub periods: usize,
 }
 
-/// Returns the number of periods in `samples` samples of a record; the span may differ from whole periods by half a
+/// Returns the number of periods in `samples` samples of a record. The length may differ from whole periods by half a
 /// sample.
 pub(super) fn whole_periods(record: &Record, samples: usize, period_s: f64) -> Result<usize, IdentError> {
     let ts = record.sample_time().s();
@@ -51,7 +51,7 @@ pub(super) fn whole_periods(record: &Record, samples: usize, period_s: f64) -> R
 }
 
 impl Window {
-    /// Returns the window of the samples with `from_s <= t < to_s`; these must be whole periods.
+    /// Returns the window of the samples with `from_s <= t < to_s`, which must cover whole periods.
     pub fn of_span(record: &Record, from_s: Option<f64>, to_s: Option<f64>, period_s: f64) -> Result<Self, IdentError> {
         let ts = record.sample_time().s();
         let start_s = record.time_s(0);
@@ -75,8 +75,8 @@ impl Window {
         (0..self.periods).map(one).collect()
     }
 
-    /// Returns the samples in the window of a channel that is `offset` samples late, and the part of the offset that
-    /// remains after the shift.
+    /// Returns the samples of a channel that is `offset` samples late, shifted to the window, and the part of the
+    /// offset that remains after the shift.
     pub fn samples_of(self, values: &[f64], offset: f64) -> (&[f64], f64) {
         let whole = offset.floor();
         let begin = self.first as f64 + whole;

@@ -28,8 +28,8 @@ impl GreyBox {
     /// Fits one model to all records; each record has its own initial states.
     ///
     /// # Errors
-    /// [`IdentError`] if no model can be fitted. The fit itself reports how its search ended. With several orders an
-    /// error means that none of them could be fitted.
+    /// [`IdentError`] if no model can be fitted; with several orders, if none of the orders could be fitted. The fit
+    /// itself reports how its search ended.
     pub fn fit(&self, records: &[Record]) -> Result<GreyBoxFit, IdentError> {
         let sample_time = informative_data::common_sample_time(records)?;
         self.check_orders()?;
@@ -66,7 +66,7 @@ impl GreyBox {
             let candidates = vec![candidate(criterion, Ok(&fit))];
             return Ok(GreyBoxFit { candidates, ..fit });
         }
-        // The comparison of orders does not need an exact loss, and the search for a wrong order converges slowly.
+        // The comparison of orders does not need an exact loss, and a search for a wrong order converges slowly.
         let quick = SearchOptions {
             tolerance: self.search.tolerance.max(QUICK_TOLERANCE),
             max_iterations: self.search.max_iterations.min(QUICK_ITERATIONS),

@@ -28,9 +28,9 @@ pub(crate) const TIME_CONSTANT: usize = 5;
 /// Names of the parameters that can be constrained or estimated individually for each record.
 pub const GREY_BOX_NAMES: [&str; 7] = ["K_e", "K_e_dot", "T_L", "omega_nm", "zeta_nm", "tau_e", "T_n"];
 
-/// Bounds of zeta_nm. Beyond these bounds the two poles are effectively independent.
+/// Bounds of zeta_nm. Beyond the bounds the two poles are effectively independent.
 const ZETA_LIMITS: (f64, f64) = (1e-4, 20.0);
-/// Bounds of T_n in samples: below them the remnant is white noise, above them it is a drift.
+/// Bounds of T_n in samples: below the lower bound the remnant is white noise, above the upper bound it is a drift.
 const TIME_CONSTANT_LIMITS: (f64, f64) = (0.1, 1e4);
 /// Largest omega_nm as a share of pi/Ts.
 const HIGHEST_FREQUENCY: f64 = 0.999;
@@ -70,7 +70,7 @@ pub(crate) struct Polynomials {
     pub jacobian: Vec<[f64; SLOTS]>,
 }
 
-/// Returns the orders of the Box-Jenkins model that contains the grey box.
+/// Returns the orders of the Box-Jenkins model of which the grey box is a special case.
 pub(crate) fn orders(order: usize, nk: usize) -> Orders {
     Orders {
         na: 0,
@@ -205,12 +205,12 @@ impl Layout {
         Ok(whole_samples(longest, self.sample_time)? + 1)
     }
 
-    /// Returns the eta that has these parameters for every record.
+    /// Returns the eta in which every record has these parameters.
     pub fn spread(&self, slots: &[f64; SLOTS]) -> Vec<f64> {
         self.slots.iter().map(|&slot| slots[slot]).collect()
     }
 
-    /// Returns the parameters of one record; T_n is 0 if the model has none.
+    /// Returns the parameters of one record; T_n is 0 for a model without T_n.
     pub fn of_record(&self, eta: &[f64], record: usize) -> [f64; SLOTS] {
         let mut values = [0.0; SLOTS];
         for (value, &position) in values.iter_mut().zip(&self.positions[record]).take(self.slots_in_use()) {

@@ -39,7 +39,7 @@ pub(crate) struct PhysicalCriterion<'a, P> {
     pub additional: Option<AdditionalTerm<'a>>,
 }
 
-/// Another criterion for the first elements of eta, which is added to the sum of squares with a weight.
+/// Another criterion, which depends on the first elements of eta and is added to the sum of squares with a weight.
 #[derive(Clone)]
 pub(crate) struct AdditionalTerm<'a> {
     pub criterion: Arc<dyn Objective + Send + Sync + 'a>,
@@ -55,7 +55,7 @@ impl fmt::Debug for AdditionalTerm<'_> {
 }
 
 impl AdditionalTerm<'_> {
-    /// Adds the contribution of the term at eta to a linearisation.
+    /// Adds the contribution of the additional criterion at eta to a linearisation.
     pub fn add_to(&self, eta: &[f64], total: &mut Linearisation, workspace: &mut Workspace) {
         let (p, q) = (eta.len(), self.elements);
         let own = self.criterion.linearise(&eta[..q], workspace);
@@ -172,7 +172,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         self.with_data((mapped.orders, &mapped.further), record, self.data[record])
     }
 
-    /// Returns the criterion of one record for another e and u.
+    /// Returns the criterion of one record with other samples of e and u, such as a part of the record.
     pub fn with_data<'b>(
         &self,
         (orders, further): (hoid_model::Orders, &[InputOrders]),
@@ -204,8 +204,8 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         self.layout.map(eta, record, held).ok()
     }
 
-    /// Returns the ranges of successive records whose parameters have the same indices in eta; the records of a range
-    /// have the same polynomials.
+    /// Returns ranges of successive records whose parameters have the same indices in eta. All records of a range have
+    /// the same polynomials.
     fn of_same_places(&self) -> impl Iterator<Item = Range<usize>> {
         let records = 0..self.data.len();
         let mut next = records.start;
@@ -219,8 +219,8 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         })
     }
 
-    /// Sets the optimal gains for given other parameters and returns the sum of squares: the residual is affine in K_e
-    /// and K_e_dot. All records must have the same parameters, with K_e_dot as a coordinate.
+    /// Sets K_e and K_e_dot to their optimum for the other parameters in eta and returns the sum of squares; the
+    /// residual is affine in these gains. All records must have the same parameters, with K_e_dot as a coordinate.
     pub fn best_gains(&self, eta: &mut [f64], workspace: &mut Workspace) -> Option<f64> {
         eta[..2].fill(0.0);
         if !self.is_feasible(eta) {
@@ -256,7 +256,8 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         Some(self.search_by_samples(minimum, options, workspace))
     }
 
-    /// Searches within one sampling interval after the other as long as the loss decreases.
+    /// Searches within single sampling intervals of the delays, and moves to a neighbouring interval as long as the
+    /// loss decreases.
     fn search_by_samples(&self, minimum: Minimum, options: &SearchOptions, workspace: &mut Workspace) -> Minimum {
         let (delays, ts) = (self.layout.delays(), self.layout.sample_time().s());
         let begin = self.layout.first_sample_begins();
@@ -280,7 +281,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
             minimise(&within, eta, options, None, workspace)
         };
         let mut best = inside(&samples, &minimum, workspace).unwrap_or(minimum);
-        // Each change of interval decreases the loss; the limit on their number only guards against rounding.
+        // Each change of interval decreases the loss; the limit on the number of changes only guards against rounding.
         for _ in 0..100 {
             let mut moved = false;
             for (k, &i) in delays.iter().enumerate() {
@@ -342,7 +343,7 @@ impl<P: Parametrisation> Objective for PhysicalCriterion<'_, P> {
         let mut total = Linearisation::empty(p);
         for records in self.of_same_places() {
             let Some(polynomials) = self.polynomials(eta, records.start) else {
-                // This occurs only if eta is not feasible.
+                // The polynomials are missing only if eta is not feasible.
                 total.sum_of_squares = f64::NAN;
                 return total;
             };

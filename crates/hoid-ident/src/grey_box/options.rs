@@ -28,19 +28,19 @@ pub struct GreyBox {
     pub initial_state: InitialState,
     /// Limits of the search.
     pub search: SearchOptions,
-    /// Number of grid points from which a search is completed. Default 2.
+    /// Number of grid points from which searches are made. Default 2.
     pub starts: usize,
 }
 
 impl Default for GreyBox {
-    /// Returns the options for the orders 1 to 4 of the remnant.
+    /// Returns the default options, with the orders 1 to 4 of the remnant.
     fn default() -> Self {
         Self::new(DEFAULT_ORDERS)
     }
 }
 
 impl GreyBox {
-    /// Creates a grey box with the default options.
+    /// Creates a grey box with these orders of the remnant and otherwise the default options.
     pub fn new(order: RangeInclusive<usize>) -> Self {
         Self {
             order,

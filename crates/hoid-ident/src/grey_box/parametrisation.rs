@@ -6,7 +6,7 @@ use hoid_model::{ModelError, Orders, SampleTime};
 
 use crate::criterion::further_input::InputOrders;
 
-/// Orders and theta of one record for a given eta, and the derivatives of theta with a column for each slot of the
+/// Orders and theta of one record for a given eta, and the derivatives of theta, with a column for each slot of the
 /// record.
 #[derive(Debug, Clone)]
 pub(crate) struct Mapped {
@@ -17,7 +17,7 @@ pub(crate) struct Mapped {
     pub columns: Vec<Vec<f64>>,
 }
 
-/// Sampling intervals to which delays are restricted, if the caller has chosen them.
+/// Sampling intervals to which the delays are restricted; empty if there is no restriction.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct HeldSamples<'s> {
     /// Indices of the delays in eta.
@@ -26,7 +26,7 @@ pub(crate) struct HeldSamples<'s> {
 }
 
 impl HeldSamples<'_> {
-    /// Returns the sampling interval chosen for the delay at index `place` of eta.
+    /// Returns the sampling interval chosen for the delay at index `place` of eta; `None` if there is no restriction.
     pub fn of(&self, place: usize) -> Option<usize> {
         let index = self.delays.iter().position(|&delay| delay == place)?;
         self.samples.get(index).copied()
@@ -55,7 +55,7 @@ impl Mapped {
     }
 }
 
-/// Physical parameters eta of one or several records.
+/// Relation between the physical parameters eta of one or several records and the polynomials.
 pub(crate) trait Parametrisation: Clone {
     /// Returns the index in eta of each slot of a record.
     fn positions(&self, record: usize) -> &[usize];
@@ -67,14 +67,15 @@ pub(crate) trait Parametrisation: Clone {
     fn delay_of(&self, record: usize) -> usize;
     /// Returns the sample time.
     fn sample_time(&self) -> SampleTime;
-    /// Returns the delay in samples at which the sampling interval 0 starts: -0.5 where e is interpolated (the response
-    /// is half a sample later), 0 by default.
+    /// Returns the delay in samples at which the sampling interval 0 starts: -0.5 if e is interpolated (the response is
+    /// then half a sample later), 0 by default.
     fn first_sample_begins(&self) -> f64 {
         0.0
     }
     /// Returns the orders of the polynomials if the first coefficient of B has the delay nk.
     fn orders(&self, nk: usize) -> Orders;
-    /// Returns the index ranges in eta of polynomials C that must be stable and are not restricted by limits.
+    /// Returns the ranges of indices in eta that contain a polynomial C, which must be stable and is not restricted by
+    /// limits.
     fn stable_blocks(&self) -> Vec<Range<usize>>;
     /// Returns the orders of the further inputs at their shortest delays; there are none by default.
     fn further(&self) -> Vec<InputOrders> {

@@ -16,7 +16,8 @@ use super::layout::{DELAY, LEAD, Layout, Lead, TIME_CONSTANT};
 pub struct OrderCandidate {
     /// Order m.
     pub order: usize,
-    /// Criteria of this order, on the same samples for all orders, or the reason why the order could not be fitted.
+    /// Criteria of the fit of this order, computed from the same samples for all orders, or the reason why the order
+    /// could not be fitted.
     pub outcome: Result<OrderFigures, String>,
 }
 
@@ -33,12 +34,12 @@ pub struct OrderFigures {
     pub converged: bool,
 }
 
-/// A fit in physical parameters.
+/// A fit of an operator and its remnant in physical parameters.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct GreyBoxFit {
     pub(crate) layout: Layout,
     pub(crate) eta: Vec<f64>,
-    /// Covariance of eta by rows; zero for parameters that are fixed or at a bound.
+    /// Covariance of eta by rows, with zeros for parameters that are fixed or at a bound; `None` for an exact fit.
     pub(crate) covariance: Option<Vec<f64>>,
     /// Indices of the elements of eta that have a variance.
     pub(crate) free: Vec<usize>,
@@ -54,14 +55,14 @@ impl GreyBoxFit {
         self.layout.order
     }
 
-    /// Returns all orders that were tried, including that of this fit.
+    /// Returns all orders that were tried, including the order of this fit.
     pub fn candidates(&self) -> &[OrderCandidate] {
         &self.candidates
     }
 
     /// Returns the name, value and standard error of each fitted parameter in the coordinates of the fit: K_e, K_e_dot
-    /// (s) or, if the lead is described by it, T_L (s), omega_nm (rad/s), zeta_nm, tau_e (s), T_n (s). The name of an
-    /// individual parameter contains the number of its record.
+    /// (s) or T_L (s), omega_nm (rad/s), zeta_nm, tau_e (s), T_n (s). The name of an individual parameter contains the
+    /// number of its record.
     pub fn parameters(&self) -> Vec<(String, Estimate)> {
         self.layout
             .names
@@ -85,8 +86,8 @@ impl GreyBoxFit {
         }
     }
 
-    /// Returns an estimate with this value, where `by_gain` is its derivative with respect to K_e and `by_lead` its
-    /// derivative with respect to the second coordinate.
+    /// Returns the estimate of a quantity that depends on the gain and the lead. `by_gain` is its derivative with
+    /// respect to K_e, `by_lead` its derivative with respect to the coordinate of the lead.
     fn of_gains(&self, record: usize, value: f64, by_gain: f64, by_lead: f64) -> Estimate {
         let places = &self.layout.positions[record];
         let used = |place: usize, by: f64| by != 0.0 && self.free.contains(&place);
@@ -101,8 +102,8 @@ impl GreyBoxFit {
         }
     }
 
-    /// Returns the operator of a record with standard errors. `record` is the index of the record in the fit; a larger
-    /// index refers to the last record. This applies to all methods of the fit.
+    /// Returns the operator of a record with standard errors. `record` is the index of the record in the fit; as in all
+    /// methods of the fit, a larger index refers to the last record.
     ///
     /// # Errors
     /// [`NotConvertible::ZeroGain`] if K_e is zero, so that there is no T_L.
@@ -135,7 +136,7 @@ impl GreyBoxFit {
     /// Returns the operator of a record without standard errors.
     ///
     /// # Errors
-    /// As [`GreyBoxFit::operator`].
+    /// The errors of [`GreyBoxFit::operator`].
     pub fn operator_parameters(&self, record: usize) -> Result<OperatorParameters, NotConvertible> {
         Ok(self.operator(record)?.parameters())
     }
@@ -168,9 +169,9 @@ impl GreyBoxFit {
         })
     }
 
-    /// Returns the same model as a Box-Jenkins model with three coefficients in B, for prediction, simulation and the
-    /// frequency response with its confidence bands. Its covariance `J P J'` is singular, since theta has more elements
-    /// than eta. Use the methods of this fit for parameters, criteria, operator and remnant.
+    /// Returns the model of a record as a Box-Jenkins model with three coefficients in B, for prediction, simulation
+    /// and the frequency response with its confidence bands. Its covariance `J P J'` is singular, since theta has more
+    /// elements than eta. Use the methods of [`GreyBoxFit`] for parameters, criteria, operator and remnant.
     pub fn polynomial_fit(&self, record: usize) -> &Fit {
         &self.fits[self.known(record)]
     }

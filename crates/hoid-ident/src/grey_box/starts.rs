@@ -4,8 +4,8 @@
 //!    these delays, frequencies and damping ratios in the range of human operators. The residual is affine in K_e and
 //!    K_e_dot, so that these are eliminated at each point; the noise model has a single fixed T_n. The points with the
 //!    smallest loss are starts.
-//! 2. `box-jenkins`: the operator that corresponds to a Box-Jenkins fit at the delay of the best point, if there is
-//!    one.
+//! 2. `box-jenkins`: the operator that corresponds to a Box-Jenkins fit at the delay of the best grid point, if such an
+//!    operator exists.
 //! 3. `order m - 1`: the minimum for the previous order, if several orders are tried.
 //!
 //! For each order, T_n of a start is the best of a few values.
@@ -25,19 +25,19 @@ const GRID_DELAY_S: f64 = 0.04;
 const DEFAULT_OMEGA: f64 = 11.0;
 /// Damping ratio for the ranking of the delays.
 const DEFAULT_ZETA: f64 = 0.4;
-/// Number of delays at which other frequencies and damping ratios are tried.
+/// Number of delays at which several frequencies and damping ratios are tried.
 const BEST_DELAYS: usize = 2;
 /// Neuromuscular frequencies of the grid, rad/s.
 const GRID_OMEGA: [f64; 3] = [6.0, 11.0, 20.0];
 /// Damping ratios of the grid.
 const GRID_ZETA: [f64; 3] = [0.25, 0.7, 1.3];
-/// Time constants of the remnant, s. The first is used for ranking the grid. A third-order filter has another minimum
-/// below half a sample.
+/// Time constants of the remnant that are tried, s. The first is used for ranking the grid. A third-order filter has
+/// another minimum below half a sample.
 pub(crate) const GRID_TIME_CONSTANT_S: [f64; 6] = [0.1, 0.004, 0.012, 0.03, 0.06, 0.3];
 /// Minimum number of delays if the range of delays is not a single value.
 const FEWEST_DELAYS: usize = 3;
 
-/// A named start `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, T_n]`, which is the same for all records.
+/// A start with a name, which is the same for all records: `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, T_n]`.
 #[derive(Debug, Clone)]
 pub(crate) struct Start {
     pub label: String,
@@ -79,8 +79,8 @@ pub(crate) fn common_parameter_criterion<'a>(
     PhysicalCriterion::new(layout, criterion.data.clone(), criterion.initial, criterion.first)
 }
 
-/// Returns the best grid points with their optimal gains: `starts` points with a lead and, if it is better than all
-/// these, the best point without a lead.
+/// Returns the best grid points with their optimal gains: `starts` points with a positive lead and, if it is better
+/// than all of them, the best point with a negative lead.
 pub(crate) fn grid(criterion: &PhysicalCriterion<'_, Layout>, starts: usize, workspace: &mut Workspace) -> Vec<Start> {
     let scout = common_parameter_criterion(criterion, criterion.layout.order.min(1));
     let bounded = |slot: usize, value: f64| value.clamp(scout.limits[slot].0, scout.limits[slot].1);
@@ -121,8 +121,8 @@ pub(crate) fn grid(criterion: &PhysicalCriterion<'_, Layout>, starts: usize, wor
     leading(&points, starts)
 }
 
-/// Returns the first n points with a lead, and the first point if it has no lead. A lag with a shorter delay imitates
-/// the phase of an operator with a lead and causes a local minimum.
+/// Returns the first n points with a positive lead, and the first point of all if its lead is negative. A negative lead
+/// with a shorter delay imitates the phase of an operator with a positive lead and causes a local minimum.
 fn leading(points: &[(Start, f64)], n: usize) -> Vec<Start> {
     let has_lead = |s: &Start| s.slots[0] * s.slots[LEAD] >= 0.0;
     let mut chosen: Vec<Start> = points
@@ -136,7 +136,8 @@ fn leading(points: &[(Start, f64)], n: usize) -> Vec<Start> {
     chosen
 }
 
-/// Returns the operator of a Box-Jenkins fit at the delay of `nearest`.
+/// Returns the operator of a Box-Jenkins fit at the delay of `nearest`; `None` if the fit does not correspond to an
+/// operator.
 pub(crate) fn box_jenkins(
     records: &[Record],
     nearest: &Start,
@@ -163,7 +164,7 @@ pub(crate) fn box_jenkins(
     })
 }
 
-/// Returns the start as an eta of this criterion, with the best of a few values of T_n for its order.
+/// Returns the start as an eta of this criterion, with the best of the given values of T_n.
 pub(crate) fn complete(
     criterion: &PhysicalCriterion<'_, Layout>,
     start: &Start,

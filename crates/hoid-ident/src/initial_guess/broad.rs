@@ -23,13 +23,13 @@ use crate::{
     optimize::Objective,
 };
 
-/// Number of points of the pole grid that are used.
+/// Number of points of the pole grid that are used as systems.
 const PLACES: usize = 8;
 /// Number of noise models for a fitted system, and for a system of the grid.
 const NOISE_MODELS: (usize, usize) = (4, 1);
 /// Orders of the autoregressive noise models for the instrumental variables.
 const IV_NOISE: [usize; 2] = [2, 6];
-/// Number of additional coefficients of the autoregression that ranks the grid, compared with the noise model.
+/// Number of coefficients by which the autoregression that ranks the grid exceeds the noise model.
 const EXTRA_NOISE_COEFFICIENTS: usize = 1;
 
 /// A candidate for B and F.
@@ -40,7 +40,7 @@ struct System {
     noise_models: usize,
 }
 
-/// Returns complete starts in order of their loss; `known` is a minimum that was found before.
+/// Returns complete starts in order of their loss; `known` is the theta of a minimum that was found before.
 pub(crate) fn broad_starts(criterion: &Criterion<'_>, known: &[f64], workspace: &mut Workspace) -> Vec<Start> {
     let o = criterion.orders;
     let fitted = |label, b: &[f64], f: &[f64]| System {

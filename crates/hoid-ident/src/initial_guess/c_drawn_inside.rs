@@ -21,7 +21,7 @@ pub(crate) fn starts_with_c_inside(o: &Orders, theta: &[f64]) -> Vec<Vec<f64>> {
         let drawn: Vec<f64> = c.iter().zip(1..).map(|(ci, i)| ci * f64::powi(rho, i)).collect();
         push(&drawn);
     }
-    // C = (1 + x q^-1)^n has the same sum of roots.
+    // C = (1 + x q^-1)^n has the same sum of roots as C.
     let x = (c[0] / c.len() as f64).clamp(-0.95, 0.95);
     let multiple = polynomial::from_roots(&vec![Complex64::new(-x, 0.0); c.len()]);
     if multiple.len() == c.len() + 1 {

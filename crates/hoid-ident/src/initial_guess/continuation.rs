@@ -1,4 +1,4 @@
-//! A start from averaged records, which have fewer samples and a loss with fewer minima.
+//! A start from averaged records, which have fewer samples and whose loss has fewer minima.
 //!
 //! Input and output are filtered by the same moving average over K samples and decimated by K. At low frequencies the
 //! system between them stays the same, with its poles raised to the power K. On these records the search is completed
@@ -6,8 +6,8 @@
 //! the search on the original records. The delay becomes a fraction of a sample, so that B has one additional
 //! coefficient.
 //!
-//! The result is only a start. It is poor for a system that is fast compared with K samples, so that other starts are
-//! tried as well.
+//! The result is only a start. It is poor for a system that is fast compared with K samples; for such a system other
+//! starts are tried as well.
 
 use hoid_model::{Complex64, Orders, SampleTime, polynomial, polynomial_model::monic};
 
@@ -21,11 +21,11 @@ use crate::{
 
 /// Minimum number of samples of each averaged record.
 const MIN_AVERAGED_SAMPLES: usize = 800;
-/// Largest K.
+/// Largest number K of samples that are averaged.
 const LARGEST_FACTOR: usize = 8;
 /// Largest number of coefficients of D for the averaged records.
 const LARGEST_ND: usize = 2;
-/// Number of points of the pole grid from which a search is made.
+/// Number of points of the pole grid from which searches on the averaged records are made.
 const SEARCHED: usize = 2;
 /// Limits of the searches on the averaged records.
 const SEARCH: SearchOptions = SearchOptions {
@@ -43,7 +43,7 @@ const SLOW: f64 = 1.3;
 pub(crate) struct SlowPoles {
     /// Polynomials F, best first. Empty if the records are too short, or if the model has poles outside F.
     pub f: Vec<Vec<f64>>,
-    /// True if all poles of the best F are slow compared with the averaging, so that the averaged records determine it
+    /// True if all poles of the best F are slow compared with the averaging, so that the averaged records determine F
     /// nearly as well as the original records do.
     pub complete: bool,
 }
@@ -114,15 +114,15 @@ impl AveragedRecords {
     }
 }
 
-/// Search on the averaged records: the points of the pole grid are ranked with one noise model, which is estimated at
-/// the first point, and searches start from the best points.
+/// Search on the averaged records. The points of the pole grid are ranked with one noise model, which is estimated at
+/// the first point; searches then start from the best points.
 pub(crate) struct Continuation<'c> {
     averaged_criterion: &'c Criterion<'c>,
     factor: usize,
     grid: Vec<Vec<f64>>,
     /// Noise model for the ranking; `None` until it has been estimated.
     noise: Option<Vec<f64>>,
-    /// Current point of the grid, and its index.
+    /// Current point of the pole grid; `None` after the last point.
     trial: Option<Start>,
     tried: usize,
     ranked: Vec<Start>,
@@ -167,7 +167,7 @@ impl<'c> Continuation<'c> {
         }
     }
 
-    /// Returns the poles that were found.
+    /// Returns the poles that the search has found, converted to the original sample time.
     pub fn slow(self) -> SlowPoles {
         let o = &self.averaged_criterion.orders;
         let mut minima = self.searches.map(|searches| searches.minima).unwrap_or_default();
@@ -234,7 +234,7 @@ impl LinearisationClient for Continuation<'_> {
     }
 }
 
-/// Returns the means of consecutive groups of samples; incomplete groups are left out.
+/// Returns the means of successive groups of `factor` samples; an incomplete group at the end is left out.
 fn averaged(x: &[f64], factor: usize) -> Vec<f64> {
     let scale = 1.0 / factor as f64;
     x.chunks_exact(factor)

@@ -41,7 +41,7 @@ use crate::{
 /// Number of candidates that are completed with their own noise model.
 const COMPLETED: usize = 4;
 
-/// Returns the starts, each with the unknowns that still need to be found.
+/// Returns the starts, each with the polynomials that are still unknown.
 pub(crate) fn initial_guesses(
     criterion: &Criterion<'_>,
     sample_time: SampleTime,
@@ -65,7 +65,7 @@ pub(crate) fn initial_guesses_with_poles(
     starts
 }
 
-/// Returns starts from candidates for F.
+/// Returns the starts from all candidates for F, or for a model without F.
 fn from_poles(
     slow: SlowPoles,
     criterion: &Criterion<'_>,
@@ -108,8 +108,8 @@ fn from_poles(
     starts
 }
 
-/// Returns starts from candidates for F with their own A, B and noise model. These unknowns are computed here if the
-/// model has A or C; otherwise they remain to be found.
+/// Returns starts from candidates for F with their own A, B and noise model. A, B and the noise model are computed here
+/// if the model has A or C; otherwise they are still unknown in the starts.
 fn completed(criterion: &Criterion<'_>, proposals: Vec<(String, Vec<f64>)>, workspace: &mut Workspace) -> Vec<Start> {
     let o = &criterion.orders;
     let in_steps = o.na + o.nc == 0 && criterion.initial != InitialState::Backcast;
@@ -125,8 +125,8 @@ fn completed(criterion: &Criterion<'_>, proposals: Vec<(String, Vec<f64>)>, work
         .collect()
 }
 
-/// Returns the points of the pole grid, best first. All are ranked with the noise model of the first point, which takes
-/// one pass over the data for each point.
+/// Returns the points of the pole grid, best first. All points are ranked with the noise model of the first point,
+/// which takes one pass over the data for each point.
 fn ranked_grid(
     criterion: &Criterion<'_>,
     sample_time: SampleTime,
@@ -190,9 +190,9 @@ fn complete(criterion: &Criterion<'_>, f: &[f64], workspace: &mut Workspace) -> 
     Some((theta, value))
 }
 
-/// Returns starts for a model of the output alone, `u = (C/A) eps`. The first has A and C from the Hannan-Rissanen
-/// method; the two partly cancel if roots of C are near the unit circle and the long autoregression is too short. The
-/// other starts have A from an autoregression, with the same C and with C = 1.
+/// Returns starts for a model of the output alone, `u = (C/A) eps`. The first start has A and C from the
+/// Hannan-Rissanen method; A and C partly cancel if roots of C are near the unit circle and the long autoregression is
+/// too short. The other starts have A from an autoregression, with the same C and with C = 1.
 fn time_series(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Start> {
     let o = criterion.orders;
     let outputs: Vec<Vec<f64>> = criterion.data.iter().map(|d| d.u.to_vec()).collect();

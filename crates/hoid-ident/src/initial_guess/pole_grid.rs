@@ -8,10 +8,10 @@ use hoid_model::{Complex64, SampleTime, polynomial};
 const GRID_OMEGA: [f64; 4] = [3.0, 6.0, 12.0, 24.0];
 /// Damping ratios of the pole grid.
 const GRID_ZETA: [f64; 2] = [0.25, 0.7];
-/// Further poles of the grid for nf > 2, which are fast and have the least effect.
+/// Further poles of the pole grid for nf > 2; fast poles have the least effect.
 const EXTRA_POLE: f64 = 0.3;
 
-/// Returns F and a name for each point of the grid.
+/// Returns F and a name for each point of the grid of neuromuscular systems.
 pub(crate) fn pole_grid(nf: usize, sample_time: SampleTime) -> Vec<(String, Vec<f64>)> {
     GRID_OMEGA
         .into_iter()
@@ -28,15 +28,15 @@ pub(crate) fn pole_grid(nf: usize, sample_time: SampleTime) -> Vec<(String, Vec<
 
 /// Real poles of the grid over the unit disc, denser for slow poles.
 const REAL_POLES: [f64; 7] = [0.985, 0.95, 0.88, 0.7, 0.3, -0.5, -0.95];
-/// Angles in rad of the pole pairs of this grid; each angle is combined with every radius.
+/// Angles in rad of the pole pairs of the grid over the unit disc; each angle is combined with every radius.
 const ANGLES: [f64; 8] = [0.05, 0.1, 0.2, 0.4, 0.8, 1.3, 2.0, 2.6];
 const RADII: [f64; 2] = [0.98, 0.85];
-/// Third pole for nf > 2: slow, like the lag of an operator, or fast.
+/// Third pole in the grid over the unit disc for nf > 2: slow, like the lag of an operator, or fast.
 const THIRD_POLES: [f64; 2] = [0.95, EXTRA_POLE];
 
 /// Real roots of the grid for C.
 const REAL_ZEROS: [f64; 6] = [0.98, 0.8, 0.3, -0.3, -0.8, -0.98];
-/// Angles in rad of the root pairs of this grid, and their radius.
+/// Angles in rad of the root pairs of the grid for C; all pairs have the same radius.
 const ZERO_ANGLES: [f64; 7] = [0.1, 0.3, 0.7, 1.2, 1.7, 2.2, 2.7];
 const ZERO_RADIUS: f64 = 0.9;
 

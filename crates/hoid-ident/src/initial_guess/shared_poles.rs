@@ -24,9 +24,9 @@ use crate::{
     optimize::{SearchOptions, minimise},
 };
 
-/// Number of starts with the smallest loss that are tried.
+/// Number of starts with the smallest loss from which search steps are made.
 const TRIED_STARTS: usize = 8;
-/// Number of search steps from each of these starts.
+/// Number of search steps from each start that is tried.
 const STEPS: usize = 8;
 /// Largest number of real poles and pole pairs that are assigned in all ways.
 const MAX_GROUPS: usize = 6;
@@ -36,7 +36,8 @@ pub(crate) fn concerns(o: &Orders) -> bool {
     o.na > 0 && o.nb > 0 && o.nc + o.nd + o.nf > 0
 }
 
-/// Returns the best starts of both kinds and of `others` after a few steps of the search, with their sums of squares.
+/// Makes a few search steps from the best starts with assigned poles and from the best of `others`, and returns the
+/// results with their sums of squares.
 pub(crate) fn initial_guesses(criterion: &Criterion<'_>, others: Vec<Start>, workspace: &mut Workspace) -> Vec<Start> {
     let mut starts = others;
     starts.extend(from_instruments(criterion, workspace));
@@ -114,7 +115,7 @@ fn from_long_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<St
     starts
 }
 
-/// Returns a start for given A, B and F: the noise model is estimated from the residual, and A and B are estimated
+/// Returns a start for given A, B and F. The noise model is estimated from the residual, and A and B are then estimated
 /// again with this noise model.
 fn start(
     label: &str,

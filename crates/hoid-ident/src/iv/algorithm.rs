@@ -19,20 +19,20 @@ pub(super) struct Algorithm {
     pub solve: fn(&IvProblem<'_>, &Criterion<'_>, IterationLimits) -> Result<IvSolution, IdentError>,
 }
 
-/// Termination criteria of a refined method.
+/// Criteria for ending the iteration of a refined method.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct IterationLimits {
     /// Largest number of iterations.
     pub max_iterations: usize,
-    /// The iteration ends if a step is smaller than this value, relative to the standard errors.
+    /// The iteration ends if a step, measured in standard errors, is smaller than this value.
     pub tolerance: f64,
 }
 
-/// Result of a method.
+/// Result of an instrumental variable method.
 pub(super) struct IvSolution {
     /// Theta in the order of [`Orders::parameter_names`](hoid_model::Orders::parameter_names).
     pub theta: Vec<f64>,
-    /// Covariance by rows, if the method has one.
+    /// Covariance of theta by rows; `None` if the method gives none.
     pub covariance: Option<Vec<f64>>,
     pub termination: Termination,
 }

@@ -1,8 +1,8 @@
-//! Columns over the rows of all records, one record after the other.
+//! Columns with the rows of all records, one record after the other.
 
 use crate::linalg::least_squares::{add_scaled, dot};
 
-/// Columns over the rows of all records, one record after the other.
+/// Columns with the rows of all records, one record after the other.
 pub(crate) type Columns = Vec<Vec<f64>>;
 
 /// A column counts as a linear combination of previous columns if its independent part has less than this share of its
@@ -46,7 +46,7 @@ pub(super) fn orthonormal(columns: &[Vec<f64>]) -> (Columns, Vec<usize>) {
     (q, kept)
 }
 
-/// Splits a stacked residual into the parts of the single records.
+/// Splits a residual over all records into the parts of the single records, which have these numbers of rows.
 pub(super) fn cut(residual: &[f64], rows: &[usize]) -> Columns {
     let mut at = 0;
     rows.iter()

@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 use super::columns::{Columns, cut};
 use crate::{linalg::least_squares::dot, noise_model::noise_model};
 
-/// Largest order of the autoregression for the spectrum of a residual.
+/// Largest order of the autoregression that describes the spectrum of a residual.
 const LONGEST: usize = 30;
 
 /// Fits a long autoregression `D r = eps` to a residual and returns D and the variance of eps.
@@ -32,7 +32,7 @@ fn coloured_noise(residual: &[Vec<f64>], parameters: usize) -> (Vec<f64>, f64) {
         total += dot(whole, whole);
         rows += whole.len();
     }
-    // Correction for the degrees of freedom used by the parameters, as for the innovation variance.
+    // Correction for the degrees of freedom used by the parameters, as in the innovation variance.
     let freedom = n as f64 / n.saturating_sub(parameters).max(1) as f64;
     (d, total / rows.max(1) as f64 * freedom)
 }

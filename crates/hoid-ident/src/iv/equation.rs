@@ -1,11 +1,11 @@
 //! The prefiltered equation, its instruments and its solution.
 //!
 //! With poles `f_1 .. f_n` (of A or F) the equation is `u(t) = -f_1 u(t-1) - .. + b_0 e(t-nk) + .. + r(t)`. A filter L,
-//! which is at rest at the first row, is applied to each column of the equation. The instruments are the same columns
-//! computed with the noise-free input x instead of e and with `(B/F) q^-nk x` instead of u, under the same filter.
+//! which is at rest at the first row, is applied to each column of the equation. The instruments are the same columns,
+//! filtered by L as well, but with the noise-free input x instead of e and `(B/F) q^-nk x` instead of u.
 //!
 //! **Solution.** With `Z = Q T` and orthonormal Q (two passes of Gram-Schmidt), `Q' Phi theta = Q' y` is solved by QR
-//! with column pivoting. The condition number of Z then has no effect, and the rank is determined as for least squares.
+//! with column pivoting. The condition number of Z then has no effect, and the rank is determined as in least squares.
 
 use std::{borrow::Cow, ops::Range};
 
@@ -64,15 +64,16 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Data, noise-free inputs and orders. A system is a vector `[f_1 .. f_n, b_0 .. ]`, with A instead of F for ARX.
+/// Data, noise-free inputs and orders of an estimate. A system is a vector `[f_1 .. f_n, b_0 .. ]`, with A instead of F
+/// for ARX.
 pub(crate) struct IvProblem<'a> {
     pub poles: usize,
     pub nb: usize,
     pub nk: usize,
     pub data: Vec<Data<'a>>,
-    /// Noise-free inputs; each of them is used only for its own rows.
+    /// Noise-free inputs; each input is used only for its own samples.
     pub sources: Vec<Source<'a>>,
-    /// First row of each record.
+    /// Sample of each record at which the equation has its first row.
     pub first: usize,
     names: Vec<String>,
 }
@@ -104,7 +105,7 @@ impl<'a> IvProblem<'a> {
         }
     }
 
-    /// Returns the same problem for other signals.
+    /// Returns the problem with the same orders for other data and noise-free inputs.
     pub fn of<'b>(&self, data: Vec<Data<'b>>, sources: Vec<Source<'b>>) -> IvProblem<'b> {
         IvProblem {
             poles: self.poles,
@@ -117,7 +118,7 @@ impl<'a> IvProblem<'a> {
         }
     }
 
-    /// Returns the number of rows of each record for a filter with this order of D.
+    /// Returns the number of rows of each record in the equation, for a filter with this order of D.
     pub fn rows(&self, order_of_d: usize) -> Vec<usize> {
         self.data
             .iter()
@@ -125,7 +126,7 @@ impl<'a> IvProblem<'a> {
             .collect()
     }
 
-    /// Returns the filtered columns `[-u(t-i), e(t-nk-j)]` of pairs of outputs and inputs.
+    /// Returns the filtered columns `[-u(t-i), e(t-nk-j)]` of these pairs of output and input.
     fn columns(&self, filter: Prefilter<'_>, signals: &[(&[f64], &[f64])]) -> Columns {
         let shifted = |lag: usize, input: bool| {
             let mut column = Vec::new();
@@ -155,8 +156,8 @@ impl<'a> IvProblem<'a> {
         output
     }
 
-    /// Returns the filtered equation. Its instruments are the noise-free inputs and the outputs that this system (with
-    /// stable F) simulates from them.
+    /// Returns the filtered equation. Its instruments come from the noise-free inputs and from the outputs that this
+    /// system (with stable F) simulates from them.
     pub fn equation(&self, filter: Prefilter<'_>, system: &[f64]) -> Equation {
         let measured: Vec<(&[f64], &[f64])> = self.data.iter().map(|d| (d.u, d.e)).collect();
         let mut equation = Equation {
@@ -196,7 +197,7 @@ impl<'a> IvProblem<'a> {
         z
     }
 
-    /// Returns the rows of a range of samples that is counted through all records.
+    /// Returns the rows of the equation that belong to a range of samples; the samples are counted through all records.
     fn rows_of(&self, samples: &Range<usize>, order_of_d: usize) -> Vec<Range<usize>> {
         let (mut sample, mut row) = (0, 0);
         let mut found = Vec::new();
@@ -217,7 +218,7 @@ impl<'a> IvProblem<'a> {
             .collect()
     }
 
-    /// Returns the initial-state responses of 1/(C F) for each record, with the number of its rows.
+    /// Returns, for each record, the initial-state responses of 1/(C F) and the number of rows.
     fn initial_state_responses(&self, filter: Prefilter<'_>) -> Vec<(InitialStateResponses, usize)> {
         let poles = product(&monic(filter.c), &monic(filter.f));
         let past = InitialHistory {
@@ -280,7 +281,7 @@ impl<'a> IvProblem<'a> {
         Ok(solved.solution())
     }
 
-    /// Returns an orthonormal basis of the instruments.
+    /// Returns an orthonormal basis of the instruments `z`.
     ///
     /// # Errors
     /// [`IdentError::SingularInstruments`] if the instruments are linearly dependent.
@@ -331,7 +332,7 @@ impl<'a> IvProblem<'a> {
         }
     }
 
-    /// Returns the system with its poles inside the unit circle, and true if poles had to be moved.
+    /// Returns the system with its poles inside the unit circle, and whether poles had to be moved.
     ///
     /// # Errors
     /// [`IdentError::NoFiniteLoss`] if the roots cannot be found.

@@ -17,7 +17,7 @@ use crate::{
     linalg::least_squares::dot,
 };
 
-/// Residuals with an amplitude below this share of the output are only rounding errors.
+/// Residuals are only rounding errors if their amplitude is below this share of the output.
 const EXACT: f64 = 1e-11;
 
 /// Instrumental variable estimator with its options.
@@ -31,7 +31,7 @@ pub struct InstrumentalVariable {
     pub instruments: Instruments,
     /// Largest number of iterations of a refined method. Default 100.
     pub max_iterations: usize,
-    /// A refined method has converged if an iteration changes theta by less than this share of the standard errors.
+    /// A refined method has converged if an iteration changes theta by less than this number of standard errors.
     /// Default 1e-4.
     pub tolerance: f64,
 }
@@ -48,7 +48,8 @@ impl InstrumentalVariable {
         }
     }
 
-    /// Fits one model to all records, with a common theta. For the residuals each record has its own initial states.
+    /// Fits one model to all records, with a common theta. The residuals are computed with initial states for each
+    /// record.
     ///
     /// # Errors
     /// [`IdentError`] if no model can be fitted. The fit itself reports how its iteration ended.
@@ -122,7 +123,8 @@ impl InstrumentalVariable {
         })
     }
 
-    /// Rejects problems in which the filtered equation has fewer rows than parameters and initial states of the filter.
+    /// Returns an error if the filtered equation has fewer rows than there are parameters and initial states of the
+    /// filter.
     fn check_rows(&self, problem: &IvProblem<'_>, records: &[Record]) -> Result<(), IdentError> {
         let o = &self.orders;
         let states = o.nf + o.nc;

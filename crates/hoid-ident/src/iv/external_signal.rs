@@ -9,11 +9,11 @@
 //! filters cover the memory of a loop of several seconds, for which a finite impulse response would need hundreds of
 //! lags. The expansion is always stable, and for a sum of sinusoids it is the projection on their lines.
 //!
-//! The sum depends only on f_t, so that noise can affect it only through the weights: the noise of the record at the
-//! lines of f_t enters them, which is considerable if noise and f_t are both slow. Therefore the record is divided into
-//! blocks, and the instruments of a block are computed with weights from the other blocks, whose noise is independent
-//! of the noise in this block (split-sample instruments, J. D. Angrist and A. B. Krueger, *J. Business Econ. Stat.* 13
-//! (1995) 225-235). Poor weights then increase the variance but cause no bias.
+//! The sum depends only on f_t, so that noise can affect it only through the weights. Components of the noise at the
+//! lines of f_t enter the weights, and their effect is considerable if noise and f_t are both slow. Therefore the
+//! record is divided into blocks, and the instruments of a block are computed with weights from the other blocks, whose
+//! noise is independent of the noise in this block (split-sample instruments, J. D. Angrist and A. B. Krueger, *J.
+//! Business Econ. Stat.* 13 (1995) 225-235). Poor weights then increase the variance but cause no bias.
 //!
 //! Instruments from an external signal were proposed by M. Gilson, H. Garnier, P. C. Young and P. Van den Hof, *IET
 //! Control Theory Appl.* 5 (2011) 1147-1154; their construction uses the known controller, which for a human operator
@@ -39,12 +39,12 @@ use super::{
 const TIME_CONSTANTS: [f64; 3] = [4.0, 16.0, 64.0];
 /// Number of filters, if the records are long enough.
 const FILTERS: usize = 24;
-/// Minimum number of samples per filter.
+/// Minimum number of samples for each filter.
 const SAMPLES_EACH: usize = 10;
 /// Number of blocks; the input in each block is computed with weights from the other blocks.
 const BLOCKS: usize = 4;
-/// Ridge factor of the weights, needed if the output of a filter is concentrated in one block. The scale of an
-/// instrument does not matter.
+/// Ridge factor in the equations for the weights, needed if the output of a filter is concentrated in one block. The
+/// scale of an instrument does not matter.
 const RIDGE: f64 = 0.02;
 
 /// Returns the external signal of each record.
@@ -99,7 +99,7 @@ pub(super) fn noise_free<'a>(external: &[&[f64]], data: &[Data<'a>]) -> Vec<Sour
     (0..BLOCKS)
         .map(|k| {
             let block = k * samples / BLOCKS..(k + 1) * samples / BLOCKS;
-            // The weights come from the other blocks. The noise of this block is independent of them, so that it is not
+            // The weights come from the other blocks. The noise of this block does not affect them, so that it is not
             // correlated with the instrument.
             let weights = weights_of_others(&basis, &whole, &target, block.clone()).unwrap_or_else(|| whole.clone());
             let sum = combination(&basis, &weights, samples);
@@ -118,8 +118,8 @@ fn weights_of_others(basis: &[Vec<f64>], whole: &[f64], target: &[f64], block: R
     let mut right = whole.to_vec();
     for i in 0..p {
         let inside = &basis[i][block.clone()];
-        // The normal equations are those of all samples minus those of the block. The basis is orthonormal over all
-        // samples, so that its Gram matrix is the identity.
+        // The normal equations are the equations of all samples minus the equations of the block. The basis is
+        // orthonormal over all samples, so that its Gram matrix is the identity.
         right[i] -= dot(inside, &target[block.clone()]);
         for j in 0..p {
             let unit = if i == j { 1.0 + RIDGE } else { 0.0 };
@@ -146,8 +146,8 @@ fn combination(basis: &[Vec<f64>], weights: &[f64], samples: usize) -> Vec<f64> 
     sum
 }
 
-/// Returns an orthonormal basis of the filter outputs over all records, for the time constant that explains most of the
-/// targets.
+/// Returns an orthonormal basis of the filter outputs over all records, for the time constant whose filters explain the
+/// largest share of the targets.
 fn best_basis(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>> {
     let target = targets.concat();
     let filters = FILTERS.min(target.len() / SAMPLES_EACH).max(1);
@@ -162,7 +162,7 @@ fn best_basis(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>> {
     best.1
 }
 
-/// Returns the outputs of the filters with the pole p, over all records.
+/// Returns the outputs of the Laguerre filters with the pole p, over all records.
 fn laguerre(driving: &[&[f64]], p: f64, filters: usize) -> Vec<Vec<f64>> {
     let mut columns: Vec<Vec<f64>> = vec![Vec::new(); filters];
     for x in driving {

@@ -10,8 +10,8 @@ pub const FORCING_CHANNEL: &str = "f_t";
 /// The choice of instruments.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Instruments {
-    /// The measured input, and the output that the model simulates from it. This is valid for an open loop: in a closed
-    /// loop the input contains noise, and the estimate is biased.
+    /// The measured input, and the output that the model simulates from it. These instruments are valid for an open
+    /// loop: in a closed loop the input contains noise, and the estimate is biased.
     #[default]
     Simulated,
     /// The part of the input that follows this channel, for a closed loop. The channel is a forcing function f_t or a
@@ -28,8 +28,8 @@ impl Instruments {
         }
     }
 
-    /// Returns the forcing function f_t if all records have it, since it is independent of the noise in a closed loop;
-    /// otherwise simulated instruments.
+    /// Returns the forcing function f_t as instruments if all records have it, since it is independent of the noise in
+    /// a closed loop; otherwise simulated instruments.
     pub fn default_for(records: &[Record]) -> Self {
         if records.iter().all(|r| r.channel(FORCING_CHANNEL).is_some()) {
             Self::External(FORCING_CHANNEL.to_owned())

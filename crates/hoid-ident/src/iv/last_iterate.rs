@@ -4,7 +4,7 @@ use crate::{Termination, linalg::least_squares::dot};
 
 use super::equation::{Equation, Prefilter};
 
-/// Noise model C/D: numerator and denominator.
+/// Noise model C/D.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct NoiseModel {
     pub c: Vec<f64>,
@@ -12,7 +12,7 @@ pub(super) struct NoiseModel {
 }
 
 impl NoiseModel {
-    /// Returns the filter `D/(C F)` for these poles.
+    /// Returns the filter `D/(C F)` for F given by its coefficients.
     pub fn prefilter<'p>(&'p self, f: &'p [f64]) -> Prefilter<'p> {
         Prefilter {
             d: &self.d,

@@ -32,7 +32,7 @@
 //! | `refined` | iteration of the refined methods |
 //! | `last_iterate` | final state of an iteration |
 //! | `own_poles` | nonlinear form of the equation, used if the iteration does not converge |
-//! | `refined_system` | the same iteration as a start for the prediction error method |
+//! | `refined_system` | the iteration of RIV-BJ, as a start for the prediction error method |
 //! | `noise_free` | noise-free signals for other estimators |
 //! | `simulation_error` | part of the output that a system does not explain |
 //! | `algorithm` | interface between a method and the estimator |

@@ -10,14 +10,14 @@ use crate::{IdentError, criterion::Data};
 
 /// The part of e that follows an excitation, and the samples for which it is valid.
 pub(crate) struct NoiseFreeInput {
-    /// The part of e in each whole record.
+    /// The part of e that follows the excitation, for each whole record.
     pub inputs: Vec<Vec<f64>>,
     /// Samples whose noise does not affect this input, counted through all records.
     pub samples: Range<usize>,
 }
 
-/// Returns the parts of e that follow this channel, one for each block of samples, with weights computed from the other
-/// samples ([`super::external_signal`]).
+/// Returns the parts of e that follow this channel, one for each block of samples, with weights computed from the
+/// samples outside the block ([`super::external_signal`]).
 ///
 /// # Errors
 /// [`IdentError::NoChannel`] if a record does not have the channel, [`IdentError::NoExcitation`] if the channel is

@@ -8,11 +8,11 @@
 //!
 //! `g(theta) = Z' eps(theta)`,  `eps = (D/C) (u - (B/F) q^-nk e)`,
 //!
-//! which is the same at a fixed point but has a stable F. With Z, C and D of a system fixed, and Q an orthonormal basis
-//! of Z, `|Q' eps(theta)|^2` is therefore minimised over B and stable F (damped Gauss-Newton, along the border of
-//! stability if necessary: [`crate::optimize`]). Then Z, C and D are computed again, until theta no longer changes;
-//! [`Extrapolation`] helps if the convergence is slow or oscillates. If g has no zero in the region of stability, its
-//! smallest norm is on the border of this region, and the termination reports this.
+//! which is the same at a fixed point of the iteration but has a stable F. With Z, C and D of a system fixed, and Q an
+//! orthonormal basis of Z, `|Q' eps(theta)|^2` is therefore minimised over B and stable F (damped Gauss-Newton, along
+//! the border of stability if necessary: [`crate::optimize`]). Then Z, C and D are computed again, until theta no
+//! longer changes; [`Extrapolation`] helps if the convergence is slow or oscillates. If g has no zero in the region of
+//! stability, its smallest norm is on the border of this region, and the termination reports this.
 //!
 //! **Without convergence.** If the model is smaller than the operator, eps is correlated with some of the instruments
 //! that other systems give, and each theta may lead to instruments that give another theta. Instruments need not come
@@ -20,12 +20,12 @@
 //! `Z' eps(theta)` for the Z, C and D whose zero is closest to the system from which they were computed. It counts as
 //! converged if the zero differs from this system by less than half a standard error.
 //!
-//! psi is the exact derivative with 1/(C F) at rest at the first row. The unknown state there has no effect, since its
-//! responses are projected out of Z.
+//! psi is the exact derivative with 1/(C F) at rest at the first row. The unknown state at this row has no effect,
+//! since its responses are projected out of Z.
 //!
-//! This is the nonlinear form of the optimal instrumental variable estimate (T. Söderström and P. Stoica, *Instrumental
-//! Variable Methods for System Identification*, 1983, ch. 6; see P. C. Young, *Automatica* 52 (2015) 35-46, on the
-//! stationary point of the refined iteration).
+//! The zero of g is the nonlinear form of the optimal instrumental variable estimate (T. Söderström and P. Stoica,
+//! *Instrumental Variable Methods for System Identification*, 1983, ch. 6; see P. C. Young, *Automatica* 52 (2015)
+//! 35-46, on the stationary point of the refined iteration).
 
 use std::ops::Range;
 
@@ -49,7 +49,7 @@ const SEARCH_STEPS: usize = 30;
 /// Number of iterations used by the extrapolation, and the ridge factor of their combination.
 const EXTRAPOLATED_ITERATES: usize = 5;
 const RIDGE: f64 = 1e-10;
-/// The search with given instruments ends at this fraction of the tolerance.
+/// Tolerance of the search with given instruments, as a share of the tolerance of the iteration.
 const INNER_TOLERANCE_FACTOR: f64 = 1e-2;
 /// A pole with at least this radius counts as being on the unit circle.
 const ON_CIRCLE: f64 = 1.0 - 1e-7;
@@ -59,7 +59,7 @@ const NEGLIGIBLE_STEP: f64 = 0.5;
 /// the factor `GAIN`.
 const MAX_STEPS_WITHOUT_GAIN: usize = 12;
 const GAIN: f64 = 0.9;
-/// A step longer than this multiple of the shortest step is attributed to an excessive extrapolation.
+/// If a step is longer than this multiple of the shortest step, the extrapolation has diverged.
 const DIVERGED: f64 = 10.0;
 
 /// The objective `|Q' eps(theta)|^2` for given instruments and a given noise model.
@@ -67,7 +67,7 @@ struct GivenInstruments<'p, 'a> {
     problem: &'p IvProblem<'a>,
     noise: &'p NoiseModel,
     q: Columns,
-    /// Reference power, chosen such that 1e-26 of it is the largest value that counts as zero.
+    /// Reference power, chosen such that a sum of squares up to 1e-26 of it counts as zero.
     power: f64,
 }
 
@@ -103,7 +103,8 @@ impl Objective for GivenInstruments<'_, '_> {
     }
 }
 
-/// Iterates, starting from a system with stable F; `noise_of` returns the noise model of a system.
+/// Iterates the nonlinear form, starting from a system with stable F, and returns the iterate with the shortest step.
+/// `noise_of` returns the noise model of a system.
 ///
 /// # Errors
 /// [`IdentError::SingularInstruments`] if the instruments are linearly dependent, [`IdentError::NoFiniteLoss`] if the
@@ -191,11 +192,12 @@ fn reason(moved: f64, tolerance: f64, f: &[f64]) -> Reason {
 }
 
 /// Extrapolation of a fixed-point iteration from the last few points, by the combination of their steps with the
-/// smallest norm (D. G. Anderson, *J. ACM* 12 (1965) 547-560). Without it the iteration may converge slowly or
-/// oscillate if the model is too small and the instruments are noise-free.
+/// smallest norm (D. G. Anderson, *J. ACM* 12 (1965) 547-560). Without the extrapolation the iteration may converge
+/// slowly or oscillate if the model is too small and the instruments are noise-free.
 #[derive(Default)]
 struct Extrapolation {
-    /// Point and step of the last iteration, followed by the differences of points and steps between iterations.
+    /// Point and step of the last iteration; `differences` contains the changes of point and step between successive
+    /// iterations.
     last: Option<(Vec<f64>, Vec<f64>)>,
     differences: Vec<(Vec<f64>, Vec<f64>)>,
 }

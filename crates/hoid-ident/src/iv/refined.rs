@@ -33,8 +33,8 @@ const FAR: f64 = 1.15;
 /// Steps smaller than this share of the output are only rounding errors.
 const ROUNDING: f64 = 1e-12;
 
-/// Iterates and, if this does not converge, continues in the nonlinear form ([`super::own_poles`]); `noise_of` returns
-/// the noise model of a system.
+/// Runs the iteration and, if it does not converge, continues in the nonlinear form ([`super::own_poles`]). `noise_of`
+/// returns the noise model of a system.
 pub(super) fn settle(
     limits: IterationLimits,
     problem: &IvProblem<'_>,
@@ -45,8 +45,8 @@ pub(super) fn settle(
     if plain.termination.converged() || limits.max_iterations <= FULL_STEPS {
         return Ok(plain);
     }
-    // The nonlinear form starts from the last iterate and, if this leads far away, from the best system of the
-    // iteration and from its start.
+    // The nonlinear form starts from the last iterate. If the result is far from the operator, it starts again from the
+    // best system of the iteration and then from the start of the iteration.
     let mut spent = plain.termination.iterations;
     let starts = [
         plain.system.clone(),
@@ -74,7 +74,7 @@ pub(super) fn settle(
         }
     }
     if rank.0 == 2.0 {
-        // This is another zero of the equation, which does not fit the data.
+        // The best result is another zero of the equation, which does not fit the data.
         best.termination.reason = Reason::IterationLimit;
     }
     best.termination.iterations = spent;
@@ -96,7 +96,7 @@ impl Default for SmallestResidual {
     }
 }
 
-/// Iterates without the nonlinear form; `noise_of` returns the noise model of a system.
+/// Runs the iteration without the nonlinear form; `noise_of` returns the noise model of a system.
 fn iterate(
     limits: IterationLimits,
     problem: &IvProblem<'_>,
@@ -169,8 +169,8 @@ fn of_noise_free_parts(problem: &IvProblem<'_>) -> Result<Vec<f64>, IdentError> 
     let delayed: Vec<Vec<f64>> = source.inputs.iter().map(|x| late(x)).collect();
     let driving: Vec<&[f64]> = delayed.iter().map(Vec::as_slice).collect();
     let outputs: Vec<&[f64]> = problem.data.iter().map(|d| d.u).collect();
-    // In a closed loop e contains noise. The projections on the noise-free input do not contain it, so that least
-    // squares on them is consistent, apart from the error of the projection.
+    // In a closed loop e contains noise. The parts of e and u that follow the noise-free input contain no noise, so
+    // that least squares on these parts is consistent, apart from the error of the expansion.
     let clean = following(&driving, &outputs);
     let data = clean.iter().zip(&source.inputs).map(|(u, e)| Data::new(e, u)).collect();
     let parts = problem.of(data, Vec::new());
@@ -188,7 +188,7 @@ fn of_noise_free_parts(problem: &IvProblem<'_>) -> Result<Vec<f64>, IdentError> 
     Ok(system)
 }
 
-/// Iterates without the nonlinear form, for use as a start.
+/// Runs the iteration without the nonlinear form, for use as a start.
 pub(super) fn plain_iteration(
     limits: IterationLimits,
     problem: &IvProblem<'_>,

@@ -32,7 +32,7 @@ impl Gram {
         self.sums[i.max(j) * self.size + i.min(j)]
     }
 
-    /// Returns the matrix of some columns by rows, and the products of these columns with another column.
+    /// Returns the products of some columns with each other, by rows, and their products with the column `with`.
     pub fn system(&self, columns: Range<usize>, with: usize) -> (Vec<f64>, Vec<f64>) {
         let pairs = columns.clone().flat_map(|i| columns.clone().map(move |j| (i, j)));
         let matrix = pairs.map(|(i, j)| self.at(i, j)).collect();

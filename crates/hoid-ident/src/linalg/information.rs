@@ -57,7 +57,7 @@ pub(crate) fn inverse_information(gram: &[f64], names: &[String]) -> Result<Vec<
 /// no variance.
 ///
 /// # Errors
-/// As [`inverse_information`].
+/// The errors of [`inverse_information`].
 pub(crate) fn inverse_of_free(gram: &[f64], free: &[usize], names: &[String]) -> Result<Vec<f64>, IdentError> {
     let p = names.len();
     if free.is_empty() {

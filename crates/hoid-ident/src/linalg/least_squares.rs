@@ -12,17 +12,17 @@ use nalgebra::{DMatrix, DVector};
 /// 1e-10.
 pub(crate) const RANK_TOLERANCE: f64 = 1e-12;
 
-/// The factors of `X P = Q R` and `Q' y`, which contain all necessary information about the data.
+/// The factors of `X P = Q R` and `Q' y`, from which all results are computed.
 #[derive(Debug)]
 pub(crate) struct LeastSquares {
-    /// Upper triangle by columns of the scaled columns, in pivoted order.
+    /// Upper triangular factor R of the scaled columns in pivoted order, stored by columns.
     r: Vec<f64>,
     qty: Vec<f64>,
     pivots: Vec<usize>,
     scales: Vec<f64>,
     /// Number of independent columns.
     pub rank: usize,
-    /// Residual sum of squares of the least-squares fit, for full rank.
+    /// Residual sum of squares of the least-squares fit; valid only for full rank.
     pub residual_sum_of_squares: f64,
 }
 
@@ -112,7 +112,7 @@ impl LeastSquares {
         self.rank == self.columns()
     }
 
-    /// Returns the least-squares solution; to be called only if the rank is full.
+    /// Returns the least-squares solution, which is valid only if the rank is full.
     pub fn solution(&self) -> Vec<f64> {
         let p = self.columns();
         let scaled = self.back_substitute(&self.qty[..p]);
@@ -123,7 +123,7 @@ impl LeastSquares {
         theta
     }
 
-    /// Returns `(X' X)^-1` by rows; to be called only if the rank is full.
+    /// Returns `(X' X)^-1` by rows, which is valid only if the rank is full.
     pub fn inverse_gram(&self) -> Vec<f64> {
         let p = self.columns();
         // First the columns of R^-1, then R^-1 R^-T.
@@ -156,7 +156,8 @@ impl LeastSquares {
         x
     }
 
-    /// Describes by name which columns are linearly dependent on which others.
+    /// Returns a description of the linearly dependent columns by name, each with the columns of which it is a
+    /// combination.
     pub fn describe_dependence(&self, names: &[String]) -> String {
         let p = self.columns();
         let sentences: Vec<String> = (self.rank..p)

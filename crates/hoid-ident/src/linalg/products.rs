@@ -26,12 +26,13 @@ struct Tile<F> {
     x: usize,
     ys: [usize; 4],
     count: usize,
-    /// Four partial sums for each product. A single product has eight, in the first two elements.
+    /// Four partial sums for each product. If the tile has a single product, the first two elements contain its eight
+    /// partial sums.
     sums: [F; 4],
 }
 
 impl<F: FourLanes> Tile<F> {
-    /// Creates tiles for the products of x with each of ys; their sums are zero.
+    /// Creates tiles for the products of column x with each of the columns ys; their sums are zero.
     fn cover(x: usize, mut ys: &[usize], zero: F, tiles: &mut Vec<Self>) {
         while !ys.is_empty() {
             let count = match ys.len() {
@@ -52,8 +53,8 @@ impl<F: FourLanes> Tile<F> {
         }
     }
 
-    /// Adds the products over the whole blocks of a stretch. The sums are separate variables, because the elements of
-    /// an array would be kept in memory.
+    /// Adds the products over the whole blocks of four or eight samples in a stretch. The sums are separate variables,
+    /// because the elements of an array would be kept in memory.
     #[inline(always)]
     fn add<'a>(&mut self, column: impl Fn(usize) -> &'a [f64]) {
         let x = column(self.x);
@@ -88,8 +89,8 @@ impl<F: FourLanes> Tile<F> {
         self.sums = [s0, s1, s2, s3];
     }
 
-    /// Returns the product of x with the k-th of ys over the whole columns: the partial sums, plus the samples after
-    /// the last whole block.
+    /// Returns the product of column x with the k-th of the columns ys over the whole record: the partial sums, plus
+    /// the samples after the last whole block.
     #[inline(always)]
     fn total<'a>(&self, k: usize, column: impl Fn(usize) -> &'a [f64]) -> f64 {
         let (x, y) = (column(self.x), column(self.ys[k]));
@@ -120,7 +121,7 @@ fn eights(x: &[f64]) -> &[[[f64; 4]; 2]] {
     fours(x).as_chunks().0
 }
 
-/// Returns the ranges of the stretches of n samples.
+/// Returns the ranges of samples of the stretches into which n samples are divided.
 fn stretches(n: usize) -> impl Iterator<Item = Range<usize>> {
     (0..n).step_by(STRETCH).map(move |from| from..n.min(from + STRETCH))
 }
@@ -138,7 +139,7 @@ fn sum<F: FourLanes>(x: &[f64], zero: F) -> f64 {
     sums.as_flattened().iter().chain(tail).sum()
 }
 
-/// Returns the sum of the squared distances from the mean.
+/// Returns the sum of the squared distances of the elements of x from the mean.
 #[inline(always)]
 fn squares<F: FourLanes>(x: &[f64], mean: f64, zero: F) -> f64 {
     let (mut s0, mut s1) = (zero, zero);
@@ -178,18 +179,18 @@ impl FourLaneTask for Variance<'_, '_> {
     }
 }
 
-/// A column of a regression.
+/// A column of a regression, with a mark if it is a shift of the previous column.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lagged<'a> {
     pub values: &'a [f64],
-    /// True if this is the previous column delayed by one sample.
+    /// True if the column is the previous column delayed by one sample.
     pub is_shift_of_previous: bool,
 }
 
 /// Returns the symmetric matrix of the products of all columns, by rows.
 ///
-/// A column that does not follow another is multiplied by all columns. In each remaining pair both columns follow
-/// others, so that the product results from the product of the previous columns.
+/// A column that is not a shift of the previous column is multiplied by all columns. In each remaining pair both
+/// columns are shifts, so that their product follows from the product of the two columns before them.
 pub(crate) fn gram(columns: &[Lagged<'_>]) -> Vec<f64> {
     with_four_lanes(Gram(columns))
 }
@@ -210,7 +211,7 @@ impl FourLaneTask for Gram<'_, '_> {
             .filter(|(_, column)| !column.is_shift_of_previous)
         {
             others.clear();
-            // The products with previous columns that do not follow others are already known.
+            // The products with earlier columns that are not shifts are already known.
             others.extend((0..p).filter(|j| *j >= i || columns[*j].is_shift_of_previous));
             Tile::cover(i, &others, zero, &mut tiles);
         }
@@ -243,18 +244,19 @@ impl FourLaneTask for Gram<'_, '_> {
     }
 }
 
-/// Returns the product of columns i and j minus the product of the columns before them.
+/// Returns the product of columns i and j minus the product of columns i - 1 and j - 1, if i and j are shifts.
 fn ends(columns: &[Lagged<'_>], i: usize, j: usize) -> f64 {
     let (x, y) = (columns[i - 1].values, columns[j - 1].values);
     let last = x.len() - 1;
     columns[i].values[0] * columns[j].values[0] - x[last] * y[last]
 }
 
-/// Columns that follow others in the most frequent regression: an output with two lags, and an input with one.
+/// Marks of the columns that are shifts, in the most frequent regression: an output with two lags, and an input with
+/// one.
 const TWO_OF_EACH: [bool; 5] = [false, true, true, false, true];
 
-/// Adds the products of such a regression in one pass, which reads five numbers for nine products; separate tiles would
-/// read twelve.
+/// Adds the products of the regression [`TWO_OF_EACH`] in one pass, which reads five numbers for nine products;
+/// separate tiles would read twelve.
 #[inline(always)]
 fn add_two_of_each<F: FourLanes>(tiles: &mut [Tile<F>], columns: [&[f64]; 5]) {
     // The tiles are u with the first four columns, u with the last column, and e with the last four columns.
@@ -279,8 +281,8 @@ fn add_two_of_each<F: FourLanes>(tiles: &mut [Tile<F>], columns: [&[f64]; 5]) {
         eu2 = eu2 + e * u2;
         let e1 = kind.load(e1);
         ee1 = ee1 + e * e1;
-        // The single product has eight partial sums, which are used alternately: with two blocks per step the sums
-        // would not fit in sixteen registers.
+        // The product of a single pair has eight partial sums, which are used alternately: with two blocks per step the
+        // sums would not fit in sixteen registers.
         (ue1, ue1_later) = (ue1_later, ue1 + u * e1);
     }
     by_u.sums = [uu, uu1, uu2, ue];
@@ -299,7 +301,7 @@ pub(crate) struct ResidualProducts {
 }
 
 impl ResidualProducts {
-    /// Creates zero sums for p columns.
+    /// Creates zero sums for the products with p columns.
     pub fn new(p: usize) -> Self {
         Self {
             squares: 0.0,
@@ -331,7 +333,7 @@ impl FourLaneTask for Residuals<'_, '_> {
     fn run<F: FourLanes>(self, zero: F) {
         let Self { columns, factors, of } = self;
         let inputs: Vec<usize> = (1..columns.len()).collect();
-        // In these tiles the residual replaces y.
+        // In the tiles for the residual, the residual replaces y.
         let mut tiles = Vec::with_capacity(columns.len());
         Tile::cover(0, &[0], zero, &mut tiles);
         Tile::cover(0, &inputs, zero, &mut tiles);
@@ -364,8 +366,8 @@ impl FourLaneTask for Residuals<'_, '_> {
     }
 }
 
-/// Returns the sum of squares and the products of the residuals of four inputs over a whole stretch; all sums are kept
-/// in registers.
+/// Returns the sum of squares of the residuals and their products with four columns over a whole stretch; all sums are
+/// kept in registers.
 #[inline(always)]
 fn of_four_inputs<F: FourLanes>(columns: [&[f64]; 5], factors: [f64; 4], zero: F) -> (f64, [f64; 4]) {
     let [y, a, b, c, d] = columns;

@@ -1,5 +1,5 @@
 //! A search by reverse communication: it returns the theta at which it needs the linearisation of the criterion, and
-//! continues when it is given this linearisation. The caller decides how to linearise: for one record, or for several
+//! continues when it receives this linearisation. The caller decides how to linearise: for one record, or for several
 //! records in parallel lanes.
 
 use crate::{
@@ -7,9 +7,9 @@ use crate::{
     optimize::Linearisation,
 };
 
-/// A computation that needs the linearisation of a criterion at a sequence of theta.
+/// A computation that needs the linearisation of a criterion at successive values of theta.
 pub(crate) trait LinearisationClient {
-    /// Returns the criterion.
+    /// Returns the criterion that must be linearised.
     fn criterion(&self) -> &Criterion<'_>;
     /// Returns theta at which the linearisation is needed next; `None` when the computation has ended.
     fn evaluation_point(&self) -> Option<&[f64]>;

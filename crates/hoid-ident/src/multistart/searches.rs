@@ -1,11 +1,11 @@
-//! Searches from several starts of one criterion, with one linearisation after another.
+//! Searches from several starts for the minima of one criterion, which request one linearisation after another.
 //!
-//! The unknown polynomials of each start are computed first; searches then run from the best starts in turn. A start in
-//! the basin of a known minimum is skipped, and a search that comes close to such a minimum is stopped unless it is
-//! predicted to end lower.
+//! The unknown polynomials of each start are computed first; searches then run from the best starts, one after another.
+//! A start in the basin of a known minimum is skipped, and a search that comes close to a known minimum is stopped
+//! unless it is predicted to end lower.
 //!
 //! The searches do not evaluate the criterion themselves: they return the theta at which they need its linearisation
-//! and continue when they are given it (reverse communication), so that the searches for several records can run in
+//! and continue when they receive it (reverse communication), so that the searches for several records can run in
 //! parallel lanes ([`crate::pem::batched`]).
 
 use hoid_model::Orders;
@@ -26,9 +26,9 @@ pub(crate) struct MultiStart<'s> {
     objective: &'s dyn Objective,
     orders: Orders,
     options: &'s SearchOptions,
-    /// Largest number of searches.
+    /// Largest number of starts from which searches are made.
     most: usize,
-    /// Starts; after all starts are complete, the starts that have not been used, the best last.
+    /// All starts until each is complete; then the starts that have not been used yet, the best last.
     starts: Vec<Start>,
     /// Current search, with the label of its start.
     searching: Option<(String, GaussNewton<'s>)>,
@@ -37,7 +37,7 @@ pub(crate) struct MultiStart<'s> {
 }
 
 impl<'s> MultiStart<'s> {
-    /// Creates searches from the best of these starts.
+    /// Creates searches from the best of these starts, at most `most` of them.
     pub fn new(
         objective: &'s dyn Objective,
         orders: Orders,
@@ -96,7 +96,7 @@ impl<'s> MultiStart<'s> {
         }
     }
 
-    /// Returns the first start that is not complete.
+    /// Returns the index of the first start with unknown polynomials; `None` if all starts are complete.
     fn incomplete(&self) -> Option<usize> {
         self.starts.iter().position(|start| start.next_block().is_some())
     }
@@ -110,7 +110,7 @@ impl<'s> MultiStart<'s> {
         self.begin();
     }
 
-    /// Starts the search from the next start.
+    /// Starts the search from the best start that has not been used.
     fn begin(&mut self) {
         while let (None, Some(Start { label, theta, .. })) = (&self.searching, self.starts.pop()) {
             let known = self.best().map(|minimum| minimum.at.sum_of_squares);

@@ -13,9 +13,9 @@ use crate::{
 pub(crate) struct Start {
     pub label: String,
     pub theta: Vec<f64>,
-    /// Sum of squares of the complete start; not finite if a regression was singular.
+    /// Sum of squares of the start; not finite before the start is complete, or if the regression for B was singular.
     pub value: f64,
-    /// Polynomials that are still unknown; the next polynomial is the last element.
+    /// Polynomials that are still unknown; the last element is computed next.
     left: Vec<Block>,
 }
 
@@ -41,7 +41,7 @@ impl Start {
         Self::to_be_found(label, [&vec![0.0; o.nb + o.nd], f].concat(), left)
     }
 
-    /// Creates a start with some unknown polynomials; the next polynomial is the last element.
+    /// Creates a start with some unknown polynomials `left`, of which the last is computed next.
     pub fn to_be_found(label: &str, theta: Vec<f64>, left: Vec<Block>) -> Self {
         Self {
             label: label.to_owned(),
@@ -51,7 +51,7 @@ impl Start {
         }
     }
 
-    /// Marks the noise model, and then B with this noise model, as unknown.
+    /// Marks D, and then B with this noise model, as unknown; no effect on a model without D.
     pub fn with_own_noise(mut self, o: &Orders) -> Self {
         if o.nd > 0 {
             self.left = vec![Block::B, Block::D];
@@ -64,8 +64,8 @@ impl Start {
         self.left.last().copied()
     }
 
-    /// Updates the start with the linearisation at its theta. The residual is affine in B and in D, so that one
-    /// least-squares step computes either polynomial if the others are fixed.
+    /// Updates the next unknown polynomial from the linearisation at theta. The residual is affine in B and in D, so
+    /// that one least-squares step computes either polynomial while the others are fixed.
     pub fn update(&mut self, o: &Orders, there: &Linearisation) {
         let Some(block) = self.left.pop() else { return };
         let (p, place) = (self.theta.len(), block.place(o));

@@ -15,5 +15,5 @@ pub(crate) fn lies_in_basin(minimum: &Minimum, start: &[f64], sum_of_squares: f6
     rise <= BASIN * minimum.at.sum_of_squares && (found - rise).abs() <= 0.1 * rise
 }
 
-/// Relative increase of the loss up to which a start is compared with the quadratic model.
+/// Largest relative increase of the loss at which a start is compared with the quadratic model.
 const BASIN: f64 = 0.05;

@@ -24,8 +24,8 @@ pub(crate) fn minimise(
 }
 
 impl GaussNewton<'_> {
-    /// Returns the minimum after the search has ended for this reason. The automatic search may first continue along
-    /// the border of stability.
+    /// Returns the minimum after a search that ended for this reason. The automatic search may first continue along the
+    /// border of stability; `None` if this continuation fails or is not predicted to end below the rival.
     pub fn finish(mut self, reason: Reason, workspace: &mut Workspace) -> Option<Minimum> {
         let reason = if self.options.method == SearchMethod::Automatic && reason == Reason::NoDescent {
             self.follow_the_border(workspace)?
@@ -42,8 +42,8 @@ impl GaussNewton<'_> {
         })
     }
 
-    /// Continues in coordinates in which the border of stability is a bound. `None` if the loss is not finite, or if
-    /// the search is not predicted to end below the rival.
+    /// Continues in coordinates in which the border of stability is a bound, and returns the reason for the end. `None`
+    /// if the loss is not finite, or if the search is not predicted to end below the rival.
     fn follow_the_border(&mut self, workspace: &mut Workspace) -> Option<Reason> {
         let Some((coordinates, kappa)) = StableCoordinates::of(self.objective, &self.theta) else {
             return Some(Reason::NoDescent);

@@ -1,5 +1,5 @@
 //! A damped Gauss-Newton search by reverse communication: it returns the theta at which it needs the derivatives and
-//! continues when it is given them.
+//! continues when it receives them.
 
 use super::{
     objective::{Linearisation, Objective},
@@ -9,11 +9,11 @@ use super::{
 use crate::criterion::Workspace;
 use crate::linalg::least_squares::{dot, solve_symmetric};
 
-/// Below this predicted relative decrease of the loss, the second derivative is estimated from the gradients.
+/// Predicted relative decrease of the loss below which the second derivative is estimated from the gradients.
 const NEAR: f64 = 1e-2;
 
-/// Relative decrease of the loss that rounding may hide: filters with poles near the unit circle lose five of the
-/// sixteen digits.
+/// Relative decrease of the loss that may be hidden by rounding: filters with poles near the unit circle lose five of
+/// the sixteen digits.
 const ROUNDING: f64 = 1e-10;
 
 /// A search that is driven by its caller, so that several searches can run in parallel lanes.
@@ -29,8 +29,8 @@ pub(crate) struct GaussNewton<'s> {
     growth: f64,
     /// Decrease of the sum of squares that the quadratic model predicts for the undamped step.
     predicted_decrease: f64,
-    /// Half the second derivative minus the Gauss-Newton matrix, estimated from the gradients of the last steps; empty
-    /// if not used.
+    /// Half the second derivative of the sum of squares minus the Gauss-Newton matrix, estimated from the gradients of
+    /// the last steps; empty if it is not used.
     secant: Vec<f64>,
     trial: Trial,
     /// Point at which the derivatives are needed next.
@@ -43,7 +43,7 @@ enum Trial {
     Start,
     /// A Levenberg-Marquardt step, with the decrease that the quadratic model predicts.
     Damped { predicted: f64 },
-    /// A fraction of a step, which is halved until the loss decreases.
+    /// A fraction of a step; the fraction is halved until the loss decreases.
     Share { delta: Vec<f64>, factor: f64 },
     /// The last step after convergence.
     Last,
@@ -54,13 +54,13 @@ enum Trial {
 pub(crate) enum Progress {
     /// The search needs another linearisation.
     Continues,
-    /// The search has ended. There is no reason if the loss is not finite, or if the search is not predicted to end
+    /// The search has ended. The reason is `None` if the loss is not finite, or if the search is not predicted to end
     /// below the rival.
     Ended(Option<Reason>),
 }
 
 impl<'s> GaussNewton<'s> {
-    /// Creates a search from `theta`, which is moved inside the limits; `None` if there is no predictor for this theta.
+    /// Creates a search from `theta`, which is moved inside the limits; `None` if the moved theta has no predictor.
     pub fn new(
         objective: &'s dyn Objective,
         mut theta: Vec<f64>,
@@ -94,7 +94,7 @@ impl<'s> GaussNewton<'s> {
         &self.evaluation_point
     }
 
-    /// True before the first linearisation.
+    /// True until the search has received its first linearisation.
     pub fn is_at_its_start(&self) -> bool {
         matches!(self.trial, Trial::Start)
     }
@@ -192,7 +192,7 @@ impl<'s> GaussNewton<'s> {
         }
     }
 
-    /// Returns the first trial of the next step, or ends the search.
+    /// Requests the first trial of the next step, or ends the search.
     fn iterate(&mut self) -> Progress {
         if !self.at.sum_of_squares.is_finite() {
             return Progress::Ended(None);
@@ -234,7 +234,7 @@ impl<'s> GaussNewton<'s> {
         }
     }
 
-    /// Increases the damping until a step can be tried.
+    /// Increases the damping until the end of the damped step has a predictor, and requests the derivatives there.
     fn try_damped(&mut self) -> Progress {
         while self.mu <= 1e16 {
             let step = match &self.secant[..] {
@@ -263,7 +263,7 @@ impl<'s> GaussNewton<'s> {
         self.growth *= 2.0;
     }
 
-    /// Halves the fraction of a step until the step can be tried.
+    /// Halves the fraction of a step until its end has a predictor, and requests the derivatives there.
     fn try_share(&mut self, delta: Vec<f64>, mut factor: f64) -> Progress {
         while factor > 1e-12 {
             if self.ask(&delta, factor) {
@@ -281,13 +281,13 @@ impl<'s> GaussNewton<'s> {
         Progress::Ended(Some(if lost { Reason::SmallDecrease } else { Reason::NoDescent }))
     }
 
-    /// Makes the end of a step the next evaluation point; returns false if there is no predictor for it.
+    /// Makes the end of a step the next evaluation point; returns false if there is no predictor at this point.
     fn ask(&mut self, delta: &[f64], factor: f64) -> bool {
         self.evaluation_point.clear();
         self.evaluation_point
             .extend(self.theta.iter().zip(delta).map(|(t, s)| t + factor * s));
         if let Some(limits) = self.objective.limits() {
-            // This corrects rounding: a step that was cut at a bound ends exactly on the bound.
+            // Corrects rounding: a step that was cut at a bound ends exactly on the bound.
             for (t, (low, high)) in self.evaluation_point.iter_mut().zip(limits) {
                 *t = t.max(*low).min(*high);
             }
@@ -332,7 +332,8 @@ impl<'s> GaussNewton<'s> {
         }
     }
 
-    /// Returns the step `alpha (diag H)^-1 g`, with the alpha that is optimal for the quadratic model.
+    /// Returns the step `alpha (diag H)^-1 g`, with the alpha that is optimal for the quadratic model; `None` if there
+    /// is no such alpha.
     fn scaled_gradient(&self) -> Option<Vec<f64>> {
         let p = self.theta.len();
         let mut delta = vec![0.0; p];
@@ -374,7 +375,8 @@ fn curvature(matrix: &[f64], delta: &[f64]) -> f64 {
     (0..p).map(|i| delta[i] * dot(&matrix[i * p..(i + 1) * p], delta)).sum()
 }
 
-/// Returns the parameters that may change: those that are neither fixed nor at a bound beyond which the loss decreases.
+/// Returns the indices of the parameters that may change, i.e. that are neither fixed nor at a bound beyond which the
+/// loss decreases.
 pub(crate) fn free_parameters(objective: &dyn Objective, theta: &[f64], descent: &[f64]) -> Vec<usize> {
     let Some(limits) = objective.limits() else {
         return (0..theta.len()).collect();

@@ -7,8 +7,8 @@ use hoid_model::Complex64;
 use super::termination::Termination;
 use crate::{criterion::Workspace, linalg::least_squares::solve_symmetric};
 
-/// Sum of squares, `psi' eps` and `psi' psi` (by rows) of a criterion at one theta, with the initial states projected
-/// out.
+/// Sum of squares, `psi' eps` and `psi' psi` (by rows) of a criterion at one value of theta, with the initial states
+/// projected out.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Linearisation {
     pub sum_of_squares: f64,
@@ -17,7 +17,7 @@ pub(crate) struct Linearisation {
 }
 
 impl Linearisation {
-    /// Creates zero sums for p parameters.
+    /// Creates a linearisation with zero sums for p parameters.
     pub fn empty(p: usize) -> Self {
         Self {
             sum_of_squares: 0.0,
@@ -38,8 +38,8 @@ impl Linearisation {
         }
     }
 
-    /// Increases the diagonal of `psi' psi` by the fraction `ridge` and solves the normal equations; `None` if they are
-    /// singular.
+    /// Increases the diagonal of `psi' psi` by the fraction `ridge` and returns the solution of the normal equations;
+    /// `None` if they are singular.
     pub fn solution(&mut self, ridge: f64) -> Option<Vec<f64>> {
         let p = self.descent.len();
         (0..p).for_each(|i| self.gram[i * p + i] *= 1.0 + ridge);
@@ -68,14 +68,15 @@ pub(crate) trait Objective {
     /// Returns the sum of squares, `psi' eps` and `psi' psi` at a feasible theta. The workspace is memory for signals
     /// that the next linearisation uses again.
     fn linearise(&self, theta: &[f64], workspace: &mut Workspace) -> Linearisation;
-    /// Returns the sum of squares of the output, which determines the residuals that count as zero.
+    /// Returns the sum of squares of the output, relative to which small residuals count as zero.
     fn output_power(&self) -> f64;
     /// Returns the lower and the upper bound of each parameter; equal bounds fix a parameter. By default there are no
     /// bounds.
     fn limits(&self) -> Option<&[(f64, f64)]> {
         None
     }
-    /// Returns the index ranges in theta of polynomials that must be stable and are not restricted by limits.
+    /// Returns the index ranges in theta that contain polynomials which must be stable and are not restricted by
+    /// limits.
     fn stable_blocks(&self) -> Vec<Range<usize>> {
         Vec::new()
     }

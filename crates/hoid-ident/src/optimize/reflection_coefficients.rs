@@ -15,11 +15,11 @@ use std::ops::Range;
 use crate::criterion::Workspace;
 use crate::optimize::objective::{Linearisation, Objective};
 
-/// Largest absolute value of a reflection coefficient: for any record, a root this close to the unit circle counts as
-/// being on it.
+/// Largest absolute value of a reflection coefficient: at this value, a root is so close to the unit circle that it
+/// counts as being on it for any record.
 pub(crate) const BORDER: f64 = 1.0 - 1e-8;
 
-/// An objective in which some polynomials are replaced by their reflection coefficients.
+/// An objective in which the polynomials that must be stable are replaced by their reflection coefficients.
 pub(crate) struct StableCoordinates<'o> {
     objective: &'o dyn Objective,
     blocks: Vec<Range<usize>>,
@@ -27,8 +27,8 @@ pub(crate) struct StableCoordinates<'o> {
 }
 
 impl<'o> StableCoordinates<'o> {
-    /// Returns the objective in these coordinates, and the coordinates of theta. `None` if no polynomial must be
-    /// stable.
+    /// Returns the objective in coordinates with reflection coefficients, and the coordinates of theta. `None` if no
+    /// polynomial must be stable.
     pub fn of(objective: &'o dyn Objective, theta: &[f64]) -> Option<(Self, Vec<f64>)> {
         let blocks = objective.stable_blocks();
         if blocks.is_empty() {
@@ -93,7 +93,7 @@ impl Objective for StableCoordinates<'_> {
         let descent = (0..p)
             .map(|j| column(j).map(|(i, j)| jacobian[i * p + j] * at.descent[i]).sum())
             .collect();
-        // First G J, then J' (G J).
+        // G J is computed first, then J' (G J).
         let times: Vec<f64> = (0..p * p)
             .map(|place| {
                 let (i, j) = (place / p, place % p);

@@ -22,7 +22,7 @@ pub enum Reason {
     /// An instrumental variable iteration has converged.
     Settled,
     /// An instrumental variable iteration did not converge, but its steps are less than half a standard error. The
-    /// parameters solve its equation for the last instruments, which were kept fixed.
+    /// parameters solve its equation with instruments that were kept fixed.
     InstrumentsHeld,
     /// An instrumental variable iteration ended with a pole outside the unit circle, which was reflected inside.
     UnstableEstimate,
@@ -51,17 +51,17 @@ impl fmt::Display for Reason {
     }
 }
 
-/// Reason and number of steps of a search.
+/// Reason for the end of a search, and its number of steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Termination {
     /// Reason for the end of the search.
     pub reason: Reason,
-    /// Number of steps from the best start.
+    /// Number of steps that led to the result.
     pub iterations: usize,
 }
 
 impl Termination {
-    /// True if a minimum was reached.
+    /// True if a minimum or a solution was reached.
     pub fn converged(&self) -> bool {
         matches!(
             self.reason,
@@ -76,7 +76,7 @@ impl Termination {
 }
 
 impl fmt::Display for Termination {
-    /// Formats the reason, and the number of steps if there was a search.
+    /// Formats the reason and, unless the problem was solved directly, the number of steps.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.reason, self.iterations) {
             (Reason::Direct, _) => write!(f, "{}", self.reason),

@@ -26,10 +26,10 @@ use crate::{
 /// the refined solution loses three digits, and the covariance keeps nine.
 const WELL_CONDITIONED: f64 = 1e7;
 
-/// A fit counts as exact if the residuals have less than this share of the power of the output.
+/// A fit is exact if the power of the residuals is below this share of the power of the output.
 const EXACT: f64 = 1e-12;
 
-/// Solution of the regression, with the matrix for its covariance.
+/// Solution of the regression, with the matrix from which its covariance is computed.
 #[derive(Debug)]
 struct Regression {
     pub theta: Vec<f64>,
@@ -38,7 +38,7 @@ struct Regression {
     pub inverse_gram: Vec<f64>,
 }
 
-/// Fits a criterion whose residual is linear in theta.
+/// Fits the model of a criterion whose residual is linear in theta.
 ///
 /// # Errors
 /// [`IdentError::SingularRegressors`] if the columns of Phi are linearly dependent.
@@ -112,8 +112,7 @@ fn regress(orders: &Orders, data: &[Data<'_>], first: usize) -> Result<Regressio
     })
 }
 
-/// Returns the columns u(t), u(t-1) .. u(t-na) without sign, e(t-nk) .. of one record: the output and the columns of
-/// Phi.
+/// Returns the columns of one record: the output u(t), then u(t-1) .. u(t-na) without their sign and e(t-nk) ...
 fn columns<'a>(orders: &Orders, data: &Data<'a>, first: usize) -> Vec<Lagged<'a>> {
     let n = data.u.len();
     let outputs = (0..=orders.na).map(|lag| Lagged {
@@ -127,7 +126,7 @@ fn columns<'a>(orders: &Orders, data: &Data<'a>, first: usize) -> Vec<Lagged<'a>
     outputs.chain(inputs).collect()
 }
 
-/// Solves by refined normal equations; `None` if QR is required instead.
+/// Solves the regression by refined normal equations; `None` if QR is required instead.
 fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Option<Regression> {
     let p = orders.na + orders.nb;
     if p == 0 || first < orders.first_regressed_sample() {

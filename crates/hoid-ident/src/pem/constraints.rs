@@ -15,7 +15,7 @@ use crate::{
     optimize::Objective,
 };
 
-/// The criterion with its limits and its prior.
+/// The prediction error criterion with its limits and its prior.
 pub(crate) struct ConstrainedCriterion<'c, 'a> {
     pub criterion: &'c Criterion<'a>,
     /// Lower and upper bound of each parameter.

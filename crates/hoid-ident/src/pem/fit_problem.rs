@@ -62,8 +62,7 @@ impl<'q, 'a> FitProblem<'q, 'a> {
             (start, minimum) = (label, lower);
         }
         if settings.start.is_none() && matches!(minimum.termination.reason, Reason::Border | Reason::NoDescent) {
-            // In addition to a minimum on the border, the loss often has a lower minimum inside the region of
-            // stability.
+            // If the search ended on the border of stability, the loss often has a lower minimum inside.
             let inside = starts_with_c_inside(&settings.orders, &minimum.theta);
             let known = minimum.at.sum_of_squares;
             let others = inside
@@ -106,7 +105,7 @@ impl<'q, 'a> FitProblem<'q, 'a> {
     }
 }
 
-/// Returns the start, with a stable A if this was requested; `None` if the roots of A cannot be found.
+/// Returns the start, with a stable A if stability is required; `None` if the roots of A cannot be found.
 fn stabilised(mut start: Start, constrained: &ConstrainedCriterion<'_, '_>) -> Option<Start> {
     if constrained.stable {
         let na = constrained.criterion.orders.na;
@@ -116,7 +115,7 @@ fn stabilised(mut start: Start, constrained: &ConstrainedCriterion<'_, '_>) -> O
     Some(start)
 }
 
-/// Checks the length of a given start and the existence of its predictor.
+/// Returns the given start, or an error if its length is wrong or it has no predictor.
 fn checked_start(theta: &[f64], constrained: &ConstrainedCriterion<'_, '_>) -> Result<Vec<f64>, IdentError> {
     let orders = constrained.criterion.orders;
     let bad = |reason: &str| IdentError::BadStart {

@@ -32,7 +32,7 @@ pub(crate) struct FitSettings {
 }
 
 impl FitSettings {
-    /// Returns the criterion for these records and their sample time. Residuals start at sample `first` or later.
+    /// Returns the criterion for these records, and their sample time. Residuals start at sample `first` or later.
     ///
     /// # Errors
     /// [`IdentError`] if the records are not informative enough.
@@ -88,7 +88,8 @@ impl FitSettings {
         }
     }
 
-    /// True if the criterion is a plain sum of squares, without constraints, priors or another loss.
+    /// True if the criterion is a plain sum of squares, without constraints, priors, a required stability or another
+    /// loss.
     pub fn is_unconstrained(&self) -> bool {
         self.constraints.is_empty() && self.priors.is_empty() && self.loss == Loss::Quadratic && !self.stable
     }

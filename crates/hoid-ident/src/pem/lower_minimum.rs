@@ -6,8 +6,8 @@
 //! without a predicted lower end. If nothing lower is found, the known result remains bitwise unchanged.
 //!
 //! **Conditions.** Records of some hundred samples have many minima. A model with more coefficients than the operator
-//! (nb, nf > 2, nc > 0, nd > 4) has many minima in longer records too; in this case the first few steps use only a part
-//! of the record, so that their cost does not depend on its length.
+//! (nb, nf > 2, nc > 0, nd > 4) has many minima for longer records too; in this case the first few steps use only a
+//! part of the record, so that their cost does not depend on its length.
 
 use super::{constraints::ConstrainedCriterion, fit_settings::FitSettings};
 use crate::{
@@ -17,24 +17,24 @@ use crate::{
     optimize::{Minimum, basin::lies_in_basin, minimise},
 };
 
-/// Largest number of residuals for which every model is searched this way, and length of the part that longer records
-/// use for the first steps.
+/// Largest number of residuals for which a lower minimum is searched for with every model. Longer records use this
+/// number of residuals for the first steps.
 const SPAN: usize = 1000;
-/// Largest order of D that does not count as larger than the operator model.
+/// Largest order of D that does not make a model larger than the operator.
 const LARGEST_ND: usize = 4;
 /// Number of starts with the smallest loss from which a few steps are made.
 const RANKED_STARTS: usize = 24;
-/// Number of steps from each of these starts.
+/// Number of steps from each start before the best searches are completed.
 const STEPS: usize = 8;
-/// Number of searches that are completed on the whole record.
+/// Largest number of searches that are completed on the whole record.
 const COMPLETED_SEARCHES: usize = 8;
 /// Values that replace [`RANKED_STARTS`] and [`COMPLETED_SEARCHES`] for a record longer than [`SPAN`].
 const COUNTS_FOR_LONG_RECORD: [usize; 2] = [12, 3];
-/// Minimum relative decrease of the loss for a minimum to count as a different one.
+/// Minimum relative decrease of the loss for which a minimum counts as lower.
 const MIN_DECREASE: f64 = 1e-7;
 
-/// Returns a lower minimum with the label of its start, if there is one. Nothing is searched for if the start was given
-/// or the number of starts is one.
+/// Returns a lower minimum with the label of its start, if one is found. No search is made if the start was given, if
+/// the number of starts is one, or if the known fit is exact.
 pub(crate) fn lower_minimum(
     settings: &FitSettings,
     constrained: &ConstrainedCriterion<'_, '_>,
@@ -80,20 +80,20 @@ pub(crate) fn lower_minimum(
     lowest
 }
 
-/// True for models with F and without A if the records are short, or if the model has more coefficients than the
-/// operator.
+/// True for models with F and without A, if the records are short or the model has more coefficients than the operator.
 fn may_have_more_minima(criterion: &Criterion<'_>) -> bool {
     let o = criterion.orders;
     let larger = o.nb > 2 || o.nc > 0 || o.nd > LARGEST_ND || o.nf > 2;
     o.na == 0 && o.nb > 0 && o.nf > 0 && (larger || criterion.residuals() <= SPAN)
 }
 
-/// Returns the criterion for the first [`SPAN`] residuals: the records in their order, with the last record truncated.
+/// Returns the criterion for about the first [`SPAN`] residuals: records in their order, with the last of them
+/// truncated.
 fn first_span<'a>(criterion: &Criterion<'a>) -> Criterion<'a> {
     let mut left = SPAN;
     let mut data = Vec::new();
     for d in &criterion.data {
-        // A shorter part carries little information in addition to its initial states.
+        // A part of a record shorter than this carries little information in addition to its initial states.
         if left < SPAN / 10 {
             break;
         }

@@ -9,7 +9,7 @@
 //! A bounded loss bounds the weight of a residual but not the effect of a sample on the regressors. A single wrong
 //! sample of e remains in the response of the operator for seconds: its residuals are large although theta is correct,
 //! so that theta becomes biased (F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw and W. A. Stahel, *Robust Statistics*,
-//! 1986, section 6.3: the influence is the product of the influence of residual and the influence of position). To
+//! 1986, section 6.3: the influence is the product of the influence of the residual and the influence of position). To
 //! bound the influence of position as well, the estimator first limits each sample of e and u by its neighbours
 //! ([`crate::faults::resistant`]); in a normal channel one sample in 16 000 is changed, so that the efficiency of the
 //! loss is retained.
@@ -29,13 +29,13 @@ use crate::{
     pem::{constraints::ConstrainedCriterion, fit_settings::FitSettings},
 };
 
-/// Number of rounds in which the scale is estimated again.
+/// Number of rounds in which the scale is estimated; in later rounds it is constant.
 const SCALES: usize = 10;
 
-/// Largest number of rounds.
+/// Largest number of rounds of reweighting.
 const ROUNDS: usize = 50;
 
-/// The rounds end when theta changes by less than this share of its standard errors.
+/// The rounds end when theta changes by less than this number of standard errors.
 const CONVERGED: f64 = 1e-5;
 
 /// State of the reweighting: threshold, scale and number of rounds.
@@ -47,7 +47,7 @@ struct Reweighting {
 }
 
 impl Reweighting {
-    /// Returns the state before the first round.
+    /// Returns the state of the reweighting before the first round.
     pub fn new(threshold: f64) -> Self {
         Self {
             threshold,
@@ -70,7 +70,7 @@ impl Reweighting {
         (bound > 0.0).then(|| residuals.iter().map(|r| r.iter().map(weight).collect()).collect())
     }
 
-    /// Returns the factor of `(psi' psi)^-1` in the covariance, with n - p degrees of freedom.
+    /// Returns the factor `s^2 kappa` of `(psi' psi)^-1` in the covariance, with n - p degrees of freedom.
     pub fn variance(&self, residuals: &[Vec<f64>], unknowns: usize) -> f64 {
         let (mut n, mut inside, mut square) = (0_usize, 0_usize, 0.0);
         for r in residuals.iter().flatten().map(|r| r / self.scale) {
@@ -83,7 +83,8 @@ impl Reweighting {
     }
 }
 
-/// Runs rounds of reweighted searches from a least-squares minimum; `start` is the label of the start of this minimum.
+/// Runs rounds of reweighted searches, starting from a least-squares minimum; `start` is the label of the start that
+/// led to this minimum.
 ///
 /// # Errors
 /// [`IdentError::NoFiniteLoss`] if a search fails, [`IdentError::SingularInformation`] if the data do not determine all

@@ -77,7 +77,7 @@ pub(crate) fn fit(settings: &FitSettings, records: &[Record], first: usize) -> R
     })
 }
 
-/// Renames coefficients of A to coefficients of F, which contains these poles in the simulation; C and D are left out.
+/// Renames the coefficients of A to coefficients of F, which contains these poles in the simulation, and omits C and D.
 fn as_poles_of_f<T: Copy>(named: &BTreeMap<String, T>) -> BTreeMap<String, T> {
     named
         .iter()
@@ -86,7 +86,7 @@ fn as_poles_of_f<T: Copy>(named: &BTreeMap<String, T>) -> BTreeMap<String, T> {
         .collect()
 }
 
-/// Selects the entries of coefficients of C or D.
+/// Returns the entries for coefficients of C and D.
 fn of_noise_model<T: Copy>(named: &BTreeMap<String, T>) -> impl Iterator<Item = (String, T)> {
     let of_noise = named.iter().filter(|(name, _)| name.starts_with(['c', 'd']));
     of_noise.map(|(name, value)| (name.clone(), *value))

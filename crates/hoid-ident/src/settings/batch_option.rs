@@ -5,9 +5,9 @@ use hoid_model::SampleTime;
 use super::setting::Setting;
 use crate::IdentError;
 
-/// Function that sets an option of an estimator from a text.
+/// Function that sets an option of an estimator from its text.
 type Set<E, X> = Box<dyn Fn(&mut E, &Setting, &str) -> Result<(), X>>;
-/// Function that returns the value as text for a given sample time; `None` if the value is not printed.
+/// Function that returns the value of an option as text for a given sample time; `None` if the value is not printed.
 type Words<E> = Box<dyn Fn(&E, SampleTime) -> Option<String>>;
 
 /// An option of an estimator `E`; invalid texts give errors of type `X`.
@@ -34,7 +34,7 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
         }
     }
 
-    /// Returns the same option, which is also printed among the settings in use, under this name.
+    /// Returns the option so that it is also printed among the settings in use, under this name.
     #[must_use]
     pub fn printed(self, name: &'static str, words: impl Fn(&E, SampleTime) -> Option<String> + 'static) -> Self {
         Self {

@@ -5,7 +5,7 @@ use std::fmt;
 /// Type of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// Yes or no.
+    /// True or false.
     Flag,
     /// An integer.
     Count,
@@ -31,7 +31,7 @@ pub enum Kind {
     Delay,
     /// A guess and its weight, `VALUE:WEIGHT`.
     Guess,
-    /// One of these words.
+    /// One word of this list.
     Choice(&'static [&'static str]),
     /// A text, such as the name of a channel.
     Channel,
@@ -39,7 +39,7 @@ pub enum Kind {
     Names,
     /// Prior knowledge about a person: `population`, `none`, `NAME=CENTRE:SPREAD,..`, or the file of a fit.
     Prior,
-    /// Values of one type by name, such as `b0=256,f=inf`.
+    /// Values of the same type, each with a name, such as `b0=256,f=inf`.
     Named(&'static Kind),
 }
 
@@ -50,7 +50,7 @@ pub enum Bounds {
     Any,
     /// Any finite number.
     Finite,
-    /// Above zero, finite or infinite.
+    /// More than zero, finite or infinite.
     Positive,
     /// More than zero and finite.
     PositiveFinite,

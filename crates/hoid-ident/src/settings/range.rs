@@ -73,13 +73,13 @@ pub enum DelayRange {
 }
 
 impl DelayRange {
-    /// Returns the delay given in samples or, if there is none, the delay given in seconds.
+    /// Returns `nk`, the delay in samples, or, if it is missing, `delay_s`, the delay in seconds.
     pub fn given(nk: Option<&Self>, delay_s: Option<OneOrSpan>) -> Option<Self> {
         nk.cloned()
             .or(delay_s.map(|OneOrSpan(low, high)| Self::Seconds(low, high)))
     }
 
-    /// Returns the range of nk, with tau_e = (nk - 1) Ts.
+    /// Returns the range of nk; a delay tau_e in seconds gives nk = tau_e/Ts + 1.
     pub fn samples(&self, sample_time: SampleTime) -> RangeInclusive<usize> {
         match self {
             Self::Samples(range) => range.clone(),
@@ -138,7 +138,7 @@ impl FromStr for DelayRange {
 impl FromStr for OneOrSpan {
     type Err = String;
 
-    /// Parses one or two nonnegative numbers.
+    /// Parses one nonnegative number, or two as `LO..HI`.
     fn from_str(text: &str) -> Result<Self, String> {
         let read = Self::read(text).map_err(|expected| format!("{text:?}: expected {expected}"))?;
         match read.0 >= 0.0 {

@@ -11,7 +11,7 @@ use crate::IdentError;
 /// Description of an option: name, type, unit, default, bounds and help text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
-    /// Name with underscores, which is a keyword in Python and, with hyphens, a flag of the command line.
+    /// Name with underscores, which is the keyword argument in Python and, with hyphens, the flag of the command line.
     pub name: &'static str,
     /// Type of the value.
     pub kind: Kind,
@@ -26,7 +26,7 @@ pub struct Setting {
 }
 
 impl Setting {
-    /// Creates an option with this default and its type.
+    /// Creates an option with this default; its type follows from the default.
     pub fn of<V: Value>(name: &'static str, default: &V) -> Self {
         Self {
             name,
@@ -38,7 +38,7 @@ impl Setting {
         }
     }
 
-    /// Creates an option of an explicit type, without a default.
+    /// Creates an option with an explicit type and without a default.
     pub fn new(name: &'static str, kind: Kind, help: &str) -> Self {
         Self {
             name,
@@ -82,7 +82,7 @@ impl Setting {
         }
     }
 
-    /// Reads a value.
+    /// Parses a value of the option and checks its bounds.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] if the text is invalid or the value is out of bounds.

@@ -18,7 +18,7 @@ pub trait Value: Sized {
     /// A description of the expected value.
     fn read(text: &str) -> Result<Self, String>;
 
-    /// Returns the value as text; `None` for an invalid value.
+    /// Returns the value as text; `None` if the value has no text form.
     fn text(&self) -> Option<String>;
 
     /// Returns the numbers in the value, which are checked against the bounds.

@@ -7,13 +7,13 @@ use hoid_model::{Form, SampleTime, operator_family::Coordinate};
 use super::layout::{Element, Layout};
 use crate::{Constraint, IdentError, family::coordinates};
 
-/// Bounds of zeta_nm. Beyond these bounds the two poles are effectively independent.
+/// Bounds of zeta_nm. Beyond the bounds the two poles are effectively independent.
 const ZETA_LIMITS: (f64, f64) = (1e-4, 100.0);
-/// Admissible range of T_I, s: a shorter lag is equivalent to no lag, a longer one to an integration.
+/// Admissible range of T_I, s: a shorter lag is equivalent to no lag, a longer lag to an integration.
 const LAG_LIMITS_S: (f64, f64) = (1e-3, 1e6);
 /// Largest omega_nm as a share of pi/Ts.
 const HIGHEST_FREQUENCY: f64 = 0.999;
-/// Share of the span at each end in which t_M is not searched by default, since such a short part of a record does not
+/// Share of the time span at each end in which t_M is not searched by default: so short a part of a record does not
 /// determine two gains.
 const ENDS: f64 = 0.05;
 /// Largest default rate times the sample time: 10 to 90 % of the change take two samples (2 ln 9 = 4.4). A faster
@@ -23,8 +23,8 @@ const ENDS: f64 = 0.05;
 pub(crate) const FASTEST: f64 = 2.0;
 /// Largest admissible rate times the sample time.
 const FASTEST_GIVEN: f64 = 10.0;
-/// Smallest rate times the span: 5 to 95 % of the change fill the span (2 ln 19 = 5.9), so that the change can hardly
-/// be distinguished from a line.
+/// Smallest rate times the time span: 8 to 92 % of the change fill the span (2 ln 12 = 5.0), so that the change can
+/// hardly be distinguished from a line.
 const SLOWEST: f64 = 5.0;
 
 /// Quantities that determine the bounds.
@@ -36,7 +36,7 @@ pub(crate) struct Frame {
     pub delay_range_s: (f64, f64),
 }
 
-/// Returns the bounds of theta, whose elements include ln G and 1/T_I.
+/// Returns the bounds of the elements of theta (ln G and 1/T_I, not G and T_I).
 ///
 /// # Errors
 /// [`IdentError::UnknownParameter`] for a constraint on an unknown name, [`IdentError::BadOption`] for an invalid
@@ -75,12 +75,12 @@ pub(crate) fn limits(
 
 type Range = (f64, f64);
 
-/// Returns the admissible range of a parameter and its default search range, in the units of the user input.
+/// Returns the admissible range of a parameter and its default search range, in the units in which users give it.
 fn ranges(layout: &Layout, frame: &Frame, element: Element) -> Result<(Range, Range), IdentError> {
     let (from, to) = frame.span_s;
     let span = to - from;
     let sample_time = SampleTime::new(frame.ts_s)?;
-    // This is the search range of the operator family.
+    // Search range of a coordinate in a fit of the operator family without a change.
     let of_family = |coordinate: Coordinate| {
         let all = coordinates::limits(layout.form, layout.neuromuscular, frame.delay_range_s, sample_time);
         let place = layout.coordinates().iter().position(|c| *c == coordinate);

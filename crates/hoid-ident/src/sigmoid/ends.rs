@@ -27,9 +27,9 @@ pub struct NamedEstimate {
 /// An operator with the standard errors of its parameters.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ChangedOperator {
-    /// The operator without standard errors.
+    /// The operator itself, without standard errors.
     pub operator: FamilyOperator,
-    /// Parameters of the operator: those of the numerator, their products, and those that do not change.
+    /// Parameters of the operator: those of the numerator, products such as K_e T_L, and those that do not change.
     pub parameters: Vec<NamedEstimate>,
 }
 
@@ -63,7 +63,8 @@ pub(super) struct ThetaEstimate<'a> {
     pub theta: &'a [f64],
     /// Covariance of theta, by rows; `None` for an exact fit.
     pub covariance: Option<&'a [f64]>,
-    /// Variance of t_M if it is a change point, where the sigmoid is not linear over the interval of t_M.
+    /// Variance of t_M if t_M is a change point, i.e. if the sigmoid is not linear over the interval of t_M; otherwise
+    /// `None`.
     pub change_point: Option<f64>,
 }
 
@@ -86,7 +87,7 @@ impl ThetaEstimate<'_> {
         Ok(ChangedOperator { operator, parameters })
     }
 
-    /// Returns the changing parameters at one time.
+    /// Returns the changing parameters at the time `time_s`, with their standard errors.
     pub fn at(&self, time_s: f64) -> Vec<NamedEstimate> {
         let here = Instant::at(self.layout, self.theta, time_s);
         // An operator between two valid operators is always valid.
@@ -131,8 +132,8 @@ impl ThetaEstimate<'_> {
         whole
     }
 
-    /// Returns the parameters of an operator whose gradients are `wanted`. `of` converts a gradient with respect to the
-    /// coordinates to a gradient with respect to theta, and returns an additional variance.
+    /// Returns the parameters of an operator for which `wanted` accepts the gradient. `of` converts a gradient with
+    /// respect to the coordinates to a gradient with respect to theta, and returns a variance to be added.
     fn named(
         &self,
         operator: &FamilyOperator,
@@ -144,7 +145,7 @@ impl ThetaEstimate<'_> {
             .map(|(parameter, gradient)| {
                 let (mut whole, beside) = of(&gradient);
                 let mut value = parameter.value;
-                // These parameters are taken directly from theta, without logarithms.
+                // omega_nm and zeta_nm are elements of theta, so that no logarithm is involved.
                 let own = match (parameter.coordinate, self.layout.neuromuscular_indices) {
                     (Some(Coordinate::LogOmega), Some([omega, _])) => Some(omega),
                     (Some(Coordinate::LogZeta), Some([_, zeta])) => Some(zeta),

@@ -20,11 +20,11 @@ use crate::{
     optimize::Reason,
 };
 
-/// Largest order of the noise model that can be chosen, and the order without a choice, i.e. for exact data or a given
-/// start.
+/// Largest order of the noise model in an automatic choice (`MOST_NOISE`), and the order without a choice, i.e. for
+/// exact data or a given start (`DEFAULT_NOISE`).
 const MOST_NOISE: usize = 12;
 const DEFAULT_NOISE: usize = 1;
-/// Number of lower minima that the likelihood intervals of t_M and G may find before the fit ends at the last one.
+/// Number of lower minima along t_M or G that the fit accepts before it stays at the last one.
 const MAX_LOWER_MINIMA: usize = 10;
 
 impl SigmoidChange {
@@ -36,7 +36,8 @@ impl SigmoidChange {
     /// data do not determine.
     pub fn fit(&self, records: &[Record]) -> Result<SigmoidFit, IdentError> {
         let sample_time = common_sample_time(records)?;
-        // The regressions that compute and rank the starts do not estimate a level.
+        // The regressions that compute and rank the starts do not estimate a level, so that the means are removed for
+        // them.
         let off_level = self.level.then(|| without_level(records));
         let off_level = off_level.as_deref().unwrap_or(records);
         let guess = match self.start {
@@ -61,7 +62,7 @@ impl SigmoidChange {
         chosen.map_or_else(|| with_noise(self.nd.unwrap_or(DEFAULT_NOISE)), Ok)
     }
 
-    /// Returns the estimator for an operator without a change, which gives the starts.
+    /// Returns the estimator for an operator without a change, whose result gives a start.
     fn of_one_operator(&self) -> FamilyEstimator {
         FamilyEstimator {
             forms: vec![self.form],
@@ -105,7 +106,7 @@ impl SigmoidChange {
             let Some(theta) = walk.flatten() else {
                 return Ok(found);
             };
-            // With the weights of the other minimum, this minimum may have the lower loss. The decision is therefore by
+            // Each of two minima may have the lower loss with the weights of the other. The decision is therefore by
             // the likelihood, which includes the weights.
             let weights = criterion.weights.clone();
             let other = search(&criterion, theta, &self.search, None).ok_or(IdentError::NoFiniteLoss)?;
@@ -142,7 +143,7 @@ impl SigmoidChange {
         Layout::new(self.form, self.neuromuscular, self.nd.unwrap_or(DEFAULT_NOISE))
     }
 
-    /// Returns the name and the theta of each start.
+    /// Returns the starts, each with its name and its theta.
     fn starts(
         &self,
         criterion: &ChangeCriterion<'_>,

@@ -20,7 +20,8 @@ pub struct ChangeParameter {
     pub unit: &'static str,
     /// Value and standard error.
     pub estimate: Estimate,
-    /// Reason why the parameter has no standard error, or none from the data.
+    /// Reason why the parameter has no standard error, or one that does not come from the data; `None` for a normal
+    /// estimate.
     pub remark: Option<Remark>,
 }
 
@@ -176,8 +177,8 @@ impl SigmoidFit {
         Some((0..p * p).map(|k| c[k] * scale[k / p] * scale[k % p]).collect())
     }
 
-    /// Adds likelihood intervals of t_M and G if there is a change and noise. If the loss is lower somewhere along t_M
-    /// or G than at the minimum, and `stay` is false, returns theta at this point instead.
+    /// Adds likelihood intervals of t_M and G if a change was found and the fit is not exact. If the loss at some t_M
+    /// or G is lower than at the minimum, and `stay` is false, returns theta at the lowest such point instead.
     pub(super) fn add_intervals(
         &mut self,
         criterion: &ChangeCriterion<'_>,
@@ -205,7 +206,8 @@ impl SigmoidFit {
         if self.change_point
             && let (Some(interval), Some(covariance)) = (self.midpoint_interval, self.covariance.as_mut())
         {
-            // The variance of a normal distribution with the same interval replaces the covariance of t_M.
+            // At a change point, the variance of a normal distribution with the same 95 % interval replaces the
+            // covariance of t_M.
             for i in 0..p {
                 (covariance[midpoint * p + i], covariance[i * p + midpoint]) = (0.0, 0.0);
             }
@@ -335,7 +337,8 @@ impl SigmoidFit {
     /// Returns the unweighted one-step-ahead residuals of a record, with its initial state estimated.
     ///
     /// # Errors
-    /// [`IdentError::MixedSampling`] for another sample time, [`IdentError::TooFewSamples`] if the record is too short.
+    /// [`IdentError::MixedSampling`] if the sample time differs from that of the fit, [`IdentError::TooFewSamples`] if
+    /// the record is too short.
     pub fn residuals(&self, record: &Record) -> Result<Series, IdentError> {
         self.errors_of(self.layout, &self.theta, record)
     }
@@ -344,7 +347,7 @@ impl SigmoidFit {
     /// error.
     ///
     /// # Errors
-    /// As [`SigmoidFit::residuals`].
+    /// The errors of [`SigmoidFit::residuals`].
     pub fn simulate(&self, record: &Record) -> Result<Series, IdentError> {
         let silent = Layout { nd: 0, ..self.layout };
         let errors = self.errors_of(silent, &self.theta[..self.layout.noise], record)?;

@@ -9,10 +9,10 @@ use hoid_model::{OperatorParameters, Orders, Record, Structure, operator_family:
 use super::{layout::Layout, objective::ChangeCriterion};
 use crate::{Estimator, Fit, SearchMethod, SearchOptions};
 
-/// Step between the delays that are tried, s. A search converges if its delay is off by no more than a tenth of the
-/// period of the poles.
+/// Step between the delays that are tried, s. A search converges if its initial delay is off by no more than a tenth of
+/// the period of the poles.
 const DELAY_STEP_S: f64 = 0.06;
-/// Limits of the searches in the windows, whose results need not be exact.
+/// Limits of the searches in the first and the last third of the records, whose results need not be exact.
 const COARSE: SearchOptions = SearchOptions {
     method: SearchMethod::LevenbergMarquardt,
     max_iterations: 15,
@@ -22,7 +22,7 @@ const COARSE: SearchOptions = SearchOptions {
 const GRID: [(f64, f64); 3] = [(6.0, 0.4), (11.0, 0.4), (18.0, 0.4)];
 /// Values of 1/T_I in the grid, 1/s.
 const LAG_RATES: [f64; 3] = [0.05, 0.25, 1.2];
-/// Coefficient d1 of candidates that do not come from a window.
+/// Coefficient d1 of candidates that do not come from a third of the records.
 const GRID_D1: f64 = -0.8;
 
 /// Poles, delay and noise model, stored in a theta without numerators and change.
@@ -67,7 +67,7 @@ pub(super) fn of_family(criterion: &ChangeCriterion<'_>) -> Vec<PoleCandidate> {
     all
 }
 
-/// Returns the poles and the delay of one operator for all records, given by its coordinates.
+/// Returns the candidate with the poles and the delay of one operator for all records, given by its coordinates.
 pub(super) fn of_guess(criterion: &ChangeCriterion<'_>, coordinates: &[f64]) -> PoleCandidate {
     let layout = &criterion.layout;
     let mut theta = vec![0.0; layout.len()];
@@ -148,7 +148,7 @@ fn fit(criterion: &ChangeCriterion<'_>, windows: &[Record], nk: usize, start: Op
         start,
         ..Estimator::new(Structure::BoxJenkins, orders)
     };
-    // Only models that correspond to an operator give poles.
+    // Only a model that corresponds to an operator gives poles.
     estimator.fit(windows).ok().filter(|fit| fit.operator().is_ok())
 }
 
@@ -178,7 +178,7 @@ pub(super) fn of_grid(criterion: &ChangeCriterion<'_>) -> Vec<PoleCandidate> {
     all
 }
 
-/// Returns values of nk from the shortest to the longest delay.
+/// Returns the values of nk to be tried, from the shortest to the longest delay.
 fn delays(criterion: &ChangeCriterion<'_>) -> Vec<usize> {
     let ts = criterion.sample_time.s();
     let (low, high) = criterion.limits[criterion.layout.delay];

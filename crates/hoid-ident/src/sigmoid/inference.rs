@@ -19,7 +19,7 @@ use crate::{
     optimize::{Linearisation, Minimum, free_parameters},
 };
 
-/// Reason why a parameter has no standard error, or none from the data.
+/// Reason why a parameter has no standard error, or one that does not come from the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum Remark {
@@ -32,11 +32,11 @@ pub enum Remark {
     /// The records show no change (BIC): t_M and G have no meaning, and the differences between the gains are due to
     /// chance.
     NoChange,
-    /// The change is too fast for a normally distributed error: only the likelihood interval is valid.
+    /// The change is too fast for a normally distributed error of t_M: only its likelihood interval is valid.
     ChangePoint,
     /// The data do not determine the parameter.
     Undetermined,
-    /// More than half of the prior variance of the parameter remains: its error is essentially that of the prior.
+    /// More than half of the prior variance of the parameter remains: its standard error comes mainly from the prior.
     PriorAlone,
 }
 
@@ -72,7 +72,7 @@ pub struct Comparison {
     /// `n ln(V_0/V_1)`.
     pub likelihood_ratio: f64,
     /// Number of parameters that the change adds: the parameters after the change (K_e2, T_L2 ...), t_M and G, without
-    /// those that were fixed.
+    /// fixed parameters.
     pub extra_parameters: usize,
     /// BIC without the change minus BIC with it; positive if the change justifies its parameters.
     pub bic_difference: f64,
@@ -84,7 +84,7 @@ pub(super) struct Inference {
     pub innovation_variance: f64,
     /// Covariance of theta by rows; `None` for an exact fit.
     pub covariance: Option<Vec<f64>>,
-    /// Remark on each element of theta that has no standard error, or none from the data.
+    /// Remark on each element of theta that has no standard error, or one that does not come from the data.
     pub remarks: Vec<Option<Remark>>,
     pub comparison: Comparison,
     /// True if the change is too fast for a normally distributed error of t_M.
@@ -135,7 +135,7 @@ pub(super) fn inference(
             }
         })
         .collect();
-    // A parameter at its bound has no variance, even if the loss is flat there.
+    // A parameter at its bound has no variance, even if the loss does not depend on it there.
     free.retain(|&i| !matches!(remarks[i], Some(Remark::AtBound | Remark::Abrupt)));
     let exact = minimum.termination.reason == Reason::ExactFit;
     let covariance = if exact {
@@ -172,13 +172,13 @@ pub(super) fn inference(
     })
 }
 
-/// Returns the smallest ln G for which the change counts as abrupt, with a margin for rounding.
+/// Returns the smallest ln G at which the change counts as abrupt: the upper bound less a margin for rounding.
 fn fastest(criterion: &ChangeCriterion<'_>) -> f64 {
     (FASTEST / criterion.sample_time.s()).ln() - 1e-9
 }
 
-/// Inverts the information matrix of the free parameters. If it is singular, t_M and G are removed, which are
-/// undetermined if the change has no effect.
+/// Inverts the information matrix of the free parameters. If the matrix is singular, t_M and G are removed first, since
+/// they are undetermined if the change has no effect.
 fn invert(
     layout: &Layout,
     at: &Linearisation,

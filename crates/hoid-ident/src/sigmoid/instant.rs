@@ -27,7 +27,7 @@ impl Instant {
     pub fn at(layout: &Layout, theta: &[f64], t_s: f64) -> Self {
         let rate = theta[layout.log_rate].exp();
         let x = rate * (t_s - theta[layout.midpoint]);
-        // The exponential underflows to zero there and would be slow to compute.
+        // For a large argument the exponential underflows to zero and is slow to compute.
         let far = if x.abs() > UNDERFLOW_ARGUMENT {
             0.0
         } else {
@@ -50,7 +50,7 @@ impl Instant {
         Self::of(layout, values, share, [-rate * slope, by_log_rate])
     }
 
-    /// Returns the state before the change, for a model without a change.
+    /// Returns the parameters before the change, for a model without a change.
     pub fn constant(layout: &Layout, theta: &[f64]) -> Self {
         let mut values = [0.0; MOST_VARYING];
         for (i, value) in values.iter_mut().enumerate().take(layout.varying) {

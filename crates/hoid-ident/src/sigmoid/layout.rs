@@ -59,7 +59,8 @@ pub(crate) enum Element {
     Varying(Coordinate, usize),
     Midpoint,
     LogRate,
-    /// A coordinate that does not change. omega_nm and zeta_nm themselves replace their logarithms.
+    /// A coordinate that does not change. For the neuromuscular part, the elements are omega_nm and zeta_nm, not their
+    /// logarithms.
     Constant(Coordinate),
     /// Coefficient d_i of the noise model.
     Noise(usize),
@@ -114,7 +115,7 @@ impl Layout {
         self.lag.into_iter().chain(muscles).chain([self.delay]).collect()
     }
 
-    /// Returns the order of the dynamics.
+    /// Returns the order of the dynamics of the operator.
     pub fn order(&self) -> usize {
         usize::from(self.form.has_pole()) + if self.neuromuscular { 2 } else { 0 }
     }
@@ -124,7 +125,7 @@ impl Layout {
         self.form.degree() == self.order()
     }
 
-    /// Returns the number of samples after nk from which the state alone represents the past.
+    /// Returns the number of samples after nk during which past errors still act directly, not only through the state.
     pub fn reach(&self) -> usize {
         if self.has_direct_part() { 2 } else { 0 }
     }
@@ -200,8 +201,8 @@ impl Layout {
             .map_or("", |(_, unit)| unit)
     }
 
-    /// Converts a number as typed by the user to an element of theta. Except for the logarithm, each conversion is its
-    /// own inverse.
+    /// Converts a number as typed by the user to an element of theta: G to ln G, T_I to 1/T_I. All other numbers stay
+    /// the same.
     pub fn of_typed(&self, place: usize, value: f64) -> f64 {
         match place {
             _ if place == self.log_rate => value.ln(),

@@ -18,14 +18,14 @@ pub enum NoiseLevel {
     Changing,
 }
 
-/// Smallest ratio of the two levels; a smaller ratio indicates a record without noise on one side.
+/// Smallest ratio of the two levels; a smaller ratio indicates a record without noise on one side of the change.
 const SMALLEST_RATIO: f64 = 1e-3;
 
 /// Returns `[sigma_1, sigma_2]` from the residuals and from the share of the change at each residual; `None` if the
-/// residuals on one side are zero or the levels cannot be determined.
+/// residuals on one side of the change are zero or the levels cannot be determined.
 pub(crate) fn levels(residuals: &[Vec<f64>], shares: &[Vec<f64>]) -> Option<[f64; 2]> {
     let pairs = || residuals.iter().flatten().zip(shares.iter().flatten());
-    // The search starts from the weighted mean squares on both sides.
+    // The search starts from the weighted mean squares before and after the change.
     let side = |weight: &dyn Fn(f64) -> f64| {
         let (sum, total) = pairs().fold((0.0, 0.0), |(sum, total), (eps, share)| {
             (sum + weight(*share) * eps * eps, total + weight(*share))

@@ -77,14 +77,14 @@ pub(crate) struct Pass {
     input: Vec<f64>,
     /// Responses y_i to the input.
     y: Vec<Vec<f64>>,
-    /// Numerators, starting at the first regressed sample.
+    /// Numerators at each sample, starting at the first regressed sample.
     gains: Vec<Instant>,
     /// `u - w`, starting at the first regressed sample.
     v: Vec<f64>,
     /// Weighted residuals.
     pub eps: Vec<f64>,
     basis: Vec<Vec<f64>>,
-    /// Level of u, and the norm of its column after the columns of the states have been projected out.
+    /// Level of u, and the norm of the column of the level after the columns of the states have been projected out.
     pub level: Option<(f64, f64)>,
 }
 
@@ -115,8 +115,8 @@ impl ChangeCriterion<'_> {
         self.penalties().map(|penalty| penalty.at(theta)).sum()
     }
 
-    /// Returns the penalties of the prior; for a model without a change, without the penalties of its additional
-    /// parameters.
+    /// Returns the penalties of the prior. For a model without a change, the penalties of the parameters that only a
+    /// change has are left out.
     fn penalties(&self) -> impl Iterator<Item = &Penalty> {
         let last = self.layout.of_the_change();
         (self.penalty.iter()).filter(move |penalty| self.changes || !last.contains(&penalty.place))
@@ -171,7 +171,7 @@ impl ChangeCriterion<'_> {
         if unit.nk + layout.reach() > from || self.first >= n {
             return None;
         }
-        // Index of the oldest unknown error. With a direct part the errors have an effect for two more samples.
+        // Index of the oldest unknown error. With a direct part the errors act for two more samples.
         let oldest = match layout.form {
             Form::Lead => 0,
             _ => from - unit.nk - layout.reach(),
@@ -245,8 +245,7 @@ impl ChangeCriterion<'_> {
         let (layout, gains) = (&self.layout, &pass.gains);
         let begin = self.first - layout.nd + layout.order() - pass.unit.nk;
         let y: Vec<&[f64]> = pass.y.iter().map(|y| &y[begin..]).collect();
-        // Derivatives with respect to the gain, and derivatives with respect to the other parameters divided by the
-        // gain.
+        // Derivatives with respect to the gain; derivatives with respect to each other parameter, divided by the gain.
         let along: Vec<Vec<f64>> = (0..layout.varying)
             .map(|j| match j.checked_sub(1) {
                 None => combined(gains, &y, |g, i| g.shape[i]),
@@ -369,7 +368,7 @@ impl Objective for ChangeCriterion<'_> {
         };
         for record in 0..self.data.len() {
             let Some(pass) = self.pass(theta, record) else {
-                // This occurs only if theta is not feasible.
+                // The signals are missing only if theta is not feasible.
                 total.sum_of_squares = f64::NAN;
                 return total;
             };
@@ -392,7 +391,7 @@ impl Objective for ChangeCriterion<'_> {
         }
         self.penalties().for_each(|penalty| penalty.add_to(theta, &mut total));
         for i in 0..p {
-            // A parameter without any effect for this theta would make the matrix singular; a diagonal element of one
+            // A parameter without any effect at this theta would make the matrix singular; a diagonal element of one
             // keeps the parameter constant.
             if total.gram[i * p + i] <= 0.0 {
                 total.descent[i] = 0.0;

@@ -76,7 +76,7 @@ impl SigmoidChange {
     /// Sets the order nd of the noise model.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for an order other than nd, and for a range.
+    /// [`IdentError::BadOption`] for an order other than nd, or for a range of orders.
     pub fn with_noise_orders(self, named: &NamedOrders) -> Result<Self, IdentError> {
         for (name, range) in named {
             if name != "nd" || range.start() != range.end() {

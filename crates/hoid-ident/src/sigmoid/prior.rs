@@ -22,7 +22,7 @@ const ROUNDS: usize = 3;
 /// Relative change of sigma^2 below which no further round is necessary.
 const CONVERGED: f64 = 0.05;
 
-/// Returns the prior for each element of theta that has one, for the innovation variance 1.
+/// Returns the penalties of all elements of theta that have a prior, for the innovation variance 1.
 pub(super) fn penalties(layout: &Layout, prior: &OperatorPrior) -> Vec<Penalty> {
     let all = layout.coordinates();
     let elements = layout.elements();
@@ -57,7 +57,7 @@ pub(super) fn innovation_variance(criterion: &ChangeCriterion<'_>, minimum: &Min
     squares / (criterion.residuals() - not_fixed - criterion.states()) as f64
 }
 
-/// Returns the minimum with noise levels, for a prior that is scaled with the innovation variance at this minimum.
+/// Returns the minimum and its noise levels, with the prior scaled by the innovation variance at this minimum.
 ///
 /// # Errors
 /// [`IdentError::NoFiniteLoss`] if a search fails.

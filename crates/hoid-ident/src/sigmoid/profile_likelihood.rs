@@ -37,19 +37,20 @@ pub(crate) struct Interval {
 pub(crate) enum Profile {
     /// The interval of the parameter.
     Interval(Interval),
-    /// A theta with a lower loss than the minimum.
+    /// A theta with a lower loss than at the given minimum.
     Lower(Vec<f64>),
 }
 
-/// True if t_M is a change point, given its standard error as a regular parameter.
+/// True if t_M is a change point. `standard_error` is the standard error that t_M would have as a regular parameter.
 pub(crate) fn is_change_point(layout: &Layout, theta: &[f64], standard_error: f64) -> bool {
-    // Derivatives at one t_M carry no information about another t_M at a distance of the width of the change, such as
-    // the ends of a 95 % interval.
+    // Derivatives at one t_M carry no information about a t_M that is further away than the width of the change, such
+    // as an end of a 95 % interval.
     2.0 * standard_error >= (-theta[layout.log_rate]).exp()
 }
 
-/// Returns the 95 % interval of t_M or ln G around a minimum, where `standard_error` is the standard error of the
-/// parameter if it has one. If `stay` is true, points with a lower loss count as inside the interval.
+/// Returns the 95 % interval of t_M or ln G around a minimum. `standard_error` is the standard error of the parameter,
+/// `None` if it has no standard error. If `stay` is true, points with a lower loss than the minimum count as inside the
+/// interval.
 pub(crate) fn profile_likelihood_interval(
     criterion: &ChangeCriterion<'_>,
     minimum: &Minimum,
@@ -98,8 +99,8 @@ pub(crate) fn profile_likelihood_interval(
             let value = (from[place] + sign * step).clamp(low, high);
             step *= GROWTH;
             let Some((loss, theta)) = at(value, &from) else { break };
-            // This minimum is lower by more than a tenth of the relevant difference: the walk continues, and its lowest
-            // point is returned.
+            // A lower loss than at the given minimum, by more than a tenth of the quantile in the statistic: the walk
+            // continues, and its lowest point is returned.
             if loss < lowest && !stay {
                 lowest = loss;
                 lower = Some(theta.clone());

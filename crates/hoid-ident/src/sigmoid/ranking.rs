@@ -17,7 +17,7 @@ use crate::linalg::least_squares::{add_scaled, dot, solve_symmetric};
 
 /// Time before the first residual of the ranking, in time constants of the poles.
 const SETTLING: f64 = 4.0;
-/// Assumed rate of decay if there is no neuromuscular part, 1/s.
+/// Rate of decay that is assumed if there is no neuromuscular part, 1/s.
 const FAST: f64 = 10.0;
 /// Lead time constants tried for a squared lead, s: first value, factor, number.
 const LEADS_S: (f64, f64, usize) = (0.02, 1.12, 60);
@@ -26,7 +26,7 @@ const LEADS_S: (f64, f64, usize) = (0.02, 1.12, 60);
 pub(super) struct Ranking<'c, 'a> {
     pub criterion: &'c ChangeCriterion<'a>,
     theta: Vec<f64>,
-    /// For each record: the first sample with a residual, and the responses and u from nd samples before it.
+    /// For each record: the first sample with a residual, and the responses and u, both starting nd samples earlier.
     signals: Vec<(usize, Vec<Vec<f64>>, Vec<f64>)>,
 }
 
@@ -58,8 +58,8 @@ impl<'c, 'a> Ranking<'c, 'a> {
     }
 
     /// Returns the sum of squares and the parameters of the numerator before and after the change, in the order of
-    /// theta, by least squares for the change in `change`. Without a change the parameters before and after it are
-    /// equal.
+    /// theta, by least squares. t_M and G come from the theta `change`. If `change` is `None`, the parameters before
+    /// and after the change are equal.
     pub fn best_gains(&self, change: Option<&[f64]>) -> Option<(f64, Vec<f64>)> {
         let powers = self.powers();
         let ends = if change.is_some() { 2 } else { 1 };
@@ -84,7 +84,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
             if of_states > 0 {
                 columns.push(self.whitened(&self.slow_state(u.len())));
             }
-            // The states of other records have no effect on this record.
+            // The initial states of other records have no effect on this record.
             let place = |i: usize| if i < ends * powers { i } else { i + record };
             let target = self.whitened(u);
             power += dot(&target, &target);
@@ -114,7 +114,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
         (rank.is_finite() && values.iter().all(|g| g.is_finite())).then_some((rank, values))
     }
 
-    /// Returns the part of u that the numerators of theta do not explain, in each record.
+    /// Returns the part of u in each record that neither the operator of theta nor its initial state explains.
     pub fn unexplained(&self, theta: &[f64]) -> Option<Vec<Vec<f64>>> {
         let (layout, mut all) = (&self.criterion.layout, Vec::new());
         for (record, (first, y, u)) in self.signals.iter().enumerate() {
@@ -146,7 +146,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
         self.criterion.layout.form.has_pole()
     }
 
-    /// Returns the decaying free response of the pole of a lag or an integration.
+    /// Returns the free response of the pole of a lag or an integration: an exponential, or a constant.
     fn slow_state(&self, n: usize) -> Vec<f64> {
         let rate = self.criterion.layout.lag.map_or(0.0, |place| self.theta[place]);
         let per_sample = (-rate * self.criterion.sample_time.s()).exp();
@@ -155,7 +155,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
             .collect()
     }
 
-    /// Returns the times of the samples of a record minus the delay.
+    /// Returns the times of the samples of a record minus the delay, starting nd samples before `first`.
     fn times(&self, theta: &[f64], record: usize, first: usize, n: usize) -> impl Iterator<Item = f64> {
         let (data, ts) = (&self.criterion.data[record], self.criterion.sample_time.s());
         let from = first - self.criterion.layout.nd;
@@ -201,7 +201,7 @@ fn parameters(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f
     }
 }
 
-/// Returns the gain and the lead time constant for which `k (1, 2 T, T^2)` is nearest to n.
+/// Returns the gain k and the lead time constant T for which `k (1, 2 T, T^2)` is nearest to n.
 fn square_of_a_lead(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f64; MOST_VARYING] {
     let product = |a: &[f64], b: &[f64]| {
         let pairs = (0..3).flat_map(|i| (0..3).map(move |j| (i, j)));

@@ -17,13 +17,13 @@ use crate::{
 /// Largest number of rounds of fit and noise levels.
 const ROUNDS: usize = 20;
 /// The rounds end when the relative change of the ratio of the levels is below this limit; the standard error of the
-/// ratio is about `1/sqrt n`, i.e. 1 %.
+/// ratio is about `1/sqrt n`, i.e. 1 % for 10000 residuals.
 const CONVERGED: f64 = 1e-6;
 /// Negligible relative change of the loss: it changes the log-likelihood of 10000 residuals by 0.005.
 const NEGLIGIBLE: f64 = 1e-6;
 
-/// Estimates fit and noise levels in turn and returns the minimum and the levels. The levels are `None` if the
-/// residuals are only rounding errors.
+/// Estimates fit and noise levels in turn and returns the minimum and the levels. The levels are `None` if they cannot
+/// be determined, such as for residuals that are only rounding errors.
 ///
 /// # Errors
 /// [`IdentError::NoFiniteLoss`] if a search fails.
@@ -49,7 +49,7 @@ pub(super) fn with_levels(
         iterations += next.termination.iterations;
         let change = next.at.sum_of_squares / minimum.at.sum_of_squares - 1.0;
         if round > 0 && change > NEGLIGIBLE {
-            // Each of two changes has the higher loss with the noise levels of the other; the more likely of the two is
+            // Each of the last two fits has the higher loss with the noise levels of the other; the more likely fit is
             // kept.
             (criterion.weights, levels) = (kept, before);
             break;

@@ -1,5 +1,5 @@
 //! Searches for the minimum of the loss. The loss has kinks where the delay is an integer number of samples and, for an
-//! operator with a direct part, also halfway between ([`super::layout`], pieces).
+//! operator with a direct part, also halfway between these delays ([`super::layout`], pieces).
 
 use super::{objective::ChangeCriterion, starts};
 use crate::{
@@ -8,13 +8,14 @@ use crate::{
     optimize::{Minimum, minimise},
 };
 
-/// Number of steps from each start before only the best search is continued.
+/// Number of steps of the short search from each start, after which only the best search is continued.
 const SHORT_SEARCH_STEPS: usize = 30;
-/// Distance from the border of a piece, in pieces, below which the next piece is tried.
+/// Distance of the delay from the border of a piece of the sampling interval, relative to the length of the piece,
+/// below which the neighbouring piece is tried.
 const NEAR_BORDER: f64 = 1e-6;
 
-/// Returns the lowest minimum found from these starts and the name of its start. Each start gets a few steps; only the
-/// best search is completed.
+/// Returns the lowest minimum found from these starts and the name of its start. A short search is made from each
+/// start; only the best is completed.
 ///
 /// # Errors
 /// [`IdentError::NoFiniteLoss`] if no search is successful.
@@ -67,7 +68,7 @@ pub(super) fn without_change(
 }
 
 /// Searches for a minimum, starting from theta. The loss has kinks where tau_e is an integer number of samples. If the
-/// search does not converge, it continues within single pieces of the sampling interval.
+/// search does not converge, it continues within single pieces of the sampling interval ([`super::layout`], pieces).
 pub(super) fn search(
     criterion: &ChangeCriterion<'_>,
     theta: Vec<f64>,
@@ -95,7 +96,7 @@ pub(super) fn search(
     let mut iterations = minimum.termination.iterations;
     let mut best = inside(piece, &minimum.theta)?;
     iterations += best.termination.iterations;
-    // Each change of piece decreases the loss; the limit on their number only guards against rounding.
+    // Each change of piece decreases the loss; the limit on the number of changes only guards against rounding.
     for _ in 0..100 {
         let position = best.theta[delay] / length;
         let neighbours = [

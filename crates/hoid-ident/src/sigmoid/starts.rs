@@ -18,8 +18,8 @@ use crate::family::noise::NoiseProducts;
 const RATES: [f64; 3] = [0.5, 5.0, 100.0];
 /// Number of times t_M in the grid.
 const MIDPOINTS: usize = 12;
-/// Number of delays of a grid that are tried for each rate, each with its best poles: a search corrects poles more
-/// easily than delays.
+/// Largest number of delays of the grid for which starts are made, each with its best poles: a search corrects poles
+/// more easily than delays.
 const BEST_DELAYS: usize = 4;
 
 /// A start with its label.
@@ -30,8 +30,8 @@ pub(crate) struct Start {
     rank: f64,
 }
 
-/// Returns the starts, best first: one for each rate and, for forms other than a gain and a lead, for each of the best
-/// delays. `guess` contains the coordinates of one operator for all records.
+/// Returns the starts, best first: one for each rate or, for forms other than a gain and a lead, one for each rate and
+/// each of the best delays. `guess` contains the coordinates of one operator for all records.
 pub(crate) fn initial_guesses(
     criterion: &ChangeCriterion<'_>,
     records: &[Record],
@@ -68,7 +68,8 @@ pub(crate) fn initial_guesses(
     starts
 }
 
-/// Returns the best poles from a grid and from a guess, each with the noise model of its residuals.
+/// Returns the best candidate for each of the best delays, from a grid and a guess, each with the noise model of its
+/// residuals.
 fn best_of_family(
     criterion: &ChangeCriterion<'_>,
     guessed: Option<PoleCandidate>,
@@ -90,8 +91,8 @@ fn best_of_family(
     all.into_iter().filter_map(noise).collect()
 }
 
-/// Adds the noise model of the part of u that the poles do not explain; `None` if no numerator can be computed for
-/// these poles.
+/// Adds the noise model of the part of u that the best operator with these poles does not explain; `None` if no
+/// numerator can be computed for these poles.
 fn with_noise(criterion: &ChangeCriterion<'_>, mut frozen: PoleCandidate, log_rate: f64) -> Option<PoleCandidate> {
     let (nd, noise) = (criterion.layout.nd, criterion.layout.noise);
     let (_, theta, ranking) = on_grid(criterion, &frozen, log_rate)?;
@@ -114,7 +115,7 @@ pub(crate) fn without_change(criterion: &ChangeCriterion<'_>, theta: &[f64]) -> 
     theta
 }
 
-/// Returns the sum of squares and theta for one t_M, with the best gains.
+/// Returns the sum of squares and theta at this t_M, with the best numerators before and after the change.
 fn rank_at(ranking: &Ranking<'_, '_>, theta: &[f64], t_m: f64) -> Option<(f64, Vec<f64>)> {
     let mut there = theta.to_vec();
     there[ranking.criterion.layout.midpoint] = t_m;
@@ -123,13 +124,13 @@ fn rank_at(ranking: &Ranking<'_, '_>, theta: &[f64], t_m: f64) -> Option<(f64, V
     Some((rank, there))
 }
 
-/// Returns the step of the grid of t_M.
+/// Returns the distance between neighbouring t_M of the grid, s.
 fn grid_step(criterion: &ChangeCriterion<'_>) -> f64 {
     let (low, high) = criterion.limits[criterion.layout.midpoint];
     (high - low) / MIDPOINTS as f64
 }
 
-/// Returns the best t_M of the grid for the given ln G, with its sum of squares.
+/// Returns the sum of squares and theta at the best t_M of the grid for the given ln G, and the ranking used.
 fn on_grid<'c, 'a>(
     criterion: &'c ChangeCriterion<'a>,
     frozen: &PoleCandidate,
@@ -145,12 +146,12 @@ fn on_grid<'c, 'a>(
     Some((rank, best, ranking))
 }
 
-/// Returns a start with the best t_M for the given ln G.
+/// Returns the start with the best t_M for the given ln G.
 fn best_midpoint(criterion: &ChangeCriterion<'_>, frozen: &PoleCandidate, log_rate: f64) -> Option<Start> {
     let (rank, theta, ranking) = on_grid(criterion, frozen, log_rate)?;
     let (low, high) = criterion.limits[criterion.layout.midpoint];
     let (mut best, mut step) = ((rank, theta), grid_step(criterion));
-    // t_M is found to a tenth of the width of the change, or to one sample.
+    // t_M is refined to a tenth of the width of the change, or to one sample if that is longer.
     let finest = (0.1 * (-log_rate).exp()).max(criterion.sample_time.s());
     while step > finest {
         step *= 0.5;

@@ -63,7 +63,7 @@ impl UnitOperator {
     }
 
     fn of_family(layout: &Layout, theta: &[f64], sample: usize, ts: SampleTime) -> Option<Self> {
-        // The numerator has no effect on the result.
+        // The numerator of this operator has no effect on the result.
         let operator = layout.operator(theta, &[1.0; 3]).ok()?;
         let powers = operator.zoh_powers_within(sample, ts).ok()?;
         // Derivatives of the family coordinates with respect to theta.

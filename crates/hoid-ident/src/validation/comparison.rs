@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{Fit, IdentError, Series};
 
-/// Results of the residual tests. One in a hundred lags is expected outside its 99 % bound; a share above
+/// Results of the residual tests. By chance one in a hundred lags is outside the 99 % bound; a share above
 /// [`OUTSIDE_ALLOWED`] is significant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ResidualDiagnostics {
@@ -28,10 +28,10 @@ pub struct ResidualDiagnostics {
 /// Share of lags outside the 99 % bound above which a correlation is significant.
 pub const OUTSIDE_ALLOWED: f64 = 0.06;
 
-/// Simulated and predicted output of a model for a record, with the derived results.
+/// Simulated and predicted output of a model for a record, with the measures and tests derived from them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Validation {
-    /// First sample of all series below.
+    /// First sample of the simulated and the predicted output.
     pub first: usize,
     /// Simulated output.
     pub simulated: Vec<f64>,
@@ -122,7 +122,7 @@ impl Fit {
     /// Compares the model with a record, which may be one of the fitted records or another record.
     ///
     /// # Errors
-    /// As [`Fit::residuals`].
+    /// The errors of [`Fit::residuals`].
     pub fn validate(&self, record: &Record) -> Result<Validation, IdentError> {
         let (first, simulated, predicted) = self.model_outputs(record)?;
         let output = &record.output()[first..];
@@ -169,8 +169,8 @@ impl Fit {
     }
 
     /// Predicts the output k samples ahead for a known input: `u - sum_{j<k} h_j eps(t-j)`, where h is the impulse
-    /// response of the noise filter C/(A D) (L. Ljung, *System Identification*, 1999, eq. 3.31). k = 1 is
-    /// [`Fit::predict`]; for large k and a stable noise filter the prediction approaches [`Fit::simulate`].
+    /// response of the noise filter C/(A D) (L. Ljung, *System Identification*, 1999, eq. 3.31). For k = 1 the result
+    /// equals [`Fit::predict`]; for large k and a stable noise filter it approaches [`Fit::simulate`].
     ///
     /// # Errors
     /// The errors of [`Fit::residuals`]; [`IdentError::BadOption`] for k = 0.
@@ -185,7 +185,7 @@ impl Fit {
         let eps = self.residuals(record)?;
         let m = self.model();
         let mut h = monic(m.c());
-        // Longer impulse responses have no effect within the record.
+        // Later values of the impulse response have no effect within the record.
         h.resize(k.min(eps.values.len().max(1)), 0.0);
         let poles = product(&monic(m.a()), &monic(m.d()));
         hoid_core::filter::divide_in_place(&poles[1..], &mut h);
@@ -205,7 +205,7 @@ impl Fit {
     /// or, for NRMSE, relative to the total of the squared deviations from the mean of each record.
     ///
     /// # Errors
-    /// As [`Fit::residuals`].
+    /// The errors of [`Fit::residuals`].
     pub fn quality(&self, records: &[Record]) -> Result<GoodnessOfFit, IdentError> {
         let all = records.iter().try_fold(ErrorSums::default(), |all, record| {
             let (first, simulated, predicted) = self.model_outputs(record)?;
@@ -216,7 +216,7 @@ impl Fit {
 }
 
 impl GoodnessOfFit {
-    /// Returns the same result as [`Fit::quality`] for several records, computed from their existing validations.
+    /// Returns the result of [`Fit::quality`] for several records, computed from their existing validations.
     pub fn pooled<'a>(validated: impl Iterator<Item = (&'a Record, &'a Validation)>) -> Self {
         let with = |all: ErrorSums, (record, v): (&'a Record, &'a Validation)| {
             all.and(&record.output()[v.first..], &v.simulated, &v.predicted)

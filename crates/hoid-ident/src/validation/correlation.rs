@@ -7,7 +7,7 @@ use crate::linalg::least_squares::dot;
 /// Two-sided 99 % point of the normal distribution.
 const Z_99: f64 = 2.575_829_303_548_901;
 
-/// A correlation at several lags with its 99 % bound.
+/// A correlation at several lags, with a 99 % bound that is the same for all lags.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correlation {
     /// Lags in samples.
@@ -18,11 +18,11 @@ pub struct Correlation {
     pub bound_99: f64,
 }
 
-/// Number of samples that are processed for all lags before the next samples, so that they remain in the processor
-/// cache.
+/// Number of samples that are processed for all lags before the next samples, so that the samples remain in the
+/// processor cache.
 const BLOCK: usize = 8192;
 
-/// Returns `sum_t x(t) y(t - k)` over the overlap for each lag k; x and y have the same length.
+/// Returns `sum_t x(t) y(t - k)` for each lag k, over all t for which both samples exist; x and y have the same length.
 fn covariances_at(x: &[f64], y: &[f64], lags: &[i64]) -> Vec<f64> {
     let n = x.len();
     let mut sums = vec![0.0; lags.len()];
@@ -46,7 +46,7 @@ pub(super) fn centred(mut x: Vec<f64>) -> Vec<f64> {
     x
 }
 
-/// Returns the covariances divided by `size`, or zeros if `size` is zero.
+/// Returns the covariances divided by `size`, or zeros if `size` is not positive.
 fn relative_to(size: f64, mut covariances: Vec<f64>) -> Vec<f64> {
     covariances
         .iter_mut()
@@ -69,7 +69,7 @@ pub(super) fn autocorrelation(x: &[f64], largest: usize) -> Correlation {
 pub(super) fn cross_correlation(x: &[f64], y: &[f64], largest: usize) -> Correlation {
     let largest = largest.min(x.len().saturating_sub(1)) as i64;
     let lags: Vec<i64> = (-largest..=largest).collect();
-    // Since the residuals are nearly white, lags near zero dominate the sum.
+    // Since the residuals are nearly white, the lags near zero dominate the sum, and the others are omitted.
     let reach: Vec<i64> = (0..=(4 * largest).min(x.len() as i64 - 1)).collect();
     let (of_x, of_y) = (covariances_at(x, x, &reach), covariances_at(y, y, &reach));
     let zero = of_x.first().zip(of_y.first()).map_or(0.0, |(x, y)| x * y);

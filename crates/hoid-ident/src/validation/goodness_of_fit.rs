@@ -1,8 +1,8 @@
-//! Share of the measured output that a model explains: VAF and NRMSE for one or several records.
+//! Goodness of fit of a model, VAF and NRMSE, for one or several records.
 
 use crate::linalg::{least_squares::dot, products::variance};
 
-/// VAF and NRMSE of a model, %.
+/// VAF and NRMSE fit of a model, %.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct GoodnessOfFit {
     /// VAF of the simulated output, %.
@@ -15,7 +15,7 @@ pub struct GoodnessOfFit {
     pub nrmse_prediction: f64,
 }
 
-/// Sums of squares for one or several records.
+/// Sums of squares of the output and of the errors, for one or several records.
 #[derive(Default)]
 pub(super) struct ErrorSums {
     power: f64,

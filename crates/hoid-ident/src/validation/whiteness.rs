@@ -12,7 +12,7 @@ pub const LARGEST_LAG: usize = 50;
 pub struct LjungBox {
     /// `Q = n (n + 2) sum_k r_k^2/(n - k)` over the lags 1 to [`LARGEST_LAG`].
     pub statistic: f64,
-    /// Number of lags minus the number of free coefficients of the noise model (those of A, C and D).
+    /// Number of lags minus the number of free coefficients of the noise model (the coefficients of A, C and D).
     pub degrees_of_freedom: usize,
     /// Probability of a larger Q if the residuals are white.
     pub p_value: f64,

@@ -6,34 +6,34 @@
 //! mistaken for a gap. If a row then appears not to advance, the excess increment of a nearby row is undone. Ts is the
 //! least-squares slope, computed twice.
 //!
-//! Jitter is the deviation from straight lines fitted to parts of up to 256 rows without a gap, so that slow drift does
-//! not count as jitter.
+//! Jitter is the deviation of the times from straight lines fitted to parts of up to 256 rows without a gap, so that
+//! slow drift does not count as jitter.
 
 use std::borrow::Cow;
 
 use crate::time::sampling::every;
 
-/// Maximum and minimum number of rows of a part.
+/// Maximum and minimum number of rows of a part to which a line is fitted.
 const PART: usize = 256;
 const LEAST_PART: usize = 5;
 /// A step of at least this many sample times is a pause, after which the grid restarts.
 const PAUSE: f64 = 10.0;
-/// Maximum distance in rows at which an excess step is corrected.
+/// Maximum distance in rows between an excess step and the row that appears not to advance.
 const NEAR: usize = 4;
-/// Number of times from which the start of a grid is estimated.
+/// Number of times from which the phase at the start of a grid is estimated.
 const BEGIN: usize = 8;
 
 /// Positions of the rows on an evenly spaced grid.
 pub(crate) struct Grid {
-    /// Rows whose time is later than the times of all rows before.
+    /// Rows whose time is later than the times of all earlier rows.
     pub(crate) rows: Vec<usize>,
-    /// Number of grid steps between each of these rows and the one before; 1 if no row is missing in between.
+    /// Number of grid steps from the previous row in `rows` to each row in `rows`; 1 if no row is missing in between.
     pub(crate) steps: Vec<f64>,
-    /// Sample time, s; NaN if fewer than two rows advance.
+    /// Sample time, s; NaN if fewer than two rows have an advancing time.
     pub(crate) sample_time_s: f64,
-    /// Rows whose time equals the latest time before them.
+    /// Rows whose time equals the latest time of all earlier rows.
     pub(super) repeated_times: Vec<usize>,
-    /// Rows whose time is earlier than the latest time before them.
+    /// Rows whose time is earlier than the latest time of all earlier rows.
     pub(super) backward_times: Vec<usize>,
 }
 
@@ -82,7 +82,7 @@ impl Grid {
                     sample_time_s = slope;
                 }
                 if is_even(&times, &steps, sample_time_s) {
-                    // A second pass would return the same steps.
+                    // A second pass would give the same grid steps.
                     break;
                 }
             }
@@ -96,15 +96,15 @@ impl Grid {
         }
     }
 
-    /// Returns each gap: the index of its preceding row among the rows that advance, and the number of missing rows.
+    /// Returns each gap: the index in `rows` of the row before the gap, and the number of missing rows.
     pub(crate) fn gaps(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         (1..self.steps.len())
             .filter(|i| self.steps[*i] > 1.5)
             .map(|i| (i - 1, self.steps[i] - 1.0))
     }
 
-    /// Returns the deviation from lines fitted to parts without a gap: its RMS value, the largest deviation and the row
-    /// of the largest; `None` if no part is long enough.
+    /// Returns the deviation of the times from lines fitted to parts without a gap: its RMS value, the largest
+    /// deviation and the row of the largest deviation; `None` if no part is long enough.
     pub(crate) fn jitter(&self, t: &[f64]) -> Option<(f64, f64, usize)> {
         let (mut squares, mut freedom) = (0.0, 0);
         let mut worst = (0.0, 0);
@@ -143,11 +143,11 @@ fn is_even(times: &[f64], steps: &[f64], ts: f64) -> bool {
     steps.iter().all(|step| *step == 1.0) && times.iter().enumerate().all(near)
 }
 
-/// Computes the grid steps from row to row, one per time.
+/// Computes for each time the grid step from the time before it.
 fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
     steps.fill(1.0);
     let mut owed: Option<usize> = None;
-    // The start of a grid is estimated from several times, since a single time deviates by its jitter.
+    // The phase at the start of a grid is estimated from several times, since a single time deviates by its jitter.
     let begin = |i: usize| {
         let ahead = times[i..]
             .iter()
@@ -185,7 +185,7 @@ fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
 
 /// Returns the least-squares slope of the times against the grid index.
 pub(super) fn slope(times: &[f64], steps: &[f64]) -> f64 {
-    // Recomputed for each sum: for a record of several hours, storing the indices would take too much memory.
+    // The indices are recomputed for each sum: for a record of several hours, storing them would take too much memory.
     let indexed = || {
         let mut index = 0.0;
         times.iter().zip(steps).enumerate().map(move |(i, (time, step))| {
@@ -196,7 +196,7 @@ pub(super) fn slope(times: &[f64], steps: &[f64]) -> f64 {
         })
     };
     let n = times.len() as f64;
-    // Divided by n before summation, so that the sum does not overflow.
+    // Each index is divided by n before summation, so that the sum does not overflow.
     let x = indexed().map(|(index, _)| index / n).sum::<f64>();
     let y = times.iter().map(|t| t / n).sum::<f64>();
     let covariance: f64 = indexed().map(|(index, time)| (index - x) * (time - y)).sum();

@@ -15,7 +15,7 @@ use super::signals::{Signal, Signals};
 use super::values::Levels;
 use crate::wording::{counted, short};
 
-/// Finds rows whose time does not advance: rows that equal the row before, and other rows.
+/// Finds the rows whose time does not advance: rows that equal the row before, and rows with other values.
 pub(super) fn without_advance(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     let same = |row: &usize| {
         *row > 0
@@ -25,7 +25,8 @@ pub(super) fn without_advance(signals: &Signals<'_>, grid: &Grid, found: &mut Ve
                 .all(|signal| signal.values[*row] == signal.values[row - 1] || signal.values[*row].is_nan())
     };
     let (repeated, others): (Vec<usize>, Vec<usize>) = grid.repeated_times.iter().copied().partition(same);
-    // After a time that was set back, only the first row is earlier than the row before it.
+    // After the time was set back, many rows are earlier than the latest time; only those that are not later than the
+    // row before are reported.
     let falls = |row: &usize| {
         signals
             .time
@@ -90,7 +91,7 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
     if moving.is_empty() || rows < 3 {
         return;
     }
-    // True for each row whose value equals that of the row before; duplicated rows are reported separately.
+    // Duplicated rows do not count as held values, because they are reported separately.
     let advances = |row: usize| grid.is_none_or(|grid| grid.repeated_times.binary_search(&row).is_err());
     let holds: Vec<Vec<bool>> = moving
         .iter()

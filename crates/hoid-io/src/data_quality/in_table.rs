@@ -42,10 +42,10 @@ pub(crate) fn issues_of_signals(
         .collect();
     used.sort_unstable();
     used.dedup();
-    // A resampling frequency does not describe the clock of the file.
+    // A sampling frequency given for resampling is not the nominal rate of the recorder.
     let nominal_hz = options.sampling_hz.filter(|_| !options.repair.resample);
     let mut found = of_columns(table, &used, time, nominal_hz, span_rows(table, time, options));
-    // One term of a difference may be constant, such as a zero reference.
+    // One term of a difference may be constant, such as a zero reference, without being a problem.
     let names = |one: &QualityIssue, column: usize| table.columns[column].name == one.channel;
     let constant: Vec<QualityIssue> = found
         .iter()
@@ -67,7 +67,7 @@ pub(crate) fn issues_of_signals(
     found
 }
 
-/// Rows of the span, as far as the time in the file determines them.
+/// Returns the rows of the requested span, as far as the time in the file determines them.
 fn span_rows(table: &Table<'_>, time: Option<usize>, options: &ReadOptions) -> Range<usize> {
     let at = |row: usize| match (time, options.sampling_hz) {
         (Some(time), _) => table.columns[time].values[row],

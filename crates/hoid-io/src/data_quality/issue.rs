@@ -24,7 +24,7 @@ pub enum QualityIssueKind {
     Gap,
     /// Times that deviate from an evenly spaced grid.
     Jitter,
-    /// A clock whose rate differs from another clock, from the given rate or from a common rate.
+    /// A clock whose rate differs from that of another clock, from the given rate or from a common rate.
     Clock,
     /// A clock whose rate changes.
     Drift,
@@ -39,8 +39,8 @@ pub enum QualityIssueKind {
 }
 
 impl QualityIssueKind {
-    /// Kinds that are located in part of a record, so that the part can be excluded; a clock error or a constant
-    /// channel affects the whole record.
+    /// Kinds of problems that are located in part of a record, so that the part can be excluded; a clock error or a
+    /// constant channel affects the whole record.
     pub const MASKABLE: [Self; 4] = [Self::Missing, Self::Gap, Self::Stalled, Self::Saturated];
 
     /// Returns the remedy for the problem.
@@ -93,7 +93,7 @@ pub struct RowSpan {
     pub rows: usize,
     /// Time of the first row, s; `None` without a time column.
     pub from_s: Option<f64>,
-    /// Time of the row after the last one, s.
+    /// Time of the row after the last row of the span, s.
     pub to_s: Option<f64>,
 }
 

@@ -28,8 +28,8 @@ pub(crate) fn issues_of(signals: &Signals<'_>) -> Vec<QualityIssue> {
     found
 }
 
-/// Returns the problems with the values of e and u: saturation, quantisation, constants. The times are not examined,
-/// since the samples of a record are always evenly spaced.
+/// Returns the problems with the values of e and u: stalls, saturation, quantisation, constants. The times are not
+/// examined, since the samples of a record are always evenly spaced.
 pub fn quality_of_record(record: &Record) -> Vec<QualityIssue> {
     let channels = record.input_channel().into_iter().chain([record.output_channel()]);
     let columns = channels

@@ -21,20 +21,20 @@ pub(crate) struct Signals<'a> {
     pub(crate) precision: Precision,
     /// Sampling frequency given by the user or stated in the file, Hz.
     pub(crate) nominal_hz: Option<f64>,
-    /// Other columns of times.
+    /// Further columns that contain times.
     pub(crate) clocks: Vec<Signal<'a>>,
     /// Number of rows before the first examined row.
     pub(crate) before: usize,
 }
 
 impl Signals<'_> {
-    /// Number of rows.
+    /// Returns the number of rows.
     pub(super) fn rows(&self) -> usize {
         let lengths = self.columns.iter().chain(&self.time).map(|signal| signal.values.len());
         lengths.min().unwrap_or(0)
     }
 
-    /// Time of a row, s.
+    /// Returns the time of a row, s; `None` if it is unknown.
     pub(super) fn at_s(&self, row: usize) -> Option<f64> {
         match (&self.time, self.nominal_hz) {
             (Some(time), _) => time.values.get(row).copied().filter(|t| t.is_finite()),

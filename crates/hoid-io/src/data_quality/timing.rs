@@ -6,7 +6,8 @@ use super::signals::Signals;
 use crate::table::Precision;
 use crate::wording::{counted, decimal, short};
 
-/// Deviation from the grid, in sample times, above which jitter is reported; `sampling` has the same limit.
+/// Deviation from the grid, in sample times, above which jitter is reported; the module `time::sampling` has the same
+/// limit.
 const JITTER: f64 = 1e-3;
 /// Relative deviation of a clock from a given rate above which the deviation is reported; crystals are accurate to
 /// 1e-4.
@@ -21,8 +22,8 @@ const COMMON_HZ: [f64; 42] = [
     500.0, 512.0, 600.0, 1000.0, 1024.0, 2000.0,
 ];
 
-/// Largest rounding error of a time: one unit of the last printed digit, or the resolution of single precision if
-/// larger.
+/// Returns the largest rounding error of a time: one unit of the last printed digit; if all times are single-precision
+/// numbers, at least the resolution of single precision.
 fn rounding(t: &[f64], precision: Precision) -> f64 {
     let largest = t
         .iter()
@@ -104,7 +105,7 @@ fn gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     });
 }
 
-/// Compares the sampling rate with the given rate, or else with the nearest common rate.
+/// Compares the sampling rate with the given rate or, if no rate is given, with the nearest common rate.
 fn rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec<QualityIssue>) {
     let (ts, n) = (grid.sample_time_s, grid.rows.len() as f64);
     // Uncertainty of the slope from jitter, and from rounding of the first and the last time.
@@ -154,7 +155,7 @@ fn rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec
     });
 }
 
-/// Compares the sample time in the first third with that in the last third.
+/// Compares the sample time in the last third of the record with that in the first third.
 fn drift(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec<QualityIssue>) {
     let Some(time) = signals.time else { return };
     let third = grid.rows.len() / 3;
@@ -192,7 +193,7 @@ fn drift(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Ve
     });
 }
 
-/// Compares the other time columns, in s, ms, us or ns, with the time.
+/// Compares the rates of the other time columns, which are in s, ms, us or ns, with the rate of the time.
 fn second_clocks(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     let Some(time) = signals.time else { return };
     for clock in &signals.clocks {
@@ -213,7 +214,7 @@ fn second_clocks(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssu
         else {
             continue;
         };
-        // The first and last times determine the rate up to the jitter of one row.
+        // The first and last times determine the ratio of the rates up to a jitter of one row at each end.
         let uncertain = 2.0 / pairs.len() as f64;
         if off.abs() <= OFF.max(uncertain) {
             continue;

@@ -1,8 +1,8 @@
 //! Saturation, quantisation, constants and missing values of one channel.
 //!
 //! A channel is quantised if at most half of its finite values are distinct (of a long channel, see [`EXAMINED`]) and
-//! these lie on a grid within `1e-3 q`, where q is the smallest step between two of them. The smallest and the largest
-//! value may lie off the grid, like the end stops of a stick.
+//! the distinct values lie on a grid within `1e-3 q`, where q is the smallest step between two of them. The smallest
+//! and the largest value may lie off the grid, like the end stops of a stick.
 //!
 //! A channel is saturated at a limit if it stays there longer than a peak can. In full precision no two consecutive
 //! values are equal by chance: three successive rows at the extreme value are saturation. In a quantised channel a peak
@@ -22,11 +22,13 @@ const COARSE: f64 = 1e-2;
 /// Number of consecutive rows at the extreme that count as saturation, for channels in full precision and for quantised
 /// channels.
 const SATURATED_ROWS: (usize, usize) = (3, 5);
-/// Least ratio of the number of rows at the limit to the average number at each of the next three levels.
+/// Smallest ratio, in a saturated quantised channel, of the number of rows at the limit to the average number at each
+/// of the next three levels.
 const PEAK: usize = 6;
 
-/// Rows examined in a long channel (hours of recording). If more than half of their values are distinct, the channel
-/// counts as full precision. Sorting all its values would take longer than reading them.
+/// Number of rows at the start of a long channel (hours of recording) that are examined first. If more than half of
+/// their values are distinct, the channel counts as full precision, because sorting all values would take longer than
+/// reading them.
 const EXAMINED: usize = 1 << 20;
 
 /// A saturation limit of a channel.
@@ -39,7 +41,7 @@ pub(crate) struct SaturationLimit {
 }
 
 impl SaturationLimit {
-    /// Number of rows at the limit.
+    /// Returns the number of rows at the limit.
     pub(crate) fn rows(&self) -> usize {
         self.stays.iter().map(Range::len).sum()
     }
@@ -51,7 +53,7 @@ pub(crate) struct Levels {
     /// Number of rows of the channel, and number of rows with a finite value.
     rows: usize,
     finite: usize,
-    /// Levels in increasing order: all levels of a coarse channel, otherwise those at both ends.
+    /// Levels in increasing order: all levels of a quantised channel, otherwise the levels at both ends.
     kept: Vec<f64>,
 }
 
@@ -63,7 +65,7 @@ impl Levels {
         Self::examined(values, EXAMINED)
     }
 
-    /// Determines the levels; if most of the first `most` rows are distinct, all rows count as distinct.
+    /// Determines the levels; if most of the first `most` values are distinct, all values count as distinct.
     fn examined(values: &[f64], most: usize) -> Self {
         let rows = values.len();
         let finite = values.iter().filter(|v| v.is_finite()).count();
@@ -97,7 +99,8 @@ impl Levels {
         2 * self.count <= self.rows
     }
 
-    /// Returns the step of the grid on which all values lie, and the number of levels; `None` if there is no such grid.
+    /// Returns the step of the grid on which all values lie, except possibly the smallest and the largest, and the
+    /// number of levels; `None` if there is no such grid.
     pub(crate) fn quantum(&self) -> Option<(f64, usize)> {
         if self.count < 2 || 2 * self.count > self.finite {
             return None;
@@ -138,8 +141,8 @@ fn distinct(values: &[f64]) -> Vec<f64> {
     levels
 }
 
-/// Returns the levels at both ends of all values. Only values at or beyond the end levels of the first rows (`first`)
-/// are sorted.
+/// Returns the levels at both ends of all values. Only values at or beyond the end levels of `first`, the distinct
+/// values of the first rows, are sorted.
 fn ends(values: &[f64], first: &[f64]) -> Vec<f64> {
     let (lower, upper) = (first[Levels::END - 1], first[first.len() - Levels::END]);
     let outer: Vec<f64> = values.iter().copied().filter(|v| *v <= lower || *v >= upper).collect();
@@ -151,7 +154,7 @@ fn ends(values: &[f64], first: &[f64]) -> Vec<f64> {
 /// Returns the saturation limits of a channel, the lower one first.
 pub(crate) fn rails(values: &[f64], levels: &Levels) -> Vec<SaturationLimit> {
     if levels.count < 4 {
-        // A switch or a constant signal stays at its extremes by nature.
+        // A switch or a constant signal has fewer than four levels and stays at its extremes by nature.
         return Vec::new();
     }
     let (coarse, levels) = (levels.is_quantised(), &levels.kept);
@@ -171,7 +174,7 @@ pub(crate) fn rails(values: &[f64], levels: &Levels) -> Vec<SaturationLimit> {
         }
         let rows: usize = stays.iter().map(Range::len).sum();
         let beside: usize = next.iter().map(|level| count(*level)).sum();
-        // A stay at the start or end of the record may be a value that the signal has settled to.
+        // A stay at the start or end of the record does not count: the signal may have settled there.
         let inner = || {
             stays
                 .iter()
@@ -298,7 +301,7 @@ mod tests {
             assert_eq!((found.len(), found[0].value, found[0].stays.len()), (1, 2.0, 1));
             assert_eq!(found[0].stays[0], 3000..3005);
         }
-        // In steps, all rows are examined: the largest level is in one of the last.
+        // In the quantised channel all rows are examined: its largest level occurs in one of the last rows.
         let mut coarse: Vec<f64> = values.iter().map(|v| (10.0 * v).round() / 10.0).collect();
         coarse[3990] = 7.0;
         let found = Levels::examined(&coarse, 64);

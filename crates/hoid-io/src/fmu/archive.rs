@@ -198,7 +198,7 @@ mod tests {
     use super::*;
     use crate::fmu::FmuKind;
 
-    /// Headers as the systems write them, with the names of the functions.
+    /// Returns headers of libraries as the operating systems define them, followed by the names of the functions.
     fn heads() -> [(Vec<u8>, &'static str, &'static str); 5] {
         let elf = |machine: u16| {
             let mut bytes = vec![0; 64];
@@ -286,7 +286,7 @@ mod tests {
             assert!(refused.contains("cargo xtask ffi"), "{refused}");
         }
         assert!(Library::read(&folder.path().join("nowhere")).is_err());
-        // Part of a name is not the name.
+        // A library that contains only part of a function name is refused.
         for (bytes, ..) in heads() {
             let text = String::from_utf8_lossy(FUNCTIONS[1].as_bytes()).into_owned();
             let place = bytes.windows(text.len()).position(|w| w == text.as_bytes()).unwrap();

@@ -20,7 +20,7 @@ hoid_model::named_choice!(FmiVersion, "version of FMI", 2, {
 
 /// Name of the library in an FMU.
 pub(super) const MODEL: &str = "hoid";
-/// Units with their nonzero exponents of the SI base units and rad, and their factor.
+/// Units, each with its nonzero exponents of the SI base units and rad, and its factor if this is not 1.
 const UNITS: [(&str, &str); 3] = [
     ("s", r#"s="1""#),
     ("rad/s", r#"s="-1" rad="1""#),
@@ -28,7 +28,7 @@ const UNITS: [(&str, &str); 3] = [
 ];
 
 impl FmuKind {
-    /// Returns the token that description and library share: version of hoid and kind of FMU.
+    /// Returns the token that the description and the library share: the version of hoid and the kind of FMU.
     pub fn token(self) -> String {
         format!("hoid-{}-{}", env!("CARGO_PKG_VERSION"), self.name())
     }

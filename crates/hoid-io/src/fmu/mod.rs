@@ -3,8 +3,8 @@
 //!
 //! *Functional Mock-up Interface for Model Exchange and Co-Simulation*, version 2.0.4 (Modelica Association, 2022), and
 //! *Functional Mock-up Interface Specification*, version 3.0.1 (2023). The library is `hoid-ffi`; this module defines
-//! the parts that library and description share: the variables ([`FmuKind::variables`]), whose value references are
-//! their positions in the list, and the token.
+//! the parts that the library and the description share: the variables ([`FmuKind::variables`]), whose value references
+//! are their positions in the list, and the token ([`FmuKind::token`]).
 //!
 //! | file | contents |
 //! |---|---|

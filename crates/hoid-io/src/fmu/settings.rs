@@ -135,7 +135,7 @@ mod tests {
         let back = FmuSettings::parse(&settings.text()).unwrap();
         assert_eq!(back.variables().unwrap()[0].start, FmuStart::Real(0.02));
         assert_eq!(back, settings);
-        // A whole number of seconds is also a valid number.
+        // An integer number of seconds is also accepted for a real parameter.
         let whole = settings.clone().with("sample_time", FmuStart::Integer(1));
         assert_eq!(whole.variables().unwrap()[0].start, FmuStart::Real(1.0));
         for wrong in [

@@ -1,7 +1,7 @@
 //! The variables of an FMU.
 
-/// Variables that indicate for each parameter of the operator whether the data determine it, in the order of the
-/// parameters.
+/// Names of the variables that indicate for each parameter of the operator whether the data determine it, in the order
+/// of the parameters.
 pub const DETERMINED: [&str; 6] = [
     "K_e_determined",
     "T_L_determined",

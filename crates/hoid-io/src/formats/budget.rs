@@ -1,27 +1,27 @@
 //! Memory limit of a file of any format, since a few bytes can be crafted to decompress to any length.
 //!
 //! A file of n bytes may decompress to `48 MB + 64 n`, at most 16 GB. The environment variable [`UNPACKED`], in
-//! megabytes, raises both limits for files that need more. Parsing settings takes many times the length of their text
-//! (TOML up to a hundred times, JSON less): their text may have at most 2 MB (TOML) or 10 MB (JSON), or a fraction of
-//! the raised limit.
+//! megabytes, replaces this limit if it is larger. Parsing settings takes many times the length of their text (TOML up
+//! to a hundred times, JSON less): their text may have at most 2 MB (TOML) or 10 MB (JSON), or a fraction of the limit
+//! in the environment variable if that is longer.
 
 use crate::IoError;
 
-/// Decompressed bytes allowed for every file. Readers hold values up to four times during conversion (as stored, as
-/// numbers, as columns, in a survey): a file of a few bytes stays below 300 MB.
+/// Number of bytes to which a file of any size may decompress. Readers hold values up to four times during conversion
+/// (as stored, as numbers, as columns, in a survey): reading a file of a few bytes takes less than 300 MB.
 const AT_LEAST: u64 = 48 << 20;
 /// Additional decompressed bytes allowed per byte of the file.
 const FACTOR: u64 = 64;
-/// Upper limit for files of any size, in bytes.
+/// Largest number of bytes to which a file may decompress, regardless of its size.
 const CEILING: u64 = 16 << 30;
 /// Environment variable that raises the limit, in MB.
 const UNPACKED: &str = "HOID_MAX_UNPACKED_MB";
-/// Memory of a text in addition to its characters, in bytes.
+/// Memory that a text takes in addition to its characters, in bytes.
 const TEXT: u64 = 64;
 /// Maximum nesting of structures.
 pub(super) const MOST_NESTED: usize = 32;
 
-/// Memory that a file may still take.
+/// Memory that reading a file may still take.
 #[derive(Debug)]
 pub(super) struct Budget {
     left: u64,
@@ -67,7 +67,7 @@ impl Budget {
     }
 }
 
-/// Returns the limit from the environment in bytes.
+/// Returns the limit in the environment variable in bytes; `None` if it is not set.
 fn raised() -> Option<u64> {
     let megabytes: u64 = std::env::var(UNPACKED).ok()?.trim().parse().ok()?;
     megabytes.checked_mul(1 << 20)
@@ -81,7 +81,8 @@ pub(crate) enum Settings {
 }
 
 impl Settings {
-    /// Divisor by which the raised limit gives the maximum length of the text.
+    /// Returns the number by which the limit in the environment variable is divided to obtain the maximum length of the
+    /// text.
     pub(crate) fn share(self) -> u64 {
         match self {
             Self::Json => 32,
@@ -89,7 +90,7 @@ impl Settings {
         }
     }
 
-    /// Maximum length of the text in bytes.
+    /// Returns the maximum length of the text in bytes.
     pub(crate) fn longest(self) -> u64 {
         let typical = match self {
             Self::Json => 10 << 20,
@@ -103,16 +104,16 @@ impl Settings {
 mod tests {
     use super::*;
 
-    /// A damaged HDF5 file of 31 kB stated an array of 128 MB that was nowhere in it.
+    /// A damaged HDF5 file of 31 kB stated an array of 128 MB, although it did not contain the data.
     #[test]
     fn a_small_file_does_not_unpack_to_hundreds_of_megabytes() {
         let mut budget = Budget::of(31_128);
         assert!(budget.take(1 << 27, "a.mat").is_err());
         budget.take(1 << 25, "a.mat").unwrap();
         assert!(budget.take(1 << 25, "a.mat").is_err());
-        // A million texts of one character.
+        // A million texts of one character exceed the limit of a small file.
         assert!(Budget::of(1000).take_texts(1_000_000, 1_000_000, "a.mat").is_err());
-        // A large file may unpack to more.
+        // A larger file may decompress to more.
         Budget::of(10 << 20).take(1 << 29, "a.mat").unwrap();
         assert!(Budget::of(usize::MAX).take(CEILING + 1, "a.mat").is_err());
         let said = Budget::up_to(1).take(2, "a.mat").unwrap_err().to_string();

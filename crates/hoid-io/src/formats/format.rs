@@ -1,7 +1,7 @@
-//! Interface of a file format: its name, its extensions, and its functions for reading and writing.
+//! Description of a file format: its name, its extensions, and its functions for reading and writing.
 //!
 //! Each format defines a [`Format`] in its own module of `formats`; reading, writing, the survey of a file and all
-//! messages use it.
+//! messages depend on formats only through it.
 
 use std::io::{self, Write};
 
@@ -28,25 +28,25 @@ pub(crate) struct Format {
     pub(crate) record: Option<RecordWriter>,
 }
 
-/// Reads the columns of a record; the reader may take the bytes or borrow from them.
+/// Function that reads the columns of a record; it may take the bytes or borrow from them.
 type TableReader = for<'a> fn(&'a mut Vec<u8>, &'a str) -> Result<Table<'a>, IoError>;
-/// Reads the columns of a table of results with their kinds.
+/// Function that reads the columns of a table of results with their kinds.
 type ResultsReader = fn(Vec<u8>, &str) -> Result<OutputTable, IoError>;
-/// Reads all arrays with their paths.
+/// Function that reads all arrays of a file with their paths.
 type ArraysReader = fn(Vec<u8>, &str) -> Result<Contents, IoError>;
-/// Starts a file that is written row by row.
+/// Function that starts a file to be written row by row.
 type RowsStart = fn(&mut dyn Write, &TableSchema) -> io::Result<Box<dyn RowWriter>>;
-/// Writes columns of equal length.
+/// Function that writes columns of equal length.
 pub(crate) type ColumnsWriter = fn(&mut dyn Write, &TableSchema, &[Values<'_>]) -> io::Result<()>;
 type RecordWriter = fn(&mut dyn Write, &Record) -> io::Result<()>;
 
-/// Contents of a file of this format, and the function that reads them.
+/// Structure of a file of this format, and the functions that read it.
 pub(crate) enum Reading {
     /// One flat table.
     Table {
-        /// Numeric columns, for a record.
+        /// Reader of the numeric columns, for a record.
         record: TableReader,
-        /// Columns with their original kinds, for results.
+        /// Reader of the columns with their original kinds, for results.
         results: ResultsReader,
     },
     /// Named arrays, from which the columns are selected.
@@ -55,11 +55,11 @@ pub(crate) enum Reading {
 
 /// Kind of writer of the format.
 pub(crate) enum Writing {
-    /// Row by row, in bounded memory.
+    /// Rows are written in groups, in bounded memory.
     Rows(RowsStart),
-    /// Each column as one array preceded by its length: all rows must be known before writing.
+    /// Each column is written as one array preceded by its length: all rows must be known before writing.
     Columns(ColumnsWriter),
-    /// No writing; the text describes the format, such as "the format of a recorder".
+    /// Files are only read; the text describes the format, such as "the format of a recorder".
     ReadOnly(&'static str),
 }
 
@@ -103,7 +103,7 @@ impl Format {
     }
 }
 
-/// Completes a table: its time is determined, and the requested columns and trial are selected.
+/// Determines the time of a table, and selects the requested columns and the requested trial.
 pub(super) fn with_time_and_selection<'a>(
     table: Table<'a>,
     is_trial: bool,

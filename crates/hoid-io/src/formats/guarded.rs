@@ -1,7 +1,8 @@
-//! Isolation of crates that read untrusted bytes, so that a panic in them does not abort a study.
+//! Isolation of third-party crates that read untrusted bytes, so that a panic in them does not abort a study.
 //!
-//! These crates report most damage as an error, but panic at some, such as an index or a sum out of range. Panics are
-//! caught only here. The partial results of the crate are dropped. With `panic = "abort"` no panic can be caught.
+//! These crates report most damage as an error, but some damage makes them panic, such as an index or a sum out of
+//! range. Only this module catches panics. The partial results of the crate are dropped. With `panic = "abort"` no
+//! panic can be caught.
 
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
@@ -25,7 +26,7 @@ pub(super) fn guarded<T>(file: &str, read: impl FnOnce() -> Result<T, IoError>) 
     })
 }
 
-/// Returns the result, or the message of a panic.
+/// Returns the result of `read`, or the message with which it panicked.
 ///
 /// The panic hook is replaced once per process. The new hook prints nothing on a thread that is reading, and reports
 /// all other panics as before.

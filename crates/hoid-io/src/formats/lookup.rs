@@ -39,7 +39,8 @@ fn extensions(formats: &[&Format]) -> String {
     }
 }
 
-/// Remedies for files of other programs, by extension. pyhoid itself reads the formats with the remedy `PYTHON`.
+/// Remedies for files of other programs, by extension. In Python, `pyhoid.read` reads the formats with the remedy
+/// `PYTHON`.
 const ELSEWHERE: [(&[&str], &str); 12] = [
     (&["gz", "zip", "bz2", "xz", "zst"], "unpack it first"),
     (&["arrow", "feather", "ipc", "xlsx", "xls", "ods"], PYTHON),
@@ -94,7 +95,8 @@ fn format_of(path: &Path) -> Option<&'static Format> {
         .find(|format| format.extensions.contains(&ending.as_str()))
 }
 
-/// Error for an extension that belongs to no format, with the `expected` extensions and, if there is one, the remedy.
+/// Returns the error for an extension that belongs to no format, with the `expected` extensions and, if there is one,
+/// the remedy.
 fn unknown(path: &Path, expected: String, remedy: Option<&str>) -> IoError {
     IoError::UnknownFormat {
         file: path.display().to_string(),
@@ -143,7 +145,8 @@ fn packed_text(path: &Path) -> Option<PathBuf> {
     packed::inner(path).filter(|inner| format_of(inner).is_some_and(|format| format.name == csv::CSV.name))
 }
 
-/// Returns the format of a file and its decompressed bytes.
+/// Returns the format of a file and its bytes. A text compressed by gzip is decompressed, and a BIDS table gets a
+/// header.
 pub(crate) fn bytes_of(path: &Path) -> Result<(&'static Format, Vec<u8>), IoError> {
     let file = || path.display().to_string();
     if path.is_dir() {
@@ -184,7 +187,7 @@ pub(crate) fn long_text<'a>(
 /// Returns the requested columns of a file of any format; the table may borrow from `bytes`.
 ///
 /// # Errors
-/// As in reading a record.
+/// The errors of [`crate::read_record`].
 pub(crate) fn table_of_file<'a>(
     path: &Path,
     file: &'a str,

@@ -16,7 +16,7 @@ use crate::table::Cell;
 /// Number of bytes decompressed at a time.
 const PART: usize = 1 << 16;
 
-/// Returns the name without `.gz`; `None` if the file has another extension.
+/// Returns the path without `.gz`; `None` if the file has another extension.
 pub(super) fn inner(path: &Path) -> Option<PathBuf> {
     let packed = path.extension()?.eq_ignore_ascii_case("gz");
     packed.then(|| path.with_extension(""))

@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 use super::part_file::Part;
 use crate::IoError;
 
-/// Writes a file by calling `write`. An existing file is replaced only after all data have been written to the disk; if
-/// an error occurs, it is unchanged and no other file remains. Pipes and devices are written to directly.
+/// Writes a file with the function `write`. An existing file is replaced only after all data have been written to the
+/// disk; if an error occurs, the existing file is unchanged and no other file remains. Pipes and devices are written to
+/// directly.
 ///
 /// # Errors
 /// [`IoError::Directory`] if the path is a directory; [`IoError::Unwritable`] for an error of the operating system or
@@ -38,7 +39,7 @@ pub fn make_directory(path: &Path) -> Result<(), IoError> {
     })
 }
 
-/// A file being written; if dropped before [`finish`](Self::finish), it leaves an existing file unchanged.
+/// A file being written; if this value is dropped before [`finish`](Self::finish), an existing file is unchanged.
 pub(crate) struct WholeFile {
     buffer: BufWriter<fs::File>,
     /// Path as given by the user.
@@ -56,7 +57,7 @@ struct PartFile {
 impl WholeFile {
     pub(crate) fn create(path: &Path) -> Result<Self, IoError> {
         let name = path.display().to_string();
-        // A symbolic link is kept: the file to which it points is replaced.
+        // If the path is a symbolic link, the link is kept, and the file to which it points is replaced.
         let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         let known = fs::metadata(&place).ok();
         let opened = match known {

@@ -2,9 +2,9 @@
 //!
 //! A temporary file is locked while its writer exists; the operating system releases the locks of a process when the
 //! process ends for any reason. A temporary file that can be locked therefore has no owner, and the next process that
-//! writes to its directory removes it. After locking, a writer checks that its file still exists, because another
-//! process may have removed the file before it was locked. On a file system that does not support locks, temporary
-//! files are left in place.
+//! writes to its directory removes it. After a writer has locked its file, it checks that the file still exists,
+//! because another process may have removed the file before it was locked. On a file system that does not support
+//! locks, temporary files are left in place.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -46,13 +46,14 @@ pub fn remove_unfinished_files() {
     }
 }
 
-/// A temporary file, removed when this value is dropped.
+/// A temporary file, which is removed when this value is dropped.
 pub(super) struct Part {
     path: Option<TempPath>,
 }
 
 impl Part {
-    /// Creates a locked temporary file in a directory, after removing the temporary files of processes that have ended.
+    /// Creates a locked temporary file in a directory. The first time, the temporary files of processes that have ended
+    /// are removed from the directory.
     pub(super) fn create_in(directory: &Path) -> io::Result<(File, Self)> {
         sweep_once(directory);
         let mut made = make(directory)?;
@@ -103,7 +104,8 @@ fn make(directory: &Path) -> io::Result<NamedTempFile> {
     builder.tempfile_in(directory).map_err(without_path)
 }
 
-/// Returns the system error without the name of the temporary file; the message contains the requested path instead.
+/// Returns the error of the operating system without the name of the temporary file; the message names the requested
+/// path instead.
 fn without_path(error: io::Error) -> io::Error {
     let text = error.to_string();
     match text.split_once(" at path ") {
@@ -112,7 +114,7 @@ fn without_path(error: io::Error) -> io::Error {
     }
 }
 
-/// Cleans a directory the first time this process writes to it.
+/// Removes the temporary files of ended processes from a directory the first time this process writes to it.
 fn sweep_once(directory: &Path) {
     let directory = fs::canonicalize(directory).unwrap_or_else(|_| directory.to_owned());
     if known().swept.insert(directory.clone()) {
@@ -131,8 +133,8 @@ fn sweep(directory: &Path) {
             continue;
         }
         let path = entry.path();
-        // The lock is held during the removal: the writer of the file waits for the lock, and then creates another
-        // file.
+        // This process holds the lock during the removal: the writer of the file waits for the lock, and then creates
+        // another file.
         if let Ok(file) = File::options().read(true).write(true).open(&path)
             && file.try_lock().is_ok()
         {
@@ -150,7 +152,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = |name: &str| dir.path().join(name);
         let (file, living) = Part::create_in(dir.path()).unwrap();
-        // No process holds the lock of these, as after kill -9.
+        // No process holds the lock of these temporary files, as after kill -9.
         fs::write(path(".hoid-dead01.part"), "half").unwrap();
         for other in [".hoid-notes", "hoid-a.part", ".part"] {
             fs::write(path(other), "kept").unwrap();
@@ -176,7 +178,7 @@ mod tests {
     fn an_interrupt_leaves_nothing_on_its_way() {
         let dir = tempfile::tempdir().unwrap();
         let (_file, part) = Part::create_in(dir.path()).unwrap();
-        // For this directory only: other tests have parts in progress.
+        // Only the file in this directory is examined: other tests have temporary files in progress.
         let own = part.path.as_ref().unwrap().to_path_buf();
         assert!(known().parts.contains(&own) && own.exists());
         drop(part);

@@ -71,7 +71,7 @@ pub fn check_output_directory(directory: &Path, inputs: &[&Path]) -> Result<(), 
     tried.map_err(|source| IoError::Unwritable { file: file(), source })
 }
 
-/// Returns the directory, or its nearest existing parent.
+/// Returns the directory if it exists, otherwise its nearest existing parent.
 fn nearest(directory: &Path) -> io::Result<PathBuf> {
     let mut at = directory;
     loop {

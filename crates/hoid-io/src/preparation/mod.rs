@@ -1,4 +1,4 @@
-//! Preparation of a record between file and estimator, and the list of applied steps.
+//! Preparation of a record between its file and the estimator, and the list of applied steps.
 //!
 //! The steps are applied in a fixed order, independent of the order in which they were requested:
 //!
@@ -13,7 +13,7 @@
 //!
 //! [`Preparation`] in `pipeline` applies the steps to the channels of a record, which `record_parts` separates. The
 //! interpolation filter of the steps offset and rate, and the decimation, are in [`hoid_model::resampling`]. For an
-//! offset or a new frequency, samples whose filter would reach beyond the record are cut and never extrapolated;
+//! offset or a new frequency, samples whose filter would reach beyond the record are cut, and nothing is extrapolated;
 //! decimation cuts nothing at the ends. Each applied step is a [`Step`] with its numbers; the repairs made in reading
 //! precede these steps in the list.
 

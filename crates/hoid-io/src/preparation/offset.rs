@@ -15,7 +15,7 @@ use super::step::Step;
 use crate::IoError;
 use crate::wording::decimal;
 
-/// Largest deviation from a whole number of samples at which an offset counts as whole.
+/// Largest distance from a whole number of samples at which an offset counts as a whole number.
 const WHOLE: f64 = 1e-6;
 
 /// Recording delay of a channel; negative if it was recorded early.
@@ -44,7 +44,7 @@ impl FromStr for Offset {
     }
 }
 
-/// An offset as a whole number of samples and a remainder.
+/// An offset in samples, and whether it requires interpolation.
 #[derive(Clone, Copy)]
 struct Shift {
     samples: f64,
@@ -80,8 +80,8 @@ impl RecordParts {
         let kernel = Kernel::interpolating();
         let half = |shift: Shift| if shift.interpolated { kernel.half() as f64 } else { 0.0 };
         let last = self.len() as f64 - 1.0;
-        // First and last row for which every channel has the samples it needs; in floating point, since an offset may
-        // be arbitrarily large.
+        // First and last row for which every channel has the samples it needs. They are floating-point numbers, since
+        // an offset may be arbitrarily large.
         let (mut from, mut to) = (0.0_f64, last);
         for (_, shift) in &shifts {
             from = from.max((half(*shift) - shift.samples).ceil());

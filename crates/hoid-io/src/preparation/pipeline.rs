@@ -1,4 +1,4 @@
-//! The preparation steps in the order of application.
+//! The preparation steps, and their application to a record in a fixed order.
 
 use std::collections::BTreeMap;
 
@@ -18,7 +18,7 @@ use crate::IoError;
 pub struct Preparation {
     /// Unit by channel, for channels whose unit the file does not give.
     pub units: BTreeMap<String, String>,
-    /// Factor and new unit by channel.
+    /// Factor or unit conversion by channel.
     pub scale: BTreeMap<String, Scaling>,
     /// Recording delay by channel.
     pub offset: BTreeMap<String, Offset>,

@@ -24,7 +24,7 @@ use super::step::Step;
 use crate::IoError;
 use crate::wording::decimal;
 
-/// Maximum number of new samples per old sample.
+/// Maximum ratio of the new sampling frequency to the old one.
 const LARGEST_FACTOR: f64 = 100.0;
 
 /// New sampling rate.
@@ -99,7 +99,8 @@ impl RecordParts {
             Kernel::interpolating()
         };
         let half = kernel.half() as f64;
-        // The new grid starts at the first sample of the record; a sample at a bound, up to rounding, is included.
+        // The new grid starts at the first sample of the record; of its samples, those whose filter lies within the
+        // record, up to rounding, are used.
         let first = ((half - 1e-10) / factor).ceil();
         let end = ((last - half + 1e-10) / factor).floor();
         if first > end {

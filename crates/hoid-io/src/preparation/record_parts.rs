@@ -12,7 +12,7 @@ pub(super) struct RecordParts {
     pub(super) start_s: f64,
     pub(super) sample_time: SampleTime,
     pub(super) channels: Vec<Channel>,
-    /// True if the first channel is an input; the output is then the second channel, otherwise the first.
+    /// True if the first channel is the input; the output is then the second channel, otherwise the first.
     has_input: bool,
     pub(super) steps: Vec<Step>,
 }
@@ -31,7 +31,7 @@ impl RecordParts {
         }
     }
 
-    /// Number of samples of each channel.
+    /// Returns the number of samples of each channel.
     pub(super) fn len(&self) -> usize {
         self.channels[0].values.len()
     }
@@ -45,7 +45,7 @@ impl RecordParts {
         }
     }
 
-    /// Returns the index of each channel that a step names, with its value.
+    /// Returns the index of each channel that a step names, with the value that the step gives for it.
     pub(super) fn find<T: Copy>(
         &self,
         step: &'static str,
@@ -85,7 +85,8 @@ impl RecordParts {
         }
     }
 
-    /// Assembles the record after removing the mean or the linear trend.
+    /// Removes the mean or the linear trend as `how` requires, and assembles the record; returns it with the applied
+    /// steps.
     pub(super) fn detrended(self, how: Detrend) -> Result<(Record, Vec<Step>), IoError> {
         let Self {
             label,

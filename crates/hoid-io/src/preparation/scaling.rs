@@ -12,7 +12,7 @@ use super::step::Step;
 use crate::IoError;
 use crate::wording::decimal;
 
-/// Known units: name, kind, and size in the first unit of their kind.
+/// Known units: name, kind, and size in multiples of the first unit of the kind.
 const UNITS: [(&str, &str, f64); 18] = [
     ("rad", "angle", 1.0),
     ("mrad", "angle", 1e-3),

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::wording::{decimal, short};
 
-/// A preparation step; steps are listed in the order of application.
+/// A preparation step that was applied to a record, or a repair made in reading.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "step", rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -19,7 +19,7 @@ pub enum Step {
         /// First dropped row, counted from 1.
         first_row: usize,
     },
-    /// Only a segment between faults was used.
+    /// Only a segment of the record between faults was used.
     Mask {
         /// Kinds of excluded faults.
         what: Vec<&'static str>,
@@ -49,7 +49,7 @@ pub enum Step {
         channel: String,
         /// Number of interpolated values.
         values: usize,
-        /// Longest run of missing values.
+        /// Number of values in the longest run of missing values.
         longest: usize,
     },
     /// Unevenly spaced samples were interpolated linearly onto an evenly spaced grid.
@@ -60,7 +60,7 @@ pub enum Step {
         to_samples: usize,
         /// Sampling frequency of the grid, Hz.
         to_hz: f64,
-        /// Longest time between two successive samples, s.
+        /// Longest time between two successive samples before the interpolation, s.
         longest_step_s: f64,
     },
     /// A channel was multiplied by a factor.
@@ -95,20 +95,20 @@ pub enum Step {
         from_hz: f64,
         /// New sampling frequency, Hz.
         to_hz: f64,
-        /// End of the pass band, Hz.
+        /// End of the pass band of the filter, Hz.
         pass_hz: f64,
-        /// Start of the stop band, Hz; `None` if the frequency increases.
+        /// Start of the stop band of the filter, Hz; `None` if the frequency increases.
         stop_hz: Option<f64>,
-        /// Attenuation in the stop band, dB.
+        /// Attenuation of the filter in the stop band, dB.
         stop_db: f64,
         /// Length of the filter, in samples at the old rate.
         taps: usize,
-        /// Lengths cut at the start and at the end, s.
+        /// Times cut at the start and at the end of the record, s.
         cut_s: (f64, f64),
-        /// Time by which the delay of a model with a hold is shorter than at the old rate, s.
+        /// Time by which the delay of a model with a hold must be shorter than at the old rate, s.
         delay_s: f64,
-        /// Time by which the input in a row is sampled later than the output, s. With it the delay is the same at both
-        /// rates.
+        /// Time by which the input of a row is sampled later than its output, s. As a result, the delay of a model is
+        /// the same at both rates.
         input_lead_s: f64,
     },
     /// The run-in at the start was dropped.

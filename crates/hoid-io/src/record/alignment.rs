@@ -3,7 +3,8 @@
 //! If a channel is shifted by d samples, d rows are missing at one end of the data. A span of whole periods would then
 //! lose its last period. If the file extends beyond the span, additional rows are therefore read, the channels are
 //! shifted, and the span is cut out afterwards, so that it keeps its length. If the file does not extend far enough, or
-//! if the rate changes (its filters cut more samples than the offsets), the missing rows are cut.
+//! if the rate changes (the filters of the rate change cut more samples than the offsets), the rows without a sample
+//! are cut.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,7 +18,7 @@ use crate::IoError;
 use crate::formats::table_of_file;
 use crate::preparation::{NewRate, Offset, Preparation, Step};
 
-/// Number of additional rows beyond each end of the span for interpolation at a fractional offset.
+/// Number of additional rows that are read beyond each end of the span for interpolation at a fractional offset.
 const FOR_INTERPOLATION: f64 = 64.0;
 
 /// Reads and prepares a record whose output is additionally shifted earlier by `late_samples`.
@@ -76,7 +77,7 @@ pub(super) fn read_as_recorded(path: &Path, options: &ReadOptions, drop_repeated
     })
 }
 
-/// Returns the largest shift of a channel in samples, including the samples needed for interpolation.
+/// Returns an upper bound of the shift of a channel in samples, including the samples needed for interpolation.
 fn reach(preparation: &Preparation, late_samples: f64, ts_s: f64) -> f64 {
     let samples = |offset: &Offset| match offset {
         Offset::Samples(samples) => *samples,
@@ -88,8 +89,8 @@ fn reach(preparation: &Preparation, late_samples: f64, ts_s: f64) -> f64 {
     most.ceil() + if between { 2.0 * FOR_INTERPOLATION } else { 0.0 }
 }
 
-/// Shifts the channels of the longer record, cuts out the span, and applies the remaining steps; `None` if this fails,
-/// in which case processing the shorter record gives the error.
+/// Shifts the channels of the longer record `wide`, cuts out the span, and applies the remaining steps; `None` if this
+/// fails: processing the shorter record then gives the error.
 fn moved_within(
     wide: Record,
     narrow: &Record,

@@ -2,15 +2,17 @@
 
 use hoid_model::{Channel, Record};
 
-/// Returns the channels in the order in which people read them: target, then input and output of the operator.
+/// Returns the channels in the order in which people read them: target, input and output of the operator, other
+/// channels.
 pub(crate) fn channels(record: &Record) -> Vec<&Channel> {
     let (target, others): (Vec<&Channel>, Vec<&Channel>) = record.channels().partition(|c| c.name == "f_t");
     target.into_iter().chain(others).collect()
 }
 
-/// Returns the comments of a file: units, roles and sample time.
+/// Returns the comments that are written above a record: units, roles and sample time.
 pub(crate) fn comments(record: &Record, channels: &[&Channel]) -> Vec<String> {
-    // A line cannot hold a comma or a line break: such words are omitted.
+    // An entry of a comment cannot contain a comma or a line break: names, units and roles that contain one are
+    // omitted.
     let fits = |text: &str| !text.is_empty() && !text.contains([',', '\n', '\r']);
     let list = |words: fn(&Channel) -> &str| {
         let with_words = channels.iter().filter(move |c| fits(&c.name) && fits(words(c)));

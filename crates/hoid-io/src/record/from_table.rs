@@ -12,7 +12,7 @@ use crate::preparation::{Preparation, Step};
 use crate::table::{Column, ColumnExpression, Signal, Table};
 use crate::wording::{list, named};
 
-/// A record, the steps applied to it, and notes on reading.
+/// A record read from a file, the steps applied to it, and notes about the reading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadRecord {
     /// The record, labelled with the name of the file without extension.
@@ -21,11 +21,11 @@ pub struct ReadRecord {
     pub notes: Vec<String>,
     /// Steps applied to the values of the file, in the order of application.
     pub steps: Vec<Step>,
-    /// Problems with the input, the output and their time in the span that is read, as in the file before any step.
+    /// Problems with the input, the output and their time, in the part of the file that is read, before any step.
     pub quality_issues: Vec<QualityIssue>,
 }
 
-/// Converts a table to a record, without duplicated rows if requested.
+/// Converts a table to a record; if `drop_repeated` is true, duplicated rows are dropped first.
 pub(super) fn record_of(
     mut table: Table<'_>,
     options: &ReadOptions,
@@ -124,7 +124,7 @@ impl TableReader<'_> {
                 }
             }
         }
-        // Expressions are evaluated first; afterwards a column that is itself a signal can be moved.
+        // Expressions are evaluated first, because a column that is itself a signal is then moved out of `columns`.
         let mut made: Vec<Channel> = signals()
             .map(|(signal, expression)| combine(signal, expression, &columns))
             .collect();

@@ -10,10 +10,11 @@ use crate::preparation::Step;
 use crate::table::{Table, kept};
 use crate::time::sampling::pairs;
 
-/// Fraction of a step by which rounding may shift a time: a grid point this close before a row counts as the row.
+/// Fraction of a step by which rounding may shift a time: a held signal takes the value of a row already this close
+/// before the row.
 const ROUNDING: f64 = 1e-6;
 
-/// Reason why missing values could not be interpolated: they reach the start or the end of the column.
+/// End of the column that the missing values reach, so that they cannot be interpolated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum OpenEnd {
     Start,
@@ -111,7 +112,7 @@ pub(super) fn resample(t: &[f64], values: &[f64], (start, step): (f64, f64), n: 
 }
 
 fn line(a: f64, b: f64, share: f64) -> f64 {
-    // This form gives exactly a and b at the ends and does not overflow in between.
+    // This form gives exactly a and b at the ends and does not overflow between them.
     a * (1.0 - share) + b * share
 }
 
@@ -146,13 +147,14 @@ mod tests {
         let values = t.map(|t| 2.0 - 3.0 * t);
         let even = resample(&t, &values, (0.0, 0.1), 11, false);
         for (k, value) in even.iter().enumerate() {
-            // Two products of numbers of order 1: a few units in the last place.
+            // The result is a sum of two products of numbers of order 1, with rounding errors of a few units in the
+            // last place.
             assert!((value - (2.0 - 0.3 * k as f64)).abs() < 1e-14, "{k}");
         }
         assert_eq!(even[0], 2.0);
-        // A last sample beyond the data due to rounding takes the last value.
+        // If rounding puts the last sample beyond the data, it takes the last value.
         assert_eq!(resample(&t, &values, (0.0, 1.0 + 1e-12), 2, false)[1], values[5]);
-        // A held signal changes at the rows alone, whatever the rounding of the grid.
+        // A held signal changes only at the rows, regardless of the rounding of the grid.
         let held = resample(&t, &values, (0.0, 0.1), 11, true);
         let rows = [0, 0, 2, 3, 3, 3, 3, 3, 3, 4, 5];
         assert_eq!(held, rows.map(|row| values[row]));

@@ -21,9 +21,9 @@ use crate::preparation::{Preparation, Step};
 use crate::wording::{decimal, list};
 
 /// Reads the segments of a file that lie between faults of the given kinds and last at least `shortest_s`, in their
-/// order; the whole record if no kind is given. The first segment carries the problems of the file as a whole.
+/// order; if no kind is given, reads the whole record. The first segment carries the problems with the file as a whole.
 ///
-/// In a file with several trials the trials are read in this way one after the other.
+/// In a file with several trials, the segments of each trial are read, one trial after the other.
 ///
 /// # Errors
 /// As [`read_prepared`]; [`IoError::Preparation`] for kinds without a location (such as a clock error or a constant
@@ -58,7 +58,7 @@ pub fn read_segments(
                     list_of(&trials)
                 ));
             } else {
-                // Problems of the file are reported with its first trial.
+                // Notes about the file are reported with its first trial only.
                 read.notes.clear();
             }
             all.push(read);
@@ -71,7 +71,7 @@ fn list_of(trials: &[String]) -> String {
     list(&trials.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
-/// Reads the segments of a file with a single trial.
+/// Reads the segments of a single trial.
 fn read_trial(
     path: &Path,
     options: &ReadOptions,
@@ -108,7 +108,7 @@ fn read_trial(
     let time = table.names().iter().position(|name| *name == "t");
     let at = |row: usize| match (time, options.sampling_hz) {
         (Some(time), None) => table.value(time, row),
-        // Samples are counted from the first time.
+        // With a given sampling frequency, the time is counted from the first time in the file.
         (time, Some(hz)) => {
             let first = time.map_or(0.0, |time| table.value(time, 0));
             if first.is_finite() { first } else { 0.0 }.max(f64::MIN) + row as f64 / hz
@@ -118,7 +118,7 @@ fn read_trial(
     let mut segments = Vec::new();
     for segment in between(&quality_issues, mask, rows.clone()) {
         let (from, last) = (at(segment.start), at(segment.end.saturating_sub(1)));
-        // The comparison is false for NaN, so that such a segment is skipped.
+        // The comparison is false if a time is NaN, so that such a segment is skipped.
         let is_long = last - from >= shortest_s;
         if !is_long {
             continue;
@@ -132,7 +132,7 @@ fn read_trial(
             span_s: (Some(from), to),
             ..options.clone()
         };
-        // The rows next to a segment are masked; rows beyond the segment are therefore not used for an offset.
+        // The rows next to a segment are excluded faults; an offset therefore does not use rows beyond the segment.
         let read = read_as_recorded(path, &span, preparation.drop_repeated)?.prepared(preparation)?;
         let to_s = to.unwrap_or(last);
         let mut steps = vec![Step::Mask {
@@ -164,7 +164,7 @@ fn read_trial(
 
 /// Returns the row ranges between faults of the given kinds.
 fn between(issues: &[QualityIssue], mask: &[QualityIssueKind], rows: Range<usize>) -> Vec<Range<usize>> {
-    // Excluded rows, and rows at which the record is cut.
+    // `out` marks excluded rows; `cut` marks rows at which the record is cut.
     let mut out = vec![false; rows.len()];
     let mut cut = out.clone();
     for found in issues.iter().filter(|found| mask.contains(&found.kind)) {

@@ -8,10 +8,10 @@
 //! | [`Sparse::Linear`] | `x_i + (x_{i+1} - x_i) (t - t_i)/(t_{i+1} - t_i)`, for a signal that is smooth between samples |
 //! | [`Sparse::Drop`] | none: the row is left out |
 //!
-//! A held value is late on average by half the time between logged values. Rows before the first and after the last
-//! logged value are cut. All values are computed before the rows and the span are cut, so that a row at the start of a
-//! span takes the value logged before it. Text and infinite numbers do not count as missing values: they remain, and
-//! reading refuses them.
+//! A held value is late on average by half the time between logged values. Rows before the first logged value and after
+//! the last one are cut. All values are computed before the rows and the span are cut, so that a row at the start of a
+//! span takes the value logged before the span. Text and infinite numbers do not count as missing values: they remain,
+//! and reading refuses them.
 
 use std::ops::Range;
 
@@ -23,7 +23,8 @@ use crate::wording::{list, named};
 
 const STEP: &str = "sparse";
 
-/// Fills in or drops the rows without a value in the columns named as sparse; returns the table and the applied steps.
+/// In the columns named as sparse, fills in the rows without a value or drops these rows; returns the table and the
+/// applied steps.
 ///
 /// # Errors
 /// [`IoError::Preparation`] if a column does not exist, is the time, is named twice or is completely empty, or if no
@@ -138,7 +139,7 @@ fn columns(table: &Table<'_>, options: &ReadOptions) -> Result<Vec<(usize, Spars
     Ok(all)
 }
 
-/// Returns the time of each row in the record, s: the time t, unless samples are counted.
+/// Returns the time of each row of the table, s: the time t, or the time that follows from counting the samples.
 fn abscissa(table: &Table<'_>, options: &ReadOptions) -> Vec<f64> {
     let time = table.columns.iter().find(|column| column.name == "t");
     match (time, options.sampling_hz) {
@@ -214,7 +215,7 @@ impl Gaps {
             for (value, x) in (values.iter_mut().zip(x)).take(run.end).skip(run.start) {
                 let share = (x - from) / (to - from);
                 *value = match how {
-                    // Between two equal times linear interpolation is undefined.
+                    // Linear interpolation between two equal times is undefined.
                     Sparse::Linear if share.is_finite() => a * (1.0 - share) + b * share,
                     _ => a,
                 };
@@ -253,7 +254,7 @@ mod tests {
             }
             assert_eq!((e.filled_rows, e.is_held), (vec![1, 2, 4], how == Sparse::Hold));
         }
-        // Times that stand.
+        // The times are constant.
         let mut e = column(&[1.0, GONE, 2.0]);
         Gaps::of(&e).close(&mut e, Sparse::Linear, &[0.0; 3]);
         assert_eq!(e.values, [1.0, 1.0, 2.0]);

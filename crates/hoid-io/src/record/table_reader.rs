@@ -29,8 +29,8 @@ impl TableReader<'_> {
         }
     }
 
-    /// If missing values are interpolated, returns the range of rows in which all signals have values on both sides:
-    /// two topics in one table do not start and end in the same row.
+    /// Returns the rows to use: if missing values are interpolated, those in which all signals have values on both
+    /// sides, since two topics in one table do not start and end in the same row; otherwise all `rows`.
     pub(super) fn between_values(&mut self, rows: Range<usize>, time: Option<usize>) -> Range<usize> {
         if !self.options.repair.fill {
             return rows;
@@ -55,7 +55,8 @@ impl TableReader<'_> {
                 names.join(" and ")
             ));
         }
-        // In the first and the last row of the range a missing value lies between values outside the range.
+        // A missing value in the first or the last row of the range has a neighbour outside the range, and is
+        // interpolated here.
         for at in [first, last] {
             for &column in &self.signals {
                 let value = self.between(column, at, &rows, time);
@@ -68,8 +69,8 @@ impl TableReader<'_> {
         kept
     }
 
-    /// Returns a missing value interpolated between its neighbours; `None` if the value is not missing, or if there is
-    /// no value on one side.
+    /// Returns the value interpolated in row `at` between its neighbours; `None` if the value is not missing, or if
+    /// there is no value on one side.
     fn between(&self, column: usize, at: usize, rows: &Range<usize>, time: Option<usize>) -> Option<f64> {
         let source = self.table.columns.get(column)?;
         if !source.values.get(at)?.is_nan() || source.texts.binary_search(&at).is_ok() {
@@ -87,10 +88,10 @@ impl TableReader<'_> {
         value.is_finite().then_some(value)
     }
 
-    /// Returns the times of the signal with the most samples, if it has fewer samples than the table has rows: if two
-    /// topics share a table, each has its own clock.
+    /// Returns the times at which the signal with the most samples has values; `None` unless these are fewer than the
+    /// rows: if two topics share a table, each has its own clock.
     pub(super) fn own_times(&self, rows: &Range<usize>, time: usize, t: &[f64]) -> Option<Vec<f64>> {
-        // If the time itself is a signal, it has a sample in each row; its values have already been moved out of the
+        // If the time itself is a signal, it has a value in each row; its values have already been moved out of the
         // table.
         if self.signals.contains(&time) {
             return None;
@@ -107,7 +108,8 @@ impl TableReader<'_> {
         (densest.len() > 2 && t.len().saturating_sub(densest.len()) > 2).then_some(densest)
     }
 
-    /// Returns the values of a column in use: all values are finite, and missing values are interpolated if requested.
+    /// Returns the values of a column in use; missing values are interpolated if requested, and any other value that is
+    /// not finite is an error.
     pub(super) fn values(&mut self, column: usize, rows: Range<usize>, t: Option<&[f64]>) -> Result<Vec<f64>, IoError> {
         let Some(source) = self.table.columns.get_mut(column) else {
             return Ok(Vec::new());

@@ -11,16 +11,16 @@ use crate::table::Precision;
 use crate::time::sampling::{self, Uneven};
 use crate::wording::list;
 
-/// Maximum number of resampled samples per recorded sample.
+/// Maximum ratio of the number of resampled samples to that of recorded samples.
 const LARGEST_FACTOR: usize = 100;
 
 /// Rows and times from which the samples of a record are taken.
 pub(super) struct TimeGrid {
-    /// Rows of the table in use.
+    /// Rows of the table from which the samples are taken.
     pub(super) rows: Range<usize>,
     pub(super) start_s: f64,
     pub(super) sample_time: SampleTime,
-    /// Number of samples to interpolate from rows with an unevenly spaced t.
+    /// Number of samples that are interpolated from rows with an unevenly spaced t; `None` without resampling.
     pub(super) resampled: Option<usize>,
     /// Values of t in these rows, if t is known to increase.
     pub(super) t: Option<Vec<f64>>,
@@ -63,7 +63,7 @@ impl TableReader<'_> {
             (Some(t), Some(first)) if first.is_finite() => {
                 let last = t.last().copied().unwrap_or(first);
                 let stated = (last - first) / t.len().saturating_sub(1) as f64;
-                // A deviation above one percent exceeds any clock error.
+                // A deviation above one percent is larger than any clock error.
                 if (stated - ts).abs() > 0.01 * ts {
                     self.table.notes.push(format!(
                         "the given sampling frequency of {} Hz is used; t gives {:.6} Hz on average",
@@ -93,7 +93,7 @@ impl TableReader<'_> {
         })
     }
 
-    /// Determines the sampling from the column t, or the sampling to which t is resampled.
+    /// Determines the grid from the column t, or the grid to which the record is resampled.
     fn grid_of_t(&mut self, time: usize, given: Option<SampleTime>) -> Result<TimeGrid, IoError> {
         let too_few = |this: &Self| this.uneven(Uneven::TooFew, &(0..0), &[]);
         let column = self.table.columns.get(time).ok_or_else(|| too_few(self))?;
@@ -223,7 +223,7 @@ impl TableReader<'_> {
         SampleTime::new(ts_s).map_err(|source| self.model(source))
     }
 
-    /// Returns the rows inside the span.
+    /// Returns the range of rows whose time is inside the span.
     fn rows(&self, times: &[f64]) -> Result<Range<usize>, IoError> {
         let (from, to) = self.options.span_s;
         let mut finite = times.iter().copied().filter(|t| t.is_finite());
@@ -231,7 +231,7 @@ impl TableReader<'_> {
             finite.next().unwrap_or(f64::NAN),
             finite.next_back().unwrap_or(f64::NAN),
         );
-        // Tolerance so that a bound that falls on a sample is not affected by rounding.
+        // With this tolerance, a bound that coincides with a sample is not affected by rounding.
         let slack = ((end_s - start_s).abs() / times.len() as f64 * 1e-6).min(1e-6);
         let slack = if slack.is_finite() { slack } else { 0.0 };
         let start = match from {

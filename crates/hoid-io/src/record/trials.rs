@@ -2,10 +2,10 @@
 //! array of structures.
 //!
 //! Each trial becomes a separate record with its own initial states; in a single record of all trials the output after
-//! each boundary would depend on inputs that never occurred. A trial starts where the value of the column changes or
-//! where t decreases. Without `--trial`, trials are recognised only where t decreases: each trial must have at least
-//! [`SHORTEST`] rows, and t must decrease by at least half of its range, which never occurs in a clock correction. If a
-//! column changes exactly where t decreases, it names the trials.
+//! each boundary would depend on inputs that never occurred. A trial starts where the value of the given column changes
+//! or where t decreases. Without `--trial`, trials are recognised only where t decreases: each trial must have at least
+//! [`SHORTEST`] rows, and t must decrease by at least half of its range in the trial before, which never occurs in a
+//! clock correction. If a column changes exactly where t decreases, the trials have the names in this column.
 
 use std::ops::Range;
 
@@ -61,7 +61,7 @@ fn several(file: String, by: &str, names: Vec<&str>) -> IoError {
     }
 }
 
-/// Rows where t decreases.
+/// Returns the rows at which t decreases.
 fn falls(table: &Table<'_>) -> Vec<usize> {
     let time = table.columns.iter().find(|column| column.name == "t");
     let pairs = (1..).zip(time.into_iter().flat_map(|t| pairs(&t.values)));
@@ -71,7 +71,7 @@ fn falls(table: &Table<'_>) -> Vec<usize> {
         .collect()
 }
 
-/// Returns the row ranges between the starting positions.
+/// Returns the row range of each trial; `begins` are the first rows of all trials except the first.
 fn between(begins: &[usize], rows: usize) -> Vec<Range<usize>> {
     let from = std::iter::once(0).chain(begins.iter().copied());
     let to = begins.iter().copied().chain([rows]);
@@ -88,7 +88,7 @@ fn cell(table: &Table<'_>, at: usize, row: usize) -> Option<String> {
     is_text.then(|| table.source.cell(row, at))
 }
 
-/// Divides a table into trials by a column, or by t only.
+/// Divides a table into trials by a column and by t, or by t only.
 fn parts_by(table: &Table<'_>, choice: &TrialChoice) -> Result<Parts, IoError> {
     let mut begins = falls(table);
     if choice.column == "t" {
@@ -114,13 +114,14 @@ fn parts_by(table: &Table<'_>, choice: &TrialChoice) -> Result<Parts, IoError> {
     }))
 }
 
-/// Names the trials by their number.
+/// Numbers the trials; their numbers are their names.
 fn numbered(parts: Vec<Range<usize>>) -> Parts {
     let counted = (1_usize..).zip(parts);
     counted.map(|(number, rows)| (number.to_string(), rows)).collect()
 }
 
-/// Names each trial by the value in its first row and omits trials without one; repeated values are numbered.
+/// Names each trial by the value of the column in its first row and omits trials without a value; a number is appended
+/// to repeated values.
 fn named(parts: Vec<Range<usize>>, label: impl Fn(usize) -> Option<String>) -> Parts {
     let mut found: Vec<(String, usize, Range<usize>)> = Vec::new();
     for rows in parts {
@@ -135,7 +136,8 @@ fn named(parts: Vec<Range<usize>>, label: impl Fn(usize) -> Option<String>) -> P
     found.into_iter().map(name).collect()
 }
 
-/// Returns the trials between restarts of t, and the column that names them; `t` if no column does.
+/// Returns the name of the column that names the trials, or `t` if no column does, and the trials between restarts of
+/// t; `None` if t does not restart.
 fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
     let begins = falls(table);
     let time = table.columns.iter().position(|column| column.name == "t")?;
@@ -154,7 +156,7 @@ fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
             first.is_some() && rows.clone().all(|row| cell(table, at, row) == first)
         };
         let steps = |row: &usize| cell(table, at, *row) != cell(table, at, row.saturating_sub(1));
-        // The changes are compared first because they are few.
+        // The rows at which t decreases are compared first because they are few.
         begins.iter().all(steps) && parts.iter().all(same)
     };
     let is_named = |column: &Column| !column.name.is_empty() && column.name != "t";
@@ -165,8 +167,8 @@ fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
     })
 }
 
-/// Selects a trial from an array of structures, such as `trial(3).e`; also returns whether the user requested this
-/// array.
+/// Selects a trial from an array of structures, such as `trial(3).e`; the second value is true if a trial was selected
+/// or the array was requested, so that the rows need not be divided into trials.
 pub(crate) fn of_contents(
     mut contents: Contents,
     choice: Option<&TrialChoice>,

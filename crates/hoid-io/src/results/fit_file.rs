@@ -26,7 +26,7 @@ pub struct FitParameter {
 /// Contents of a fit file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitFile {
-    /// Parameters that have a value.
+    /// Parameters of the fit that have a value.
     pub parameters: Vec<FitParameter>,
     /// Response to the target; `None` unless the fit has exactly one feedforward input.
     pub feedforward: Option<Feedforward>,
@@ -51,7 +51,7 @@ pub fn is_fit_file(name: &str) -> bool {
         .is_some_and(|ending| ending.eq_ignore_ascii_case("json"))
 }
 
-/// Reads a fit.
+/// Reads a fit from its file.
 ///
 /// # Errors
 /// [`IoError::Unreadable`]; [`IoError::NoFit`].
@@ -62,7 +62,7 @@ pub fn read_fit(path: &Path) -> Result<FitFile, IoError> {
 /// Reads a fit from the text of its file.
 ///
 /// # Errors
-/// [`IoError::NoFit`] for any other object.
+/// [`IoError::NoFit`] for a text that is not such a fit.
 pub fn parse_fit(text: &str, source: &str) -> Result<FitFile, IoError> {
     let found: FitObject = serde_json::from_str(text).map_err(|error| no_fit(source, error.to_string()))?;
     let of = |p: &ParameterObject| {

@@ -15,7 +15,7 @@ use std::ops::Range;
 
 use crate::IoError;
 
-/// Table of columns to be written.
+/// A table of results: comments and columns.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OutputTable {
     /// Comments of the table, one per line.
@@ -33,7 +33,7 @@ pub struct OutputColumn {
     pub values: ColumnValues,
 }
 
-/// Values of one kind.
+/// Values of a column, which are all of one kind.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ColumnValues {
     /// Real numbers; NaN is written as an empty cell.
@@ -55,7 +55,7 @@ pub enum ColumnKind {
     Text,
 }
 
-/// Schema of a table.
+/// Comments, names and kinds of the columns of a table.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct TableSchema {
     /// Comments of the table, one per line.
@@ -87,7 +87,7 @@ impl OutputTable {
         }
     }
 
-    /// Returns the values of a column.
+    /// Returns the values of the column with this name; `None` if there is none.
     #[must_use]
     pub fn column(&self, name: &str) -> Option<&ColumnValues> {
         self.columns.iter().find(|c| c.name == name).map(|c| &c.values)
@@ -119,7 +119,7 @@ impl ColumnValues {
         self.all().len()
     }
 
-    /// True if there are no rows.
+    /// True if the table has no rows.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0

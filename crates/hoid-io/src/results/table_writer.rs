@@ -8,16 +8,17 @@ use crate::IoError;
 use crate::formats::{ColumnsWriter, Format, RowWriter, Writing, format_to_write};
 use crate::output::{WholeFile, write_atomically};
 
-/// Number of rows written at a time. The contents of the file do not depend on how the rows were appended.
+/// Number of rows written at a time, so that the contents of the file do not depend on the groups in which rows were
+/// appended.
 const GROUP: usize = 1 << 16;
 
-/// State of a file between groups of rows.
+/// State of a file between two groups of rows.
 enum Sink {
     Rows(Box<dyn RowWriter>),
     Columns(WaitingColumns),
 }
 
-/// Columns kept until the end, since the length of an array is written before its values.
+/// Columns that are kept until all rows are known, since the length of an array is written before its values.
 struct WaitingColumns {
     write: ColumnsWriter,
     schema: TableSchema,
@@ -87,7 +88,7 @@ pub struct TableWriter {
     file: WholeFile,
     name: String,
     columns: Vec<ColumnSchema>,
-    /// `None` after an error of the operating system: the file may then contain an incomplete group.
+    /// State of the file; `None` after an error of the operating system: the file may then contain an incomplete group.
     sink: Option<Sink>,
     /// Rows that do not yet form a full group.
     waiting: Vec<ColumnValues>,

@@ -1,4 +1,4 @@
-//! Conversion of the keys of a file to a scenario; missing keys have the values of its condition.
+//! Conversion of the keys of a file to a scenario; missing keys have the values of the condition that the file names.
 
 use std::f64::consts::TAU;
 

@@ -191,7 +191,7 @@ impl Source<'_> {
         })
     }
 
-    /// Returns the response to a target, which passes through the neuromuscular system of the operator.
+    /// Returns the person's response to a target, which passes through the neuromuscular system of the operator.
     fn feedforward(
         &self,
         given: FeedforwardTable,
@@ -201,7 +201,7 @@ impl Source<'_> {
         self.checked("feedforward.tau_f_s", given.tau_f_s, Limits::LEAD_S)?;
         let preview_s = self.whole("feedforward.preview_s", given.preview_s, 0.0, scenario.sample_time, 0.0)?;
         let delay_s = given.tau_f_s + preview_s;
-        // A tiny negative sum comes from rounding and is not an input error.
+        // A negative sum close to zero comes from rounding and is not an input error.
         let delay_s = if delay_s.abs() < 1e-12 { 0.0 } else { delay_s };
         if delay_s < 0.0 {
             return Err(self.keys(&format!(
@@ -414,7 +414,7 @@ impl Source<'_> {
     }
 }
 
-/// Admissible range of an operator parameter.
+/// Returns the admissible range of an operator parameter.
 fn limits_of(key: &str) -> Limits {
     match key {
         "T_L_s" | "T_I_s" | "c_1_s" | "c_2_s2" | "tau_e_s" | "K_d_s" => Limits::LEAD_S,

@@ -44,7 +44,7 @@ pub fn parse_any_scenario(text: &str, path: &str, name: &str) -> Result<AnyScena
     Ok(AnyScenario::Family(Box::new(scenario)))
 }
 
-/// True for a file that describes an operator of the family.
+/// True if the text has the key `form` and therefore describes an operator of the family.
 fn has_form(text: &str) -> bool {
     text.parse::<toml::Table>()
         .is_ok_and(|table| table.contains_key("form"))

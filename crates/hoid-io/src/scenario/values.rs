@@ -22,7 +22,7 @@ impl Limits {
     pub(super) const NOISE_GAIN: Self = Self(0.0, 1e6);
     /// Lead times and other times of an operator.
     pub(super) const LEAD_S: Self = Self(-1e3, 1e3);
-    /// Break frequencies of a controlled element, which is unstable if they are negative.
+    /// Break frequencies of a controlled element; a negative frequency makes the element unstable.
     pub(super) const BREAK_RAD_S: Self = Self(-1e4, 1e4);
     /// Frequencies of an operator and of forcing functions.
     pub(super) const FREQUENCY_RAD_S: Self = Self(1e-6, 1e4);
@@ -30,7 +30,7 @@ impl Limits {
     pub(super) const CYCLES: Self = Self(1e-6, 1e6);
     /// Time constants of a remnant.
     pub(super) const TIME_CONSTANT_S: Self = Self(1e-6, 1e4);
-    /// Var(u_n)/var(u), or var(n)/var(u).
+    /// Noise level: var(u_n)/var(u), or var(n)/var(u).
     pub(super) const NOISE_LEVEL: Self = Self(0.0, 100.0);
     pub(super) const PHASE_RAD: Self = Self(-1e6, 1e6);
     /// Rate of a change; 1e6 in 1/s is effectively a step.
@@ -83,8 +83,8 @@ pub(super) struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// Returns a time that is a whole number of samples, from `least` to ten million. A default time may also fail this
-    /// check, if the file gives the sample time.
+    /// Returns a time in s, given or default, after checking that it is a whole number of samples, from `least` to ten
+    /// million. A default time may also fail this check if the file gives the sample time.
     pub(super) fn whole(
         &self,
         key: &str,
@@ -110,7 +110,7 @@ impl Source<'_> {
         })
     }
 
-    /// Returns an optional number, after checking its limits.
+    /// Returns an optional number after checking that it is within its limits.
     pub(super) fn limited(
         &self,
         key: &str,
@@ -128,7 +128,7 @@ impl Source<'_> {
         Err(self.value(key, given.span().start, &in_short(value), &limits.to_string()))
     }
 
-    /// Checks the limits of a number whose line is unknown.
+    /// Checks that a number, whose line in the file is unknown, is within its limits.
     pub(super) fn checked(&self, key: &str, value: f64, limits: Limits) -> Result<(), ScenarioFileError> {
         if limits.hold(value) {
             return Ok(());

@@ -22,15 +22,15 @@ pub struct FileSurvey {
     pub format: &'static str,
     /// Columns in the order of the file.
     pub columns: Vec<ColumnSurvey>,
-    /// Sampling of each structure that has a time; a flat table has one at most.
+    /// Sampling of each structure that has a time; a flat table has at most one.
     pub samplings: Vec<SamplingSurvey>,
     /// Problems with the sampling and the values, listed by structure.
     pub quality_issues: Vec<QualityIssue>,
-    /// Notes on reading.
+    /// Notes about the reading of the file.
     pub notes: Vec<String>,
 }
 
-/// One column.
+/// Overview of one column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColumnSurvey {
     /// Name of the column, or its path in the file.
@@ -75,7 +75,7 @@ pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
     })
 }
 
-/// Returns format, columns and notes of a file.
+/// Returns the format, the columns and the notes of a file.
 fn columns_of(path: &Path, file: &str) -> Result<(&'static Format, Vec<RawColumn>, Vec<String>), IoError> {
     if let Some((format, table)) = long_text(path, file, &ReadOptions::default())? {
         let (columns, notes) = of_table(with_time(table, None)?);

@@ -57,7 +57,8 @@ fn decimal_commas(table: &Table<'_>) -> Vec<String> {
     table.columns.iter().enumerate().filter_map(first_text).collect()
 }
 
-/// Describes numeric columns with some text or infinite cells, with the message with which reading would refuse them.
+/// Describes each numeric column that has some text or infinite cells, with the message that reading it as a signal
+/// would give.
 fn unusable(table: &Table<'_>) -> Vec<String> {
     let first = |(at, column): (usize, &Column)| {
         let numbers = column.values.iter().any(|value| value.is_finite());

@@ -16,7 +16,7 @@ pub struct SamplingSurvey {
     pub sample_time_s: f64,
     /// Largest deviation of a time from the evenly spaced grid, s.
     pub jitter_s: f64,
-    /// Number of gaps.
+    /// Number of gaps in the time.
     pub gaps: usize,
     /// Total number of rows missing in the gaps.
     pub missing: u64,
@@ -24,11 +24,12 @@ pub struct SamplingSurvey {
     pub first_gap_s: Option<f64>,
     /// Number of rows in which the time is constant or runs backwards.
     pub not_increasing: usize,
-    /// Number of rows in which every other column that is not constant repeats the value of the row before.
+    /// Number of rows in which each other column, unless it is constant, repeats its value in the row before.
     pub repeated: usize,
 }
 
-/// Returns the sampling determined by a time; `None` if fewer than two times are finite or none advances.
+/// Returns the sampling that a time column determines; `None` if fewer than two times are finite or the time does not
+/// advance.
 pub(super) fn sampling(time: &RawColumn, columns: &[RawColumn]) -> Option<SamplingSurvey> {
     let t: Vec<f64> = time
         .values
@@ -102,7 +103,7 @@ mod tests {
         let columns = [read("t", t), read("x", x), read("c", vec![1.0; 100])];
         let found = sampling(&columns[0], &columns).unwrap();
         assert!((found.sample_time_s - 0.01).abs() < 1e-5 && (found.jitter_s - 0.002).abs() < 2e-4);
-        // The row after one whose time is constant is two steps late.
+        // The row after a row with constant time is two steps later.
         assert_eq!(
             (found.gaps, found.missing, found.not_increasing, found.repeated),
             (2, 4, 1, 1)

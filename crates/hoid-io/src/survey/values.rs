@@ -21,7 +21,7 @@ pub struct ValueSurvey {
     pub deviation: f64,
     /// True if all values are equal.
     pub constant: bool,
-    /// Step of a quantised column.
+    /// Step of a quantised column; `None` if the column is not quantised.
     pub quantum: Option<f64>,
     /// Number of rows in which a saturated column has its smallest value.
     pub saturated_low: usize,
@@ -41,7 +41,7 @@ pub(super) fn values(all: &[f64]) -> Option<ValueSurvey> {
         return None;
     }
     let n = finite.len() as f64;
-    // Scaled so that the sum does not overflow.
+    // The values are divided by their number before summation, so that the sum does not overflow.
     let mean = if min == max {
         min
     } else {
@@ -70,7 +70,7 @@ pub(super) fn values(all: &[f64]) -> Option<ValueSurvey> {
     })
 }
 
-/// Draws the means of equal parts as bars; a part without finite values is blank.
+/// Draws the mean of each of several equally long parts as a bar; a part without finite values is blank.
 fn sketch(all: &[f64], min: f64, max: f64) -> String {
     let parts = SKETCH.min(all.len());
     let bar = |part: usize| {

@@ -43,7 +43,7 @@ impl Cell {
 /// Remedy for cells for which [`has_decimal_comma`] is true.
 pub(crate) const DECIMAL_COMMA: &str = "write the numbers with a decimal point instead of a comma";
 
-/// True if a text cell would be a number if its comma were a point.
+/// True if a text cell would be a number with a decimal point instead of its comma.
 pub(crate) fn has_decimal_comma(cell: &str) -> bool {
     cell.contains(',') && matches!(Cell::parse(&cell.replacen(',', ".", 1)), Cell::Number(_))
 }

@@ -32,7 +32,7 @@ pub(crate) enum Signal {
 }
 
 impl Signal {
-    /// Returns the columns in the expression.
+    /// Returns the indices of the columns in the expression.
     pub(crate) fn columns(self) -> impl Iterator<Item = usize> {
         let (a, b) = match self {
             Self::Column(a) | Self::Negative(a) => (a, None),
@@ -58,7 +58,7 @@ impl ColumnExpression {
         terms
     }
 
-    /// Returns the texts before and after each hyphen.
+    /// Returns for each hyphen in the text the texts before and after it.
     fn splits(&self) -> impl Iterator<Item = (&str, &str)> {
         let hyphens = self.text.match_indices('-');
         hyphens.filter_map(|(at, hyphen)| {
@@ -67,13 +67,13 @@ impl ColumnExpression {
         })
     }
 
-    /// True if the expression is valid for these columns.
+    /// True if the expression is valid for columns with these names.
     #[must_use]
     pub fn is_among(&self, names: &[&str]) -> bool {
         self.resolve(names, "").is_ok()
     }
 
-    /// Returns the columns in the expression, each with its sign and its index in `names`.
+    /// Returns the sign of each column in the expression and its index in `names`.
     ///
     /// # Errors
     /// [`IoError`] if the expression is not valid for these columns; `file` is the file from which they were read.
@@ -85,7 +85,7 @@ impl ColumnExpression {
         })
     }
 
-    /// Resolves the expression to columns of `names`.
+    /// Resolves the expression to indices of columns in `names`.
     pub(crate) fn resolve(&self, names: &[&str], file: &str) -> Result<Signal, IoError> {
         let find = |name: &str| {
             let name = name.trim();
@@ -110,8 +110,8 @@ impl ColumnExpression {
         match (meanings.as_slice(), splits.as_slice()) {
             ([one], _) => Ok(*one),
             ([], splits) => {
-                // With a single hyphen the wrong one of the two names is known; otherwise the message quotes the whole
-                // text.
+                // If the text contains a single hyphen, the message quotes only the names that do not exist; otherwise
+                // it quotes the whole text.
                 let parts = match splits {
                     [(left, right)] => vec![*left, *right],
                     _ => vec![self.text.strip_prefix('-').unwrap_or(&self.text)],
@@ -194,7 +194,7 @@ mod tests {
         assert_eq!(resolve("-stick-x").unwrap(), Signal::Negative(3));
         assert_eq!(resolve("stick-x-y").unwrap(), Signal::Difference(3, 2));
         assert_eq!(resolve("y - stick-x").unwrap(), Signal::Difference(2, 3));
-        // There is no column d, but r-d is one: the exact name takes precedence.
+        // The text `r-d` is the name of a column, which takes precedence over a difference; there is no column d.
         assert_eq!(resolve("r-d").unwrap(), Signal::Column(5));
     }
 

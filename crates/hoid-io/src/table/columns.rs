@@ -13,8 +13,8 @@ use super::precision::Precision;
 use crate::IoError;
 use crate::wording::{named, shown};
 
-/// Minimum number of separate gaps, and minimum fraction of rows with missing values, in a sparse column. A dropout is
-/// a single gap.
+/// Minimum number of separate gaps in a sparse column, and minimum fraction of its rows without a value. A dropout is a
+/// single gap.
 const SPARSE: (usize, f64) = (5, 0.05);
 
 /// A column of a table.
@@ -35,19 +35,19 @@ pub(crate) struct Column {
     /// Rows whose value was not recorded but computed from other values of the column (`--sparse`), in increasing
     /// order.
     pub(crate) filled_rows: Vec<usize>,
-    /// True if the computed values are held, so that the signal is also constant between rows.
+    /// True if the computed values are held, so that the signal is constant from each recorded value to the next.
     pub(crate) is_held: bool,
     /// Precision of the printed values; kept only for the time.
     pub(crate) precision: Precision,
 }
 
 impl Column {
-    /// True if a row contains neither a number nor text.
+    /// True if the column has neither a number nor text in a row.
     pub(crate) fn is_missing(&self, row: usize) -> bool {
         self.values.get(row).is_none_or(|value| value.is_nan()) && self.texts.binary_search(&row).is_err()
     }
 
-    /// True if values are missing in many places, as in a topic with another rate, and not only in a dropout.
+    /// True if values are missing in many places, as for a topic with another rate, and not only in a dropout.
     pub(crate) fn is_sparse(&self, rows: Range<usize>) -> bool {
         let missing = |row: &usize| self.is_missing(*row);
         let follows = |row: &usize| {
@@ -59,7 +59,7 @@ impl Column {
         places.count() >= SPARSE.0 && count as f64 >= SPARSE.1 * rows.len() as f64
     }
 
-    /// Returns the values of some rows, with NaN for values that were not recorded.
+    /// Returns the values of the column in some rows, with NaN for values that were not recorded.
     pub(crate) fn own_values(&self, rows: Range<usize>) -> Cow<'_, [f64]> {
         let values = self.values.get(rows.clone()).unwrap_or_default();
         if self.filled_rows.is_empty() {
@@ -71,13 +71,13 @@ impl Column {
     }
 }
 
-/// Source of the rows, for messages.
+/// The file from which the rows of a table were read, for messages.
 pub(crate) trait Source {
-    /// Name of the file.
+    /// Returns the name of the file.
     fn file(&self) -> &str;
-    /// Place of a row in the file: "line 12" or "row 12".
+    /// Returns the place of a row in the file: "line 12" or "row 12".
     fn place(&self, row: usize) -> String;
-    /// Contents of a cell, shortened to a readable length.
+    /// Returns the contents of a cell, shortened to a readable length.
     fn cell(&self, row: usize, column: usize) -> String;
     /// True if the file appears to end in the middle of this row.
     fn is_open(&self, _row: usize) -> bool {
@@ -113,7 +113,8 @@ impl Table<'_> {
         self.columns.iter().all(has_none)
     }
 
-    /// Returns the reason why the non-finite value at `row` of a column cannot be used. `rows` are the rows in use.
+    /// Returns the error that explains why the non-finite value of column `at` in a row cannot be used. `rows` are the
+    /// rows in use.
     pub(crate) fn bad_value(&self, at: usize, row: usize, rows: Range<usize>) -> IoError {
         let unknown = Column::default();
         let column = self.columns.get(at).unwrap_or(&unknown);
@@ -122,7 +123,7 @@ impl Table<'_> {
         let found = self.source.cell(row, at);
         let is_last_cell = self.columns.len().checked_sub(1) == Some(at);
         let name = named(&column.name);
-        // If the file is truncated, a sign or a point at its end is the start of a number.
+        // A sign or a point at the end of a truncated file is the start of a number.
         let begun = is_last_cell && self.source.is_open(row) && matches!(found.as_str(), "-" | ".");
         if begun || column.texts.binary_search(&row).is_ok() {
             let remedy = if has_decimal_comma(&found) {
@@ -178,7 +179,7 @@ impl Table<'_> {
     }
 }
 
-/// Remedy for a first row without numbers.
+/// Remedy for a first row of the data without numbers.
 pub(crate) const UNITS_ROW: &str =
     "no column has a number there: if that line names the units, remove it and give them with --unit e=deg,u=deg";
 
@@ -233,11 +234,12 @@ pub(crate) fn read_comments<'a>(comments: impl Iterator<Item = &'a str>, columns
     sample_time_s
 }
 
-/// Calls `set` with each column that a list `NAME WORDS, NAME WORDS` names, and its words.
+/// Calls `set` with each column named in a list `NAME WORDS, NAME WORDS`, and with its words.
 fn for_each_named(list: &str, columns: &mut [Column], set: impl Fn(&mut Column, String)) {
-    // If there are more parts than columns, the rest is ignored.
+    // If the list has more entries than there are columns, the remaining entries are ignored.
     for part in list.split(',').take(columns.len()).map(str::trim) {
-        // A name may contain blanks, and so may its words: the matching column with the longest name applies.
+        // A name may contain blanks, and so may its words: of the columns with a matching name, the one with the
+        // longest name applies.
         let words_of = |column: &Column| {
             let words = part.strip_prefix(column.name.as_str())?;
             words.starts_with(char::is_whitespace).then(|| words.trim().to_owned())

@@ -1,8 +1,8 @@
 //! Recognition of error and control by common column names.
 //!
-//! A column matches if its whole name is a common name, regardless of case; otherwise the only column that contains a
-//! common name as a word matches, such as `Tracking error`, `stick [V]` or `e (deg)`. A single letter counts only as
-//! the first word.
+//! A column matches if its whole name is a common name, regardless of case. If there is no such column, the only column
+//! that contains a common name as a word matches, such as `Tracking error`, `stick [V]` or `e (deg)`. A single letter
+//! counts only as the first word.
 
 /// Common names of the error, the most specific first.
 const ERRORS: [&str; 10] = [
@@ -34,13 +34,13 @@ const CONTROLS: [&str; 13] = [
     "manche",
 ];
 
-/// Returns the column whose name denotes the tracking error.
+/// Returns the column whose name denotes the tracking error; `None` if there is none.
 #[must_use]
 pub fn error_among<'a>(columns: &[&'a str]) -> Option<&'a str> {
     among(columns, &ERRORS)
 }
 
-/// Returns the column whose name denotes the control.
+/// Returns the column whose name denotes the control; `None` if there is none.
 #[must_use]
 pub fn control_among<'a>(columns: &[&'a str]) -> Option<&'a str> {
     among(columns, &CONTROLS)

@@ -3,7 +3,7 @@
 //! | module | contents |
 //! |---|---|
 //! | `columns` | [`Table`]: the columns of a file, and the reasons why a value cannot be used |
-//! | `cell` | [`Cell`]: numbers with a decimal point or comma, words for missing values |
+//! | `cell` | [`Cell`]: numbers with a decimal point or comma, missing values, text |
 //! | `precision` | [`Precision`]: the number of digits with which a column is printed |
 //! | `column_expression` | [`ColumnExpression`]: choice of the input and output columns |
 //! | `selection` | selection of the columns that are kept |

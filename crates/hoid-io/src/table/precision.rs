@@ -1,6 +1,6 @@
 //! Precision of the printed numbers of a column.
 
-/// Largest number of decimals at which rounding of times is recognised (1 µs).
+/// Largest number of decimals at which rounding of binary times is recognised (1 µs).
 const MOST_DECIMALS: i32 = 6;
 
 /// Precision with which a column of decimal numbers is printed.
@@ -8,7 +8,7 @@ const MOST_DECIMALS: i32 = 6;
 pub(crate) struct Precision {
     /// Largest number of decimals of any value; `None` if the values come from binary numbers that were not rounded.
     decimals: Option<i32>,
-    /// Largest number of significant digits of any value.
+    /// Largest number of significant digits of any value; 0 if only the decimals are known.
     significant: i32,
 }
 
@@ -23,8 +23,8 @@ impl Precision {
 
     /// Determines the precision of times stored as binary numbers. If a recorder rounds its times, for example to
     /// tenths of a ms, all times are multiples of one unit of the last decimal, from which the rounding is recognised.
-    /// The deviation of a rounded number from the multiple is below two units of its last binary digit; for the numbers
-    /// of decimals tried here such a small deviation does not occur by chance.
+    /// A rounded number deviates from such a multiple by less than two units of its last binary digit; for the numbers
+    /// of decimals tried here, numbers that were not rounded do not come so close by chance.
     pub(crate) fn of_times(values: &[f64], single: bool) -> Self {
         if single {
             return Self::single();
@@ -40,12 +40,12 @@ impl Precision {
         }
     }
 
-    /// Includes another printed number.
+    /// Updates the precision with another printed number of the column.
     pub(crate) fn add(&mut self, text: &str) {
         self.add_bytes(text.trim().as_bytes());
     }
 
-    /// Includes another printed number, which must have no surrounding blanks.
+    /// Updates the precision with another printed number, which must have no surrounding blanks.
     pub(crate) fn add_bytes(&mut self, text: &[u8]) {
         let mut parts = text.splitn(2, |byte| matches!(byte, b'e' | b'E'));
         let digits = parts.next().unwrap_or_default();
@@ -66,13 +66,13 @@ impl Precision {
         self.significant = self.significant.max(count(significant));
     }
 
-    /// Includes the numbers of another part of the column.
+    /// Updates the precision with that of another part of the column.
     pub(crate) fn join(&mut self, other: Self) {
         self.decimals = self.decimals.max(other.decimals);
         self.significant = self.significant.max(other.significant);
     }
 
-    /// Includes another number with the given number of decimals.
+    /// Updates the precision with another number that has the given number of decimals.
     pub(crate) fn add_decimals(&mut self, decimals: usize) {
         self.decimals = Some(self.decimals.unwrap_or(0).max(decimals as i32));
     }
@@ -136,7 +136,7 @@ mod tests {
         for t in [0.0, 0.0167, 45.0] {
             assert!((fixed.unit(t) - 1e-4).abs() < 1e-18, "{t}");
         }
-        // Five significant digits, as some programs print: at 100 s the last digit is 0.01.
+        // Some programs print five significant digits: at 100 s one unit of the last digit is 0.01.
         let significant = precision(&["0", "0.016667", "1.0167", "100.02"]);
         assert!((significant.unit(100.02) - 1e-2).abs() < 1e-15);
         assert!((significant.unit(0.016667) - 1e-6).abs() < 1e-18);
@@ -156,7 +156,7 @@ mod tests {
         }
         assert!(precision(&["0.30000000000000004"]).unit(0.3) < 1e-15);
         assert_eq!(Precision::default().unit(3.0), 0.0);
-        // Any content of a file gives a number of s.
+        // The unit is a number for any content of a file.
         assert!(precision(&["1e-99999999999", ".", "-", "e"]).unit(1e300) >= 0.0);
     }
 
@@ -170,7 +170,7 @@ mod tests {
         let exact: Vec<f64> = times(60.0).collect();
         assert_eq!(Precision::of_times(&exact, false).unit(45.0), 0.0);
         assert_eq!(Precision::of_times(&exact, true), Precision::single());
-        // A t with NaN is handled elsewhere.
+        // Times with NaN are reported elsewhere; here NaN is ignored.
         assert_eq!(Precision::of_times(&[f64::NAN, 0.5], false).unit(1.0), 0.1);
     }
 }

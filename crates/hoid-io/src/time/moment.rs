@@ -71,7 +71,7 @@ impl Moments {
         column.values.push(seconds(ns, first));
     }
 
-    /// A number was found in the column: its apparent clock times are treated as text.
+    /// Called if a number was found in the column: its apparent clock times are then treated as text.
     pub(crate) fn refuse(&mut self, column: &mut Column) {
         if let Self::From(_) = std::mem::replace(self, Self::No) {
             column.moments = false;
@@ -88,11 +88,12 @@ impl Moments {
 
 /// Returns the time between two clock times in s.
 pub(crate) fn seconds(ns: i64, from: i64) -> f64 {
-    // The result is exact below 2^53 ns, about a hundred days.
+    // The number of ns is exact below 2^53, which is about a hundred days.
     i128::from(ns).saturating_sub(i128::from(from)) as f64 / NS_PER_S as f64
 }
 
-/// Returns the number of days since 1970. Year first with hyphens or slashes, day first with points.
+/// Returns the number of days from 1 January 1970 to a date, whose year comes first or last; `None` for other text.
+/// With points the day comes first, with slashes the month or the day.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "numbers of at most five digits, in 64 bits"
@@ -105,11 +106,12 @@ fn days_of(date: &str) -> Option<i64> {
     let (year, month, day) = match mark {
         '.' => (c, b, a),
         _ if a.len() == 4 => (a, b, c),
-        // Otherwise month or day comes first; which of them is unknown, and does not matter within one day.
+        // Otherwise the month or the day comes first. It is unknown which of them, but this does not matter within one
+        // day.
         _ => (c, a, b),
     };
     let (year, month, day) = (year.len() == 4).then_some((number(year)?, number(month)?, number(day)?))?;
-    // With slashes the day may come first.
+    // With slashes the day comes first if the month would exceed 12.
     let (month, day) = if mark == '/' && month > 12 {
         (day, month)
     } else {
@@ -128,8 +130,8 @@ fn days_of(date: &str) -> Option<i64> {
     Some(of_years + (153 * month + 2) / 5 + day - 1 - 719_468)
 }
 
-/// Parses a time of day such as `10:11:12.5`, optionally followed by `Z`, `+02:00`, AM or PM; returns ns since midnight
-/// UTC and the number of decimals.
+/// Parses a time of day such as `10:11:12.5`, optionally followed by `Z`, `+02:00`, AM or PM; returns the number of ns
+/// since midnight UTC and the number of decimals of the seconds.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "numbers of at most three digits and a fraction of 1e9 ns, in 64 bits"
@@ -191,7 +193,7 @@ mod tests {
 
     #[test]
     fn moments_against_the_clock_of_unix() {
-        // date -u -d '2024-03-05 10:11:12' +%s
+        // Result of `date -u -d '2024-03-05 10:11:12' +%s`.
         let s = 1_709_633_472 * NS_PER_S;
         for (cell, ns) in [
             ("2024-03-05T10:11:12Z", s),

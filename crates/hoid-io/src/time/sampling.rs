@@ -41,11 +41,11 @@ pub(crate) struct Sampling {
     pub(crate) note: Option<String>,
 }
 
-/// Returns the sample time in s of evenly spaced times that do not come from a file. The rules are those for files:
-/// rounding of the times is detected.
+/// Returns the sample time in s of evenly spaced times that do not come from a file. The rules are those for files: a
+/// possible rounding of the times is detected.
 ///
 /// # Errors
-/// The row, counted from 0, at which the spacing is uneven.
+/// The index of the row, counted from 0, at which the spacing is uneven.
 pub fn even_times(t: &[f64]) -> Result<f64, usize> {
     match even(t, Precision::of_times(t, false), None) {
         Ok(sampling) => Ok(sampling.sample_time_s),
@@ -129,7 +129,7 @@ pub(crate) fn typical(t: &[f64], precision: Precision) -> Result<f64, Uneven> {
 }
 
 fn increasing(t: &[f64]) -> Result<(), Uneven> {
-    // Written so that NaN also counts as not increasing.
+    // The condition is formulated so that NaN also counts as not increasing.
     let standing =
         |(_, (before, next)): &(usize, (f64, f64))| next.partial_cmp(before) != Some(std::cmp::Ordering::Greater);
     match (1..).zip(pairs(t)).find(standing) {
@@ -149,16 +149,16 @@ pub(crate) fn steps(values: &[f64]) -> impl Iterator<Item = f64> {
     pairs(values).map(|(value, next)| next - value)
 }
 
-/// Stride at which about a million steps of a long time are used for its median.
+/// Returns the stride at which at most about two million steps of a long time are used for its median.
 pub(crate) fn every(times: usize) -> usize {
     (times >> 20).max(1)
 }
 
-/// Rounding error of a printed t.
+/// Rounding error of the times as printed in a file.
 #[derive(Clone, Copy)]
 struct Rounding {
     precision: Precision,
-    /// Result of [`Precision::fixed_unit`], with which nearly all times need no logarithm.
+    /// Result of [`Precision::fixed_unit`], which avoids a logarithm for nearly all times.
     fixed: (f64, f64),
     median_step_s: f64,
 }
@@ -242,7 +242,7 @@ mod tests {
         assert_eq!(even_times(&[0.0]), Err(0));
     }
 
-    /// Times as a file with a given number of decimals prints them.
+    /// Returns times as a file with a given number of decimals prints them.
     fn printed(times: impl Iterator<Item = f64>, decimals: usize) -> (Vec<f64>, Precision) {
         let mut precision = Precision::default();
         let t = times
@@ -275,7 +275,7 @@ mod tests {
                 }
             }
         }
-        // Alternating steps of 0.01 and 0.02.
+        // The printed steps alternate between 0.01 and 0.02.
         let (t, precision) = printed(grid(2000, 0.0, 1.0 / 60.0), 2);
         assert_eq!(even(&t, precision, None).unwrap().sample_time_s, 1.0 / 60.0);
     }
@@ -326,7 +326,7 @@ mod tests {
             assert_eq!((row, missing, gaps), (399, 1, 2), "{decimals} decimals");
             assert!((sample_time_s - 0.01).abs() < 1e-4);
         }
-        // Counts instead of s.
+        // The times are counts of samples instead of s.
         let (mut t, precision) = printed(grid(50, 0.0, 1.0), 0);
         t.remove(20);
         assert!(matches!(
@@ -353,7 +353,7 @@ mod tests {
             panic!("not found");
         };
         assert_eq!(row, 321);
-        // One sample of 1000 moves neither end of the grid.
+        // A deviation of one sample in 1000 moves neither end of the grid.
         assert!((deviation_s - 0.002).abs() < 1e-9 && (tolerance_s - 1e-5).abs() < 1e-9);
         t[321] -= 0.001_995;
         assert!(even(&t, precision, None).is_ok());

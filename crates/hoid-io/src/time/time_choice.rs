@@ -76,7 +76,7 @@ impl FromStr for TimeChoice {
         let (column, unit) = match text.rsplit_once(':') {
             Some((column, unit)) => match Unit::of(unit.trim()) {
                 Some(unit) => (column.trim(), Some(unit)),
-                // Paths of matrix rows and columns in MATLAB and numpy contain colons: `ans(1,:)`.
+                // A colon in the path of a matrix row or column, such as `ans(1,:)`, does not precede a unit.
                 None if unit.starts_with([')', ',', ']']) => (text, None),
                 None => {
                     return Err(refuse(

@@ -1,6 +1,6 @@
 //! Recognition of the time column under the name and in the unit that a recorder uses.
 //!
-//! The time is the column t, in s. If there is no such column, the first of these columns that exists is used:
+//! The time is the column t, in s. If there is no such column, the first of the following columns that exists is used:
 //! 1. the only column whose name denotes a time, with or without a unit: `Time (s)`, `Zeit [s]`, `time_ns`, `elapsed`,
 //!    `%time`;
 //! 2. the only column with time stamps: dates and clock times as text or as a data type, or numbers counted from 1970
@@ -9,10 +9,10 @@
 //! 4. the first column if it has no name, or the first row or column of a matrix, if its values increase from row to
 //!    row and are not row numbers.
 //!
-//! `--time COLUMN[:unit]` takes precedence. The unit is taken from the name. Without a unit in the name, it follows
-//! from the size of numbers counted from 1970 (1e11 s would be the year 5138), or else from the steps: integers at
-//! least 5 apart are not taken as s, but in the unit that gives a sampling frequency from 2 to 2000 Hz. The choice is
-//! reported.
+//! A column selected by `--time COLUMN[:unit]` takes precedence. The unit is taken from the name. Without a unit in the
+//! name, it follows from the size of numbers counted from 1970 (1e11 s would be the year 5138), or else from the steps:
+//! integers at least 5 apart are taken to be in the unit that gives a sampling frequency from 2 to 2000 Hz, and not in
+//! s. The choice is reported.
 
 use super::sampling::{pairs, steps};
 use super::time_choice::{TimeChoice, Unit};
@@ -20,11 +20,11 @@ use crate::IoError;
 use crate::table::{Column, Precision, Table};
 use crate::wording::{did_you_mean, list, named, shown};
 
-/// Numbers above this limit in a time stamp column are counted from 1970: 1e8 s falls in 1973.
+/// Size above which the numbers in a time stamp column are taken to be counted from 1970: 1e8 s falls in 1973.
 const STAMP: f64 = 1e8;
-/// Median step from which on integer times are assumed not to be in s.
+/// Median step above which integer times are assumed not to be in s.
 const STEP_OF_NO_SECONDS: f64 = 5.0;
-/// Largest sampling frequency in Hz at which the unit is inferred from the steps.
+/// Largest sampling frequency that is assumed when the unit is inferred from the steps, Hz.
 const MOST_HZ: f64 = 2000.0;
 
 /// Column names that denote a time.
@@ -39,7 +39,7 @@ const WORDS: [&str; 9] = [
     "elapsed time",
     "elapsedtime",
 ];
-/// Column names that denote a time stamp; such a column may also hold the time of day or a count.
+/// Column names that denote a time stamp; a column with such a name may also hold the time of day or a count.
 const STAMPS: [&str; 5] = ["timestamp", "stamp", "datetime", "date time", "date"];
 
 /// Role of a column, as its name suggests.
@@ -90,7 +90,7 @@ pub(crate) fn may_be_time(at: usize, name: &str, choice: Option<&TimeChoice>) ->
         || (at == 0 && name.is_empty())
 }
 
-/// Returns the table with a column t in s, if a column was recognised or selected as the time.
+/// Returns the table, in which the column recognised or selected as the time, if any, is named t and is in s.
 pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -> Result<Table<'a>, IoError> {
     let found = match choice {
         Some(choice) => Some(chosen(&table, choice)?),
@@ -150,7 +150,7 @@ fn only(table: &Table<'_>, is_meant: impl Fn(usize, &Column) -> bool) -> Option<
     meant.next().filter(|_| meant.next().is_none())
 }
 
-/// Finds the time column by its name, type or position.
+/// Finds the time column by its name, type or position; also returns its unit, if known.
 fn found(table: &Table<'_>) -> Option<(usize, Option<Unit>)> {
     let is_constant = |values: &[f64]| values.iter().all(|value| values.first() == Some(value));
     let unit = |at: usize| match table.columns.get(at).map(|column| column_role(&column.name)) {

@@ -151,7 +151,7 @@ impl Shared {
             });
         let samples: Samples = samples.collect();
         if let (Some(live), false) = (&run.live, samples.is_empty()) {
-            // If the estimate has ended early, its missing lines show this.
+            // If the thread of the estimate has ended, the error is ignored: the missing lines show it.
             let _ = live.send(samples);
         }
         let refused = match run.log.append(batch) {
@@ -163,7 +163,7 @@ impl Shared {
         Err(refused)
     }
 
-    /// Ends a run that has all its ticks.
+    /// Ends a run of which all ticks have been received.
     pub(super) fn finish(
         self: &Arc<Self>,
         state: &mut Current,

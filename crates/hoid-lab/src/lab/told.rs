@@ -95,7 +95,7 @@ impl Shared {
     }
 }
 
-/// Returns the runs with new verdicts from the current state of their files.
+/// Returns the runs that have ended, each with a new verdict on the current state of its files.
 fn judged_again(session: &Session) -> Vec<Done> {
     let again = |done: &Done| {
         let checked = check(&session.stem(&done.condition, done.number));

@@ -1,7 +1,7 @@
 //! Journal of a run in progress: each line is complete or absent.
 //!
-//! A line is complete if it has its line end. If a batch cannot be written completely, it is undone: the files are
-//! truncated to the last complete batch, and the ticks of a batch count only once all three files contain them. A
+//! A line is complete if it has its line end. If a batch cannot be written completely, the write is undone: the files
+//! are truncated to the last complete batch, and the ticks of a batch count only once all three files contain them. A
 //! temporarily full disk therefore leaves no partial line before later lines; the run is ended and is *unverified*.
 //! After a power failure the files are used only up to the last complete line.
 //!
@@ -94,7 +94,7 @@ pub struct Batch {
 #[derive(Debug)]
 pub struct RunLog {
     files: [(PathBuf, File); 3],
-    /// Size of the complete batches in each file in bytes.
+    /// Size in bytes of the complete batches in each file.
     whole: [u64; 3],
     synced: Instant,
     logged: usize,
@@ -185,14 +185,14 @@ impl RunLog {
         Ok(())
     }
 
-    /// Truncates the files to the last complete batch. If this fails, it is done when the session is next opened.
+    /// Truncates the files to the last complete batch. A failure is ignored, since an incomplete line is never read.
     fn truncate_to_last_batch(&self) {
         for ((_, file), whole) in self.files.iter().zip(self.whole) {
             let _ = file.set_len(whole);
         }
     }
 
-    /// Number of logged ticks.
+    /// Returns the number of logged ticks.
     pub fn ticks(&self) -> usize {
         self.logged
     }

@@ -61,7 +61,7 @@ pub struct RunStart {
 pub enum RunEnd {
     /// Completed.
     Finished,
-    /// Aborted by the person, by closing the window, or by the end of the server.
+    /// Aborted by the person, by closing the window, or because the server ended.
     Interrupted,
 }
 
@@ -73,7 +73,7 @@ pub struct Ended {
     pub how: RunEnd,
     /// Time of the end in UTC.
     pub utc: String,
-    /// Numbers counted by the page, such as events not made by hand, or the memory of the page in MB.
+    /// Quantities measured by the page, such as the number of events not made by hand, or the memory of the page in MB.
     #[serde(default)]
     pub counted: BTreeMap<String, f64>,
     /// SHA-256 hashes of the files of ticks, events and frames, in that order.
@@ -89,7 +89,7 @@ impl RunStart {
     /// # Errors
     /// [`LabError::Io`].
     pub fn write(&self, stem: &Stem, task: &Task) -> Result<(), LabError> {
-        // Both tables get the length of the target, which extends beyond the end of the run by the preview.
+        // The disturbance is extended to the length of the target, which exceeds that of the run by the preview.
         let mut disturbance = task.disturbance.clone();
         disturbance.resize(task.target.len(), 0.0);
         let column = |name: &str, values: Vec<f64>| OutputColumn {
@@ -107,7 +107,7 @@ impl RunStart {
         write_json(&stem.file("run.json"), self)
     }
 
-    /// Reads the file.
+    /// Reads `run.json`.
     ///
     /// # Errors
     /// [`LabError::Damaged`], [`LabError::Io`].
@@ -150,7 +150,7 @@ impl RunStart {
 }
 
 impl Ended {
-    /// Writes the file.
+    /// Writes `end.json`.
     ///
     /// # Errors
     /// [`LabError::Io`].
@@ -158,7 +158,7 @@ impl Ended {
         write_json(&stem.file("end.json"), self)
     }
 
-    /// Reads the file; `None` if the run has not ended.
+    /// Reads `end.json`; `None` if the run has not ended.
     ///
     /// # Errors
     /// [`LabError::Damaged`], [`LabError::Io`].
@@ -170,7 +170,7 @@ impl Ended {
         read_json(&path).map(Some)
     }
 
-    /// Returns the hashes of the current files; an empty text for a missing file.
+    /// Returns the SHA-256 hashes of the appended files in their current state; an empty text for a missing file.
     ///
     /// # Errors
     /// [`LabError::Io`].

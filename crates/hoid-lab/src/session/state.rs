@@ -158,8 +158,8 @@ impl Session {
         Ok(begun)
     }
 
-    /// Opens a session. Runs that were interrupted by the end of a server, or whose files are missing or truncated, are
-    /// closed as unverified.
+    /// Opens a session and evaluates the runs that are missing in `runs.csv`. A run without `end.json` or with a
+    /// damaged `run.json` becomes unverified.
     ///
     /// # Errors
     /// [`LabError::Damaged`] for a folder without a session; errors of writing files.
@@ -220,7 +220,7 @@ impl Session {
         (0..self.facts.plan.len()).find(|place| !finished(place))
     }
 
-    /// Returns a number for a new run.
+    /// Returns the number of a new run, one more than that of the last run that was started.
     ///
     /// # Errors
     /// [`LabError::Io`].
@@ -240,7 +240,7 @@ impl Session {
     /// Errors of reading or writing files.
     pub fn end(&mut self, stem: &Stem, how: RunEnd, counted: BTreeMap<String, f64>) -> Result<Checked, LabError> {
         if !APPENDED.iter().any(|end| stem.file(end).exists()) {
-            // The run ended before its first tick.
+            // The run ended before its first tick: empty files are created.
             drop(RunLog::create(stem, 0)?);
         }
         Ended {
@@ -259,7 +259,7 @@ impl Session {
         Ok(checked)
     }
 
-    /// Appends a finished run to `runs.csv`.
+    /// Appends a run that has ended to `runs.csv`.
     fn note(&mut self, stem: &Stem, checked: &Checked) -> Result<(), LabError> {
         let begun = RunStart::read(stem)?;
         let done = Done {
@@ -300,7 +300,7 @@ impl Session {
         })
     }
 
-    /// Appends a line, completely or not at all, after the last complete line.
+    /// Appends a line to `runs.csv`, completely or not at all, after the last complete line.
     fn write_down(&mut self, done: Done) -> Result<(), LabError> {
         let path = self.folder.join("runs.csv");
         let whole = if path.exists() {
@@ -360,7 +360,8 @@ fn directories(of: &Path, prefix: &str) -> Result<Vec<PathBuf>, LabError> {
     Ok(found)
 }
 
-/// Returns the row of a person: the row in their first session, or else the number of people before them.
+/// Returns the row of the Latin square for a person: the row in their first session, or else the number of people
+/// before them.
 fn row_of(out: &Path, subject: &str) -> Result<usize, LabError> {
     let mut others = 0_usize;
     for person in directories(out, "sub-")? {

@@ -1,4 +1,4 @@
-//! Zero-order and first-order hold, by the matrix exponential.
+//! Zero-order and first-order hold, computed by the matrix exponential.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -18,7 +18,7 @@ pub(super) fn hold(
     let magnitude = (1..=n).map(|k| h.den()[k].abs().powf(1.0 / k as f64));
     let alpha = magnitude.fold(1.0 / ts, f64::max);
 
-    // Controllable canonical form in p = s/alpha; x[i] = p^i / den(p) u.
+    // The state is in controllable canonical form in p = s/alpha: x[i] = p^i / den(p) u.
     let mut extended = DMatrix::zeros(n + 2, n + 2);
     let mut output = DVector::zeros(n);
     let offset = n + 1 - h.num().len();
@@ -42,7 +42,7 @@ pub(super) fn hold(
     for i in 0..n {
         difference[(i, i)] -= 1.0;
     }
-    // With the triangle hold, the state depends on u(k) and u(k + 1), but x - Gamma_2 u depends only on u(k).
+    // With the triangle hold, the state x depends on u(k) and u(k + 1), but x - Gamma_2 u depends only on u(k).
     let drive = if triangle {
         &over_sample.constant + &difference * &over_sample.slope
     } else {
@@ -76,8 +76,8 @@ pub(super) fn hold(
         num[i + 1] += b;
     }
     if fraction != 0.0 {
-        // An output read within a sample depends on the input at the start of that sample; `ahead` is the coefficient
-        // of the input at its end.
+        // An output read within a sample depends on the inputs at the start and, with the triangle hold, at the end of
+        // that sample; `ahead` is the coefficient of the input at the end.
         num.insert(0, 0.0);
         for (n, d) in num.iter_mut().zip(&den) {
             *n += ahead * d;

@@ -25,19 +25,20 @@ pub(super) fn matched(h: &ContinuousTransferFunction, ts: f64) -> Option<(Vec<f6
     Some((num.iter().map(|c| gain * c).collect(), image(&poles, ts)))
 }
 
-/// `prod (z - e^{p Ts})` in descending powers of z.
+/// Returns `prod (z - e^{p Ts})` over the roots p, in descending powers of z.
 fn image(roots: &[Complex64], ts: f64) -> Vec<f64> {
     polynomial::from_roots(&roots.iter().map(|p| (p * ts).exp()).collect::<Vec<_>>())
 }
 
-/// `prod p / (e^{p Ts} - 1)`: the factors `s - p` at s = 0, divided by their images at z = 1.
+/// `prod p / (e^{p Ts} - 1)` over the roots p: the factors `s - p` at s = 0, divided by their images `z - e^{p Ts}` at
+/// z = 1.
 fn static_ratio(roots: &[Complex64], ts: f64) -> f64 {
     let ratio = |p: &Complex64| {
         let z = p * ts;
         if z.norm() < 1e-8 {
             return (1.0 - z / 2.0) / ts;
         }
-        // e^z - 1 without cancellation for small z.
+        // The real part of e^z - 1 is computed without cancellation for small z.
         let sine = (z.im / 2.0).sin();
         let real = z.re.exp_m1() * z.im.cos() - 2.0 * sine * sine;
         p / Complex64::new(real, z.re.exp() * z.im.sin())

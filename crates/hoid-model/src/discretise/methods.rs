@@ -1,4 +1,4 @@
-//! The methods of Table 5.2; some of them are substitutions `s = c (z - 1) / q(z)`.
+//! The methods of discretisation in Table 5.2; some of them are substitutions `s = c (z - 1) / q(z)`.
 
 use super::hold::hold;
 use super::matched::matched;
@@ -7,9 +7,9 @@ use crate::{ContinuousTransferFunction, DiscreteTransferFunction, ModelError, Sa
 /// Method of discretisation of a continuous transfer function.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Method {
-    /// Rectangle rule at the start of the sample.
+    /// Rectangle rule with the value at the start of each sample.
     ForwardEuler,
-    /// Rectangle rule at the end of the sample.
+    /// Rectangle rule with the value at the end of each sample.
     BackwardEuler,
     /// Trapezoid rule (bilinear transformation).
     Tustin,
@@ -35,7 +35,7 @@ const LONGEST_DELAY_SAMPLES: f64 = 1e6;
 /// # Errors
 /// [`ModelError::OutOfRange`] if the delay is not an integer number of samples (the two holds accept any delay) or the
 /// prewarping frequency is not between 0 and pi/Ts; [`ModelError::TransferFunction`] if the method maps a pole to
-/// infinity or the result is not finite.
+/// infinity or a coefficient of the result is not finite.
 pub fn discretise(
     h: &ContinuousTransferFunction,
     sample_time: SampleTime,
@@ -102,8 +102,8 @@ fn substitute(h: &ContinuousTransferFunction, c: f64, q: [f64; 2]) -> Result<(Ve
     let den = substitute_in_polynomial(h.den(), order, c, q);
     let powers = (0..=order).rev().map(|k| c.powi(k as i32));
     let size: f64 = h.den().iter().zip(powers).map(|(a, c)| (a * c).abs()).sum();
-    // The leading coefficient is the value of the denominator at s = c (backward Euler, Tustin), which is zero if a
-    // pole lies there.
+    // With backward Euler and Tustin, the leading coefficient is the value of the denominator at s = c, which is zero
+    // if a pole is at s = c.
     if q[0] != 0.0 && den[0].abs() <= 1e-13 * size {
         return Err(ModelError::TransferFunction {
             found: format!("{:?} / {:?}", h.num(), h.den()),
@@ -115,7 +115,8 @@ fn substitute(h: &ContinuousTransferFunction, c: f64, q: [f64; 2]) -> Result<(Ve
     Ok((substitute_in_polynomial(h.num(), order, c, q), den))
 }
 
-/// `q(z)^order p(c (z - 1) / q(z))` for p in descending powers of s, of degree `order` or less.
+/// Returns `q(z)^order p(c (z - 1) / q(z))` in descending powers of z, for p in descending powers of s, of degree
+/// `order` or less.
 fn substitute_in_polynomial(p: &[f64], order: usize, c: f64, q: [f64; 2]) -> Vec<f64> {
     let mut result = vec![p[0]];
     let mut q_power = vec![1.0];

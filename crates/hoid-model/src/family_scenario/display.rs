@@ -1,4 +1,4 @@
-//! The display: the signals of the task that a person sees.
+//! The display of a task: the signals that the person sees.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Display {
-    /// Error only.
+    /// The person sees only the error.
     #[default]
     Compensatory,
-    /// Target and output.
+    /// The person sees the target and the output.
     Pursuit,
-    /// Output, target, and future target.
+    /// The person sees the output, the target and the future target.
     Preview,
 }
 

@@ -17,7 +17,7 @@ use crate::{
 /// A target or a disturbance.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Excitation {
-    /// Sinusoids of the signal; empty for no signal.
+    /// Sinusoids of the signal; empty if there is no signal.
     pub function: ForcingFunction,
     /// True if new phases, uniform over the circle, are drawn for each run.
     pub random_phases: bool,
@@ -36,16 +36,16 @@ pub struct MultiSine {
     pub interleaved: Interleaved,
 }
 
-/// Selection of primes, which gives a target and a disturbance separate lines.
+/// Selection of primes, by which a target and a disturbance can have different lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Interleaved {
     /// All primes.
     #[default]
     All,
-    /// The second, fourth, ... prime: 3, 7, 13 ...
+    /// The second, fourth, ... prime number: 3, 7, 13 ...
     Even,
-    /// The first, third, ... prime: 2, 5, 11 ...
+    /// The first, third, ... prime number: 2, 5, 11 ...
     Odd,
 }
 
@@ -77,8 +77,8 @@ impl MultiSine {
     /// Returns the excitation; its phases are random in each run.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] for a period that is not positive, an rms that is not finite, or a largest multiple
-    /// outside 2 to 10000.
+    /// [`ModelError::OutOfRange`] for a period that is not positive or not finite, an rms that is negative or not
+    /// finite, or a largest multiple outside 2 to 10000 or below the first selected prime.
     pub fn excitation(&self) -> Result<Excitation, ModelError> {
         let refuse = |quantity, found, expected| {
             Err(ModelError::OutOfRange {

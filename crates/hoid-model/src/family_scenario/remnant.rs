@@ -8,8 +8,8 @@
 //! where g and h are normal, b = 1 with probability `lambda Ts` and 0 otherwise (Poisson pulses), and s is 1 or 0 (on
 //! or off) for exponentially distributed times with means `T_on` and `T_off`, `D = T_on/(T_on + T_off)`. The factor m
 //! is given by `m^2 = 1 - c + c r^2/E r^2`, where r^2 is the running mean square of u or of its rate and `E r^2` is its
-//! mean over the whole run. The factors of g(k) and h(k) do not depend on these two numbers, so that w is white with
-//! unit variance, and the filter alone determines the spectrum and the strength of the remnant.
+//! mean over the whole run. The factors of g(k) and h(k) are independent of g(k) and h(k), so that w is white with unit
+//! variance, and the filter alone determines the spectrum and the strength of the remnant.
 //!
 //! | part | source |
 //! |---|---|
@@ -22,10 +22,10 @@
 
 use crate::{ModelError, polynomial, remnant::HIGHEST_ORDER};
 
-/// The shaping filter of a part.
+/// Shaping filter of a part of the remnant.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RemnantShape {
-    /// `1`: white.
+    /// `1`: the part is white.
     White,
     /// `1/(T_n s + 1)^m`, discretised by an exact hold. With a T_n of many seconds, the part is a slow drift.
     Lag {
@@ -62,12 +62,12 @@ pub enum PartStrength {
     },
 }
 
-/// Signal that drives a signal-dependent remnant.
+/// Signal on which a signal-dependent part of the remnant depends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Followed {
-    /// The running rms of u.
+    /// The part depends on the running rms of u.
     Control,
-    /// The running rms of the rate of u.
+    /// The part depends on the running rms of the rate of u.
     Rate,
 }
 
@@ -78,27 +78,27 @@ crate::named_choice!(Followed, "signal that a remnant follows", 2, { Control => 
 pub struct SignalDependence {
     /// Signal that determines the standard deviation.
     pub follows: Followed,
-    /// c: share of the variance that depends on the signal, 0 to 1.
+    /// c: share of the variance of the part that depends on the signal, 0 to 1.
     pub part: f64,
     /// Memory length of the running mean square, s.
     pub memory_s: f64,
 }
 
-/// Poisson pulses.
+/// Poisson pulses in a part of the remnant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pulses {
-    /// p: share of the variance in pulses, 0 to 1.
+    /// p: share of the variance of the part that is due to pulses, 0 to 1.
     pub part: f64,
     /// lambda: mean number of pulses per second.
     pub rate_per_s: f64,
 }
 
-/// Switching of a part on and off.
+/// Switching of a part of the remnant on and off.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intermittence {
-    /// Mean time T_on, s.
+    /// Mean duration T_on for which the part is on, s.
     pub on_s: f64,
-    /// Mean time T_off, s.
+    /// Mean duration T_off for which the part is off, s.
     pub off_s: f64,
 }
 
@@ -109,11 +109,11 @@ pub struct RemnantPart {
     pub shape: RemnantShape,
     /// Strength of the part.
     pub strength: PartStrength,
-    /// Dependence on u, if any.
+    /// Dependence of the part on u; `None` if there is no dependence.
     pub signal_dependence: Option<SignalDependence>,
-    /// Pulses, if any.
+    /// Pulses of the part; `None` if there are no pulses.
     pub pulses: Option<Pulses>,
-    /// Switching on and off, if any.
+    /// Switching of the part on and off; `None` if it is always on.
     pub intermittence: Option<Intermittence>,
 }
 
@@ -122,7 +122,7 @@ pub struct RemnantPart {
 /// signals.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Stick {
-    /// Constant part of u.
+    /// Bias of the stick: the constant part of u.
     pub bias: f64,
     /// Standard deviation of the random walk of u after 1 s; it grows with the square root of time.
     pub walk_per_root_s: f64,
@@ -133,7 +133,7 @@ pub struct Stick {
 }
 
 impl RemnantPart {
-    /// Returns a Gaussian, stationary part with a share of the variance of u.
+    /// Returns a Gaussian, stationary part that causes the given share of the variance of u.
     pub fn new(shape: RemnantShape, share: f64) -> Self {
         Self {
             shape,
@@ -144,7 +144,7 @@ impl RemnantPart {
         }
     }
 
-    /// Returns the share of the variance of u, if it is given.
+    /// Returns the share of the variance of u; `None` if the strength is given as a gain.
     pub fn share(&self) -> Option<f64> {
         match self.strength {
             PartStrength::Share(share) => Some(share),
@@ -152,7 +152,7 @@ impl RemnantPart {
         }
     }
 
-    /// Checks the parameters.
+    /// Checks the parameters of the part.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] or [`ModelError::Operator`], which name the quantity.

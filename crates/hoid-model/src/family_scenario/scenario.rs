@@ -1,4 +1,4 @@
-//! The task with an operator of the family.
+//! The task of an operator of the family.
 
 use super::{
     multi_sine::Excitation,
@@ -18,17 +18,17 @@ const MOST_SAMPLES: usize = 100_000_000;
 /// One task: operator, controlled element, excitation, remnant, stick and change over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FamilyScenario {
-    /// Name for tables and file names.
+    /// Name of the task in tables and file names.
     pub name: String,
     /// State before the change.
     pub initial: FamilyState,
     /// State after the change. It has the same form as the state before the change.
     pub last: FamilyState,
-    /// The change.
+    /// Course of the change over time.
     pub schedule: Schedule,
     /// Target f.
     pub target: Excitation,
-    /// The response of u to the displayed target; `None` for a display of the error only.
+    /// Response of u to the displayed target; `None` if the display shows only the error.
     pub feedforward: Option<Feedforward>,
     /// Disturbance d at the input of the controlled element, held over each sample.
     pub disturbance: Excitation,
@@ -59,7 +59,7 @@ pub struct Feedforward {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResolvedFamilyScenario {
     scenario: FamilyScenario,
-    /// Delays in whole samples and a fraction of a sample, before and after the change.
+    /// Delay before and after the change, each as a number of whole samples and a fraction of a sample.
     delays: [(usize, f64); 2],
     run_in_samples: usize,
     measurement_samples: usize,
@@ -86,7 +86,7 @@ impl FamilyScenario {
         }
     }
 
-    /// Checks the scenario and computes the quantities for a simulation.
+    /// Checks the scenario and computes the quantities that a simulation needs.
     ///
     /// # Errors
     /// [`ModelError`], which names the quantity.
@@ -135,7 +135,7 @@ impl FamilyScenario {
             *delay = if changes {
                 (tau.round() as usize, 0.0)
             } else {
-                // If tau is an integer number of samples, the remainder is a rounding error.
+                // If tau is an integer number of samples, this remainder is only a rounding error.
                 let late = tau - whole as f64;
                 (whole, if late < 1e-9 { 0.0 } else { late })
             };
@@ -164,12 +164,12 @@ impl FamilyScenario {
 }
 
 impl ResolvedFamilyScenario {
-    /// Returns the original scenario.
+    /// Returns the scenario from which the quantities were computed.
     pub fn scenario(&self) -> &FamilyScenario {
         &self.scenario
     }
 
-    /// Number of samples before t = 0.
+    /// Number of samples of the run-in, before t = 0.
     pub fn run_in_samples(&self) -> usize {
         self.run_in_samples
     }
@@ -190,7 +190,8 @@ impl ResolvedFamilyScenario {
         self.delays
     }
 
-    /// Returns the delay at time `t_s`, rounded to the nearest whole sample if the delay changes.
+    /// Returns the delay at time `t_s` as a number of whole samples and a fraction of a sample; it is rounded to the
+    /// nearest whole sample if the delay changes.
     pub fn delay_at(&self, t_s: f64) -> (usize, f64) {
         let [initial, last] = self.delays;
         if initial == last {
@@ -203,7 +204,7 @@ impl ResolvedFamilyScenario {
     /// Returns operator and controlled element at time `t_s`.
     ///
     /// # Errors
-    /// [`ModelError`] if the transition between two valid states passes through an invalid one.
+    /// [`ModelError`] if the transition between the two valid states passes through an invalid state.
     pub fn state_at(&self, t_s: f64) -> Result<FamilyState, ModelError> {
         let FamilyScenario {
             initial,

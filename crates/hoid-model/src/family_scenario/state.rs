@@ -9,14 +9,14 @@ use crate::{
 /// Operator of the family and controlled element at one instant.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FamilyState {
-    /// The operator.
+    /// Operator at this instant.
     pub operator: FamilyOperator,
-    /// The controlled element.
+    /// Controlled element at this instant.
     pub controlled_element: ContinuousTransferFunction,
 }
 
 impl FamilyState {
-    /// `Y(s) P(s)`.
+    /// Returns the open loop `Y(s) P(s)`.
     ///
     /// # Errors
     /// As [`FamilyOperator::transfer_function`].
@@ -32,7 +32,7 @@ impl FamilyState {
         Ok(self.crossings()?.margins())
     }
 
-    /// Returns every crossing of the open loop in continuous time.
+    /// Returns every crossing of unit gain and of the negative real axis by the open loop in continuous time.
     ///
     /// # Errors
     /// As [`FamilyState::open_loop`]; [`ModelError::UnstableLoop`].
@@ -64,7 +64,7 @@ impl FamilyState {
         let kinds = a.form().coordinates(a.has_neuromuscular());
         let on_its_way = |(kind, (x, y)): (&Coordinate, (&f64, &f64))| match kind {
             Coordinate::Delay => *x,
-            // Equal values are kept exactly.
+            // If both values are equal, this value is kept exactly.
             _ if x == y => *x,
             Coordinate::LogOmega | Coordinate::LogZeta => between(x.exp(), y.exp()).ln(),
             _ => between(*x, *y),

@@ -7,7 +7,8 @@ use num_complex::Complex64;
 use super::crossings::{LARGEST_TURN_RAD, turn};
 use crate::{ContinuousTransferFunction, polynomial};
 
-/// Maximum number of subdivisions in the stability test; a loop that needs more is not proven stable.
+/// Maximum number of subdivisions of frequency intervals in the stability test; if more are needed, the loop is not
+/// proven stable.
 const MOST_EVALUATIONS: usize = 4_000_000;
 
 /// True if unit negative feedback around the open loop gives a stable loop: all closed-loop poles are in the open left
@@ -24,14 +25,14 @@ pub fn closed_loop_is_stable(open_loop: &ContinuousTransferFunction) -> bool {
 /// Lowest frequency at which a closed loop is evaluated, relative to the magnitude of the largest pole of the
 /// controlled element or to 1 rad/s, whichever is lower.
 const LOWEST: f64 = 1e-4;
-/// Deviation of a phase in rad from an integer number of half turns that is too large to be rounding.
+/// Deviation of the phase, in rad, from an integer number of half turns above which it is not attributed to rounding.
 const NO_HALF_TURN_RAD: f64 = 0.5;
 
 /// Returns the number of closed-loop poles in the right half plane for a loop with unit negative feedback. The loop
 /// consists of a stable operator, given by its frequency response, and a controlled element.
 ///
-/// `None` if this number cannot be determined: the response is not finite, `|L|` is not below one at `highest_rad_s`,
-/// or a closed-loop pole is on the imaginary axis.
+/// Returns `None` if this number cannot be determined: the response is not finite, `|L|` is not below one at
+/// `highest_rad_s`, or a closed-loop pole is on the imaginary axis.
 pub fn unstable_poles(
     operator: impl Fn(f64) -> Complex64,
     element: &ContinuousTransferFunction,
@@ -49,7 +50,8 @@ pub fn unstable_poles(
         (horner(element.den(), s) + loop_part) / Complex64::new(scale, omega).powu(order as u32)
     };
     let low = LOWEST * scale.min(1.0);
-    // Beyond `highest_rad_s` only D/(s + a)^n is followed, without the operator; this requires |L| < 1 there.
+    // Beyond `highest_rad_s` the phase of D/(s + a)^n alone is followed, without the operator; this requires |L| < 1
+    // there.
     if !(highest_rad_s > low && (operator(highest_rad_s) * element.response(highest_rad_s)).norm() < 1.0) {
         return None;
     }
@@ -60,31 +62,33 @@ pub fn unstable_poles(
     };
     let far = 1e3 * highest_rad_s.max(scale);
     let (beyond, from, to) = turn(element_alone, (highest_rad_s, far))?;
-    // F(0) and F(infinity) are real; 1 + L has an argument between -90 and 90 deg from the last frequency on.
+    // F(0) and the limit of F/(s + a)^n at infinite frequency are real; the argument of 1 + L is between -90 and 90 deg
+    // from the last frequency on.
     let at_zero = if first.re >= 0.0 { first } else { -first }.arg();
     let total = at_zero + turned - (last / from).arg() + beyond - to.arg();
     let half_turns = (-total / PI).round();
     ((-total / PI - half_turns).abs() * PI < NO_HALF_TURN_RAD && half_turns >= 0.0).then_some(half_turns as usize)
 }
 
-/// Magnitude of the largest root of a polynomial, estimated from its coefficients.
+/// Returns the magnitude of the largest root of a polynomial, estimated from its coefficients.
 fn root_size(p: &[f64]) -> f64 {
     let relative = (1..p.len()).map(|k| (p[k] / p[0]).abs().powf(1.0 / k as f64));
     relative.fold(0.0, f64::max)
 }
 
-/// `F(s) / (s + a)^n` on the imaginary axis.
+/// Characteristic function `F(s) / (s + a)^n` on the imaginary axis.
 pub(super) struct Characteristic<'a> {
     open_loop: &'a ContinuousTransferFunction,
     order: usize,
     /// The shift a, 1/s: the magnitude of the largest open-loop pole, or 1 if all poles are zero.
     scale: f64,
-    /// Above this frequency `F/(s + a)^n` remains near its limit and does not encircle zero.
+    /// Frequency above which `F/(s + a)^n` remains near its limit and does not encircle zero.
     last: f64,
 }
 
 impl<'a> Characteristic<'a> {
-    /// Returns `None` if the gain at infinite frequency makes the loop unstable.
+    /// Builds the characteristic function of an open loop. Returns `None` if the gain at infinite frequency makes the
+    /// closed loop unstable.
     pub(super) fn new(open_loop: &'a ContinuousTransferFunction) -> Option<Self> {
         let (num, den, tau) = (open_loop.num(), open_loop.den(), open_loop.delay_s());
         let order = den.len() - 1;
@@ -109,7 +113,7 @@ impl<'a> Characteristic<'a> {
                 let powers = p.iter().rev().enumerate().take(degree);
                 powers.map(|(k, c)| c.abs() / last.powi((degree - k) as i32)).sum()
             };
-            // Terms below s^n in D and in N: F/s^n differs from 1 + L(infinity) by at most their sum.
+            // The terms below s^n in D and in N: F/s^n differs from 1 + L(infinity) by at most the sum of these terms.
             let rest = below(den, order) + below(num, order);
             if rest < 0.3 * clearance && scale * (order as f64) < 0.1 * last {
                 return Some(Self {
@@ -124,7 +128,7 @@ impl<'a> Characteristic<'a> {
         None
     }
 
-    /// Returns `F/(s + a)^n`, its smallest meaningful magnitude (the rounding error of a zero), and `|L|`.
+    /// Returns `F/(s + a)^n`, the magnitude below which it is zero up to rounding, and `|L|`.
     fn at(&self, omega: f64) -> (Complex64, f64, f64) {
         let s = Complex64::new(0.0, omega);
         let horner = |p: &[f64]| p.iter().fold(Complex64::new(0.0, 0.0), |sum, &c| sum * s + c);
@@ -135,8 +139,8 @@ impl<'a> Characteristic<'a> {
         (f / shifted, 1e-12 * size / shifted.norm(), num.norm() / den.norm())
     }
 
-    /// Number of zeros of F in the open right half plane; `None` if a zero is on the imaginary axis, within rounding,
-    /// or if the delay turns the phase too many times to be followed.
+    /// Returns the number of zeros of F in the open right half plane; `None` if a zero is on the imaginary axis, within
+    /// rounding, or if the delay turns the phase too many times to be followed.
     pub(super) fn zeros_in_right_half_plane(&self) -> Option<usize> {
         let tau = self.open_loop.delay_s();
         let mut grid = vec![0.0];
@@ -180,7 +184,7 @@ impl<'a> Characteristic<'a> {
                 }
             }
         }
-        // From here to infinity the argument approaches that of the limit without another turn.
+        // From this frequency to infinity the argument approaches that of the limit without another turn.
         let limit = if tau == 0.0 && self.open_loop.num().len() == self.order + 1 {
             Complex64::new(1.0 + self.open_loop.num()[0], 0.0)
         } else {

@@ -21,7 +21,7 @@ pub const MANUAL_CONTROL_RANGE_RAD_S: (f64, f64) = (1e-3, 1e3);
 /// A frequency at which the open loop crosses unit gain or the negative real axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
-    /// The frequency, rad/s.
+    /// Frequency of the crossing, rad/s.
     pub omega_rad_s: f64,
     /// Margin at this frequency: phase margin in deg at a crossing of unit gain, gain margin in dB at a crossing of the
     /// negative real axis.
@@ -38,7 +38,8 @@ pub struct Crossings {
 }
 
 impl Crossings {
-    /// Returns the margins nearest to zero; of equal margins, the one at the lowest frequency.
+    /// Returns the phase margin and the gain margin nearest to zero; of margins equally near, the one at the lowest
+    /// frequency.
     pub fn margins(&self) -> Margins {
         let nearest = |of: &[Crossing]| {
             of.iter().copied().reduce(|held, next| {
@@ -60,13 +61,14 @@ impl Crossings {
 }
 
 const POINTS_PER_DECADE: f64 = 100.0;
-/// Largest phase change between neighbouring points of the scan, rad.
+/// Largest accepted phase change between neighbouring points of the scan, rad.
 pub(super) const LARGEST_TURN_RAD: f64 = 0.5;
-/// Phase change between neighbouring points above which its direction is uncertain, rad.
+/// Phase change between neighbouring points above which the direction of the change is uncertain, rad.
 const MOST_TURN_RAD: f64 = 2.0;
-/// Maximum number of halvings: 4096 points per step of the grid are enough to follow a delay of 90 s at 1000 rad/s.
+/// Maximum number of successive halvings of a step of the grid: the resulting 4096 points per step are enough to follow
+/// a delay of 90 s at 1000 rad/s.
 const DEEPEST_HALVING: u32 = 12;
-/// Returns the margins nearest to zero for any frequency response; the arguments are those of [`crossings`].
+/// Returns the margins nearest to zero of any frequency response; the arguments are those of [`crossings`].
 pub fn margins(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> Margins {
     crossings(open_loop, range_rad_s).margins()
 }
@@ -74,7 +76,7 @@ pub fn margins(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) ->
 /// Returns the crossings of any frequency response, continuous with delay or discrete. For a discrete response the
 /// range ends at pi/Ts, where a response on the negative real axis counts as a phase crossover.
 ///
-/// If the range is not finite with `0 < low < high`, there are no crossings. Frequencies at which the response is not
+/// Returns no crossings if the range is not finite with `0 < low < high`. Frequencies at which the response is not
 /// finite are skipped.
 pub fn crossings(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> Crossings {
     let points = scan(&open_loop, range_rad_s);
@@ -93,8 +95,8 @@ pub fn crossings(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) 
             let omega = bisect(low, high, |w| above(open_loop(w)) == above(l_low));
             found.gain.push(crossing(omega, phase_margin_deg(open_loop(omega))));
         }
-        // The phase change between neighbours is small, so that a change of sign in the left half plane is a crossing
-        // of the negative real axis.
+        // The phase change between neighbouring points is small, so that a change of the sign of the imaginary part in
+        // the left half plane is a crossing of the negative real axis.
         let upper = |l: Complex64| l.im >= 0.0;
         if upper(l_low) != upper(l_high) && l_low.re < 0.0 && l_high.re < 0.0 {
             let omega = bisect(low, high, |w| upper(open_loop(w)) == upper(l_low));
@@ -111,8 +113,8 @@ pub fn crossings(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) 
     found
 }
 
-/// Total phase change of a response from the lower to the upper end of a range, rad, with the values at both ends.
-/// `None` if the response is not finite, or turns too fast to be followed.
+/// Returns the total phase change of a response from the lower to the upper end of a range, in rad, and the response at
+/// both ends. `None` if the response is not finite, or if its phase turns too fast to be followed.
 pub(super) fn turn(of: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> Option<(f64, Complex64, Complex64)> {
     let points = scan(&of, range_rad_s);
     let (first, last) = (points.first()?.l, points.last()?.l);
@@ -127,12 +129,12 @@ pub(super) fn turn(of: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> Op
     Some((turned, first, last))
 }
 
-/// One frequency of the scan.
+/// One point of the scan: a frequency, with the response and the slope of its phase.
 #[derive(Clone, Copy)]
 struct Point {
     omega: f64,
     l: Complex64,
-    /// Slope of the phase, rad/(rad/s).
+    /// Slope of the phase, rad per rad/s.
     slope_s: f64,
 }
 
@@ -166,7 +168,7 @@ fn scan(open_loop: &impl Fn(f64) -> Complex64, (low, high): (f64, f64)) -> Vec<P
     points
 }
 
-/// Appends `high`, preceded by as many intermediate points as are needed to follow the phase.
+/// Appends the point `high`, preceded by as many intermediate points as are needed to follow the phase from `low`.
 fn halve(open_loop: &impl Fn(f64) -> Complex64, low: Point, high: Point, depth: u32, points: &mut Vec<Point>) {
     let turn = (high.l * low.l.conj()).arg().abs();
     let by_slope = low.slope_s.abs().max(high.slope_s.abs()) * (high.omega - low.omega);
@@ -179,7 +181,7 @@ fn halve(open_loop: &impl Fn(f64) -> Complex64, low: Point, high: Point, depth: 
     }
 }
 
-/// Returns the point at which `holds` changes from true (at `low`) to false, up to rounding.
+/// Returns the frequency at which `holds` changes from true (at `low`) to false, up to rounding.
 fn bisect(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (low, high);
     for _ in 0..60 {

@@ -2,10 +2,10 @@
 //!
 //! For the open loop L in a loop with unit negative feedback,
 //!
-//! - the gain crossovers are where `|L| = 1`; the phase margin there is `180 deg + arg L`, between
-//!   -180 and 180 deg;
-//! - the phase crossovers are where L crosses the negative real axis (`arg L = -180 deg` modulo 360
-//!   deg); the gain margin there is `-20 log10 |L|` dB.
+//! - a gain crossover is a frequency at which `|L| = 1`; the phase margin there is `180 deg + arg L`, between -180 and
+//!   180 deg;
+//! - a phase crossover is a frequency at which L crosses the negative real axis (`arg L = -180 deg` modulo 360 deg);
+//!   the gain margin there is `-20 log10 |L|` dB.
 //!
 //! If there are several crossovers, the phase margin nearest to 0 deg and the gain margin nearest to 0 dB are returned,
 //! each with its frequency. MATLAB's `margin` and python-control's `margin` use the same rule. Margins do not show
@@ -13,16 +13,16 @@
 //!
 //! **Scan.** The scan starts from a logarithmic grid. A step of the grid is halved wherever the phase changes by more
 //! than 0.5 rad over it, judged by the phases at its ends and also by the slopes of the phase there (the phases alone
-//! would not show a whole turn within the step). The phase is therefore followed even with a long delay. Sign changes
-//! are refined by bisection to rounding. A pair of crossings that are closer together than the grid (a curve that only
-//! touches) is not detected.
+//! would not show a whole turn within the step). The phase is therefore followed even with a long delay. Each crossing,
+//! found by a change of sign, is refined by bisection to rounding. Two crossings that are closer together than the grid
+//! (because the curve nearly touches the limit) are not detected.
 //!
-//! **Stability.** With `L = N e^{-s tau} / D`, the closed loop is stable when `F(s) = D + N e^{-s tau}` has no zero in
+//! **Stability.** With `L = N e^{-s tau} / D`, the closed loop is stable if `F(s) = D + N e^{-s tau}` has no zero in
 //! the closed right half plane. `F/(s + a)^n`, where n is the degree of D, is analytic there and, if L is strictly
 //! proper, tends to 1, so that its argument changes by `-pi Z` along s = j omega from omega = 0 to infinity, where Z is
 //! the number of zeros (Cauchy's argument principle; Mikhailov's form of the Nyquist criterion). F has no poles, so
-//! that open-loop poles at the origin or on the axis need no detour, and common factors of N and D in the right half
-//! plane are counted correctly. If only the frequency response Y of a stable, sampled operator is known
+//! that open-loop poles at the origin or on the imaginary axis need no detour, and common factors of N and D in the
+//! right half plane are counted correctly. If only the frequency response Y of a stable, sampled operator is known
 //! ([`unstable_poles`]), `F = D + N Y e^{-s tau}` is followed up to a frequency beyond which `|L| < 1`.
 
 mod closed_loop;

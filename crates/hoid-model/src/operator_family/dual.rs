@@ -1,7 +1,7 @@
 //! Dual numbers, which carry their derivatives: `x + sum_i x_i eps_i`, `eps_i eps_j = 0`.
 //!
-//! Results computed with dual numbers contain their exact partial derivatives (forward differentiation; A. Griewank and
-//! A. Walther, *Evaluating Derivatives*, 2008, chapter 3).
+//! Results computed with dual numbers contain their partial derivatives, which are exact except for rounding (forward
+//! differentiation; A. Griewank and A. Walther, *Evaluating Derivatives*, 2008, chapter 3).
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -11,7 +11,7 @@ pub const PARTIALS: usize = 6;
 /// A value and its partial derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dual {
-    /// The value.
+    /// Value of the number.
     pub value: f64,
     /// Partial derivatives of the value.
     pub partials: [f64; PARTIALS],
@@ -26,14 +26,14 @@ impl Dual {
         }
     }
 
-    /// Returns the variable with this index.
+    /// Returns the variable with this index, whose derivative with respect to itself is one.
     pub fn variable(value: f64, index: usize) -> Self {
         let mut partials = [0.0; PARTIALS];
         partials[index] = 1.0;
         Self { value, partials }
     }
 
-    /// Applies the chain rule: `value` is f(x), `slope` is f'(x).
+    /// Applies the chain rule to a function f of this number x: `value` is f(x), `slope` is f'(x).
     fn chain(self, value: f64, slope: f64) -> Self {
         Self {
             value,
@@ -41,13 +41,13 @@ impl Dual {
         }
     }
 
-    /// Returns the exponential.
+    /// Returns the exponential of the number.
     pub fn exp(self) -> Self {
         let e = self.value.exp();
         self.chain(e, e)
     }
 
-    /// Returns the number times a constant.
+    /// Returns the number multiplied by a constant.
     pub fn scaled(self, factor: f64) -> Self {
         self.chain(factor * self.value, factor)
     }
@@ -76,7 +76,7 @@ impl Sub for Dual {
     }
 }
 
-// The lint reports the rules of differentiation as suspicious arithmetic.
+// The lint reports the sums and products in the rules of differentiation as suspicious arithmetic.
 #[allow(clippy::suspicious_arithmetic_impl)]
 impl Mul for Dual {
     type Output = Self;

@@ -6,7 +6,7 @@ use crate::{ModelError, SampleTime};
 /// An operator with the covariance of its coordinates, its noise model, and information on its fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FittedOperator {
-    /// The operator.
+    /// Fitted operator.
     pub operator: FamilyOperator,
     /// Covariance of the coordinates, by rows.
     pub covariance: Vec<f64>,
@@ -14,16 +14,16 @@ pub struct FittedOperator {
     pub noise: (Vec<f64>, Vec<f64>),
     /// Variance of eps, in the unit of u squared.
     pub innovation_variance: f64,
-    /// Sample time of the records.
+    /// Sample time of the records used for the fit.
     pub sample_time: SampleTime,
     /// Units of e and u; empty if they were not declared.
     pub units: [String; 2],
-    /// Source of the fit, for messages: the name of a file.
+    /// Source of the fit for messages, such as the name of a file.
     pub source: String,
 }
 
 impl FittedOperator {
-    /// Returns the fit if its values are valid.
+    /// Returns the fit unchanged if its values are valid.
     ///
     /// # Errors
     /// [`ModelError::Operator`] for a covariance of another size, numbers that are not finite, and variances that are
@@ -55,8 +55,8 @@ impl FittedOperator {
         Ok(self)
     }
 
-    /// Checks that sample time and units are those of the fit; units are compared only if both are declared. `units`
-    /// are the units of e and u.
+    /// Checks that sample time and units of a record are those of the fit; units are compared only if both are
+    /// declared. `units` are the units of e and u in the record.
     ///
     /// # Errors
     /// [`ModelError::Operator`] with the difference and the remedy.

@@ -1,4 +1,4 @@
-//! The forms of the family: the parameters of an operator.
+//! The forms of the family, and the coordinates of an operator.
 
 use super::dual::{Dual, PARTIALS};
 
@@ -8,7 +8,7 @@ use super::dual::{Dual, PARTIALS};
 pub enum Form {
     /// `K` (p = 0, q = 0).
     Gain,
-    /// `K (T_L s + 1)` (p = 1, q = 0; eq. 4).
+    /// `K (T_L s + 1)` (p = 1, q = 0; eq. 2).
     Lead,
     /// `K (T_L s + 1)^2` (p = 2, q = 0).
     Lead2,
@@ -50,11 +50,11 @@ const LEAK: f64 = 1e-4;
 /// are nearly normal even if the data carry little information.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Coordinate {
-    /// K without a pole, `K/T_I` with a lag, K_I with an integration, K_d of a derivative in s.
+    /// Gain of the form: K without a pole, `K/T_I` with a lag, K_I with an integration, K_d (in s) of a derivative.
     Gain,
     /// T_L, s.
     Lead,
-    /// `1/T_I`, 1/s; zero is a pure integration.
+    /// `1/T_I`, 1/s; zero gives a pure integration.
     LagRate,
     /// c_1 of the quadratic numerator, s.
     Linear,
@@ -71,7 +71,7 @@ pub enum Coordinate {
 }
 
 impl Coordinate {
-    /// All coordinates.
+    /// All coordinates that occur in a form.
     pub const ALL: [Self; 9] = [
         Self::Gain,
         Self::Lead,
@@ -84,8 +84,8 @@ impl Coordinate {
         Self::Delay,
     ];
 
-    /// Returns the name of the related parameter: T_I for `1/T_I`, and K for every gain, which is `K/T_I`, K_I or K_e
-    /// in some forms.
+    /// Returns the name of the parameter to which the coordinate is related: T_I for `1/T_I`, and K for every gain,
+    /// although the gain is `K/T_I`, K_I or K_e in some forms.
     pub fn parameter(self) -> &'static str {
         match self {
             Self::Gain => "K",
@@ -100,8 +100,8 @@ impl Coordinate {
         }
     }
 
-    /// Returns the coordinate of a parameter by its name; `None` for K_e_dot, which is a product of two coordinates,
-    /// and for unknown names.
+    /// Returns the coordinate that belongs to a parameter name; `None` for K_e_dot, which is a product of two
+    /// coordinates, and for unknown names.
     pub fn of_parameter(name: &str) -> Option<Self> {
         match name {
             "K_over_T_I" | "K_I" | "K_e" | "K_d" => Some(Self::Gain),
@@ -125,7 +125,7 @@ impl Coordinate {
     }
 }
 
-/// Numerator `n_0 + n_1 s + n_2 s^2` and pole `-a` of an operator, if it has one.
+/// Numerator `n_0 + n_1 s + n_2 s^2` of an operator, and its pole `-a`, if it has one.
 pub(super) struct Rational {
     pub numerator: [Dual; 3],
     pub pole: Option<Dual>,
@@ -153,12 +153,12 @@ impl Form {
         Self::DerivativeLead,
     ];
 
-    /// True if the steady response to a constant input is zero.
+    /// True if the steady response of the form to a constant input is zero.
     pub fn is_derivative(self) -> bool {
         matches!(self, Self::Derivative | Self::DerivativeLead)
     }
 
-    /// Returns the degree of the numerator, which is the power p of the lead in forms of lead and lag.
+    /// Returns the degree of the numerator, which is the power p of the lead in forms that consist of lead and lag.
     pub fn degree(self) -> usize {
         match self {
             Self::Gain | Self::Lag => 0,
@@ -167,7 +167,7 @@ impl Form {
         }
     }
 
-    /// True if the form itself has a pole: a lag or an integration.
+    /// True if the form has a pole, without the neuromuscular part: a lag or an integration.
     pub fn has_pole(self) -> bool {
         !matches!(self, Self::Gain | Self::Lead | Self::Lead2) && !self.is_derivative()
     }
@@ -177,18 +177,19 @@ impl Form {
         matches!(self, Self::Lag | Self::LeadLag | Self::Lead2Lag)
     }
 
-    /// True if the degree of the numerator does not exceed that of the denominator, so that the operator has no pure
-    /// derivative.
+    /// True if the degree of the numerator does not exceed that of the denominator, so that the operator does not
+    /// differentiate its input.
     pub fn is_proper(self, neuromuscular: bool) -> bool {
         self.degree() <= usize::from(self.has_pole()) + if neuromuscular { 2 } else { 0 }
     }
 
-    /// Returns the number of coordinates without the neuromuscular part; a form with fewer coordinates is simpler.
+    /// Returns the number of coordinates of the form without the neuromuscular part; a form with fewer coordinates is
+    /// simpler.
     pub fn simplicity(self) -> usize {
         self.coordinates(false).len()
     }
 
-    /// Returns the coordinates, in the order in which they are fitted.
+    /// Returns the coordinates of the form, in the order in which they are fitted.
     pub fn coordinates(self, neuromuscular: bool) -> Vec<Coordinate> {
         let mut all = vec![Coordinate::Gain];
         match self {
@@ -237,7 +238,7 @@ impl Form {
         }
     }
 
-    /// Returns numerator and pole from the coordinates, without the neuromuscular part and the delay.
+    /// Computes numerator and pole from the coordinates, without the neuromuscular part and the delay.
     pub(super) fn rational(self, x: &[Dual]) -> Rational {
         let zero = Dual::constant(0.0);
         let k = x[0];

@@ -2,10 +2,10 @@
 //!
 //! With a hold, the operator responds to a staircase. If its step response starts with a slope (relative degree 1), the
 //! model has a kink at every delay of an integer number of samples, and a search over the delay of a recorded person
-//! ends at such a kink. A person does not see a staircase. Here the error `e(t)` is linear from sample to sample, and
-//! the operator acts on `e(t - tau - Ts/2)`. The half sample is the delay of a hold, so that tau has the same meaning
-//! in both models. At frequency omega the two models differ in gain by the factor `sin(x)/x`, `x = omega Ts/2` (0.5 %
-//! at 20 rad/s and 60 Hz), and not in phase.
+//! often ends at such a kink. A person does not see a staircase. Here the error `e(t)` is linear from sample to sample,
+//! and the operator acts on `e(t - tau - Ts/2)`. The half sample is the delay of a hold, so that tau has the same
+//! meaning in both models. At frequency omega the gains of the two models differ by the factor `sin(x)/x`,
+//! `x = omega Ts/2` (0.5 % at 20 rad/s and 60 Hz); their phases are equal.
 //!
 //! With `tau + Ts/2 = l Ts + delta`, `0 <= delta < Ts`, and times in samples,
 //!
@@ -35,7 +35,7 @@ impl FamilyOperator {
     /// Returns the discrete model for an error that is interpolated between samples.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] if an exponential overflows or the delay has too many samples.
+    /// [`ModelError::OutOfRange`] if an exponential overflows or the delay is too long in samples.
     pub fn interpolate(&self, sample_time: SampleTime) -> Result<HeldFamily, ModelError> {
         let late = self.tau_e_s() + 0.5 * sample_time.s();
         self.interpolate_within(whole_samples(late, sample_time)?, sample_time)

@@ -6,7 +6,7 @@ use super::dual::Dual;
 pub(super) const ORDER: usize = 3;
 /// Number of rows of the extended matrices: states, input, and slope of the input.
 pub(super) const SIZE: usize = ORDER + 2;
-/// Terms of the series at a norm of at most one: 1/20! is 4e-19.
+/// Number of terms of the series for a norm of at most one: 1/20! is 4e-19.
 const TERMS: usize = 20;
 
 pub(super) type Matrix = [[Dual; SIZE]; SIZE];
@@ -30,7 +30,7 @@ pub(super) fn exponential(m: &Matrix, h: Dual) -> Matrix {
     let m: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| m[i][j] * h));
     let row = |r: &[Dual; SIZE]| r.iter().map(|c| c.value.abs()).sum::<f64>();
     let norm = m.iter().map(row).fold(0.0, f64::max);
-    // With a very large norm, the result overflows anyway.
+    // If the norm is very large, the result overflows regardless of the number of halvings.
     let halvings = if norm > 1.0 {
         norm.log2().ceil().min(60.0) as i32
     } else {
@@ -79,7 +79,7 @@ pub(super) fn times(a: &Matrix, x: &Vector, size: usize) -> Vector {
     y
 }
 
-/// Coefficients of `det(I - q^-1 Phi)` without the leading one, by the method of Faddeev and LeVerrier.
+/// Returns the coefficients of `det(I - q^-1 Phi)` without the leading 1, by the method of Faddeev and LeVerrier.
 pub(super) fn characteristic(phi: &Matrix, order: usize) -> Vec<Dual> {
     let mut coefficients = Vec::with_capacity(order);
     let mut m = identity();

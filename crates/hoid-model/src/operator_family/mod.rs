@@ -6,7 +6,7 @@
 //! controlled elements of second order ([`Form`]).
 //!
 //! A person who integrates slow errors has a lag with a long T_I. Then K and T_I cannot be determined separately, but
-//! `K/T_I` can; an operator is therefore represented by the coordinates `[K/T_I, T_L, 1/T_I, ln omega, ln zeta, tau]`
+//! `K/T_I` can. An operator is therefore represented by the coordinates `[K/T_I, T_L, 1/T_I, ln omega, ln zeta, tau]`
 //! ([`Coordinate`]), in which the pure integration, `1/T_I = 0`, is an ordinary point.
 //!
 //! | file | contents |

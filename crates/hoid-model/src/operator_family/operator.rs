@@ -11,7 +11,7 @@ use crate::{
     uncertainty::{Estimate, variance_along},
 };
 
-/// The parameters of all forms, with the names of [`FamilyOperator::named`], and their units.
+/// Names and units of the parameters of all forms; the names are those of [`FamilyOperator::named`].
 pub const PARAMETERS: [(&str, &str); 14] = [
     ("K", ""),
     ("K_over_T_I", "1/s"),
@@ -38,7 +38,7 @@ pub struct FamilyOperator {
     coordinates: Vec<f64>,
 }
 
-/// An operator as read from a file, not yet checked.
+/// An operator as read from a file, before it is checked.
 #[derive(serde::Deserialize)]
 struct Written {
     form: Form,
@@ -54,24 +54,24 @@ impl TryFrom<Written> for FamilyOperator {
     }
 }
 
-/// `Y(j omega)` and its derivatives with respect to the coordinates.
+/// Frequency response `Y(j omega)` and its derivatives with respect to the coordinates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FamilyResponse {
-    /// `Y(j omega)`.
+    /// Frequency response `Y(j omega)`.
     pub value: Complex64,
     /// Derivative of Y with respect to each coordinate.
     pub gradient: Vec<Complex64>,
 }
 
 impl FamilyResponse {
-    /// Returns the covariance of the real and imaginary part of `dY/Y = d ln Y`, which are the relative error of the
-    /// gain and the error of the phase, from the covariance of the coordinates by rows.
+    /// Returns the covariance of the real part of `dY/Y = d ln Y`, the relative error of the gain, and its imaginary
+    /// part, the error of the phase in rad. `covariance` is the covariance of the coordinates by rows.
     pub fn relative_covariance(&self, covariance: &[f64]) -> [[f64; 2]; 2] {
         let along = |part: fn(Complex64) -> f64| -> Vec<f64> {
             let gradient = self.gradient.iter().map(|g| part(g / self.value));
             gradient.collect()
         };
-        // The variance of the sum of both parts contains their covariance twice.
+        // The variance of the sum of real and imaginary part contains their covariance twice.
         let [a, c, both] = [along(|z| z.re), along(|z| z.im), along(|z| z.re + z.im)]
             .map(|gradient| variance_along(&gradient, covariance));
         let b = 0.5 * (both - a - c);
@@ -79,10 +79,10 @@ impl FamilyResponse {
     }
 }
 
-/// A reported parameter.
+/// A reported parameter of an operator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NamedParameter {
-    /// K, K_over_T_I, T_L, T_I, omega_nm, zeta_nm, tau_e and so on.
+    /// Name of the parameter: K, K_over_T_I, T_L, T_I, omega_nm, zeta_nm, tau_e and so on.
     pub name: &'static str,
     /// Unit of the parameter; empty for a ratio of control and error.
     pub unit: &'static str,
@@ -93,7 +93,7 @@ pub struct NamedParameter {
 }
 
 impl Form {
-    /// Returns the names of the parameters of an operator of this form, in the order of [`FamilyOperator::named`].
+    /// Returns the names of the parameters of an operator with this form, in the order of [`FamilyOperator::named`].
     pub fn parameters(self, neuromuscular: bool) -> Vec<&'static str> {
         let any = FamilyOperator {
             form: self,
@@ -105,7 +105,7 @@ impl Form {
 }
 
 impl FamilyOperator {
-    /// Creates an operator with these coordinates, in the order of [`Form::coordinates`].
+    /// Creates an operator from its coordinates, in the order of [`Form::coordinates`].
     ///
     /// # Errors
     /// [`ModelError::Operator`] for an improper form, a wrong number of coordinates, or a value that is not finite;
@@ -291,7 +291,7 @@ impl FamilyOperator {
                 (Some(i), Some(Coordinate::LagRate)) => gradient[i] = -1.0 / (x[i] * x[i]),
                 (Some(i), Some(Coordinate::LogOmega | Coordinate::LogZeta)) => gradient[i] = parameter.value,
                 (Some(i), _) => gradient[i] = 1.0,
-                // K = (K/T_I)/(1/T_I), or K_e_dot = K_e T_L.
+                // The parameter is a product of coordinates: K = (K/T_I)/(1/T_I), or K_e_dot = K_e T_L.
                 (None, _) => match (place(Coordinate::LagRate), place(Coordinate::Lead)) {
                     (Some(i), _) => {
                         gradient[0] = 1.0 / x[i];
@@ -307,7 +307,7 @@ impl FamilyOperator {
     }
 
     /// Returns the parameters of [`FamilyOperator::named`] with their standard errors to first order, from the
-    /// covariance of the coordinates by rows. There is no standard error without a covariance or if a parameter is
+    /// covariance of the coordinates by rows. A standard error is missing if there is no covariance or the parameter is
     /// infinite.
     pub fn named_estimates(&self, covariance: Option<&[f64]>) -> Vec<(NamedParameter, Estimate)> {
         let of = |(parameter, gradient): (NamedParameter, Vec<f64>)| {
@@ -322,13 +322,13 @@ impl FamilyOperator {
         self.named_gradients().into_iter().map(of).collect()
     }
 
-    /// Returns the coordinates as variables.
+    /// Returns the coordinates as variables of dual numbers.
     pub(super) fn variables(&self) -> Vec<Dual> {
         let variable = |(i, &x): (usize, &f64)| Dual::variable(x, i);
         self.coordinates.iter().enumerate().map(variable).collect()
     }
 
-    /// Returns `(omega, zeta)` as functions of the coordinates.
+    /// Returns omega and zeta as functions of the coordinates; `None` without a neuromuscular part.
     pub(super) fn neuromuscular_of(&self, variables: &[Dual]) -> Option<(Dual, Dual)> {
         let n = variables.len();
         self.neuromuscular

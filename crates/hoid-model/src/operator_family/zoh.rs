@@ -26,26 +26,27 @@ use super::{
 };
 use crate::{ModelError, SampleTime, delayed_operator::whole_samples};
 
-/// `q^-nk B/F` with the derivatives of its coefficients.
+/// Discrete model `q^-nk B/F` of an operator, with the derivatives of its coefficients.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldFamily {
     /// Delay of the first coefficient of B, in samples.
     pub nk: usize,
     /// Coefficients of B.
     pub b: Vec<f64>,
-    /// Coefficients of F without the leading one.
+    /// Coefficients of F without the leading 1.
     pub f: Vec<f64>,
-    /// One row for each coefficient of B, then of F, with a derivative for each coordinate.
+    /// Derivatives of the coefficients of B, then of F: one row for each coefficient, with one column for each
+    /// coordinate.
     pub jacobian: Vec<[f64; PARTIALS]>,
 }
 
-/// Dynamics of poles and delay over one sample, for any numerator.
+/// Dynamics of the poles and the delay over one sample, independent of the numerator.
 struct HeldPoles {
-    /// omega^2, if there is a neuromuscular part.
+    /// Numerator omega^2 of the neuromuscular part; `None` without a neuromuscular part.
     gain: Option<Dual>,
     f: Vec<Dual>,
     denominator: Vector,
-    /// delta in samples.
+    /// Fraction delta of the delay, in samples.
     delta: Dual,
     phi: Matrix,
     gamma_old: Vector,
@@ -53,7 +54,7 @@ struct HeldPoles {
 }
 
 impl HeldFamily {
-    /// Returns the model with this impulse response from lag nk on and with the denominator F: `B = F h`.
+    /// Returns the model with the denominator F whose impulse response, from lag nk on, is `impulse`: `B = F h`.
     pub(super) fn of_impulse_response(nk: usize, impulse: &[Dual], f: &[Dual]) -> Result<Self, ModelError> {
         let order = f.len();
         let b: Vec<Dual> = (0..impulse.len())
@@ -76,8 +77,8 @@ impl HeldFamily {
 }
 
 impl FamilyOperator {
-    /// Returns the numbers of coefficients of B and F in the discrete model, which do not depend on the values of the
-    /// parameters, and the difference between nk and the whole samples of tau.
+    /// Returns three numbers that do not depend on the values of the parameters: the numbers of coefficients of B and
+    /// of F in the discrete model, and the difference between nk and the number of whole samples in tau.
     pub fn held_orders(&self) -> (usize, usize, usize) {
         let order = self.order();
         if self.has_direct_part() {
@@ -87,7 +88,7 @@ impl FamilyOperator {
         }
     }
 
-    /// Returns the order of the dynamics.
+    /// Returns the number of poles of the operator.
     pub fn order(&self) -> usize {
         usize::from(self.form().has_pole()) + if self.has_neuromuscular() { 2 } else { 0 }
     }
@@ -96,16 +97,16 @@ impl FamilyOperator {
         self.form().degree() == self.order()
     }
 
-    /// Returns the exact discrete model.
+    /// Returns the exact discrete model of the operator after a zero-order hold.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] if an exponential overflows or the delay has too many samples.
+    /// [`ModelError::OutOfRange`] if an exponential overflows or the delay is too long in samples.
     pub fn zoh(&self, sample_time: SampleTime) -> Result<HeldFamily, ModelError> {
         self.zoh_within(whole_samples(self.tau_e_s(), sample_time)?, sample_time)
     }
 
-    /// As [`FamilyOperator::zoh`], with a given number of whole samples in the delay: `delta = tau - sample Ts` may be
-    /// 0 or Ts, where the models of neighbouring samples are equal.
+    /// As [`FamilyOperator::zoh`], with a given number of whole samples in the delay. `delta = tau - sample Ts` may be
+    /// 0 or Ts; the models for neighbouring values of `sample` are equal where their intervals meet.
     ///
     /// # Errors
     /// As [`FamilyOperator::zoh`].
@@ -134,7 +135,7 @@ impl FamilyOperator {
     /// Returns the dynamics of the poles and the delay over one sample.
     fn held_poles(&self, variables: &[Dual], sample: usize, ts: f64) -> HeldPoles {
         let delay = variables[variables.len() - 1];
-        // With time in samples, all matrices have entries of moderate size.
+        // Time is in samples, so that the entries of all matrices are of moderate size.
         let delta = delay.scaled(1.0 / ts) - Dual::constant(sample as f64);
         let denominator = self.denominator_by_samples(variables, ts);
         let order = self.order();
@@ -161,18 +162,18 @@ impl FamilyOperator {
         }
     }
 
-    /// Returns the model with this numerator and these poles.
+    /// Returns the model with the given numerator and poles.
     fn held(&self, poles: &HeldPoles, numerator: [Dual; 3], sample: usize, ts: f64) -> Result<HeldFamily, ModelError> {
         let (zero, one) = (Dual::constant(0.0), Dual::constant(1.0));
         let order = self.order();
         let numerator = self.numerator_by_samples(numerator, poles.gain, ts);
         let direct = if self.has_direct_part() { numerator[order] } else { zero };
-        // The strictly proper part, c_i = n_i - D d_i.
+        // Output row of the strictly proper part, c_i = n_i - D d_i.
         let output: Vec<Dual> = (0..order)
             .map(|i| numerator[i] - direct * poles.denominator[i])
             .collect();
 
-        // Impulse response from e(k-l-1), of the length of B; then B = F h.
+        // The impulse response h starts at lag nk and has as many values as B; then B = F h.
         let (nb, _, shift) = self.held_orders();
         let first_dynamic = 1 - shift;
         let mut impulse = vec![zero; nb];
@@ -188,7 +189,7 @@ impl FamilyOperator {
             late = times(&poles.phi, &late, order);
         }
         if self.has_direct_part() {
-            // tau + Ts/2 = (sample + whole + part) Ts.
+            // The delay of the direct part is tau + Ts/2 = (sample + whole + part) Ts.
             let late_by = poles.delta + Dual::constant(0.5);
             let whole = usize::from(late_by.value >= 1.0);
             let part = late_by - Dual::constant(whole as f64);
@@ -198,7 +199,7 @@ impl FamilyOperator {
         HeldFamily::of_impulse_response(sample + shift, &impulse, &poles.f)
     }
 
-    /// Returns numerator and monic denominator in ascending powers of `s Ts`.
+    /// Returns numerator and monic denominator of the operator in ascending powers of `s Ts`.
     pub(super) fn by_samples(&self, variables: &[Dual], ts: f64) -> (Vector, Vector) {
         let Rational { numerator, .. } = self.form().rational(variables);
         (
@@ -242,7 +243,8 @@ impl FamilyOperator {
         std::array::from_fn(|i| den[i].scaled(self.scale(i, ts)))
     }
 
-    /// Factor that converts a coefficient of s^i to that of `(s Ts)^i`, for a denominator that remains monic.
+    /// Factor that converts a coefficient of s^i to the coefficient of `(s Ts)^i`, for a denominator that remains
+    /// monic.
     fn scale(&self, i: usize, ts: f64) -> f64 {
         ts.powi(self.order() as i32 - i as i32)
     }

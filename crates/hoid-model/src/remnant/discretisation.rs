@@ -2,7 +2,7 @@
 
 use super::held_numerator::Factored;
 
-/// Lower limit of Ts/T_n for which the filter is computed; the upper limit is its inverse.
+/// Lower limit of Ts/T_n for which the filter is computed; the upper limit is the reciprocal of this value.
 pub(super) const SMALLEST_RATIO: f64 = 1e-9;
 
 /// Discretisation of the remnant filter.
@@ -21,7 +21,7 @@ crate::named_choice!(RemnantDiscretisation, "discretisation of the remnant", 2, 
 });
 
 impl RemnantDiscretisation {
-    /// Returns the pole alpha, from `a = Ts/T_n`.
+    /// Returns the pole alpha as a function of `a = Ts/T_n`.
     pub(super) fn pole(self, a: f64) -> f64 {
         match self {
             Self::ZeroOrderHold => (-a).exp(),
@@ -29,7 +29,7 @@ impl RemnantDiscretisation {
         }
     }
 
-    /// Returns `T_n/Ts` from the pole, and its derivative.
+    /// Returns `T_n/Ts` as a function of the pole, and the derivative of this function.
     pub(super) fn time_constant(self, alpha: f64) -> (f64, f64) {
         match self {
             Self::ZeroOrderHold => {
@@ -53,14 +53,14 @@ impl RemnantDiscretisation {
     }
 }
 
-/// `(1 - alpha q^-1)^m`.
+/// Returns the coefficients of `(1 - alpha q^-1)^m`.
 pub(crate) fn denominator(order: usize, alpha: f64) -> Vec<f64> {
     (0..=order)
         .map(|i| binomial(order, i) * (-alpha).powi(i as i32))
         .collect()
 }
 
-/// `(Ts/(T_n + Ts))^m` (B.12).
+/// Returns the gain `(Ts/(T_n + Ts))^m` of the backward Euler filter (B.12).
 pub(super) fn backward_gain(order: usize, a: f64) -> f64 {
     (a / (1.0 + a)).powi(order as i32)
 }

@@ -7,7 +7,7 @@ use crate::{DiscreteTransferFunction, ModelError, SampleTime};
 /// `K_n / (T_n s + 1)^m`, driven by white noise of unit variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RemnantFilter {
-    /// Gain K_n.
+    /// Gain K_n of the filter.
     pub gain: f64,
     /// Time constant T_n in s.
     pub time_constant_s: f64,
@@ -15,19 +15,19 @@ pub struct RemnantFilter {
     pub order: usize,
 }
 
-/// `C(q^-1)/D(q^-1) eps'`, both monic with all roots inside the unit circle.
+/// Noise model `C(q^-1)/D(q^-1) eps'`, where C and D are monic with all roots inside the unit circle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseModel {
-    /// `[1, c1, ...]` in ascending powers of `q^-1`.
+    /// Coefficients `[1, c1, ...]` of C in ascending powers of `q^-1`.
     pub c: Vec<f64>,
-    /// `[1, d1, ..., dm]` in ascending powers of `q^-1`.
+    /// Coefficients `[1, d1, ..., dm]` of D in ascending powers of `q^-1`.
     pub d: Vec<f64>,
     /// Standard deviation sigma' of eps'.
     pub innovation_sd: f64,
 }
 
 impl RemnantFilter {
-    /// Creates a remnant filter with valid parameters.
+    /// Creates a remnant filter and checks its parameters.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] unless the gain is zero or more, the time constant is positive, both are finite, and
@@ -77,7 +77,8 @@ impl RemnantFilter {
         Ok(a)
     }
 
-    /// Returns the discrete filter from the white noise, with one draw per sample, to the remnant n.
+    /// Returns the discrete transfer function from the white noise, of which one value is drawn per sample, to the
+    /// remnant n.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] as for [`RemnantFilter::new`], and if T_n is not between 1e-9 and 1e9 samples.
@@ -99,7 +100,7 @@ impl RemnantFilter {
         DiscreteTransferFunction::new(&num, &denominator(self.order, how.pole(a)), sample_time)
     }
 
-    /// Returns the monic noise model with the same spectrum.
+    /// Returns the monic noise model with the same spectrum as the remnant.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] as for [`RemnantFilter::new`], and if T_n is not between 1e-9 and 1e9 samples.

@@ -20,13 +20,13 @@ const B_SPLINES: [&[[f64; 4]]; HIGHEST_ORDER] = [
     ],
 ];
 
-/// `integral over [0, 1] of u^k e^{-a u} du`, k = 0..4.
+/// Returns the moments `integral over [0, 1] of u^k e^{-a u} du`, k = 0 to 4.
 fn moments(a: f64) -> [f64; 5] {
     let decay = (-a).exp();
     let mut m = [0.0; 5];
     if a < 8.0 {
         // The highest moment is computed from its series of positive terms, e^-a sum of a^i k!/(k + 1 + i)!, and the
-        // others by downward recurrence (integration by parts).
+        // other moments by downward recurrence (integration by parts).
         let (mut term, mut sum) = (0.2, 0.0);
         for i in 0..80 {
             sum += term;
@@ -45,7 +45,7 @@ fn moments(a: f64) -> [f64; 5] {
     m
 }
 
-/// `n_1, ..., n_m`.
+/// Returns the coefficients `n_1, ..., n_m` of the numerator.
 pub(super) fn held_numerator(order: usize, a: f64) -> Vec<f64> {
     let m = moments(a);
     let pieces = B_SPLINES[order - 1].iter().enumerate();
@@ -55,7 +55,7 @@ pub(super) fn held_numerator(order: usize, a: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The derivatives of `n_1, ..., n_m` with respect to a.
+/// Returns the derivatives of `n_1, ..., n_m` with respect to a.
 fn held_numerator_derivative(order: usize, a: f64) -> Vec<f64> {
     let m = moments(a);
     let numerator = held_numerator(order, a);
@@ -72,7 +72,7 @@ fn held_numerator_derivative(order: usize, a: f64) -> Vec<f64> {
 /// The numerator of the zero-order hold with its zeros inside the unit circle, for K_n = 1.
 pub(crate) struct Factored {
     pub c: Vec<f64>,
-    /// Derivative of c with respect to `a = Ts/T_n`.
+    /// Derivatives of the coefficients c with respect to `a = Ts/T_n`.
     pub c_derivative: Vec<f64>,
     pub innovation_sd: f64,
     /// Derivative of `ln innovation_sd` with respect to a.

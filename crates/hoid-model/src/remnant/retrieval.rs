@@ -18,8 +18,8 @@ pub struct RetrievedRemnant {
 ///
 /// # Errors
 /// [`NotConvertible::NotFinite`] for coefficients that are not finite; [`NotConvertible::NotARemnantFilter`] if m is
-/// not 1 to 4, a coefficient has the wrong sign, it implies a pole outside (0, 1), or T_n is negligible compared with a
-/// sample.
+/// not 1 to 4, if a coefficient has the wrong sign or implies a pole outside (0, 1), or if T_n is negligible compared
+/// with a sample.
 pub fn retrieve(
     d: &[f64],
     innovation_sd: f64,
@@ -35,8 +35,8 @@ pub fn retrieve(
     })
 }
 
-/// Jacobian of `[T_n in s, K_n]` (rows) with respect to `[d_1, ..., d_m, sigma']` (columns) at the result of
-/// [`retrieve`].
+/// Returns the Jacobian of `[T_n in s, K_n]` (rows) with respect to `[d_1, ..., d_m, sigma']` (columns) at the result
+/// of [`retrieve`].
 ///
 /// # Errors
 /// As [`retrieve`].
@@ -51,7 +51,7 @@ pub fn retrieval_jacobian(
     let t_n_s = mean_time_constant(&poles, sample_time, how)?;
     let a = ts / t_n_s;
     let (unit, log_derivative) = how.innovation_sd(order, a);
-    // a = Ts/T_n: da/dT_n = -a/T_n.
+    // The factor a/T_n comes from a = Ts/T_n: da/dT_n = -a/T_n.
     let gain_by_time = innovation_sd / unit * log_derivative * a / t_n_s;
     let mut time: Vec<f64> = Vec::with_capacity(order + 1);
     for (i, (&alpha, &d)) in poles.iter().zip(d).enumerate() {
@@ -64,7 +64,7 @@ pub fn retrieval_jacobian(
     Ok([time, gain])
 }
 
-/// Returns the pole alpha that each coefficient of D implies.
+/// Returns the poles alpha, one implied by each coefficient of D.
 fn implied_poles(d: &[f64], innovation_sd: f64) -> Result<Vec<f64>, NotConvertible> {
     let order = d.len();
     let refuse = |reason: String| NotConvertible::NotARemnantFilter { order, reason };

@@ -10,10 +10,10 @@ use crate::{ModelError, SampleTime};
 const HIGHEST_HZ: f64 = 200.0;
 /// Target rate of the automatic decimation, Hz.
 const TARGET_HZ: f64 = 100.0;
-/// Relative difference between two rates that is too large to be rounding.
+/// Relative difference between two rates above which it is not attributed to rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// Choice of the decimation factor of a record.
+/// Choice of the decimation factor for a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Decimation {
     /// Rates above 200 Hz are decimated by the factor that gives the rate nearest to 100 Hz.
@@ -21,13 +21,13 @@ pub enum Decimation {
     Auto,
     /// No decimation.
     Off,
-    /// Decimation by this factor.
+    /// Decimation by the given factor.
     By(usize),
 }
 
 impl Decimation {
-    /// Returns the choice for estimators of polynomials, whose orders and delays are in samples: these use the original
-    /// samples unless a factor is given.
+    /// Returns the choice for estimators of polynomials, whose orders and delays are in samples: these estimators use
+    /// the original samples unless a factor is given.
     pub fn when_named(self) -> Self {
         match self {
             Self::Auto => Self::Off,
@@ -35,7 +35,7 @@ impl Decimation {
         }
     }
 
-    /// Returns the factor for a sample time: 1 for no decimation.
+    /// Returns the factor for a sample time; 1 means no decimation.
     pub fn factor(self, sample_time: SampleTime) -> usize {
         let hz = 1.0 / sample_time.s();
         match self {
@@ -87,10 +87,10 @@ impl fmt::Display for Decimation {
     }
 }
 
-/// Data of an applied decimation.
+/// Description of an applied decimation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decimated {
-    /// Ratio of the new sample time to the old one.
+    /// Ratio of the new sample time to the old sample time.
     pub factor: usize,
     /// Old sampling frequency, Hz.
     pub from_hz: f64,
@@ -105,14 +105,14 @@ pub struct Decimated {
     pub stop_db: f64,
     /// Length of the filter in samples at the old rate.
     pub taps: usize,
-    /// Time in s by which a sample of the input was taken later than the sample of the output with the same index.
+    /// Time in s by which each sample of the input was taken later than the sample of the output with the same index.
     pub lead_s: f64,
     /// Delay of the decimated values of a stream, s.
     pub lag_s: f64,
 }
 
 impl Decimated {
-    /// Returns the decimation of a sample time by a factor, with its filter and the new sample time; `None` if the
+    /// Returns the description of a decimation by a factor, with its filter and the new sample time; `None` if the
     /// filter would be longer than `longest` samples on each side.
     pub(super) fn by(factor: usize, old: SampleTime, longest: usize) -> Option<(Self, Kernel, SampleTime)> {
         let kernel = Kernel::folding(1.0 / factor as f64, longest)?;
@@ -133,7 +133,7 @@ impl Decimated {
     }
 }
 
-/// Formats the rates as a phrase without a full stop.
+/// Formats the description of a decimation as a phrase without a full stop.
 impl fmt::Display for Decimated {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let hz = |hz: f64| (hz * 1e4).round() / 1e4;

@@ -1,12 +1,13 @@
 //! Sample-by-sample decimation, for streams.
 //!
-//! The output for old sample `k M` is available when the filter has received the old samples after it that it needs.
-//! The delay of the stream is half the length of the filter plus M/2 samples, about 15 samples at the new rate
+//! The output for old sample `k M` is available when the filter has received all later old samples that it needs. The
+//! delay of the stream is half the length of the filter plus M/2 samples, about 15 samples at the new rate
 //! ([`Decimated::lag_s`]). Up to the last available sample, the values of the stream are identical to those of the
 //! decimated record.
 //!
 //! **Values that are not finite** (missing, faulty) are replaced by the last valid value at the input of the filter. A
-//! new sample is NaN if one of its M old samples is not finite, so that it is not used for identification.
+//! new sample is NaN if one of the M old samples that it replaces is not finite, so that it is not used for
+//! identification.
 
 use std::collections::VecDeque;
 
@@ -16,19 +17,19 @@ use super::decimation::Decimated;
 use super::kernel::Kernel;
 use crate::{ModelError, SampleTime};
 
-/// Largest number of samples on each side of the filter of a stream.
+/// Maximum number of samples on each side of the filter in a stream.
 const LONGEST: usize = 1_000_000;
 
-/// Decimates C channels together.
+/// Decimator of C channels together.
 #[derive(Debug, Clone)]
 pub struct Decimator<const C: usize> {
     done: Decimated,
     kernel: Kernel,
     sample_time: SampleTime,
     lanes: [DecimatedChannel; C],
-    /// Number of input samples.
+    /// Number of input samples so far.
     input_count: u64,
-    /// Number of output samples.
+    /// Number of output samples so far.
     output_count: u64,
 }
 
@@ -38,18 +39,18 @@ struct DecimatedChannel {
     /// Number of whole samples from old sample `k M` to the instant of the new value: 0, or the middle of the M
     /// samples.
     lead: i64,
-    /// Position of the first weight relative to that instant, and the weights.
+    /// Position of the first weight relative to the instant of the new value, and the weights.
     offset: i64,
     weights: Vec<f64>,
-    /// Samples that the filter needs. The first one has the index `first`, which is negative within the reflection of
-    /// the start.
+    /// Past samples that the filter needs. The first of them has the index `first`, which is negative within the
+    /// reflection of the start.
     past: VecDeque<f64>,
     first: i64,
-    /// The last valid value.
+    /// Last valid value of the channel.
     last: f64,
-    /// True if there has been a valid value.
+    /// True if a valid value has been received.
     seen: bool,
-    /// Indices of samples that are not finite, from the last output on.
+    /// Indices of samples that are not finite, from the sample of the last output on.
     bad: VecDeque<u64>,
 }
 
@@ -93,7 +94,7 @@ impl<const C: usize> Decimator<C> {
         })
     }
 
-    /// Returns the data of the decimation.
+    /// Returns the description of the decimation.
     pub fn done(&self) -> Decimated {
         self.done
     }
@@ -103,7 +104,7 @@ impl<const C: usize> Decimator<C> {
         self.sample_time
     }
 
-    /// Returns the number of samples between the last output and the last input.
+    /// Returns the number of old samples between the sample to which the last output belongs and the last input.
     pub fn lag_samples(&self) -> u64 {
         let at = self.output_count.saturating_sub(1) * self.done.factor as u64;
         self.input_count.saturating_sub(1).saturating_sub(at)
@@ -116,7 +117,7 @@ impl<const C: usize> Decimator<C> {
         numbers
     }
 
-    /// Restores the state saved by [`Decimator::saved`]; returns false for numbers of another decimator.
+    /// Restores the state saved by [`Decimator::saved`]; returns false if the numbers belong to another decimator.
     #[must_use]
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let (mut left, mut lacking) = (numbers.iter(), false);
@@ -127,7 +128,7 @@ impl<const C: usize> Decimator<C> {
         !lacking && left.next().is_none()
     }
 
-    /// Takes one sample of each channel; returns a new sample of each channel when it is available.
+    /// Takes one sample of each channel; returns a new sample of each channel if one is available, otherwise `None`.
     pub fn take(&mut self, values: [f64; C]) -> Option<[f64; C]> {
         let (number, factor, half) = (self.input_count, self.done.factor as u64, self.kernel.half());
         self.input_count += 1;
@@ -157,7 +158,7 @@ impl DecimatedChannel {
         if value.is_finite() {
             self.last = value;
             if !self.seen {
-                // The past is not known: it is set to the first value.
+                // The samples before the first value are not known: they are set to this value.
                 self.past.iter_mut().for_each(|past| *past = value);
                 self.seen = true;
             }
@@ -171,14 +172,14 @@ impl DecimatedChannel {
     fn reflect(&mut self, half: usize) {
         let begin = self.past[0];
         for k in 1..=half {
-            // The k - 1 values inserted so far shift sample k to position 2 k - 1.
+            // The k - 1 values inserted so far have shifted sample k to position 2 k - 1.
             let value = 2.0 * begin - self.past[2 * k - 1];
             self.past.push_front(value);
         }
         self.first = -(half as i64);
     }
 
-    /// Returns the new value for the old samples from `at` on.
+    /// Returns the new value for the `factor` old samples from `at` on; NaN if one of them is not finite.
     fn value(&mut self, at: u64, factor: u64) -> f64 {
         if self.bad.iter().any(|bad| (at..at + factor).contains(bad)) {
             return f64::NAN;

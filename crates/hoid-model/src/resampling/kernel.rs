@@ -12,27 +12,27 @@
 //!
 //! At integer t this is a linear-phase FIR filter whose delay is compensated; at other t it interpolates, with the same
 //! frequency response. The weights for each t are divided by their sum, so that a constant is unchanged. A is
-//! [`DESIGN_DB`], which satisfies the stated [`STOP_DB`] with a margin.
+//! [`DESIGN_DB`], which exceeds the documented attenuation [`STOP_DB`] by a margin.
 
 use std::f64::consts::PI;
 
-/// Design attenuation, dB.
+/// Attenuation for which the filter is designed, dB.
 const DESIGN_DB: f64 = 90.0;
-/// Stated attenuation of aliases and of the interpolation error, dB.
+/// Documented attenuation of aliases and of the interpolation error, dB.
 pub const STOP_DB: f64 = 80.0;
 /// Half the width of the transition, relative to its upper edge.
 const HALF_TRANSITION: f64 = 0.1;
 /// End of the pass band relative to the lower of the two Nyquist frequencies.
 pub const PASS: f64 = 0.8;
 
-/// Distance from an integer that counts as rounding, samples.
+/// Distance from an integer, in samples, up to which the difference counts as rounding.
 const WHOLE: f64 = 1e-9;
 
 /// Continuous impulse response of a low-pass filter, in samples of the record.
 #[derive(Debug, Clone, Copy)]
 pub struct Kernel {
     cutoff: f64,
-    /// Number of samples on each side.
+    /// Number of samples that the filter uses on each side.
     half: usize,
 }
 
@@ -50,7 +50,7 @@ impl Kernel {
     /// relative to the old one; `None` if the filter would be longer than `longest` on each side.
     pub fn limiting(ratio: f64, longest: usize) -> Option<Self> {
         let half = half_length(2.0 * HALF_TRANSITION * ratio);
-        // Written so that NaN gives `None`.
+        // The condition is written so that NaN gives `None`.
         (half <= longest as f64).then_some(Self {
             cutoff: (1.0 - HALF_TRANSITION) * ratio,
             half: half as usize,
@@ -63,14 +63,14 @@ impl Kernel {
     /// spectrum of noise has no gap. `None` if the filter would be longer than `longest` on each side.
     pub fn folding(ratio: f64, longest: usize) -> Option<Self> {
         let half = half_length(2.0 * (1.0 - PASS) * ratio);
-        // Written so that NaN gives `None`.
+        // The condition is written so that NaN gives `None`.
         (half <= longest as f64).then_some(Self {
             cutoff: ratio,
             half: half as usize,
         })
     }
 
-    /// Returns the number of samples on each side of the requested one.
+    /// Returns the number of samples that the filter uses on each side of the requested instant.
     pub fn half(self) -> usize {
         self.half
     }
@@ -93,7 +93,7 @@ impl Kernel {
         self.cutoff * sinc(self.cutoff * s) * bessel_i0(beta * root) / bessel_i0(beta)
     }
 
-    /// Returns the values at `t_k = first + k step` for k = 0 .. n, in samples; every t must be at least
+    /// Returns the values at `t_k = first + k step` for k = 0 to n - 1, in samples; every t_k must be at least
     /// [`Kernel::half`] samples from both ends.
     pub fn values(self, samples: &[f64], first: f64, step: f64, n: usize) -> Vec<f64> {
         // For an integer step all fractions are equal, and the weights are computed once.
@@ -105,7 +105,7 @@ impl Kernel {
                 let whole = (t - t.round()).abs() < WHOLE;
                 let at = if whole { t.round() } else { t.floor() };
                 let fraction = if whole { 0.0 } else { t - at };
-                // Before the first value the fraction is NaN, which differs from every fraction.
+                // The initial value of `known` is NaN, which differs from every fraction.
                 let is_known = (fraction - known).abs() < 1e-13;
                 if !is_known {
                     (offset, weights) = self.weights(fraction);
@@ -118,7 +118,7 @@ impl Kernel {
     }
 }
 
-/// Half the length for a transition of this width, relative to the Nyquist frequency.
+/// Returns half the length of the filter for a transition of the given width, relative to the Nyquist frequency.
 fn half_length(width: f64) -> f64 {
     ((DESIGN_DB - 7.95) / (2.0 * 2.285 * PI * width)).ceil()
 }
@@ -128,7 +128,8 @@ fn sinc(x: f64) -> f64 {
     if angle.abs() < 1e-8 { 1.0 } else { angle.sin() / angle }
 }
 
-/// Modified Bessel function of the first kind and order 0, by its power series; the terms decrease for k > x / 2.
+/// Returns the modified Bessel function of the first kind and order 0, computed from its power series; the terms
+/// decrease for k > x / 2.
 fn bessel_i0(x: f64) -> f64 {
     let square = 0.25 * x * x;
     let (mut term, mut sum) = (1.0, 1.0);

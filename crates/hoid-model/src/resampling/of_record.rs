@@ -5,8 +5,8 @@ use super::kernel::Kernel;
 use crate::{Channel, ModelError, Record};
 
 impl Decimation {
-    /// Returns the record at its new rate, with the data of the decimation; these are `None` if the record was not
-    /// decimated.
+    /// Returns the record at its new rate, with the description of the decimation, which is `None` if the record was
+    /// not decimated.
     ///
     /// # Errors
     /// As [`Record::decimated`].
@@ -20,7 +20,7 @@ impl Decimation {
 
 impl Record {
     /// Returns every M-th sample of all channels after the same linear-phase filter, with the input taken in the middle
-    /// of the M samples over which it is held.
+    /// of the M samples over which it is held. M is `factor`.
     ///
     /// # Errors
     /// [`ModelError::Decimation`] for a factor of 0, and for a record that is shorter than half the filter.
@@ -34,7 +34,7 @@ impl Record {
             return Err(refuse("a factor of 0".to_owned(), "1 or more".to_owned()));
         }
         let n = self.len();
-        // The reflection must be shorter than the record.
+        // The reflected part must be shorter than the record.
         let Some((done, kernel, new)) = Decimated::by(factor, self.sample_time(), n - 1) else {
             let half = Decimated::by(factor, self.sample_time(), usize::MAX).map(|(_, kernel, _)| kernel.half());
             return Err(refuse(
@@ -45,7 +45,7 @@ impl Record {
                 "a longer record, or a smaller factor; decimate off keeps the rate".to_owned(),
             ));
         };
-        // The duration is preserved to half a new sample: whole periods remain whole.
+        // The duration is preserved to within half a new sample, so that whole periods remain whole.
         let new_samples = (n + factor / 2) / factor;
         let (label, start_s) = (self.label().to_owned(), self.time_s(0));
         let (input, output, others) = self.into_channels();
@@ -66,7 +66,7 @@ impl Record {
     }
 }
 
-/// Returns filtered values at `first + k factor`, k = 0 .. n; beyond its ends the signal is reflected in the end
+/// Returns filtered values at `first + k factor` for k = 0 to n - 1; beyond its ends the signal is reflected in the end
 /// points.
 fn filtered(kernel: Kernel, values: &[f64], first: f64, factor: usize, n: usize) -> Vec<f64> {
     let half = kernel.half();

@@ -12,9 +12,10 @@
 //! ```
 //!
 //! so that `90/(s(s+6))`, `(2s+1)/(s^2+0.4s+1)` and `0.5(s+1)/s/(s+2)` have their expected meaning. A number precedes
-//! its factor (`s2` is a mistyped `s^2`). A factor that follows a divisor without an operator in between is ambiguous
-//! (`90/s(s+6)`) and is refused; the message shows both ways to write it. Common factors of numerator and denominator
-//! are kept: `s/s^2` has a pole that is cancelled in its response. A delay is a factor of the whole expression.
+//! the factor that it multiplies (`s2` is a mistyped `s^2`). A factor that follows a divisor without an operator in
+//! between is ambiguous (`90/s(s+6)`) and is refused; the error message shows both unambiguous notations. Common
+//! factors of numerator and denominator are kept: `s/s^2` has a pole that is cancelled in its response. A delay is a
+//! factor of the whole expression.
 //!
 //! | file | contents |
 //! |---|---|
@@ -37,7 +38,7 @@ use crate::ModelError;
 impl FromStr for ContinuousTransferFunction {
     type Err = ModelError;
 
-    /// Parses `90/1,6,0`, `90/(s(s+6))`, `0.5(s+1)exp(-0.1s)/s^2`.
+    /// Parses a transfer function, such as `90/1,6,0`, `90/(s(s+6))` or `0.5(s+1)exp(-0.1s)/s^2`.
     ///
     /// ```
     /// # use hoid_model::ContinuousTransferFunction;
@@ -73,7 +74,7 @@ impl FromStr for ContinuousTransferFunction {
 }
 
 impl fmt::Display for ContinuousTransferFunction {
-    /// Formats the transfer function as an expression in s that is parsed to the same transfer function.
+    /// Formats the transfer function as an expression in s from which the same transfer function can be parsed.
     ///
     /// ```
     /// # use hoid_model::ContinuousTransferFunction;
@@ -102,7 +103,7 @@ impl fmt::Display for ContinuousTransferFunction {
     }
 }
 
-/// Returns the shortest text that is parsed to the same number.
+/// Returns the shortest text from which the same number can be parsed.
 fn number(value: f64) -> String {
     if value != 0.0 && !(1e-4..1e7).contains(&value.abs()) {
         format!("{value:e}")
@@ -111,7 +112,7 @@ fn number(value: f64) -> String {
     }
 }
 
-/// Formats a polynomial in descending powers, `s^2 + 6s - 1`.
+/// Formats a polynomial in descending powers, such as `s^2 + 6s - 1`.
 fn polynomial_text(p: &[f64]) -> String {
     let mut text = String::new();
     for (c, power) in p.iter().zip((0..p.len()).rev()).filter(|(c, _)| **c != 0.0) {

@@ -6,8 +6,8 @@ use kuva::prelude::{Layout, TickFormat};
 
 use super::style;
 
-/// Smallest distance between the ticks of an ordinate; `HIGH_DECADE` is the smallest height of a decade with labels at
-/// 2 and 5.
+/// Smallest distance between the ticks of an ordinate, in units of the figure; `HIGH_DECADE` is the smallest height of
+/// a decade with labels at 2 and 5.
 const TICK_HEIGHT: f64 = 16.0;
 const HIGH_DECADE: f64 = 48.0;
 /// Spacings of phase ticks, deg.
@@ -45,8 +45,8 @@ pub fn tick(value: f64, step: f64) -> String {
     format!("{value:.digits$e}")
 }
 
-/// Returns the layout with the ticks of an ordinate of this height in `unit`; the ticks have numbers if `labelled` is
-/// true.
+/// Returns the layout with ticks for an ordinate of this height; the ticks have numbers if `labelled` is true. If the
+/// unit is `deg`, the tick spacing of a wide range is one of `PHASE_STEPS`.
 pub fn with_ordinate(
     layout: Layout,
     (low, high): (f64, f64),
@@ -96,7 +96,7 @@ impl SymmetricLogAxis {
         }
     }
 
-    /// The value at an integer height.
+    /// Returns the value at an integer height in decades.
     fn value(self, height: f64) -> f64 {
         match height.abs() {
             0.0 => 0.0,
@@ -104,7 +104,7 @@ impl SymmetricLogAxis {
         }
     }
 
-    /// Returns the layout with ticks at the integer heights of a range on axes that are `height` units high.
+    /// Returns the layout with ticks at the integer decades of a range, on axes that are `height` units high.
     pub fn with_ordinate(self, layout: Layout, (low, high): (f64, f64), height: f64) -> Layout {
         let step = ((high - low) * TICK_HEIGHT / height).ceil().max(1.0);
         let range = (self.linear_within, self.value(low.abs().max(high.abs())));
@@ -156,8 +156,8 @@ pub fn log_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     }
 }
 
-/// Label of a tick on a logarithmic axis with this range. All labels of an axis are decimal numbers, or all are powers
-/// of ten.
+/// Label of a tick on a logarithmic axis with this range. The labels of one axis are either all decimal numbers or all
+/// powers of ten.
 pub fn log_tick(value: f64, (low, high): (f64, f64)) -> String {
     if low > 0.999e-3 && high < 1e6 {
         return crate::numbers::plain(value);

@@ -2,8 +2,7 @@
 //!
 //! The estimators identify the operator including the zero-order hold of the sampling, `B q^-nk/(A F)`. The true
 //! response is drawn with the same hold, so that the curves coincide if the parameters agree. Before the phase is
-//! unwrapped, the phase of the delay, `nk Ts omega`, is removed because it is the largest part; it is added back
-//! afterwards.
+//! unwrapped, the phase of the delay, `nk Ts omega`, is removed because it dominates; it is added back afterwards.
 
 use std::f64::consts::TAU;
 
@@ -30,8 +29,8 @@ const PHASE_STEPS: [f64; 6] = [15.0, 30.0, 45.0, 90.0, 180.0, 360.0];
 
 /// Number of frequencies of a curve.
 const POINTS: usize = 240;
-/// Frequency range of manual control, rad/s; on an axis from 0.1 to 50 rad/s there are ticks at 1, 2 and 5 in each
-/// decade.
+/// Lowest frequency of manual control, rad/s, followed by the highest; on an axis from 0.1 to 50 rad/s there are ticks
+/// at 1, 2 and 5 in each decade.
 const LOWEST_RAD_S: f64 = 0.1;
 const HIGHEST_RAD_S: f64 = 50.0;
 /// Displayed range of the phase, deg. Below this range the phase of a dead time decreases without bound and is not
@@ -58,9 +57,9 @@ pub struct TrueResponse {
     pub sample_time: SampleTime,
 }
 
-/// Draws the magnitude in dB and the phase in deg over frequency in rad/s. The lower end is 0.1 rad/s or, if that is
-/// higher, the lowest frequency that the longest record resolves; the upper end is 50 rad/s or, if that is lower, the
-/// Nyquist frequency.
+/// Draws the magnitude in dB and the phase in deg over frequency in rad/s. The lower end of the abscissa is 0.1 rad/s
+/// or, if that is higher, the lowest frequency that the longest record resolves; the upper end is 50 rad/s or, if that
+/// is lower, the Nyquist frequency.
 ///
 /// Bands extend 1.96 standard errors to either side; a model without standard errors has no band. A true response that
 /// no discrete model represents (with a fractional delay) is drawn without the hold.
@@ -69,8 +68,8 @@ pub fn bode(id: &str, models: &[BodeModel<'_>], truths: &[TrueResponse]) -> Stri
 }
 
 /// Draws the figure of [`bode`] with additional points, such as a describing function of the same records, with error
-/// bars of 1.96 standard errors. The axes extend to lower frequencies if points lie there. The first set of points is
-/// black; further sets have colours that no model has.
+/// bars of 1.96 standard errors. The axes extend below the frequencies of the curves if there are points at lower
+/// frequencies. The first set of points is black; further sets have colours that no model has.
 pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueResponse], points: &[BodePoints]) -> String {
     let points: Vec<BodePoints> = points.iter().map(BodePoints::drawable).collect();
     let omega = frequencies(models, &points);
@@ -266,7 +265,8 @@ impl Curve {
     }
 }
 
-/// The first of `steps` that gives at most eight ticks; if there is none, a multiple of the last.
+/// Returns the first element of `steps` that gives at most eight ticks over `span`; if there is none, a multiple of the
+/// last element.
 fn tick_step(span: f64, steps: &[f64]) -> f64 {
     let largest = steps.last().copied().unwrap_or(1.0);
     let enough = |step: &&f64| span / **step <= MOST_STEPS;

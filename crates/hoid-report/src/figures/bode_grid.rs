@@ -129,7 +129,8 @@ impl BodeCurve {
 /// One column of Bode diagrams.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BodeColumn {
-    /// Title; empty for no title. `_` or `^` is followed by one character, or by several in braces.
+    /// Title; empty for no title. `_` and `^` mark subscripts and superscripts of one character, or of several in
+    /// braces.
     pub title: String,
     /// Curves of the column.
     pub curves: Vec<BodeCurve>,

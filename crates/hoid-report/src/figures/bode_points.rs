@@ -1,8 +1,8 @@
 //! Points with error bars in a Bode diagram, for comparison of describing functions with the models fitted to the same
 //! records.
 //!
-//! The phase of a point is known up to full turns. It is drawn on the branch nearest to the first curve. If there is no
-//! curve, it is unwrapped from point to point after the delay of the points is removed.
+//! The phase of a point is known up to full turns. A point is drawn on the branch nearest to the first curve. If there
+//! is no curve, the phase is unwrapped from point to point after the delay of the points is removed.
 
 use hoid_ident::frequency::{DescribingFunction, unwrapped_deg};
 use hoid_model::uncertainty::Estimate;
@@ -81,7 +81,7 @@ impl BodePoints {
         self
     }
 
-    /// The values and both ends of their error bars.
+    /// Returns the values together with both ends of their error bars.
     pub(super) fn reach(values: &[Estimate]) -> impl Iterator<Item = f64> + '_ {
         values.iter().flat_map(|v| {
             let half = half_bar(v);

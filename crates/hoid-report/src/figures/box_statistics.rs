@@ -41,7 +41,7 @@ impl BoxStatistics {
         let inside: Vec<f64> = values.iter().copied().filter(within).collect();
         Self {
             count: values.len(),
-            // An interpolated quartile may lie beyond the last value within the limit.
+            // An interpolated quartile may lie beyond the most extreme value within the limit.
             lower_whisker: inside.first().copied().unwrap_or_default().min(lower),
             lower_quartile: lower,
             median: quartile(0.5),

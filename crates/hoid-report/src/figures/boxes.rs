@@ -21,7 +21,7 @@ use super::{
 /// Height of the axes of a panel; `SINGLE_PANEL_HEIGHT` is the height if the figure has a single panel.
 const HEIGHT: f64 = 112.0;
 const SINGLE_PANEL_HEIGHT: f64 = 150.0;
-/// Space above a panel for its note and the number of outliers beyond its range.
+/// Space above a panel for its note and for the counts of outliers beyond its range.
 const COUNTS: f64 = 13.0;
 /// Distance of the group names below the axis; `ROW_DISTANCE` is the distance of a second row of names below the first.
 const NAMES_BELOW: f64 = 17.0;
@@ -38,8 +38,8 @@ pub enum BoxRange {
     /// The range includes all boxes, whiskers and outliers.
     #[default]
     Full,
-    /// The range includes boxes and whiskers. Outliers beyond it are counted above the panel, and a triangle at the
-    /// edge of the panel marks their box.
+    /// The range includes boxes and whiskers. The number of outliers beyond it is written above the panel, and a
+    /// triangle at the edge of the panel marks each box that has such outliers.
     Whiskers,
 }
 
@@ -55,7 +55,8 @@ pub struct BoxSeries {
 /// One panel of box plots.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BoxPanel {
-    /// Name of the quantity, such as `B_r(b_0)`; `_` or `^` is followed by one character, or by several in braces.
+    /// Name of the quantity, such as `B_r(b_0)`; `_` and `^` mark subscripts and superscripts of one character, or of
+    /// several in braces.
     pub name: String,
     /// Unit of the quantity; empty if it has none.
     pub unit: String,
@@ -63,7 +64,7 @@ pub struct BoxPanel {
     pub boxes: Vec<Vec<BoxStatistics>>,
     /// Limit up to which the ordinate is linear; it is logarithmic beyond. `None` for a linear ordinate.
     pub linear_within: Option<f64>,
-    /// Text above the panel, such as its largest number; empty for no text.
+    /// Text above the panel, such as the largest value that it shows; empty for no text.
     pub note: String,
 }
 
@@ -89,7 +90,8 @@ pub struct BoxGrid {
     pub shared_ordinates: bool,
     /// True if every range includes zero, which is marked by a line.
     pub with_zero: bool,
-    /// Smallest half width of every range, so that rounding errors do not look like scatter; zero for no limit.
+    /// Smallest half width of the range of each ordinate, so that rounding errors do not look like scatter; zero for no
+    /// limit.
     pub least_reach: f64,
 }
 
@@ -270,7 +272,7 @@ impl BoxGrid {
         if missing {
             entries.push(Entry::new("no value", INK, Sample::Cross));
         }
-        // The levels of one method stay in one row.
+        // In the legend, the levels of one method stay in one row.
         let levels = self.series.first().map_or(1, |s| s.shade.levels);
         add_legend_by(scene, &entries, levels);
     }

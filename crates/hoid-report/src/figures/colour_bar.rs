@@ -1,4 +1,4 @@
-//! Colour map for values, and its colour bar.
+//! Colours that represent the values of a map, and the colour bar next to it.
 //!
 //! The default colours are viridis (Smith and van der Walt, 2015), with evenly spaced lightness. Differences have the
 //! diverging colours of Harrower and Brewer (2003), from red over white at zero to blue, whose ends are equally dark.
@@ -29,7 +29,7 @@ pub enum MapColours {
     /// From dark for the smallest value to light for the largest.
     #[default]
     Sequential,
-    /// White at zero; the range has the same length on both sides.
+    /// White at zero; the range extends equally far to both sides of zero.
     Diverging,
 }
 

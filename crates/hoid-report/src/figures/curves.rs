@@ -34,7 +34,7 @@ pub enum LineKind {
     /// Solid line in the colour of the curve.
     #[default]
     Line,
-    /// Dashed line in the colour of the curve; a curve that coincides with it stays visible.
+    /// Dashed line in the colour of the curve, so that a curve that coincides with it stays visible.
     Dashed,
     /// Dotted line in the colour of the curve.
     Dotted,
@@ -70,7 +70,7 @@ pub struct Curve {
 /// One panel of curves.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CurvePanel {
-    /// Name of the ordinate; `_` or `^` is followed by one character, or by several in braces.
+    /// Name of the ordinate; `_` and `^` mark subscripts and superscripts of one character, or of several in braces.
     pub name: String,
     /// Unit of the ordinate; empty if it has none. An ordinate in `deg` has ticks at fractions of a full turn.
     pub unit: String,
@@ -190,12 +190,12 @@ impl CurveGrid {
                 entries.push(entry);
             }
         }
-        // The truth comes last, so that the levels of a method stay in one row.
+        // In the legend, the true value comes last, so that the levels of a method stay in one row.
         entries.sort_by_key(|entry| entry.sample == Sample::Dashed && entry.colour == BLACK);
         entries
     }
 
-    /// Largest number of levels of any method.
+    /// Number of levels of the method with the most levels.
     fn levels(&self) -> usize {
         let curves = self.panels.iter().flat_map(|p| &p.curves);
         curves.map(|c| c.shade.levels).max().unwrap_or(1)

@@ -39,8 +39,8 @@ pub struct ModelCurve {
 }
 
 impl ModelCurve {
-    /// Creates the curve of a response over the frequency range of a description, with a small margin and at least up
-    /// to `reach_rad_s`.
+    /// Creates the curve of a response over the frequency range of a description; the range is widened by a small
+    /// margin and extends at least up to `reach_rad_s`.
     pub fn over(
         found: &Description,
         reach_rad_s: f64,
@@ -115,7 +115,8 @@ impl ModelCurve {
     }
 }
 
-/// Frequencies in rad/s over the range of a description, with a small margin and at least up to `reach_rad_s`.
+/// Returns frequencies in rad/s over the range of a description, widened by a small margin and at least up to
+/// `reach_rad_s`.
 fn frequencies(found: &Description, reach_rad_s: f64) -> Vec<f64> {
     let lines = &found.function.lines;
     let ends = lines.first().zip(lines.last());

@@ -57,7 +57,7 @@ impl FigureFormat {
     }
 }
 
-/// Scales the figure to a width in mm and the height in proportion. The text is scaled too; it has 7.5 pt at 85 mm.
+/// Scales the figure to a width in mm and the height in proportion. The text is scaled too, to 7.5 pt at 85 mm.
 pub fn with_width_mm(svg: &str, width_mm: f64) -> String {
     let size = |name: &str| -> Option<f64> {
         let (_, rest) = svg.split_once(&format!(" {name}=\""))?;

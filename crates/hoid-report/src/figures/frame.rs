@@ -25,8 +25,8 @@ const SPACE: f64 = 8.0;
 const GAP: f64 = 16.0;
 /// Space to the left of a panel that has ticks of its own but no label.
 const TICKS: f64 = 50.0;
-/// Space to the right of a panel whose neighbour has ticks but no label. It is less than half of a tick label, which
-/// extends into the space of the neighbour.
+/// Space to the right of a panel whose neighbour has ticks but no label. This space is less than half of a tick label,
+/// which therefore extends into the space of the neighbour.
 const NARROW: f64 = 5.0;
 const TITLE: f64 = 18.0;
 /// Position of the centre of the ordinate label.
@@ -69,7 +69,7 @@ pub struct Area {
 }
 
 impl Area {
-    /// Number of columns to which a line between these axes is reduced: one for each unit of width.
+    /// Number of columns of points to which a line between these axes is reduced: one for each unit of width.
     pub fn parts(&self) -> usize {
         self.width.max(1.0) as usize
     }
@@ -190,7 +190,7 @@ impl Frame {
         }
     }
 
-    /// Returns the layout with the size and margins of a panel; only the lowest panel of a column has tick labels on
+    /// Returns the layout with the size and margins of a panel. Only the lowest panel of a column has tick labels on
     /// the abscissa.
     pub fn fitted(&self, i: usize, layout: Layout) -> Layout {
         let (row, column) = (i / self.columns, i % self.columns);

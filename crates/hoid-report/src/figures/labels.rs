@@ -1,10 +1,10 @@
 //! Text of labels: symbols of parameters, subscripts and superscripts.
 //!
-//! The drawing library has no subscripts. They are marked by characters of the private use area of Unicode, which
-//! become tags in the finished SVG ([`tagged`]). SVG readers differ: some add the shifts of nested tags, others replace
-//! them; some drop tags without text, trim spaces at the edges of a tag, or position each tag of a centred text
-//! separately. The tags are therefore not nested; each contains text and the full shift from the previous tag, and
-//! leading spaces are non-breaking. `svg` sets the start position of a text with tags.
+//! The drawing library has no subscripts. Subscripts and superscripts are marked by characters of the private use area
+//! of Unicode, which become tags in the finished SVG ([`tagged`]). SVG readers differ: some add the shifts of nested
+//! tags, others replace them; some drop tags without text, trim spaces at the edges of a tag, or position each tag of a
+//! centred text separately. The tags are therefore not nested; each contains text and the full shift from the previous
+//! tag, and leading spaces are non-breaking. `svg` sets the start position of a text with tags.
 
 /// Markers in a label for the start and end of a subscript and of a superscript; they become tags.
 const SUB: char = '\u{e000}';
@@ -23,7 +23,7 @@ pub enum Level {
 }
 
 impl Level {
-    /// Distance below the baseline, in units of the figure.
+    /// Distance of the part below the baseline, in units of the figure; negative for a superscript.
     fn below(self) -> i32 {
         match self {
             Self::Line => 0,
@@ -32,7 +32,7 @@ impl Level {
         }
     }
 
-    /// Font size relative to the line.
+    /// Font size of the part relative to that of the line.
     pub fn size(self) -> f64 {
         if self == Self::Line { 1.0 } else { SMALLER }
     }
@@ -63,8 +63,8 @@ pub fn panel_label(name: &str, unit: &str) -> String {
     literal(&format!("{}{unit}", names.join(", ")))
 }
 
-/// Marks the subscripts and superscripts of a label, such as `n_k^*` or `B_r(b_0^{d,0})`. `_` or `^` is followed by one
-/// character, or by several in braces; words such as `my_model` and `run_2` are unchanged.
+/// Marks the subscripts and superscripts of a label, such as `n_k^*` or `B_r(b_0^{d,0})`. `_` and `^` mark one
+/// character, or several in braces; words such as `my_model` and `run_2` are unchanged.
 pub fn marked(text: &str) -> String {
     literal(&marks(text))
 }
@@ -160,7 +160,7 @@ pub fn has_tags(text: &str) -> bool {
     text.contains(SIGNS)
 }
 
-/// Removes the characters that become tags.
+/// Removes the private characters that mark subscripts and superscripts.
 pub fn plain(text: &str) -> String {
     text.replace(SIGNS, "")
 }

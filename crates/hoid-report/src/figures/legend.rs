@@ -15,7 +15,7 @@ const GAP: f64 = 6.0;
 const BETWEEN: f64 = 14.0;
 const LONGEST: usize = 48;
 
-/// Sample of a legend entry.
+/// Graphical sample next to the text of a legend entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sample {
     /// A solid line.
@@ -43,7 +43,7 @@ pub struct Entry {
     pub name: String,
     /// Colour `#rrggbb`.
     pub colour: String,
-    /// Sample of the entry.
+    /// Graphical sample of the entry.
     pub sample: Sample,
 }
 

@@ -47,7 +47,8 @@ pub struct MapGrid {
     pub columns: usize,
     /// Titles of the columns, or of all panels; empty for no titles.
     pub titles: Vec<String>,
-    /// Name of the abscissa, such as `n_k^*`; `_` or `^` is followed by one character, or by several in braces.
+    /// Name of the abscissa, such as `n_k^*`; `_` and `^` mark subscripts and superscripts of one character, or of
+    /// several in braces.
     pub abscissa: String,
     /// Category names of the abscissa.
     pub x_categories: Vec<String>,

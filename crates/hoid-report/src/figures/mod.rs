@@ -7,7 +7,7 @@
 //! | [`time_response`] | measured, predicted and simulated output |
 //! | [`trace_panels`] | estimates over time, by method and level: recursive estimates, batch fits, truth |
 //! | [`box_plots`] | scatter of the results of many runs, in groups and series |
-//! | [`maps`] | a quantity over two variables as coloured cells |
+//! | [`maps`] | a quantity as a function of two variables, as coloured cells |
 //! | [`bode_grid`] | several Bode diagrams next to each other, each with several responses |
 //! | [`describing`] | a describing function with its errors and coherence, and the curves of models |
 //! | [`responses`] | frequency responses to several inputs, with 95 % bands |

@@ -7,7 +7,7 @@
 
 use super::style::MODEL_COLOURS;
 
-/// Lightness of the lowest of several levels; `DARKEST` is that of the highest.
+/// Lightness of the lowest of several levels; `DARKEST` is the lightness of the highest level.
 const LIGHTEST: f64 = 76.0;
 const DARKEST: f64 = 22.0;
 

@@ -2,11 +2,12 @@
 //!
 //! An estimate that leaves its normal range for a moment (such as T_L where K_e nearly vanishes) must not compress the
 //! scale for all other values. The ordinate therefore covers the truth, the batch fits and the estimates between their
-//! 10 and 90 % quantiles. It extends further, by at most one and a half times that range on either side, to include the
-//! 1 and 99 % quantiles and the middle part of the bands. If a true value is known and at least one method is near it,
-//! methods that are far off do not determine the scale either: the ordinate ends at most two spans from the truth,
-//! where a span is the range of the truth or a quarter of its magnitude, and methods and batch fits beyond are ignored.
-//! Values outside the ordinate are cut off at the axes, and [`TracePanel::beyond`] counts them.
+//! 10 and 90 % quantiles. The ordinate extends beyond this range, by at most one and a half times the range on either
+//! side, to include the 1 and 99 % quantiles and the middle part of the bands. If a true value is known and at least
+//! one method is near it, methods that are far off do not determine the scale either: the ordinate ends at most two
+//! spans from the truth, where a span is the range of the truth or a quarter of its magnitude, and methods and batch
+//! fits beyond are ignored. Values outside the ordinate are cut off at the axes, and [`TracePanel::beyond`] counts
+//! them.
 
 use hoid_numerics::statistics::{finite_sorted, quantile, quantile_of};
 
@@ -141,7 +142,8 @@ impl TracePanel {
         of(CurveKind::Estimate).any(near).then_some((low, high))
     }
 
-    /// The methods with rows beyond the axes, if the panel does not share its ordinate with others.
+    /// Returns the methods with rows beyond the range of this panel, which is the drawn range unless the panel shares
+    /// its ordinate with others.
     pub fn beyond(&self) -> Vec<Beyond> {
         let (low, high) = self.range();
         let estimates = self.curves.iter().filter(|c| c.kind == CurveKind::Estimate);

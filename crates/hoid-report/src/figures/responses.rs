@@ -9,7 +9,7 @@ use super::{
 };
 use crate::numbers::Z_95;
 
-/// Largest half width of a band, dB or deg: a wider one would compress the scale of all curves.
+/// Largest half width of a band, dB or deg; a wider band would compress the scale of all curves.
 const WIDEST: f64 = 60.0;
 
 /// The response of a model to one of its inputs.

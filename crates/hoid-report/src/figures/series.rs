@@ -2,10 +2,12 @@
 
 use std::ops::Range;
 
-/// Number of columns to which a line is reduced in a single-column figure: one for each unit between its axes.
+/// Number of columns of points to which a line is reduced in a single-column figure: one for each unit between its
+/// axes.
 pub const COLUMNS: usize = 340;
 
-/// Maximum number of runs; if there are more, runs separated by gaps narrower than a column are joined.
+/// Maximum number of runs of consecutive known values; if there are more, runs that are separated by gaps narrower than
+/// a column are joined.
 const MOST_RUNS: usize = 200;
 
 /// Indices of the smallest and the largest value in each column, in ascending order; all indices of a short series.
@@ -53,7 +55,7 @@ pub fn thinned_band(lower: &[f64], upper: &[f64], run: Range<usize>, parts: usiz
     kept
 }
 
-/// The parts of a run in the columns of a series of `n` values.
+/// Divides a run of indices at the boundaries of the columns of a series of `n` values.
 fn columns(n: usize, run: &Range<usize>, parts: usize) -> impl Iterator<Item = Range<usize>> {
     let run = run.clone();
     let (first, last) = (run.start * parts / n, run.end * parts / n);
@@ -76,8 +78,8 @@ pub fn without_level<T: PartialEq>(kept: &[usize], value: impl Fn(usize) -> T) -
     needed.map(|(_, &k)| k).collect()
 }
 
-/// Runs of consecutive indices with known values. If there are too many runs, those separated by less than a column are
-/// joined.
+/// Runs of consecutive indices with known values. If there are more than `MOST_RUNS` runs, runs that are separated by
+/// less than a column are joined.
 pub fn runs(n: usize, known: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     let mut found: Vec<Range<usize>> = Vec::new();
     for k in (0..n).filter(|k| known(*k)) {

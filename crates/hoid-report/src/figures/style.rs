@@ -70,7 +70,7 @@ pub fn line(points: impl IntoIterator<Item = (f64, f64)>, colour: &str, width: f
         .with_stroke_width(width)
 }
 
-/// True if the value can be drawn: differences of larger values would overflow.
+/// True if the value can be drawn; differences of values that are too large would overflow.
 pub fn is_drawable(value: f64) -> bool {
     value.abs() < 1e100
 }

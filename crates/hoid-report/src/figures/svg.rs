@@ -21,7 +21,7 @@ pub fn finish(id: &str, title: &str, scene: Scene) -> String {
     let font = scene.font_family.as_deref().map(escaped).unwrap_or_default();
     let (width, height) = (scene.width, scene.height);
     let (id, title) = (escaped(id), escaped(&plain(title)));
-    // The generator comment contains a version, so that the bytes would depend on it.
+    // The generator comment is removed: it contains a version, on which the bytes would depend.
     let body = match body.split_once("-->") {
         Some((stamp, rest)) if stamp.trim_start().starts_with("<!--") => rest,
         _ => body,

@@ -210,8 +210,8 @@ impl TraceCurve {
         shade(self.method, self.level, levels)
     }
 
-    /// The points to draw for a run of rows, without rows whose value equals that of both neighbours. A single row is
-    /// drawn over one sample time.
+    /// Returns the points to draw for a run of rows; rows whose value equals that of both neighbours are omitted. A
+    /// single row is drawn as a line over one sample time.
     fn points(&self, run: Range<usize>, parts: usize, bounded: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
         let at = |k: usize| (self.times_s[k], bounded(self.values[k]));
         if run.len() == 1 {

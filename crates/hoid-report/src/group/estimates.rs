@@ -23,7 +23,7 @@ const AVERAGE_COLUMNS: [(&str, &str); 10] = [
     ("vaf", "VAF (%)"),
 ];
 
-/// Headings of the table of averages.
+/// Returns the headings of the table of averages.
 pub(super) fn headings() -> Vec<&'static str> {
     AVERAGE_COLUMNS.iter().map(|(_, heading)| *heading).collect()
 }
@@ -76,8 +76,8 @@ impl GroupReport<'_> {
             .collect()
     }
 
-    /// Failed estimates: the number of quantities that could not be estimated, by subject, condition, estimator and
-    /// status, with the first reason.
+    /// Returns the failed estimates: for each subject, condition, estimator and status, the number of quantities that
+    /// could not be estimated, with the first reason.
     pub(super) fn failures(&self) -> Vec<Value> {
         let table = self.tables.estimates;
         let [subject, condition, estimator, status, reason] =

@@ -143,7 +143,8 @@ impl GroupReport<'_> {
         delay.unwrap_or(0.0)
     }
 
-    /// Medians of the fitted responses over the runs in a frequency range, with the quartiles as bands.
+    /// Returns the curve of each estimator: the median over the runs of the fitted response in a frequency range, with
+    /// the quartiles as a band.
     fn fits(&self, subject: &str, condition: &str, (low, high): (f64, f64)) -> Vec<BodeCurve> {
         let table = self.tables.responses;
         let (estimators, omega) = (texts(table, "estimator"), reals(table, "omega_rad_s"));

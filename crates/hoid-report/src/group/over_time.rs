@@ -32,7 +32,7 @@ const DISCRETE: [Row; 4] = [
     ("b1", "", "b1", "b1"),
 ];
 
-/// Statistics drawn over time.
+/// Statistics that a figure shows over time.
 #[derive(Clone, Copy, PartialEq)]
 enum Shown {
     /// Medians and quartiles over the runs, for all recursions.
@@ -81,7 +81,7 @@ fn short(value: f64) -> String {
 }
 
 impl GroupReport<'_> {
-    /// The figures of each condition.
+    /// Returns the figures of the recursive estimates over time, for each condition.
     pub(super) fn over_time(&self) -> Vec<Value> {
         let (_, conditions) = self.names();
         let rows = |rows: &[Row]| rows.iter().map(|row| PanelRow::of(*row)).collect::<Vec<_>>();

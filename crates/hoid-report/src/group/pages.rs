@@ -156,8 +156,8 @@ pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result
 /// every file system.
 const LONGEST_NAME: usize = 80;
 
-/// The file name of the page of each subject. It contains letters and digits, and a number if another subject has the
-/// same name or one that differs only in case, which some file systems ignore.
+/// The file name of the page of each subject. Characters other than ASCII letters and digits become `-`. A number is
+/// appended if the name of another subject is the same or differs only in case, which some file systems ignore.
 fn page_names(subjects: &[&str]) -> Vec<String> {
     let mut taken = BTreeSet::new();
     let name_of = |subject: &&str| {

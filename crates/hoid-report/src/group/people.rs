@@ -90,7 +90,7 @@ pub fn people_table<'a>(people: impl Iterator<Item = &'a Person>) -> PeopleTable
 
 /// Name of the column with the form of the response to a further input.
 const FORM: &str = "form";
-/// Names and headings of the parameters of a response to a further input that others lack.
+/// Names and headings of the parameters that occur only in the response to a further input, not in the operator.
 const OF_FURTHER: [(&str, &str); 2] = [("K_d", "K_d (s)"), ("tau_f", "tau_f (s)")];
 
 /// Input, name and heading of each column of the responses to further inputs.
@@ -169,8 +169,8 @@ impl GroupReport<'_> {
         people.iter().filter(|p| self.shows(&p.subject))
     }
 
-    /// The verdict on the group: level, reasons, notes. It is undefined on the page of a single subject, where the
-    /// operators list the reasons.
+    /// The verdict on the group: level, reasons, notes. The verdict is undefined on the page of a single subject, where
+    /// the operators list the reasons.
     pub(super) fn verdict(&self) -> Value {
         if self.subject.is_some() {
             return Value::UNDEFINED;

@@ -32,7 +32,7 @@ pub struct FrequencyTables<'a> {
     pub agreement: &'a OutputTable,
 }
 
-/// A column of texts; empty if the table has no such column.
+/// A column of text values; empty if the table has no such column.
 pub(super) fn texts<'a>(table: &'a OutputTable, name: &str) -> &'a [String] {
     match table.column(name) {
         Some(ColumnValues::Text(values)) => values,

@@ -8,7 +8,7 @@ use hoid_track::{StartAt, Trace};
 /// The span of a batch fit, s, and the fit.
 pub type BatchFit = ((f64, f64), Fit);
 
-/// The orders of a trace. If the trace tracks the delay, nk is set to the median of the estimated delay in a span, s.
+/// Returns the orders of a trace. If the trace tracks the delay, nk is the median of the estimated delay in a span (s).
 fn orders_within(trace: &Trace, (from, to): (f64, f64)) -> Orders {
     let orders = trace.options().orders;
     if trace.options().method.track_delay_s().is_none() {
@@ -46,7 +46,7 @@ pub fn batch_fit(trace: &Trace, record: &Record, (from, to): (f64, f64)) -> Resu
 }
 
 /// The default batch fits for comparison with a trace: the start fit, and, unless the method needs no start fit, a fit
-/// to the last third of the record. The second element is the error if the latter fails.
+/// to the last third of the record. The second element is the error of the fit to the last third, if that fit fails.
 pub fn default_batch_fits(trace: &Trace, record: &Record) -> (Vec<BatchFit>, Option<IdentError>) {
     let mut all = Vec::new();
     if let (Some(start), StartAt::Span(Some((from, to)))) = (trace.start(), &trace.options().start)
@@ -55,8 +55,8 @@ pub fn default_batch_fits(trace: &Trace, record: &Record) -> (Vec<BatchFit>, Opt
         all.push(((span.time_s(0), span.time_s(span.len())), start.clone()));
     }
     if trace.options().method.starts_itself() {
-        // A method without a start fit has no orders for a batch fit, because its noise model is long and it tracks its
-        // own delay.
+        // The orders of a method without a start fit do not suit a batch fit, because its noise model is long and the
+        // method tracks its own delay.
         return (all, None);
     }
     let last_third = (

@@ -24,7 +24,7 @@ impl<'a> Evaluated<'a> {
     }
 }
 
-/// The estimate of the operator's parameter with this name.
+/// Returns the estimate of the operator parameter with this name; `None` for an unknown name.
 pub fn of_name(operator: &OperatorEstimate, name: &str) -> Option<Estimate> {
     operator.rows().into_iter().find(|r| r.0 == name).map(|r| r.2)
 }

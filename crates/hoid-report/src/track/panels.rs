@@ -19,7 +19,7 @@ use crate::{
     numbers::Z_95,
 };
 
-/// Which number of an estimate is drawn: its value or its standard error.
+/// Number that is drawn for each estimate: its value or its standard error.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Shown {
     Value,

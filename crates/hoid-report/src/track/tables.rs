@@ -21,7 +21,7 @@ use crate::{
 /// Time from which errors are evaluated, s; it excludes the initial transient of a recursion.
 const ERRORS_FROM_S: f64 = 10.0;
 
-/// One row per method: description, forgetting, start.
+/// Returns one row per method: its description, its forgetting and its start.
 pub fn methods(traces: &[Evaluated<'_>], record: &Record) -> Vec<Value> {
     let row = |t: &Evaluated<'_>| {
         let trace = t.section.trace;
@@ -50,8 +50,8 @@ pub fn methods(traces: &[Evaluated<'_>], record: &Record) -> Vec<Value> {
     traces.iter().map(row).collect()
 }
 
-/// One row per method: numbers of samples used, skipped and shortened, and of rows that cannot be converted to an
-/// operator.
+/// Returns one row per method: the numbers of samples used and skipped, of shortened steps, and of rows that cannot be
+/// converted to an operator.
 pub fn counts(traces: &[Evaluated<'_>]) -> Vec<Value> {
     let row = |t: &Evaluated<'_>| {
         let trace = t.section.trace;
@@ -99,7 +99,7 @@ struct Reason {
 }
 
 /// The reasons, with the most frequent first. Reasons that differ only in their numbers are combined under the text of
-/// the first.
+/// the first of these reasons.
 fn reasons(trace: &Evaluated<'_>) -> Vec<Reason> {
     // Rows before the first estimate have the kind `None`.
     let mut found: Vec<(Option<Discriminant<NotConvertible>>, Reason)> = Vec::new();
@@ -193,7 +193,8 @@ fn percent(share: f64) -> String {
     }
 }
 
-/// The batch fits of one method: the recursive estimate at the end of each span, the fit, and the true value.
+/// Returns one row per batch fit of a method: the recursive estimate at the end of the span, the fit, and the true
+/// value.
 pub fn batch(trace: &Evaluated<'_>, record: &Record) -> Vec<Value> {
     trace
         .section

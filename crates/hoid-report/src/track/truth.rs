@@ -31,7 +31,7 @@ pub fn parameter(record: &Record, name: &str, time_s: f64) -> Option<f64> {
 
 /// The true coefficients of B and of the poles at every sample, computed by the exact hold with the parameters of that
 /// sample. Empty without true values and for a model without the structure of the operator; only B is omitted if the
-/// delay differs from that of the model.
+/// trace tracks the delay or if the true delay differs from that of the model.
 pub fn coefficients(record: &Record, trace: &Trace) -> Vec<(Coefficient, Vec<f64>)> {
     let orders = trace.options().orders;
     let is_operator = orders.nb == 2 && (orders.na, orders.nf) != (2, 2) && (orders.na == 2 || orders.nf == 2);

@@ -1,14 +1,14 @@
-//! Gains with which each part of the remnant has its share of the variance of u.
+//! Gains at which each part of the remnant has its share of the variance of u.
 //!
 //! Part i with gain 1 contributes `V_i = sum over k of h_i(k)^2` to the variance of u, where h_i is the response of u,
 //! through the closed loop, to one unit of w at sample 0. The sinusoids of target and disturbance contribute
 //! `V_0 = sum of A^2/2 |u/f|^2` at their frequencies, with the responses of the sampled loop. For a target to which the
-//! person responds with F, `e/f = (1 - P F)/(1 + B P)` and `u/f = (B + F)/(1 + B P)`. All parts are independent, so
-//! with shares p_i
+//! person responds with F, `e/f = (1 - P F)/(1 + B P)` and `u/f = (B + F)/(1 + B P)`, where B is the response to the
+//! error. All parts are independent, so with shares p_i
 //!
 //! `var u = (V_0 + sum of K_j^2 V_j of given gains) / (1 - sum of p_i)`, `K_i^2 = p_i var u / V_i`.
 //!
-//! The response also shows whether the loop is stable, since it then decays to zero.
+//! The response h_i also shows whether the loop is stable, since it then decays to zero.
 
 use hoid_model::{
     Complex64, ModelError,
@@ -26,14 +26,14 @@ use super::{
 const FIRST: usize = 512;
 /// Horizon in samples within which the response of a stable loop must decay.
 const LONGEST: usize = 1 << 20;
-/// Fraction of the energy in the second half of the horizon below which a response has decayed. The fraction beyond the
-/// horizon is then about its square.
+/// Fraction of the energy that may remain in the second half of the horizon for a response to count as decayed. The
+/// fraction beyond the horizon is then about the square of this value.
 const DECAYED_ENERGY: f64 = 1e-7;
 
 /// Mean squares of u, of its steps from sample to sample, and of e.
 type MeanSquares = [f64; 3];
 
-/// Strength of the remnant for one state of the scenario.
+/// Strength of the remnant in one state (initial or final) of the scenario.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Calibration {
     /// Gain K of each part.
@@ -49,7 +49,7 @@ impl Calibration {
         shapings: &[Shaping],
         is_last: bool,
     ) -> Result<Self, ModelError> {
-        // Stability is also checked if there is no remnant.
+        // This call checks the stability of the loop even if there is no remnant.
         energy(held, &Shaping::White)?;
         let mut sum = line_power(held, scenario)?;
         let mut energies = Vec::with_capacity(shapings.len());

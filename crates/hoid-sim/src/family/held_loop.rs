@@ -17,7 +17,7 @@ use hoid_model::{
 
 use hoid_model::Complex64;
 
-/// Smallest magnitude of `1 + D Y` within a sample.
+/// Smallest accepted magnitude of `1 + D Y` within a sample.
 const SMALLEST: f64 = 1e-9;
 
 /// Closed loop with its parameters at one instant.
@@ -63,7 +63,7 @@ pub(super) struct OperatorState {
     next: Vec<f64>,
     /// Errors e(k-1) and e(k-2).
     errors: [f64; 2],
-    /// Ring of responses, with the response of sample k at index k.
+    /// Ring of responses, in which the response of sample k has the index k modulo the length.
     ring: Vec<f64>,
     k: usize,
 }
@@ -75,7 +75,7 @@ pub(super) struct OperatorOutput {
     past: f64,
     /// Known part of u: the response after the delay of whole samples, without the contribution of the current error.
     pub known: f64,
-    /// Weight of the current error in u.
+    /// Factor by which the current error contributes to u.
     tap: f64,
 }
 
@@ -95,7 +95,8 @@ impl HeldLoop {
         taps[whole as usize] = operator.direct() * (1.0 - part);
         taps[whole as usize + 1] = operator.direct() * part;
         let p = &state.controlled_element;
-        // The leading gain is separate, since a step of this gain may or may not make y jump.
+        // The leading gain is kept separate, since the realisation determines whether a sudden change of this gain
+        // makes y jump.
         let gain = p.num()[0];
         let num: Vec<f64> = p
             .num()
@@ -132,7 +133,7 @@ impl HeldLoop {
         self.element_input * self.element_output * self.element.direct()
     }
 
-    /// Returns `1 + D Y` for the direct responses within a sample.
+    /// Returns `1 + D Y`, where D and Y are the direct responses of element and operator within a sample.
     fn return_difference(&self) -> f64 {
         1.0 + self.element_direct() * if self.delay == 0 { self.taps[0] } else { 0.0 }
     }
@@ -168,7 +169,7 @@ impl HeldLoop {
         state.errors = [e, e1];
     }
 
-    /// Advances the loop by one sample.
+    /// Advances the loop by one sample and returns its signals at this sample.
     #[inline]
     pub fn step(&self, state: &mut LoopState, inputs: Inputs) -> Outputs {
         let output = self.output(&state.operator);
@@ -189,7 +190,8 @@ impl HeldLoop {
         }
     }
 
-    /// Returns the frequency responses of operator and element in the sampled loop.
+    /// Returns the frequency responses of operator and element in the sampled loop; `None` if a response does not exist
+    /// at this frequency.
     pub fn responses(&self, omega_rad_s: f64) -> Option<[Complex64; 2]> {
         let backward = Complex64::from_polar(1.0, -omega_rad_s * self.sample_time.s());
         let [a, b, c] = self.taps;

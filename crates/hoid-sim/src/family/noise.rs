@@ -88,10 +88,11 @@ impl Shaped {
     }
 }
 
-/// Returns w without its dependence on u: normal deviates with pulses and intermittence.
+/// Returns the white sequence w of a part, with its pulses and intermittence but without its dependence on u.
 pub(super) fn driving(part: &RemnantPart, run: RunSeed, index: u64, ts_s: f64, samples: usize) -> Vec<f64> {
     let mut w = if index == 0 {
-        // The first part uses the deviates of `Simulator`, so that a single remnant equals that of `Simulator`.
+        // The first part uses the same deviates as `Simulator`, so that a remnant of one part equals that of
+        // `Simulator`.
         run.white_noise(samples)
     } else {
         run.white_noise_of(STREAMS + 4 * index, samples)
@@ -109,7 +110,7 @@ pub(super) fn driving(part: &RemnantPart, run: RunSeed, index: u64, ts_s: f64, s
     if let Some(times) = part.intermittence.filter(|times| times.off_s > 0.0) {
         let draws = run.uniform_of(STREAMS + 4 * index + 3, samples);
         let duty = times.on_s / (times.on_s + times.off_s);
-        // Two-state Markov chain with these mean times, observed at the samples.
+        // The switching is a two-state Markov chain with the mean times `on_s` and `off_s`, observed at the samples.
         let settled = 1.0 - (-ts_s * (1.0 / times.on_s + 1.0 / times.off_s)).exp();
         let mut on = draws.first().is_some_and(|draw| *draw < duty);
         for (w, draw) in w.iter_mut().zip(draws) {

@@ -1,7 +1,7 @@
 //! Operator of a scenario of the family alone, sample by sample, for a loop that is closed elsewhere.
 //!
 //! Simulates `u = r(k - l) + n` as [`FamilySimulator`] does in a loop, with the same random numbers, and with the
-//! strength of the remnant in the loop of the scenario. A loop that responds to u like the controlled element of the
+//! remnant as strong as in the loop of the scenario. A loop that responds to u like the controlled element of the
 //! scenario therefore gives a bit-identical run. The offsets of the recorder in e and u (`offset_e`, `offset_u`) are
 //! not part of the operator. The control at a sample must not depend on the error of the same sample.
 
@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{RunSeed, SimError, operator_run::saved_sample};
 
-/// Running operator of the family.
+/// Running operator of a scenario of the family.
 #[derive(Debug, Clone)]
 pub struct FamilyOperatorRun {
     simulator: FamilySimulator,
@@ -86,8 +86,9 @@ impl FamilyOperatorRun {
         beside.into_iter().chain(self.numbers().map(|number| *number)).collect()
     }
 
-    /// Continues from the saved state ([`FamilyOperatorRun::saved`]) of an operator with the same scenario and run,
-    /// with bit-identical results. Returns false, without any change, if the numbers belong to another operator.
+    /// Restores the state that [`FamilyOperatorRun::saved`] returned for an operator with the same scenario and run, so
+    /// that it continues with bit-identical results. Returns false, without any change, if the numbers belong to
+    /// another operator.
     pub fn restore(&mut self, saved: &[f64]) -> bool {
         let Some((&[k, n], rest)) = saved.split_first_chunk::<2>() else {
             return false;

@@ -20,13 +20,13 @@ const STICK_STREAM: u64 = u64::from_le_bytes(*b"stick\0\0\0");
 pub(super) struct Remnants {
     pub shapings: Vec<Shaping>,
     pub calibrations: [Calibration; 2],
-    /// True if anything changes in the scenario.
+    /// True if the scenario changes over time.
     pub changes: bool,
 }
 
 impl Remnants {
-    /// Returns a value of the calibration at sample `k`, between its initial and final values. After the end of the
-    /// scenario it is the value at the last sample.
+    /// Returns a value of the calibration at sample `k`, between its values in the initial and the final state. After
+    /// the end of the scenario it is the value at the last sample.
     #[inline]
     fn calibrated(&self, scenario: &ResolvedFamilyScenario, k: usize, of: impl Fn(&Calibration) -> f64) -> f64 {
         let [initial, last] = &self.calibrations;
@@ -42,7 +42,7 @@ fn samples_of(scenario: &ResolvedFamilyScenario) -> usize {
     scenario.run_in_samples() + scenario.measurement_samples()
 }
 
-/// Remnant of a run, with its state.
+/// Remnant of one run, with the state of its filters.
 #[derive(Debug, Clone)]
 pub(super) struct RemnantRun {
     run: RunSeed,
@@ -51,11 +51,12 @@ pub(super) struct RemnantRun {
     /// Steps of the random walk of the stick, for the same samples.
     steps: Vec<f64>,
     shaped: Vec<Shaped>,
-    /// Running mean square of the signal on which each part depends, relative to its mean over the run.
+    /// Running mean square of the signal on which each part depends, relative to the mean square of this signal over
+    /// the run.
     followed: Vec<f64>,
     forgets: Vec<f64>,
     walk: f64,
-    /// Control at the last sample.
+    /// Control at the previous sample.
     before: f64,
 }
 
@@ -81,8 +82,8 @@ impl RemnantRun {
         new
     }
 
-    /// Draws the random numbers for at least the given number of samples. The numbers of a sample do not depend on how
-    /// many samples are drawn.
+    /// Draws the random numbers for at least the given number of samples. The random numbers of a sample do not depend
+    /// on how many samples are drawn.
     fn draw(&mut self, scenario: &ResolvedFamilyScenario, samples: usize) {
         if samples <= self.steps.len() {
             return;
@@ -100,7 +101,7 @@ impl RemnantRun {
         };
     }
 
-    /// Returns the remnant at sample `k`. It must be called after the call for sample `k - 1`.
+    /// Returns the remnant at sample `k`. Must be called for the samples in order, without gaps.
     #[inline]
     pub fn next(&mut self, scenario: &ResolvedFamilyScenario, of: &Remnants, k: usize) -> f64 {
         // The remnant continues after the end of the scenario.
@@ -118,7 +119,7 @@ impl RemnantRun {
         n
     }
 
-    /// Takes the control at sample `k`, after the remnant of this sample was returned.
+    /// Takes the control at sample `k`, for which [`RemnantRun::next`] has already been called.
     #[inline]
     pub fn follow(&mut self, scenario: &ResolvedFamilyScenario, of: &Remnants, k: usize, u: f64) {
         // A restored run may not have drawn any numbers yet.

@@ -101,7 +101,7 @@ impl FamilySimulator {
         })
     }
 
-    /// Returns the same simulator with another stick.
+    /// Returns this simulator with another drift and other offsets of the stick.
     ///
     /// # Errors
     /// [`SimError::Model`] if a number of the stick is invalid.
@@ -173,7 +173,7 @@ impl FamilySimulator {
             let inputs = Inputs {
                 target: signals.f[k],
                 disturbance: signals.d[k],
-                // The response of the person to the target does not depend on the loop.
+                // The response of the person to the target does not depend on the signals of the loop.
                 remnant: n + seen.get(k).copied().unwrap_or(0.0),
             };
             let now = self.held(k).step(&mut state, inputs);
@@ -237,8 +237,8 @@ impl FamilySimulator {
         Ok(record)
     }
 
-    /// As [`FamilySimulator::run`], with the true parameters of the operator at each sample, under their names. Only
-    /// parameters that are finite throughout are included.
+    /// As [`FamilySimulator::run`], with the true parameters of the operator at each sample as additional channels.
+    /// Only parameters that are finite throughout are included.
     ///
     /// # Errors
     /// As [`FamilySimulator::run`].
@@ -257,7 +257,7 @@ impl FamilySimulator {
     }
 }
 
-/// Returns the forcing function with the phases of a run.
+/// Returns the forcing function with the phases of a run, which are random or fixed.
 fn phased(excitation: &Excitation, run: RunSeed, tag: u64) -> Result<ForcingFunction, SimError> {
     if !excitation.random_phases {
         return Ok(excitation.function.clone());

@@ -1,4 +1,4 @@
-//! One virtual person and their runs.
+//! One virtual person, and the runs of this person.
 //!
 //! Numbers in `[0, 1)` from the random stream (seed, person) give the parameters in a fixed order. If [`Population`]
 //! rejects a draw, the next numbers are used. In each run the gain, the lead, `1/T_I`, omega_nm, zeta_nm and the delay
@@ -45,9 +45,9 @@ impl Default for Task {
 /// Virtual person with all true values.
 #[derive(Debug, Clone)]
 pub struct Person {
-    /// Controlled element.
+    /// Controlled element of the task.
     pub plant: Plant,
-    /// Operator and controlled element.
+    /// Operator and controlled element, without the spread between runs.
     pub state: FamilyState,
     /// Kind of remnant.
     pub kind: RemnantKind,
@@ -57,19 +57,19 @@ pub struct Person {
     pub remnant: Vec<RemnantPart>,
     /// Drift and offsets of the stick.
     pub stick: Stick,
-    /// Crossover frequency of `Y P` in rad/s.
+    /// Crossover frequency of the open loop `Y P` in rad/s.
     pub crossover_rad_s: f64,
-    /// Phase margin of `Y P` in deg.
+    /// Phase margin of the open loop `Y P` in deg.
     pub phase_margin_deg: f64,
     task: Task,
     streams: RunSeed,
     simulator: FamilySimulator,
 }
 
-/// Run of a person.
+/// Run of a virtual person.
 #[derive(Debug, Clone)]
 pub struct PersonRun {
-    /// Operator and controlled element of this run; the same as those of the person if runs have no spread.
+    /// Operator and controlled element of this run; the same as those of the person if there is no spread between runs.
     pub state: FamilyState,
     /// Record of e, u, d, y and n from the start of the measurement.
     pub record: Record,
@@ -85,8 +85,8 @@ const PERSON: u64 = u64::from_le_bytes(*b"person\0\0");
 const SPREAD: u64 = u64::from_le_bytes(*b"spread\0\0");
 
 impl Person {
-    /// Draws the person with a given seed and number. If `form` is `None`, one of the forms that people use with this
-    /// element is drawn.
+    /// Draws the person identified by a seed and a number. If `form` is `None`, one of the forms that people use with
+    /// this element is drawn.
     ///
     /// # Errors
     /// [`SimError::Model`] for invalid ranges or an invalid task, and [`SimError::NoAcceptablePerson`] if the ranges
@@ -136,7 +136,7 @@ impl Person {
             scenario.remnant.clone_from(&remnant);
             scenario.measurement_s = task.measurement_s;
             scenario.run_in_s = task.run_in_s;
-            // A loop that is stable in continuous time can be unstable with the holds.
+            // A loop that is stable in continuous time can be unstable in the simulation with sampled signals.
             let simulator = match FamilySimulator::new(&scenario) {
                 Err(SimError::Model(ModelError::UnstableLoop { .. })) => continue,
                 other => other?,
@@ -233,7 +233,7 @@ impl Person {
     }
 }
 
-/// Loop that a population accepts.
+/// Loop that meets the conditions of a population.
 struct AcceptedLoop {
     state: FamilyState,
     crossover_rad_s: f64,
@@ -248,9 +248,9 @@ fn loop_of(population: &Population, plant: Plant, form: Form, draw: &[f64]) -> R
         Coordinate::Lead | Coordinate::Linear => population.lead_s.at_log(draw[0]),
         Coordinate::LagRate if draw[1] < population.integrates => 0.0,
         Coordinate::LagRate => 1.0 / population.lag_s.at_log(draw[2]),
-        // Double lead whose numerator has real roots: c_2 is at most (c_1/2)^2.
+        // If the numerator is a double lead with real roots, c_2 is at most (c_1/2)^2.
         Coordinate::Quadratic => (population.lead_s.at_log(draw[0]) / 2.0).powi(2) * draw[3],
-        // Phase droop of a lag: alpha is of the order of 1/T_I.
+        // A lag causes a phase droop with alpha of the order of 1/T_I.
         Coordinate::Droop => 1.0 / population.lag_s.at_log(draw[2]),
         Coordinate::LogOmega => population.omega_nm_rad_s.at(draw[4]).ln(),
         Coordinate::LogZeta => population.zeta_nm.at_log(draw[5]).ln(),
@@ -271,7 +271,7 @@ fn loop_of(population: &Population, plant: Plant, form: Form, draw: &[f64]) -> R
         controlled_element: element,
     };
     let open_loop = state.open_loop()?;
-    // The frequencies range from a tenth of the crossover frequency to ten times this frequency.
+    // The test frequencies range from a tenth of the crossover frequency to ten times this frequency.
     let is_resonant = (-40..=40).any(|i| {
         let l = open_loop.response(crossover * 10f64.powf(f64::from(i) / 40.0));
         (Complex64::from(1.0) + l).norm() * population.largest_sensitivity < 1.0
@@ -279,7 +279,8 @@ fn loop_of(population: &Population, plant: Plant, form: Form, draw: &[f64]) -> R
     if is_resonant || !closed_loop_is_stable(&open_loop) {
         return Ok(None);
     }
-    // The gain may equal one at other frequencies too, so the crossover is found by its definition.
+    // The gain may also equal one at frequencies other than the drawn crossover, so the crossover is determined by its
+    // definition.
     let found = margins(|omega| open_loop.response(omega), MANUAL_CONTROL_RANGE_RAD_S);
     let (Some(crossover_rad_s), Some(phase_margin_deg)) = (found.crossover_rad_s, found.phase_margin_deg) else {
         return Ok(None);

@@ -198,8 +198,8 @@ impl Plant {
         }
     }
 
-    /// Returns the disturbance: the prime multiples of 0.05 Hz, up to 31 times with `1/s` and up to 17 times with
-    /// elements of second order, whose loops are slower.
+    /// Returns the disturbance: a multi-sine at the prime multiples of 0.05 Hz, up to 31 times with `1/s` and up to 17
+    /// times with elements of second order, whose loops are slower.
     pub fn disturbance(self) -> MultiSine {
         MultiSine {
             largest: if self == Self::Integrator { 31 } else { 17 },

@@ -11,9 +11,9 @@ use super::population::Range;
 /// Kind of remnant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum RemnantKind {
-    /// Only `1/(T_n s + 1)`, as in the thesis.
+    /// Only the part `1/(T_n s + 1)`, as in the thesis.
     Lag,
-    /// Gaussian broad band, peak and drift.
+    /// Three Gaussian parts: broad band, peak and drift.
     BroadBand,
     /// As `BroadBand`, with 80 % of the variance of the broad band proportional to the running mean square of u (memory
     /// 1 s).

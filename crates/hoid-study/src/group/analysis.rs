@@ -50,12 +50,12 @@ pub(super) struct FromCell {
     box_jenkins: Result<Orders, String>,
     /// Form of the operator of the person; `None` if the person has no operator.
     form: Option<Form>,
-    /// The further inputs to which the person responds, each in its form.
+    /// The further inputs to which the person responds, each with the form of its response.
     channels: Vec<SeenChannel>,
 }
 
 impl FromCell {
-    /// Extracts these results from two tables of the cell: its estimates and its people.
+    /// Reads the results from two tables of the cell: its estimates and its people.
     pub fn of(estimates: &OutputTable, people: &OutputTable) -> Self {
         let people = people_of(people);
         let person = people.first();
@@ -68,7 +68,7 @@ impl FromCell {
         }
     }
 
-    /// Returns the reason why a model with one input does not apply; `None` if it does.
+    /// Returns the reason why models with one input do not apply; `None` if they do.
     fn against_one_input(&self) -> Option<String> {
         let names: Vec<&str> = self.channels.iter().map(|channel| channel.name.as_str()).collect();
         (!names.is_empty()).then(|| {

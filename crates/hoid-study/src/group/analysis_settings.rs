@@ -51,14 +51,14 @@ const POLYNOMIALS: [Structure; 2] = [Structure::Arx, Structure::BoxJenkins];
 /// Name for the form chosen by the fit.
 const AUTO: &str = "auto";
 
-/// The names of the forms, for the schema.
+/// Returns the names of the forms, for the schema.
 fn form_names() -> Vec<&'static str> {
     std::iter::once(AUTO)
         .chain(Form::ALL.iter().map(|form| form.name()))
         .collect()
 }
 
-/// The names of the recursive methods, for the schema.
+/// Returns the names of the recursive methods, for the schema.
 fn method_names() -> Vec<&'static str> {
     hoid_survey::registry().into_iter().map(|spec| spec.name).collect()
 }

@@ -64,7 +64,7 @@ impl Averages {
     }
 }
 
-/// Chosen delays and orders, and T_n (Table 3): one row for each subject and condition.
+/// Chosen delays and orders, and T_n (Table 3 of the thesis): one row for each subject and condition.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Delays(BTreeMap<(String, String), BTreeMap<&'static str, f64>>);
 
@@ -119,8 +119,8 @@ pub(super) struct TraceAverages {
 }
 
 impl TraceAverages {
-    /// Creates an empty collection for these columns. For names that end in `_se`, the table gives the median of the
-    /// variances.
+    /// Creates an empty collection for these columns. For a name that ends in `_se`, the table gives the squared median
+    /// of the standard errors, as a variance.
     pub fn new(names: Vec<String>) -> Self {
         Self {
             names,
@@ -169,7 +169,7 @@ impl TraceAverages {
     }
 
     /// Returns the table of median, quartiles, mean and standard deviation over the runs at each time; for a standard
-    /// error, the median of the variances.
+    /// error, its squared median over the runs.
     pub fn table(&self) -> OutputTable {
         let mut rows = Rows::new(&Self::schema(&self.names));
         for (key, times) in &self.values {

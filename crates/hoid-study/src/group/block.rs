@@ -5,12 +5,13 @@ use super::manifest::{Manifest, RunEntry};
 /// All runs of a person in a condition.
 pub(super) struct Cell<'a> {
     pub runs: Vec<&'a RunEntry>,
-    /// Reason why the cell has no operator: the task changes within the runs. `None` if it does not.
+    /// Description of the change if the task changes within the runs, so that the cell has no operator; otherwise
+    /// `None`.
     pub changes: Option<String>,
 }
 
 impl Cell<'_> {
-    /// Subject and condition.
+    /// Returns the names of subject and condition.
     pub fn key(&self) -> (&str, &str) {
         (&self.runs[0].subject, &self.runs[0].condition)
     }

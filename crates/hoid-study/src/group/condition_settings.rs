@@ -44,7 +44,7 @@ pub struct ConditionSettings {
 }
 
 impl ConditionSettings {
-    /// Returns the controlled element of the whole run; `None` if the element changes or is unknown.
+    /// Returns the controlled element if it is known and the same during the whole run, otherwise `None`.
     pub fn lasting_element(&self) -> Option<&str> {
         match self.changes_to {
             None => self.controlled_element.as_deref(),

@@ -91,7 +91,7 @@ fn run_of(runs: &[&RunEntry], recording: &str) -> String {
     runs.iter().find_map(of).unwrap_or_else(|| recording.to_owned())
 }
 
-/// Writes parameters, loop measures and response of a fit of aligned records.
+/// Writes parameters, innovation variance, VAF and response of a fit to the whole of an aligned record.
 pub(super) fn rows_of_fit(rows: &mut RunRows<'_>, window: Window, label: &str, fit: &FamilyFit, record: &Record) {
     let of = fit.operator(0);
     for parameter in of.parameters.iter().filter(|p| p.value.is_finite()) {
@@ -107,7 +107,7 @@ pub(super) fn rows_of_fit(rows: &mut RunRows<'_>, window: Window, label: &str, f
         "innovation_variance",
         Estimate::fixed(fit.innovation_variance),
     );
-    // Without the responses to further inputs, which its polynomials lack.
+    // The responses to further inputs are removed from u, since the polynomials of the fit do not include them.
     let own = match fit.channels.is_empty() {
         true => Ok(record.clone()),
         false => fit.without_channels(record, FamilyEstimator::default().detrend),

@@ -264,7 +264,7 @@ impl Manifest {
         self.prepare.preparation(of_condition)
     }
 
-    /// Returns the decimation of the runs of a condition that depends on their sampling frequency.
+    /// Returns the decimation by sampling frequency that applies to the runs of a condition.
     ///
     /// # Errors
     /// As [`Manifest::preparation`].

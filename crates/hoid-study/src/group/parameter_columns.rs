@@ -1,6 +1,7 @@
-//! Columns of a parameter in the table `people`: its value, standard error of these runs (`_se`) and of the person
-//! (`_se_person`), 95 % interval (`_low`, `_high`), share of the prior (`_prior_share`), and whether the data determine
-//! it (`_determined`). Parameters of the response to a further input have the name of the input in front, `r_tau_f`.
+//! Columns of a parameter in the table `people`: its value, its standard errors for these runs (`_se`) and for the
+//! person (`_se_person`), its 95 % interval (`_low`, `_high`), the share of the prior (`_prior_share`), and whether the
+//! data determine it (`_determined`). The name of a parameter of the response to a further input is preceded by the
+//! name of the input, such as `r_tau_f`.
 
 use hoid_ident::family::Parameter;
 use hoid_io::OutputTable;
@@ -8,22 +9,22 @@ use hoid_io::OutputTable;
 use super::tables::{numbers, texts};
 use crate::columns::Rows;
 
-/// Ends of the names of its columns of numbers.
+/// Suffixes of the numeric columns of a parameter.
 const REAL: [&str; 6] = ["", "_se", "_se_person", "_low", "_high", "_prior_share"];
-/// End of the name of its column of texts.
+/// Suffix of the text column of a parameter.
 const DETERMINED: &str = "_determined";
 
-/// Names of the columns of numbers of a parameter.
+/// Returns the names of the numeric columns of a parameter.
 pub(super) fn real_names(name: &str) -> impl Iterator<Item = String> {
     REAL.into_iter().map(move |end| format!("{name}{end}"))
 }
 
-/// Name of the column of texts of a parameter.
+/// Returns the name of the text column of a parameter.
 pub(super) fn text_name(name: &str) -> String {
     format!("{name}{DETERMINED}")
 }
 
-/// Writes a parameter to the current row, under this name.
+/// Writes a parameter to its columns in the current row; `name` is the name of the first column.
 pub(super) fn write(rows: &mut Rows, name: &str, p: &Parameter) {
     let or_empty = |value: Option<f64>| value.unwrap_or(f64::NAN);
     let (low, high) = p.interval.unwrap_or((f64::NAN, f64::NAN));
@@ -41,7 +42,7 @@ pub(super) fn write(rows: &mut Rows, name: &str, p: &Parameter) {
     rows.text(&text_name(name), if p.determined { "yes" } else { "no" });
 }
 
-/// Reads a parameter from the columns `prefix` + name; `None` if its cell is empty.
+/// Reads a parameter from the columns whose names start with `prefix` and its name; `None` if its value is empty.
 pub(super) fn read(
     table: &OutputTable,
     row: usize,

@@ -7,7 +7,7 @@ use std::fmt;
 
 use crate::StudyError;
 
-/// Parts of a file name.
+/// A part of a pattern.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Part {
     Text(String),

@@ -83,7 +83,7 @@ pub struct Person {
     pub phase_margin_interval: Option<(f64, f64)>,
     /// chi^2 at the lines of the excitation, and the number of degrees of freedom.
     pub chi2: Option<(f64, usize)>,
-    /// Ratio of clustered to model-based variances.
+    /// Ratio of the clustered variances of the parameters to the model-based ones.
     pub kappa: Option<f64>,
     /// Order nd of the noise model.
     pub noise_order: Option<usize>,

@@ -2,7 +2,7 @@
 //! `people`.
 //!
 //! The names of the columns start with the name of the input: `r_role`, `r_preview_s`, `r_form` (empty if no response
-//! was found), `r_p_value`, and those of its parameters ([`super::parameter_columns`]), such as `r_tau_f`.
+//! was found), `r_p_value`, and the columns of the parameters ([`super::parameter_columns`]), such as `r_tau_f`.
 
 use hoid_ident::family::{ChannelFit, ChannelRole, Parameter, SeenChannel};
 use hoid_io::OutputTable;
@@ -14,12 +14,12 @@ use super::{
 };
 use crate::columns::Rows;
 
-/// End of the column that marks a further input.
+/// Suffix of the column by which a further input is recognised.
 const ROLE: &str = "_role";
 /// The delay of a response to a further input.
 const DELAY: (&str, &str) = ("tau_f", "s");
 
-/// Names and units of the parameters of a response to a further input.
+/// Returns names and units of the parameters of a response to a further input.
 fn parameters() -> impl Iterator<Item = (&'static str, &'static str)> {
     PARAMETERS.into_iter().chain([DELAY])
 }
@@ -29,11 +29,11 @@ fn parameters() -> impl Iterator<Item = (&'static str, &'static str)> {
 pub struct PersonChannel {
     /// Name of the input.
     pub name: String,
-    /// Its role for the person.
+    /// Role of the input for the person.
     pub role: ChannelRole,
     /// Preview time, s.
     pub preview_s: f64,
-    /// Probability that chance gives such an improvement over no response.
+    /// p-value of the improvement of the fit by this response.
     pub p_value: f64,
     /// Form of the response; `None` if no response was found.
     pub form: Option<Form>,
@@ -42,7 +42,7 @@ pub struct PersonChannel {
 }
 
 impl PersonChannel {
-    /// From the fit of all runs.
+    /// Creates the response from its part of the joint fit to all runs.
     pub(super) fn of(fit: &ChannelFit) -> Self {
         let response = fit.response.as_ref();
         Self {
@@ -60,7 +60,8 @@ impl PersonChannel {
         self.parameters.iter().find(|p| p.name == name)
     }
 
-    /// The input of a fit of one run, in the form of the person; `None` without a response.
+    /// Returns the input for the fit of a single run, in the form found for the person; `None` if no response was
+    /// found.
     pub(super) fn in_use(&self) -> Option<SeenChannel> {
         Some(SeenChannel {
             preview_s: self.preview_s,
@@ -80,7 +81,7 @@ impl PersonChannel {
         }
     }
 
-    /// The further inputs in a row of the table.
+    /// Reads the responses to all further inputs from a row of the table.
     pub(super) fn read(table: &OutputTable, row: usize) -> Vec<Self> {
         let names = (table.columns.iter()).filter_map(|column| column.name.strip_suffix(ROLE));
         let of = |name: &str| {
@@ -101,7 +102,7 @@ impl PersonChannel {
     }
 }
 
-/// Names of the columns of texts and of numbers for the further inputs of people.
+/// Returns the names of the text columns and of the numeric columns for the further inputs of all people.
 pub(super) fn columns<'a>(channels: impl Iterator<Item = &'a PersonChannel> + Clone) -> (Vec<String>, Vec<String>) {
     let (mut of_text, mut real): (Vec<String>, Vec<String>) = (Vec::new(), Vec::new());
     let mut names: Vec<&str> = Vec::new();

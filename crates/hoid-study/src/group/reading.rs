@@ -20,7 +20,8 @@ use crate::{StudyError, columns::Rows};
 pub(super) enum Pairing {
     /// Alignment as recorded, corrected by the offsets of `[prepare]`.
     Recorded,
-    /// As `Recorded`, and corrected by `offset_samples` of the condition: u is aligned with the e to which it responds.
+    /// Alignment as in `Recorded`, then corrected by `offset_samples` of the condition: u is aligned with the e to
+    /// which it responds.
     InTheLoop,
 }
 
@@ -261,8 +262,8 @@ pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
     run.ok_or_else(|| "no file is named".to_owned())
 }
 
-/// Returns the tables of the steps applied to the files of a run and of their problems. A file that cannot be read has
-/// no rows here; the table of estimates reports it.
+/// Returns two tables: the steps applied to the files of a run, and the problems of the files. A file that cannot be
+/// read has no rows here; the table of estimates reports it.
 pub(super) fn account(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static str, OutputTable); 2] {
     let [(steps_name, steps), (trouble_name, trouble)] = schemas();
     let (mut steps, mut trouble) = (Rows::new(&steps), Rows::new(&trouble));

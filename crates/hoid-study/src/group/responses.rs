@@ -27,7 +27,7 @@ pub(super) fn grid(sample_time_s: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Columns of the responses of single runs.
+/// Returns the columns of the table of responses of single runs.
 pub(super) fn responses_schema() -> TableSchema {
     schema(text(&["subject", "condition", "run", "estimator"]).chain(real(&[
         "omega_rad_s",

@@ -147,8 +147,8 @@ fn check_directory(manifest: &Manifest, base: &Path, directory: &Path) -> Result
     Ok(())
 }
 
-/// Returns the SHA-256 of the manifest and of the recordings that are analysed. The analysis of a run reports a file
-/// that cannot be read.
+/// Returns the SHA-256 of the manifest and of the recordings that are analysed. A file that cannot be read counts as
+/// empty here; the analysis of its run reports the error.
 fn hash(manifest: &Manifest, base: &Path) -> String {
     let mut hasher = Sha256::new();
     hasher.update(manifest.text().as_bytes());
@@ -160,7 +160,7 @@ fn hash(manifest: &Manifest, base: &Path) -> String {
     hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Prepares an empty directory, or reads the record of the results that it holds.
+/// Prepares an empty directory, or checks the directory of earlier results and returns their record.
 fn prepare(manifest: &Manifest, directory: &Path, record: &RunRecord, resume: bool) -> Result<RunRecord, StudyError> {
     let shown = || directory.display().to_string();
     if let Some(found) = RunRecord::read(directory)? {

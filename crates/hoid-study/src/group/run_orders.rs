@@ -19,7 +19,7 @@ use super::{
     windows::windows,
 };
 
-/// Label of a structure in the tables.
+/// Returns the label of a structure in the tables.
 pub(super) fn label_of(structure: Structure) -> &'static str {
     if structure == Structure::Arx { "ARX" } else { "BJ" }
 }
@@ -83,7 +83,7 @@ pub(super) fn choose(
     Ok(())
 }
 
-/// Returns the orders of a second-order operator, with nk in the range of delays of the manifest.
+/// Returns the orders of a second-order operator as ranges, with nk in the range of delays of the manifest.
 pub(super) fn ranges(settings: &AnalysisSettings, record: &Record, structure: Structure) -> OrderRanges {
     let (least, most) = settings.delay_s;
     let samples = |delay_s: f64| (delay_s / record.sample_time().s()).round() as usize + 1;

@@ -149,8 +149,8 @@ impl<'a> RunRows<'a> {
         }
     }
 
-    /// Writes the response of a model on the frequency grid, advanced by the time `advance_s` by which u is late;
-    /// returns frequencies and response.
+    /// Writes the response of a model on the frequency grid, advanced by the time `advance_s`; returns frequencies and
+    /// response.
     pub fn responses_of(
         &mut self,
         label: &str,
@@ -236,7 +236,7 @@ impl<'a> RunRows<'a> {
         self.estimates.text("reason", reason);
     }
 
-    /// An estimator that does not apply, and the reason.
+    /// Writes that an estimator does not apply, and the reason.
     pub fn omitted(&mut self, estimator: &str, reason: &str) {
         self.begin(None, estimator);
         self.estimates.text("status", "omitted");

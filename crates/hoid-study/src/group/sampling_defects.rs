@@ -15,7 +15,7 @@ pub enum SamplingDefect {
     Repeated,
     /// A clock that is slow by 0.2 %.
     SlowClock,
-    /// A stick that saturates at 1.5 standard deviations of u.
+    /// A stick that saturates at 1.5 times the root mean square of u.
     Saturated,
     /// A stick quantised to 8 bits over its range.
     Quantised,

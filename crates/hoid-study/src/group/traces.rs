@@ -88,7 +88,7 @@ fn pairs() -> impl Iterator<Item = (usize, usize)> {
     (0..CORRELATED.len()).flat_map(|i| (i + 1..CORRELATED.len()).map(move |j| (i, j)))
 }
 
-/// Label of a recursion in the tables.
+/// Returns the label of a recursion in the tables.
 pub(super) fn label_of(method: &Method) -> String {
     method.name().to_uppercase()
 }

@@ -1,4 +1,4 @@
-//! The files of a virtual experiment: one table per run, `truth.csv`, and `group.toml`. The last is written at the end,
+//! The files of a virtual experiment: one table per run, `truth.csv`, and `group.toml`. `group.toml` is written last,
 //! so a directory that contains it is complete.
 
 use std::path::Path;

@@ -46,7 +46,7 @@ pub struct PeopleExperiment {
 }
 
 impl Default for PeopleExperiment {
-    /// Three subjects, all controlled elements, all kinds of remnant, five runs each.
+    /// Returns an experiment with three subjects, all controlled elements, all kinds of remnant and five runs each.
     fn default() -> Self {
         Self {
             subjects: 3,
@@ -65,7 +65,7 @@ impl Default for PeopleExperiment {
 
 /// Columns of a file, except t.
 const COLUMNS: [&str; 4] = ["e", "u", "d", "y"];
-/// Other true values in `truth.csv`.
+/// Columns of `truth.csv` for true values other than the parameters, and for settings of the recording.
 const OTHERS: [&str; 7] = [
     "crossover_rad_s",
     "phase_margin_deg",
@@ -122,7 +122,7 @@ pub fn simulate_people(
         (plant.to_string(), facts)
     };
     let analysis = AnalysisSettings {
-        // Realistic remnants are not first-order lags.
+        // Realistic remnants are not first-order lags, so several orders are tried.
         nd: (1, 6),
         ..AnalysisSettings::default()
     };

@@ -17,8 +17,8 @@ pub(super) const TIME_VARYING: &str = "time-varying";
 /// Alternative name for `operator`.
 const FAMILY: &str = "family";
 
-/// Options of the registry that are not keys of the registry in a plan: either a plan has its own typed keys for them,
-/// or they do not apply to single runs.
+/// Options of the registry that a plan does not use: either a plan has its own typed keys for them, or they do not
+/// apply to single runs.
 const NOT_PLAN_KEYS: [&str; 10] = [
     "noise",
     "change",
@@ -54,7 +54,7 @@ pub(super) fn of_method(method: &str, changes: bool) -> Option<ResolvedRequest> 
         TIME_VARYING => CHANGE,
         OPERATOR | FAMILY if changes => CHANGE,
         OPERATOR | FAMILY => OPERATOR,
-        // A plan names these estimators differently.
+        // In a plan these estimators have other names.
         registry::PEM | registry::REMNANT | CHANGE => return None,
         name => name,
     };
@@ -97,7 +97,8 @@ pub(super) fn with_orders(
     })
 }
 
-/// Returns a fixed or bounded parameter that the model does not have, and the names of its parameters.
+/// Returns the first fixed or bounded parameter that the model does not have, with the names of the parameters of the
+/// model; `None` if there is no such parameter, or if the gains do not change.
 pub(super) fn unknown_parameter(asked: &ResolvedRequest) -> Option<(&str, Vec<String>)> {
     let ResolvedRequest::Change(how) = asked else {
         return None;

@@ -195,8 +195,8 @@ impl EstimatorCell {
             return Orders::default();
         };
         let (ts, table) = (scenario.scenario().sample_time.s() * self.decimate as f64, &self.orders);
-        // The delay in whole samples. The small number compensates the rounding of the quotient; b0 and the following
-        // coefficients represent the remaining fraction of a sample.
+        // The delay in whole samples. The small number compensates for the rounding of the quotient; b0 and the
+        // following coefficients represent the remaining fraction of a sample.
         let delay = (scenario.scenario().initial.operator.tau_e_s / ts + 1e-9).floor() as usize;
         let of = |order: Option<Order>, default: usize, simulated: usize| match order {
             None | Some(Order::Range(_)) => default,

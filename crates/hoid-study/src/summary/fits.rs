@@ -104,7 +104,8 @@ pub(crate) fn write_fits(
                     let truth = true_value(cell, estimator, name);
                     put(name, values, truth);
                     if truth.is_finite() && truth != 0.0 {
-                        // T_L of any other form is a different quantity, so it has no bias.
+                        // In any form other than a gain with a lead, T_L is a different quantity, so its bias is not
+                        // computed.
                         let meant = |lead: &bool| *lead || !name.starts_with("T_L");
                         let error = |v: f64| 100.0 * (v - truth) / truth;
                         let of_each = values.iter().zip(&found.leads);

@@ -32,9 +32,9 @@ pub(super) struct Filters {
     /// Parameters K_e, K_e_dot, omega_nm and zeta_nm; with a Padé approximation also tau_e.
     pub w: DVector<f64>,
     pub p_w: DMatrix<f64>,
-    /// Increase of the diagonal of P_w per sample.
+    /// Increase of each diagonal element of P_w per sample.
     pub walk: DVector<f64>,
-    /// Derivative dx/dw after the correction.
+    /// Derivative dx/dw of the corrected state.
     pub slope: DMatrix<f64>,
 }
 
@@ -126,7 +126,7 @@ impl Filters {
         let s = (h * &self.p_w * h.transpose())[0] + variance;
         let gain = &self.p_w * h.transpose() / s;
         let mut step = &gain * innovation;
-        // omega_nm, zeta_nm and the delay must stay positive, and a full step may be too large.
+        // A full step may be too large: omega_nm, zeta_nm and the delay must stay positive.
         for _ in 0..MOST_HALVINGS {
             let moved = &self.w + &step;
             if moved.rows(2, moved.len() - 2).iter().all(|x| *x > 0.0) {

@@ -9,10 +9,10 @@
 //!
 //! `x(k) = A(w) x(k-1) + B(w) e(k - nk) + w_x`, `u = C(w) x`, `C = [K_e, K_e_dot, 1]`,
 //!
-//! where A and B are those of the exact hold. The parameters `w = [K_e, K_e_dot, omega_nm, zeta_nm]` are a random walk.
-//! At each sample the parameters are predicted (they stay constant, P_w grows), the state is predicted with them, and
-//! the innovation `eps = u - C x` corrects both state and parameters. The parameters are corrected along the total
-//! derivative `h = d(C x)/dw`, which includes the dependence of the state on the parameters:
+//! where A and B follow from the exact hold. The parameters `w = [K_e, K_e_dot, omega_nm, zeta_nm]` are a random walk.
+//! At each sample the parameters are predicted (they stay constant, P_w grows), the state is predicted with these
+//! parameters, and the innovation `eps = u - C x` corrects both state and parameters. The parameters are corrected
+//! along the total derivative `h = d(C x)/dw`, which includes the dependence of the state on the parameters:
 //!
 //! `D(k|k-1) = A D(k-1|k-1) + (dA/dw) x + (dB/dw) e`, `h = C D(k|k-1) + (dC/dw) x`, `D(k|k) = D(k|k-1) - g h`, where g
 //! is the gain of the state filter, whose dependence on w is neglected.
@@ -196,8 +196,8 @@ impl DualEkf {
             errors.push(0.0);
             drifts.push(own.delay_drift);
         }
-        // The standard errors of the start fit hold for its delay; if the delay is estimated, the parameters are less
-        // certain.
+        // The standard errors of the start fit apply to its fixed delay; if the delay is estimated, the other
+        // parameters are less certain.
         let least = if own.pade > 0 { SMALLEST_RELATIVE_ERROR } else { 0.0 };
         let power = own.error_size.map_or(0.0, |size| size * size);
         let (n, p) = (3 + own.pade, values.len());
@@ -220,7 +220,7 @@ impl DualEkf {
             slope: DMatrix::zeros(n, p),
         };
         let [k_e, k_e_dot, omega, zeta] = physical_bounds::<OPERATOR>(setup, sample_time)?;
-        // With a Padé approximation the filters contain the delay, except for that of the hold.
+        // With a Padé approximation the filters contain the delay, except for the one sample of the hold.
         let late = if own.pade == 0 { setup.orders.nk } else { 1 };
         Ok(Self {
             first: filters.clone(),
@@ -291,7 +291,7 @@ impl State for DualEkf {
             &mut self.restarts,
         ];
         visit_all(parts, each);
-        // Restored or changed numbers must also lie within the bounds.
+        // Numbers that were restored or changed by the caller must also lie within the bounds.
         self.filters.bound(&self.bounds);
     }
 }

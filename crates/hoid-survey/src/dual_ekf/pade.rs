@@ -21,8 +21,8 @@ fn coefficients(order: usize) -> Vec<f64> {
     c
 }
 
-/// Returns the transition of the neuromuscular system with a delay over one sample of held input. The states are y_0,
-/// y_1 and those of the delay.
+/// Returns the transition, over one sample of held input, of the neuromuscular system preceded by a delay. The states
+/// are y_0, y_1 and the states of the delay.
 ///
 /// The delay is in controllable canonical form, `p^(n) + sum a_k p^(k) = e`, with the output `d e + sum b_k p^(k)` and
 /// the feedthrough `d = (-1)^n`; this output drives y_0. The delay and the neuromuscular system are discretised
@@ -58,8 +58,8 @@ pub(super) fn delayed_second_order(
         all[(n - 1, 2 + k)] = -denominator(k);
     }
     all[(n - 1, n)] = 1.0;
-    // The derivatives of p differ by orders of magnitude (powers of 1/tau); scaling by powers of tau keeps the
-    // exponential accurate.
+    // The derivatives of p differ by orders of magnitude (powers of 1/tau); scaling them by powers of tau keeps the
+    // matrix exponential accurate.
     let scale = |i: usize| {
         if (2..n).contains(&i) {
             tau_s.powi((i - 2) as i32)

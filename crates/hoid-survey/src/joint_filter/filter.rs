@@ -20,8 +20,8 @@ use super::belief::{AugmentedState, ETA, Model, N};
 /// Function that processes a sample and returns the innovation and its predicted variance.
 pub(super) type Update = fn(&Model, &mut AugmentedState, f64, f64) -> [f64; 2];
 
-/// Ratio of the assumed variance of n to the variance of the remnant. It exceeds one because a coloured remnant is less
-/// informative than a white one of equal variance.
+/// Ratio of the assumed variance of n to the variance of the remnant. The ratio exceeds one because a coloured remnant
+/// is less informative than a white one of equal variance.
 const OUTPUT_NOISE: f64 = 10.0;
 /// Variance per second of the noise that drives v in addition to the error, as a multiple of the variance of the
 /// remnant divided by `(g/omega)^2`, where g and omega are as in [`GAIN_DRIFT`].
@@ -53,7 +53,7 @@ pub(crate) struct JointFilter {
 }
 
 impl JointFilter {
-    /// Starts the filter from the batch fit of the start span.
+    /// Creates the filter from the batch fit of the start span.
     ///
     /// # Errors
     /// [`IdentError::BadStart`] if the start is not a batch fit.

@@ -1,5 +1,5 @@
-//! The computations for one sample, with fixed capacity, that only the methods of this crate use; they have the same
-//! form as those of [`hoid_core`].
+//! The computations for one sample, with fixed capacity, that only the methods of this crate use; their form is the
+//! same as in [`hoid_core`].
 //!
 //! | module | contents |
 //! |---|---|

@@ -12,7 +12,7 @@
 //!
 //! If the delay is a parameter, `tau_e = l Ts + delta`, and B has three coefficients after a delay of `nk = l + 1`
 //! samples. When tau_e passes a whole sample, B is shifted along the past input that the predictor keeps, without a
-//! transient. At such a delay the model is continuous, but its derivative has a kink (see
+//! transient. At a delay of whole samples the model is continuous, but its derivative has a kink (see
 //! [`hoid_core::held_operator`]).
 
 use hoid_core::{
@@ -30,7 +30,7 @@ use hoid_core::{
 const OMEGA: usize = 2;
 /// Index of zeta_nm in eta.
 const ZETA: usize = 3;
-/// Index of tau_e in eta, if it is a parameter.
+/// Index of tau_e in eta, if tau_e is a parameter.
 const TAU: usize = 4;
 
 /// Model of the recursion: orders, sample time and bounds.
@@ -125,9 +125,9 @@ impl<S: Shape, const N: usize> PhysicalModel<S, N> {
 }
 
 impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>> PhysicalRpem<S, N, K, L, A> {
-    /// Starts from eta with filters at rest. `None` if the orders do not satisfy [`PhysicalModel::shape`], if N, K or L
-    /// is too small, if eta lies outside the bounds, if the bounds allow omega_nm or zeta_nm to become zero, or if the
-    /// noise model is not stable.
+    /// Creates the recursion at eta with filters at rest. `None` if the orders do not satisfy [`PhysicalModel::shape`],
+    /// if N, K or L is too small, if eta lies outside the bounds, if the bounds allow omega_nm or zeta_nm to become
+    /// zero, or if the noise model is not stable.
     pub fn new(model: PhysicalModel<S, N>, eta: [f64; N], adaptation: A, bars: ErrorBars<N, K>) -> Option<Self> {
         let shape = model.shape;
         let predictor = Predictor::new(shape, Regressor::Gradient)?;
@@ -273,7 +273,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         self.correct();
     }
 
-    /// Sensitivities with respect to eta, where the noise parameters follow the operator parameters.
+    /// Returns the sensitivities with respect to eta, in which the noise parameters follow the operator parameters.
     #[inline(always)]
     fn sensitivities(&self) -> (ErrorLayout, Sensitivities<N, K>) {
         if K == 0 {

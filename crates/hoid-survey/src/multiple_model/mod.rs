@@ -217,7 +217,7 @@ impl<const M: usize> MultipleModelRecursion<M> {
     }
 }
 
-/// Converts a change declared by the kernel to seconds; `tau_e_s` is the delay before and after it.
+/// Converts a change declared by the kernel to seconds; `tau_e_s` is the delay before and after the change.
 fn declared(change: &kernel_change::Change, tau_e_s: [Estimate; 2], sample_time: SampleTime) -> Change {
     let (before, now) = (&change.before, &change.after);
     let pair = |i: usize| {

@@ -24,8 +24,9 @@ const DRIFT: f64 = 0.005;
 /// [`ChangePrior::transient_drift`]; `TRANSIENT_TIME_CONSTANT_S` is the time constant of its decay, s.
 const TRANSIENT_DRIFT: [f64; OPERATOR] = [0.05, 0.25, 0.2, 0.2];
 const TRANSIENT_TIME_CONSTANT_S: f64 = 3.0;
-/// Prior standard deviations of a relative change of omega_nm and of zeta_nm. A hypothesis of such a change is created
-/// every `NEUROMUSCULAR_EVERY` births; `NEUROMUSCULAR_ODDS` are its odds against a change of the gains alone.
+/// Prior standard deviations of a relative change of omega_nm and of zeta_nm. A hypothesis that omega_nm and zeta_nm
+/// changed too is created every `NEUROMUSCULAR_EVERY` births; `NEUROMUSCULAR_ODDS` are the odds of this change against
+/// a change of the gains alone.
 const NEUROMUSCULAR: [f64; 2] = [0.25, 0.4];
 const NEUROMUSCULAR_EVERY: u32 = 4;
 const NEUROMUSCULAR_ODDS: f64 = 0.3;
@@ -106,7 +107,7 @@ pub(super) fn change_prior(alarm: f64, setup: &Setup, sample_time: SampleTime) -
 /// Returns the initial hypothesis, from the batch fit of the start span with its covariance multiplied by `times`.
 ///
 /// # Errors
-/// [`IdentError::BadStart`] if the start is not a batch fit or lies outside the bounds.
+/// [`IdentError::BadStart`] if the start is not a batch fit or its covariance is not positive definite.
 pub(super) fn first_hypothesis(
     from: &StartState,
     times: f64,

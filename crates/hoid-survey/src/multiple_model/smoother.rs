@@ -44,7 +44,8 @@ const SPACING_S: f64 = 0.08;
 const START_COVARIANCE_FACTOR: f64 = 100.0;
 /// Time after which it no longer matters that the filters start at rest, in time constants of the neuromuscular system.
 const SETTLED: f64 = 6.0;
-/// Smallest probability of a hypothesis that is used, and smallest weight of a pair relative to the largest weight.
+/// Smallest probability of a hypothesis that is combined with others, and smallest weight of a pair relative to the
+/// largest weight.
 const LEAST: f64 = 1e-3;
 /// Limit of the signals beyond which their products would overflow.
 const LARGEST: f64 = 1e60;
@@ -55,7 +56,7 @@ struct Side {
     log_weight: f64,
     eta: [f64; OPERATOR],
     covariance: [[f64; OPERATOR]; OPERATOR],
-    /// Half the logarithm of the determinant of the covariance of eta and the log innovation variance.
+    /// Half the logarithm of the determinant of the joint covariance of eta and the log innovation variance.
     size: f64,
     /// Logarithm of the innovation variance, and the variance of this logarithm.
     level: [f64; 2],
@@ -219,7 +220,7 @@ fn join(before: &[Side], after: &[Side]) -> Joined {
     let (mut most, least) = (f64::NEG_INFINITY, LEAST.ln());
     for f in before {
         for b in after {
-            // If this bound is NaN, the pair is not skipped.
+            // The comparison is such that a pair is not skipped if this bound is NaN.
             let highest = f.log_weight + b.log_weight - f.size.max(b.size);
             if highest < most + least || highest - ForwardBackward::half_square(f, b) < most + least {
                 continue;

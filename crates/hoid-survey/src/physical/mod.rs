@@ -1,5 +1,5 @@
-//! The recursive prediction-error method in the operator's parameters. Its gradient is the gradient with respect to the
-//! polynomial coefficients multiplied by the Jacobian of theta.
+//! The recursive prediction-error method in the operator's parameters. The gradient with respect to these parameters is
+//! the gradient with respect to the polynomial coefficients multiplied by the Jacobian of theta.
 
 mod recursion;
 

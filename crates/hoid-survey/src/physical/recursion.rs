@@ -17,7 +17,7 @@ use hoid_track::{
 use crate::kernel::physical::{PhysicalModel, PhysicalRpem};
 
 /// Builds the recursion with the smallest sufficient capacity. If the orders are those of the operator, they are
-/// constants of the type.
+/// compile-time constants.
 ///
 /// # Errors
 /// [`IdentError`] if options contradict each other, or if the start cannot be used.

@@ -32,7 +32,7 @@ impl Filtered {
     }
 }
 
-/// Histories of an input and its response, and of both filtered by D/F.
+/// Histories of an input and of its response, each unfiltered and filtered by D/F.
 #[derive(Debug, Clone)]
 pub(crate) struct Simulated {
     pub input: History,

@@ -1,7 +1,7 @@
 //! The gain for a vector of instruments: the covariance update of the kernel ([`hoid_core::adaptation`]) with z in
 //! place of psi.
 //!
-//! The covariance of the kernel is that of a recursion with the gradient z; the gain does not depend on whether the
+//! The kernel updates the covariance as for a recursion with the gradient z; the gain does not depend on whether the
 //! innovation belongs to a gradient or to instruments. If rounding errors make the covariance invalid, for example
 //! after a jump in scale by 1e8 or more, it is reset to its initial value.
 
@@ -31,8 +31,8 @@ impl State for Forgetting {
 }
 
 impl Forgetting {
-    /// Starts from P, stored by rows, and a forgetting factor in (0, 1] for each parameter. `None` if P is not positive
-    /// definite or there are more parameters than the capacity.
+    /// Creates the matrix from its initial value, stored by rows, and a forgetting factor in (0, 1] for each parameter.
+    /// `None` if P is not positive definite or there are more parameters than the capacity.
     pub fn new(start: &[f64], lambda: &[f64]) -> Option<Self> {
         let p = lambda.len();
         let mut matrix = [[0.0; CAPACITY]; CAPACITY];
@@ -44,7 +44,7 @@ impl Forgetting {
         Some(Self::of(UdCovariance::from_matrix(&matrix)?, factors))
     }
 
-    /// Starts from a multiple of the unit matrix, with one forgetting factor for all parameters.
+    /// Creates the matrix as a multiple of the unit matrix, with one forgetting factor for all parameters.
     pub fn diagonal(size: f64, lambda: f64) -> Self {
         Self::of(UdCovariance::diagonal([size; CAPACITY]), [lambda; CAPACITY])
     }

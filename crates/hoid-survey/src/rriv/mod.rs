@@ -11,9 +11,9 @@
 //! are a posteriori: each filter processes a sample again with the updated auxiliary model.
 //!
 //! **Auxiliary model.** The auxiliary model is the estimate, low-pass filtered with the shortest memory length of B and
-//! F. With the unfiltered estimate the instruments would depend on its errors, and with short memory lengths some runs
-//! diverge. The reported innovation and innovation variance are those of the auxiliary model, whose filters run in any
-//! case.
+//! F. With the unfiltered estimate the instruments would depend on the errors of the estimate, and with short memory
+//! lengths some runs would diverge. The reported innovation and innovation variance are those of the auxiliary model,
+//! whose filters run in any case.
 //!
 //! **Instruments.** The signal e' is e itself, or the part of e that follows an external signal ([`super::laguerre`]).
 //! With e itself, the method needs the correct noise model in a closed loop: z then contains past noise, which is
@@ -144,8 +144,8 @@ struct Work {
 }
 
 impl RefinedRecursion {
-    /// Starts with a forgetting factor in (0, 1] for each parameter. If `external` is true, the instruments are made
-    /// from the external signal; a missing value is replaced by the last one.
+    /// Creates the recursion with a forgetting factor in (0, 1] for each parameter. If `external` is true, the
+    /// instruments are made from the external signal; a missing value is replaced by the last known value.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] if the orders include A or C, or if a factor is out of range; [`IdentError::BadStart`]
@@ -293,7 +293,7 @@ impl RefinedRecursion {
         self.theta.copy_from_slice(&w.trial);
         w.gain.iter_mut().for_each(|g| *g *= share);
 
-        // Step of D, from the residual of the current model.
+        // Step of D, from the residual xi of the auxiliary model.
         let gain = &mut w.short_gain[..nd];
         self.noise_gain.gain(&w.psi[noise.clone()], gain);
         let parts = Parts::of(&self.auxiliary, &self.orders);
@@ -343,12 +343,12 @@ impl RefinedRecursion {
             }
         }
         if (0..p).any(|i| self.spread[i * (p + 1)] < 0.0) {
-            // Rounding errors can make C invalid, as they can P.
+            // Rounding errors can make C invalid, as they can make P invalid; C is then reset.
             self.spread.copy_from_slice(&self.first_spread);
         }
         for i in 0..p {
             // The first-order recursion of C can be unstable although that of theta is stable. Each variance is
-            // therefore limited to that of an unknown parameter.
+            // therefore limited to [`LARGEST_GROWTH`] times its initial value.
             let limit = LARGEST_GROWTH * self.first_spread[i * (p + 1)];
             let found = self.spread[i * (p + 1)];
             if limit > 0.0 && found > limit {

@@ -131,7 +131,8 @@ pub(super) const CLAIMS: &[Claim] = &[
     },
 ];
 
-/// Adds the magnitude of the median bias of each named parameter as a cell.
+/// Adds a cell for each setting and parameter: the magnitude of the median bias is claimed to be above or below a
+/// limit.
 fn biases(
     study: Study<'_>,
     cells: &[Setting],

@@ -3,9 +3,10 @@
 //! - *Bias of a median trace*: mean over a span of the relative error of the median over replications. If the errors at
 //!   all times of a run were fully correlated, the error of the bias would be the mean over the span of the error of a
 //!   median, 0.93 IQR / sqrt(M) (for a normal sample 1.253 s / sqrt(M) with IQR = 1.349 s). For the span of 30.72 s a
-//!   bootstrap over runs gave 0.3 to 0.57 of this error if all parameters forget within 2.56 s (RLS and RPEM). If only
-//!   b forgets so fast (RLS), it gave 0.33 to 0.45 for K_e, T_L and K_e_dot, and 0.46 to 1.5 for the other parameters.
-//!   Half of the error is therefore used in the first two cases, and all of it in the last.
+//!   bootstrap over runs gave 0.3 to 0.57 of the fully correlated error if all parameters forget within 2.56 s (RLS and
+//!   RPEM). If only b forgets so fast (RLS), the bootstrap gave 0.33 to 0.45 for K_e, T_L and K_e_dot, and 0.46 to 1.5
+//!   for the other parameters. Half of the fully correlated error is therefore used if all parameters forget so fast,
+//!   and for K_e, T_L and K_e_dot if only b does; all of this error is used otherwise.
 //! - *Settling of a median trace*: time after t_M at which the trace has covered 90 % of its own step, from its mean
 //!   over the 10.24 s before t_M to its mean over the last 15.36 s: a biased estimate settles at its own value. The
 //!   error is half the difference between the settling times of the median plus and minus its error, and at least half
@@ -82,7 +83,7 @@ impl<'a> Study<'a> {
         Ok(self.results.values(query))
     }
 
-    /// True parameters after the change in the cell that a query selects.
+    /// True parameters after the change in the first cell that a query selects.
     pub fn truth(&self, query: &Query) -> Result<TrueState, String> {
         let cells = self.results.cells(query);
         let cell = cells.first().ok_or_else(|| format!("no cell has {query}"))?;
@@ -104,7 +105,7 @@ impl<'a> Study<'a> {
         Ok(median_of(&magnitudes(&self.sample(query)?)))
     }
 
-    /// A function of the values of several queries; values of the same replication stay paired.
+    /// A function of the samples of several queries; values of the same replication stay paired.
     pub fn of(&self, queries: &[Query], f: &dyn Fn(&[Vec<f64>]) -> f64) -> Result<Value, String> {
         let samples: Result<Vec<_>, _> = queries.iter().map(|query| self.sample(query)).collect();
         Ok(jackknife(&samples?, f))
@@ -161,8 +162,8 @@ impl<'a> Study<'a> {
     }
 
     /// Interquartile range over the runs of the traces of a parameter, averaged over a span, in % of the true value at
-    /// the end. Its relative error is that of the interquartile range of a normal sample, 1.166 / sqrt(M), if errors
-    /// are fully correlated over the span.
+    /// the end. The relative error of this range is taken from the interquartile range of a normal sample, 1.166 /
+    /// sqrt(M), if errors are fully correlated over the span.
     pub fn trace_range(&self, query: &Query, parameter: &str, (from_s, to_s): (f64, f64)) -> Result<Value, String> {
         let (traces, truth) = self.trace(query, parameter)?;
         let Some(bands) = traces.parameters.get(parameter) else {
@@ -184,8 +185,8 @@ impl<'a> Study<'a> {
         })
     }
 
-    /// Settling time of the median trace of a parameter, s. For a trace that does not settle it is the time to the end
-    /// of the trace.
+    /// Settling time of the median trace of a parameter, s. For a trace that does not settle, the value is the time
+    /// from the change to the end of the trace.
     pub fn settling(&self, query: &Query, parameter: &str) -> Result<Value, String> {
         let (traces, _) = self.trace(query, parameter)?;
         let cell = self.results.cells(query);
@@ -256,8 +257,8 @@ impl<'a> Study<'a> {
     }
 }
 
-/// True if the estimate of a parameter forgets within a small part of the span: the gains do so if b does, other
-/// parameters if all do.
+/// True if the estimate of a parameter forgets within a small part of the span: a gain if the memory length of b is
+/// short, any other parameter if all memory lengths are short.
 fn forgets(estimator: &EstimatorCell, parameter: &str) -> bool {
     const LONGEST_S: f64 = 5.0;
     const TEXT_SAMPLE_TIME_S: f64 = 0.01;

@@ -78,7 +78,7 @@ fn fit(at: Setting, quantity: &str, nk: usize, start: &str) -> Query {
     at.query(&with_f(quantity)).name("BJ").nk(nk).start(start)
 }
 
-/// Bias from a start minus bias from the base start for each replication, percentage points.
+/// Bias of the fit from a start minus bias of the fit from the base start, for each replication, percentage points.
 fn differences(study: Study<'_>, at: Setting, name: &str, nk: usize, start: &str) -> Result<Vec<f64>, String> {
     let of = |start: &str| study.sample(&fit(at, &bias_of(name), nk, start));
     Ok(of(start)?.iter().zip(&of("base")?).map(|(a, b)| a - b).collect())

@@ -1,9 +1,9 @@
 //! Statements of the thesis, tested with the data of studies.
 //!
-//! A claim contains a statement of the text and its place, the plans that provide the data, and the measurement. Its
-//! verdict follows from the data by the rules of the module [`rules`], which are the same for all claims. If a plan was
-//! not run, or if the results lack the required data, the claim cannot be tested and the verdict gives the reason. The
-//! same holds for claims on experiments with people, for which there are no data here.
+//! A claim contains a statement of the text and its place, the plans that provide the data, and the measurement. The
+//! verdict on a claim follows from the data by the rules of the module [`rules`], which are the same for all claims. If
+//! a plan was not run, or if the results lack the required data, the claim cannot be tested and the verdict gives the
+//! reason. Claims on experiments with people cannot be tested here, because there are no data.
 //!
 //! | module | theme |
 //! |---|---|

@@ -202,13 +202,14 @@ fn diverges(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![diverged, oscillates])
 }
 
-/// RMS error of a parameter estimated by RPEM minus that by RLS in the same run: median over the runs.
+/// Median over the runs of the difference between the RMS errors of a parameter estimated by RPEM and by RLS in the
+/// same run.
 fn rms(study: Study<'_>, at: Setting, name: &str) -> Result<Value, String> {
     let quantity = format!("rms_{name}");
     study.difference(&at.rpem(&quantity), &at.rls(&quantity))
 }
 
-/// Percentage by which the median RMS error of the first trace is smaller than that of the second, in the same runs.
+/// Percentage by which the median RMS error for the first query is smaller than that for the second, in the same runs.
 fn less_rms(study: Study<'_>, one: Query, other: Query) -> Result<Value, String> {
     study.of(&[one, other], &|s| 100.0 * (1.0 - med(&s[0]) / med(&s[1])))
 }

@@ -307,7 +307,7 @@ fn remnant_wrong(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(parts)
 }
 
-/// Queries for a quantity: first for all delays with m* = m0, then for all orders at the true delay.
+/// Queries for a quantity: for all delays with m* = m0, followed by those for all orders at the true delay.
 fn over_both(at: Setting, quantity: &str) -> Vec<hoid_study::Query> {
     let delays = DELAYS.map(|nk| at.bj(quantity, at.m0, nk));
     delays

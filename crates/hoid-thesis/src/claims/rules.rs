@@ -10,12 +10,13 @@
 //!      times slower, so much less error), an x beyond the range on the side of the larger effect *exceeds* the claim:
 //!      the statement is true, and the effect is larger.
 //!    - If less than half of the replications give a value (because models cannot be converted), the cell is undecided.
-//! 2. **A part** of a claim (same figure of merit, same test) *holds* if 90 % of its decided cells pass. It *holds and
-//!    more so* if fewer pass, but 90 % pass or exceed the claim. It *holds in part* if 50 % pass or exceed the claim,
-//!    and *does not hold* otherwise. If less than half of its cells are decided, the part is undecided.
-//! 3. **A claim** *holds* if all its parts hold. It *holds and more so* if all parts hold and at least one of them
-//!    holds and more so. It *does not hold* if no part holds even in part, and *holds in part* otherwise. If no part is
-//!    decided, the claim *cannot be tested*.
+//! 2. **A part** of a claim (same figure of merit, same test) *holds* if 90 % of its decided cells pass. A part *holds
+//!    and more so* if fewer cells pass, but 90 % pass or exceed the claim. A part *holds in part* if 50 % of its
+//!    decided cells pass or exceed the claim, and *does not hold* otherwise. If less than half of the cells of a part
+//!    are decided, the part is undecided.
+//! 3. **A claim** *holds* if all its parts hold. A claim *holds and more so* if all parts hold and at least one of them
+//!    holds and more so. A claim *does not hold* if no part holds even in part, and *holds in part* otherwise. If no
+//!    part is decided, the claim *cannot be tested*.
 //!
 //! Meaning of the wording, the same for all claims:
 //!
@@ -100,7 +101,7 @@ pub enum CellOutcome {
     Exceeds,
     /// The value is not as claimed.
     Fails,
-    /// The value is within the margin, or there is no value.
+    /// The margin is too large to decide, or there is no value.
     Undecided,
 }
 
@@ -241,7 +242,7 @@ impl Part {
         })
     }
 
-    /// Verdict on the part by rule 2; `None` if the replications do not decide.
+    /// Verdict on the part by rule 2; `None` if the part is undecided.
     pub fn verdict(&self) -> Option<Verdict> {
         let [passes, exceeds, fails] =
             [CellOutcome::Passes, CellOutcome::Exceeds, CellOutcome::Fails].map(|outcome| self.count(outcome));

@@ -26,7 +26,7 @@ pub(super) fn magnitudes(values: &[f64]) -> Vec<f64> {
     values.iter().map(|v| v.abs()).collect()
 }
 
-/// True if enough replications give a value for their statistic to represent all.
+/// True if the share of replications that give a value is at least [`SMALLEST_VALID_SHARE`].
 fn enough(values: &[f64]) -> bool {
     let finite = values.iter().filter(|v| v.is_finite()).count();
     finite > 0 && finite as f64 >= SMALLEST_VALID_SHARE * values.len() as f64

@@ -1,10 +1,10 @@
 //! Claims on batch fits that do not concern the bias of the coefficients: the innovation variance by order of the
 //! remnant and in C2, b at a wrong delay, and the zero in C2.
 //!
-//! The *modified remnant noise variance* of the text is the variance of the innovation that drives 1/D. Its reference
-//! value is that of the backward Euler form (eq. B.12), `sigma'^2 = (K_n (Ts/(Tn + Ts))^m)^2`. In the simulations, both
-//! those of the text and those here, the remnant is held exactly over a sample. The innovations of an exact model
-//! therefore have a different variance, which is shown as well.
+//! The *modified remnant noise variance* of the text is the variance of the innovation that drives 1/D. The reference
+//! value of this variance is that of the backward Euler form (eq. B.12), `sigma'^2 = (K_n (Ts/(Tn + Ts))^m)^2`. In the
+//! simulations, both those of the text and those here, the remnant is held exactly over a sample. The innovations of an
+//! exact model therefore have a different variance, which is shown as well.
 
 use super::{
     claim::{Claim, Source, Theme},
@@ -77,7 +77,7 @@ fn backward_euler_variance(study: Study<'_>, at: Setting) -> Result<f64, String>
     Ok((k_n * (TS_S / (T_N_S + TS_S)).powi(m)).powi(2))
 }
 
-/// A statistic of the biases of the innovation variance, %.
+/// Returns a statistic of the relative biases of the innovation variance, %.
 fn variance(study: Study<'_>, at: Setting, figure: fn(&[f64]) -> f64) -> Result<Value, String> {
     let query = at.bj("innovation_variance", at.m0, TRUE_DELAY);
     study.sample(&query)?;
@@ -163,8 +163,8 @@ fn of_zero(t_l_percent: &[f64]) -> Vec<f64> {
     t_l_percent.iter().map(of).collect()
 }
 
-/// Median magnitude of the relative error of the zero in C2 minus that in C1. If `of` gives two queries, the magnitude
-/// for the second is first subtracted from that for the first.
+/// Median magnitude of the relative error of the zero in C2 minus the same median in C1. If `of` gives two queries, the
+/// median for the second is first subtracted from that for the first.
 fn zero_change(study: Study<'_>, of: &dyn Fn(Setting) -> Vec<hoid_study::Query>, at: Setting) -> Result<Value, String> {
     let error = |condition| {
         study.of(&of(Setting { condition, ..at }), &|s| {

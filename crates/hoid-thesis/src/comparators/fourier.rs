@@ -9,8 +9,8 @@
 //!
 //! is fitted to x = e and x = u by least squares for all lines at once. Over a whole period of the forcing function the
 //! estimates are its Fourier coefficients; over less than a period the lines are separated as far as their distances
-//! allow. The response is `H(j omega_i) = U(j omega_i)/E(j omega_i)` with `X = a_i - j b_i`. The window extends T/2
-//! beyond t; near the ends of the record it is the first or last T.
+//! allow. The response is `H(j omega_i) = U(j omega_i)/E(j omega_i)` with `X = a_i - j b_i`. The window extends T/2 to
+//! either side of t; near the ends of the record it is the first or the last interval of length T.
 
 use hoid_ident::{settings, settings::Bounds};
 use num_complex::Complex64;

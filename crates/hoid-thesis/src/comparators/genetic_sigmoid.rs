@@ -3,7 +3,7 @@
 //! using genetic maximum likelihood estimation*, J. Guidance, Control, and Dynamics 32 (2009) 1089-1099; with a
 //! sigmoid: P. M. T. Zaal and B. T. Sweet, AIAA 2011-6474).
 //!
-//! The likelihood has many maxima over t_M, G and the delay. The genetic search needs no start. Its first population
+//! The likelihood has many maxima over t_M, G and the delay. The genetic search needs no start. The first population
 //! consists of parameter vectors drawn from wide ranges. Each generation keeps the best members and replaces the others
 //! by children of two parents, each of which is the best of three randomly drawn members (a *tournament*). Every gene
 //! of a child is drawn from a range that extends half of the parents' distance beyond both parents (*blend crossover*,
@@ -30,8 +30,8 @@ use super::{
 use crate::ThesisError;
 
 const NAME: &str = "genetic-sigmoid";
-/// Ranges of the genes: K_e at both ends, T_L at both ends, t_M, ln G, omega_nm, ln zeta_nm, tau_e. t_M lies in the
-/// middle eight tenths of the record.
+/// Ranges of the genes: initial and final K_e, initial and final T_L, t_M, ln G, omega_nm, ln zeta_nm, tau_e. t_M lies
+/// in the middle eight tenths of the record.
 const RANGES: [(f64, f64); 9] = [
     (0.01, 0.3),
     (0.01, 0.3),
@@ -133,7 +133,7 @@ impl GeneticSigmoid {
         all[0]
     }
 
-    /// Converts genes to parameters: K_e at both ends, T_L at both ends, t_M, G, omega_nm, zeta_nm, tau_e.
+    /// Converts genes to parameters: initial and final K_e, initial and final T_L, t_M, G, omega_nm, zeta_nm, tau_e.
     fn parameters(genes: &[f64; N], span_s: (f64, f64)) -> [f64; N] {
         let length = span_s.1 - span_s.0;
         std::array::from_fn(|i| {

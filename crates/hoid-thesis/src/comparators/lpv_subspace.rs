@@ -14,9 +14,9 @@
 //! 1. Estimate by least squares the predictor `u(k) = sum_{i=1..p} C Ã^(i-1) [B_0, B_1, K] z(k-i) + eps`, with
 //!    `z = [v, mu v, u]` and `Ã = A - K C`; p is so large that Ã^p is negligible.
 //! 2. The same coefficients, shifted and multiplied by z, give `Gamma x(k)`, the prediction of the next f outputs from
-//!    the past. Its n principal directions over the record are a state.
-//! 3. With this state, estimate C by least squares; the residuals are eps. Then estimate A, B_0, B_1 and K by least
-//!    squares.
+//!    the past. The n principal directions of this prediction over the record form a state.
+//! 3. With the state of step 2, estimate C by least squares; the residuals are eps. Then estimate A, B_0, B_1 and K by
+//!    least squares.
 //!
 //! The response at t is the response of the model with mu(t) held constant. If nothing changes, mu is omitted.
 
@@ -113,7 +113,7 @@ impl LpvSubspace {
         self.of_states(z, &states)
     }
 
-    /// Returns the principal directions of the prediction of the future from the past, scaled to unit power.
+    /// Returns the state: the principal directions of the prediction of the future from the past, scaled to unit power.
     fn states(&self, ahead: &DMatrix<f64>) -> Result<DMatrix<f64>, ThesisError> {
         let gram = (ahead * ahead.transpose()) / ahead.ncols() as f64;
         let eigen = gram.symmetric_eigen();

@@ -62,7 +62,8 @@ pub fn not_tracked(name: &str) -> Option<String> {
         extra_information,
     } = about;
     let (what, why) = match extra_information {
-        // Only a recursion needs no further information; it has more coefficients than a tracked model.
+        // The only comparator that needs no further information is a recursion with more coefficients than a tracked
+        // model may have.
         "" => (
             "does not track recordings",
             "with more coefficients than the 64 of a tracked model; up to 64 are followed by --method rls --structure fir"

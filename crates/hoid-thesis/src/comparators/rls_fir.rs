@@ -6,17 +6,19 @@
 //!
 //! `sum_k lambda^(t-k) (u(k) - g' phi(k))^2 + p var(u) g' K^-1 g`.
 //!
-//! The forcing function has ten lines, which excite only twenty of the nb directions. Without the second term the other
-//! directions would be determined by noise and rounding errors, and along them the covariance of the standard recursion
-//! would grow as lambda^-t until it were no longer positive definite. K is the *tuned-correlated* kernel
-//! `K_ij = decay^max(i, j)` (T. Chen, H. Ohlsson and L. Ljung, *Automatica* 48 (2012) 1525-1535), the covariance of a
-//! smooth, decaying response. Its inverse is that of independent increments,
+//! The forcing function has ten lines, which excite only twenty of the nb directions. Without the second term of the
+//! criterion, the other directions would be determined by noise and rounding errors, and along them the covariance of
+//! the standard recursion would grow as lambda^-t until it were no longer positive definite. K is the
+//! *tuned-correlated* kernel `K_ij = decay^max(i, j)` (T. Chen, H. Ohlsson and L. Ljung, *Automatica* 48 (2012)
+//! 1525-1535), the covariance of a smooth, decaying response. The inverse of K corresponds to independent increments of
+//! g:
 //!
 //! `g' K^-1 g = sum_i (g_i - g_{i+1})^2/(decay^i - decay^(i+1)) + g_{nb-1}^2/decay^(nb-1)`.
 //!
-//! The recursion is in information form: `R(t) = lambda R(t-1) + phi phi'`, and the same recursion for `phi u`. These
-//! sums stay positive for any excitation; the equations are solved when an estimate is requested. The response is the
-//! Fourier transform of g, `H = sum g_i e^(-j omega i Ts)`. It has no poles and therefore no operator parameters.
+//! The recursion is in information form: `R(t) = lambda R(t-1) + phi phi'`, with a corresponding recursion for `phi u`.
+//! These sums stay positive for any excitation; the equations are solved when an estimate is requested. The response is
+//! the Fourier transform of g, `H = sum g_i e^(-j omega i Ts)`. The response has no poles and therefore gives no
+//! operator parameters.
 
 use hoid_ident::{settings, settings::Bounds};
 use nalgebra::DMatrix;

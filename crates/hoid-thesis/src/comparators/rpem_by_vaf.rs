@@ -2,8 +2,9 @@
 //! of a validation set, as the discussion of the thesis proposes (VII: *the covariance matrix could be updated based on
 //! VAF from a validation data set, in order to reduce the strong oscillations that are given in state s2*).
 //!
-//! It is the method `rpem` of `hoid_track` with the settings of the text and with [`track_validated`], which contains
-//! the update rule. The validation set is a second run of the same person in the same task, with a different remnant.
+//! This comparator is the method `rpem` of `hoid_track` with the settings of the text and with [`track_validated`],
+//! which contains the update rule. The validation set is a second run of the same person in the same task, with a
+//! different remnant.
 
 use hoid_ident::{settings, settings::Bounds};
 use hoid_model::{PolynomialModel, Structure};

@@ -2,7 +2,7 @@
 //!
 //! With a known neuromuscular part, `u = K_e y_0 + K_e_dot y_1 + n`. The signal y_0 is the exact response of
 //! `omega^2/(s^2 + 2 zeta omega s + omega^2)` to the held error, delayed by nk - 1 samples, and y_1 is its rate. This
-//! is the form of [`hoid_ident::SigmoidChange`] for a delay of whole samples.
+//! model of u has the form of [`hoid_ident::SigmoidChange`] for a delay of whole samples.
 
 use hoid_model::{SampleTime, second_order::HeldStates};
 

@@ -1,8 +1,8 @@
 //! The experiment of section VI and appendix I of the thesis, with virtual or recorded people.
 //!
-//! The recordings of the text come from three subjects in a simulator and are not public. Its procedure can be applied
-//! to virtual people with known parameters (three different subjects, seven runs in each of C1 to C6, of which the last
-//! five are evaluated), and to the user's own recordings. For each run ([`procedure`]):
+//! The recordings of the text come from three subjects in a simulator and are not public. The procedure of the text can
+//! be applied to virtual people with known parameters (three different subjects, seven runs in each of C1 to C6, of
+//! which the last five are evaluated), and to the user's own recordings. For each run ([`procedure`]):
 //!
 //! 1. Batch fits to the first and the last three eighths of the run, [0, 30.72] and [51.20, 81.92] s in the text: ARX
 //!    by OLS and BJ(m* = 1) by PEM, with every delay of a range. In each span the delay with the highest VAF is the

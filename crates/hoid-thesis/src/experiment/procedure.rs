@@ -9,7 +9,8 @@ use hoid_track::{Method, StartAt, TrackOptions, track_from};
 
 use crate::ThesisError;
 
-/// Fraction of a run in each of the two batch fits, at the start and at the end: 30.72 of 81.92 s.
+/// Length of the first and of the last span of a run, to which the batch fits apply, as a fraction of the run: 30.72 of
+/// 81.92 s.
 const SHARE: f64 = 0.375;
 /// Number of samples between stored estimates.
 const EVERY: usize = 32;
@@ -32,7 +33,7 @@ pub struct RecursiveTrace {
     pub times_s: Vec<f64>,
     /// Coefficients and operator at each time.
     pub states: Vec<State>,
-    /// Variances of a1, a2, b0, b1 and, if the model has it, d1.
+    /// Variances of a1, a2, b0, b1 and, if the model has it, d1 at each time.
     pub variances: Vec<[f64; 5]>,
 }
 
@@ -52,11 +53,11 @@ pub struct RunOutcome {
     pub spans_s: [(f64, f64); 2],
     /// Delay n_k* by structure, samples.
     pub nk: [usize; 2],
-    /// Best delay in each span, samples.
+    /// Best delay by structure and span, samples.
     pub nk_of_span: [[usize; 2]; 2],
     /// Time constant T_n* of the Box-Jenkins model, s; NaN if neither span gives one.
     pub t_n_s: f64,
-    /// Batch fits with the delay n_k*.
+    /// Batch fits with the delay n_k*, by structure and span.
     pub batch: [[State; 2]; 2],
     /// Recursive estimates by RLS and RPEM.
     pub courses: [RecursiveTrace; 2],

@@ -4,11 +4,11 @@
 //! the start of the evaluated span, `from_s` in the manifest; the text omits a run-in of 8.08 s.
 //!
 //! A condition is shown in place of the condition of the text in which the controlled element changes in the same way.
-//! This is determined from `controlled_element`, `changes_to`, `change_s` and `change_per_s` of the manifest. An
-//! element counts as s1 or s2 of the text according to the slope of its logarithmic gain `d ln|H| / d ln w` at 2 rad/s,
-//! near the crossover frequency of people; the slope is -1.1 for s1 and -2.0 for s2. A change is sudden if its middle
-//! 80 %, which takes `2 ln 9 / G`, takes less than a second. If no element is given, the name of the condition (C1 to
-//! C6) decides.
+//! How the element changes is determined from `controlled_element`, `changes_to`, `change_s` and `change_per_s` of the
+//! manifest. An element counts as s1 or s2 of the text according to the slope of its logarithmic gain
+//! `d ln|H| / d ln w` at 2 rad/s, near the crossover frequency of people; the slope is -1.1 for s1 and -2.0 for s2. A
+//! change is sudden if its middle 80 %, which takes `2 ln 9 / G`, takes less than a second. If no element is given, the
+//! name of the condition (C1 to C6) decides.
 
 use std::path::{Path, PathBuf};
 
@@ -59,7 +59,7 @@ impl RecordedPeople {
             .iter()
             .flat_map(|condition| last_runs(&manifest, &condition.name, count))
             .collect();
-        // The first readable run gives the sample time. If no run can be read, the error of the first is returned.
+        // The first readable run gives the sample time. If no run can be read, the error of the first run is returned.
         let mut failed = None;
         let read = evaluated.iter().find_map(|entry| {
             let read = RecordedRun::read(&manifest, &base, entry);
@@ -91,7 +91,7 @@ impl RecordedPeople {
         &self.manifest.name
     }
 
-    /// Conditions that correspond to none of the text, with the reason.
+    /// Conditions that correspond to no condition of the text, with the reason.
     pub fn left_out(&self) -> &[(String, String)] {
         &self.left_out
     }
@@ -133,7 +133,8 @@ fn key_of(entry: &RunEntry) -> RunKey {
     }
 }
 
-/// Returns the last runs of each person in a condition, ordered by number if all runs of the person have one.
+/// Returns the last `count` runs of each person in a condition. The runs of a person are ordered by number if all of
+/// them have one, otherwise as in the manifest.
 fn last_runs(manifest: &Manifest, condition: &str, count: usize) -> Vec<RunEntry> {
     let own: Vec<&RunEntry> = (manifest.runs.iter())
         .filter(|run| run.counts && run.condition == condition)

@@ -14,7 +14,7 @@ use super::{
 };
 use hoid_report::figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, trace_panels};
 
-/// The displayed noise level. Averages and medians at three levels would be twelve lines.
+/// The displayed noise level; averages and medians at three levels would give twelve lines per panel.
 const LEVEL: f64 = 0.1;
 
 pub(super) fn items() -> Vec<Item> {

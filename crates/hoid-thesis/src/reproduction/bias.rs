@@ -101,8 +101,8 @@ impl Parameters {
 /// Limit, in %, up to which an ordinate is linear if [`has_large_biases`] is true.
 const LINEAR_WITHIN: f64 = 10.0;
 
-/// True if biases may reach thousands of times the true value: the innovation variance of a first-order model differs
-/// from that of a higher-order remnant.
+/// True if biases may reach thousands of times the true value: the remnant parameters of a first-order noise model
+/// differ from those of a higher-order remnant.
 fn has_large_biases(model: Model, remnant_order: usize, letters: &str) -> bool {
     model == Model::First && remnant_order > 1 && matches!(letters, "innovation variance" | "T_n" | "K_n")
 }
@@ -157,7 +157,7 @@ fn item(name: &str, condition: &'static str, model: Model, parameters: Parameter
 }
 
 fn make(item: &Item, results: &Results, condition: &str, model: Model, parameters: Parameters) -> ItemOutput {
-    // Without remnant, its parameters have no true values.
+    // Without a remnant, the parameters of the remnant have no true values.
     let levels = if parameters == Parameters::Remnant {
         &LEVELS[1..]
     } else {

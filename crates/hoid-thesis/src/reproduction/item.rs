@@ -17,9 +17,9 @@ pub type Studies = BTreeMap<String, Results>;
 /// Function that makes an item from the results of its plan.
 type Maker = Box<dyn Fn(&Item, Option<&Results>) -> ItemOutput + Send + Sync>;
 
-/// Runs that several items share and that belong to no plan. They are made before any item is drawn. Otherwise a thread
-/// that makes the runs for one item could, while it waits for a part of them, start on another item that waits for all
-/// of them.
+/// Runs that several items share and that belong to no plan. Shared runs are made before any item is drawn. Otherwise a
+/// thread that makes the runs for one item could, while it waits for a part of them, start on another item that waits
+/// for all of them.
 #[derive(Clone)]
 pub(super) struct SharedRuns {
     /// Name of the runs; `title` is their title.
@@ -34,7 +34,7 @@ pub(super) struct SharedRuns {
 /// Function that makes shared runs.
 type MakeRuns = Arc<dyn Fn(&ProgressCallbacks<'_>) -> Result<Vec<String>, ThesisError> + Send + Sync>;
 
-/// Callbacks for progress and cancellation while shared runs are made.
+/// Callbacks with which a caller follows or cancels the making of shared runs.
 pub(super) struct ProgressCallbacks<'a> {
     /// Called with the number of newly completed estimates.
     pub done: &'a (dyn Fn(u64) + Sync),

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | `setting` | Tables 1, 2 (4.2, 4.3), 4.4, 6.1; Figs. 3, 4, A.1 | `noise-level` |
 //! | `bias` | Figs. 5, 6, 9, C.1 to C.16: box plots of relative biases | `bias` |
-//! | `orders` | Figs. 7, 8, E.1 to E.16: maps over n_k* and m* | `bias` |
+//! | `orders` | Figs. 7, 8, E.1 to E.16: maps against n_k* and m* | `bias` |
 //! | `responses` | Figs. 10, D.1 to D.18: Bode plots of averaged models | `bias` |
 //! | `starts` | Figs. F.1 to F.8: fits from other starts compared with those from the base start | `initial-conditions` |
 //! | `traces` | Figs. 11, 12, G.1 to G.8, H.1 to H.12: recursive estimates | `recursive`, `recursive-arx` |

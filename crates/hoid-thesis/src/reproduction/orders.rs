@@ -1,5 +1,5 @@
-//! Maps over the delay n_k* and the order m* of the noise model: VAF, its difference from that of ARX, absolute biases.
-//! Figs. 7, 8, E.1 to E.16.
+//! Maps of quantities against the delay n_k* and the order m* of the noise model: VAF, its difference from that of ARX,
+//! absolute biases. Figs. 7, 8, E.1 to E.16.
 
 use hoid_study::{Query, Results};
 

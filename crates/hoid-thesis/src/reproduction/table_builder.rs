@@ -2,7 +2,7 @@
 
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
 
-/// A table with named columns of texts and numbers that is built row by row.
+/// A table with named columns of text and numbers that is built row by row.
 pub(super) struct TableBuilder {
     texts: Vec<(&'static str, Vec<String>)>,
     numbers: Vec<(&'static str, Vec<f64>)>,

@@ -201,7 +201,7 @@ fn make(
         }
     }
     let alone = orders.len() == 1;
-    // There are two columns, unless the last row would have a single panel.
+    // The panels of a single order form two columns, unless the last row would then have a single panel.
     let of_one = if panels.len().is_multiple_of(2) { 2 } else { 1 };
     let grid = TraceGrid {
         panels,
@@ -217,12 +217,12 @@ fn make(
     item.drawn(trace_panels, &grid, data)
 }
 
-/// Time from which the estimates determine the range of their panels, s; before it they are still moving away from
-/// their initial values.
+/// Time from which the estimates determine the range of their panels, s; before this time the estimates are still
+/// moving away from their initial values.
 const SETTLED_S: f64 = 15.0;
 
-/// Range of all curves from [`SETTLED_S`] on, without the highest and lowest three per cent of each estimate. Every
-/// estimator contributes, even if another is better.
+/// Range of the ordinate: all values of the truth and the batch fits, and the estimates from [`SETTLED_S`] on without
+/// the highest and lowest three per cent. Every estimator contributes, even if another is better.
 fn ordinate(curves: &[TraceCurve]) -> Ordinate {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for curve in curves {

@@ -1,7 +1,7 @@
 //! All methods of the survey, applied to the same runs.
 //!
 //! Part II of the thesis describes methods with which others have identified time-varying operators (section 2.4). A
-//! survey applies all of them to the same simulated runs. The recursive methods are estimators of a study; the
+//! survey applies all of these methods to the same simulated runs. The recursive methods are estimators of a study; the
 //! [`comparators`](crate::comparators) are tables in a separate file:
 //!
 //! ```toml

@@ -20,7 +20,7 @@ use crate::{
 
 /// Number of samples between stored estimates.
 const EVERY: usize = 32;
-/// Number of the first replication used as a validation set; no evaluated run has such a number.
+/// Number of the first replication used as a validation set; it is larger than the number of any evaluated run.
 const VALIDATION: u64 = 1 << 40;
 
 /// Errors of one method over the runs of one cell.
@@ -126,8 +126,8 @@ fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Reco
     estimators.chain(comparators).collect()
 }
 
-/// Result of an estimator of a study: a recursive method gives an estimate at each time, a batch fit the same estimate
-/// at all times.
+/// Returns the result of an estimator of a study. A recursive method gives an estimate at each time, a batch fit the
+/// same estimate at all times.
 fn of_estimator(estimator: &EstimatorCell, cell: &Cell, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
     match estimator.task_for(&cell.resolved) {
         StudyTask::Track(options) => of_trace(&track(task.record, &options, EVERY)?, task),

@@ -22,7 +22,8 @@ fn digits(value: f64) -> String {
     }
 }
 
-/// Returns the medians over the runs, NaN if at most half of the runs give a number, and the number of failed runs.
+/// Returns the median over the runs of each displayed value, which is NaN unless more than half of the runs give a
+/// number, and the number of failed runs.
 fn medians(of: &MethodErrors) -> ([f64; 6], usize) {
     let runs: Vec<[f64; 6]> = of.runs.iter().flatten().map(shown).collect();
     let column = |i: usize| {

@@ -101,7 +101,7 @@ impl Trace {
         Ok(Verdict::of(all))
     }
 
-    /// Findings about the start fit, limited to warnings.
+    /// Returns the findings about the start fit, none of them more severe than a warning.
     fn start_findings(&self, record: &Record, choice: Option<&Choice>) -> Result<Vec<Finding>, IdentError> {
         let (Some(fit), Some((from, to))) = (self.start(), self.options().start_span(record)) else {
             return Ok(Vec::new());
@@ -109,8 +109,8 @@ impl Trace {
         let span = [record.span(from, to)?];
         let of_start = |finding: &Finding| Finding {
             severity: match finding.kind {
-                // A method that forgets follows the change. A method that weights the start against all later samples
-                // starts from a mean of the operators before and after the change.
+                // A method that forgets follows a change within the start span. A method that weights the start against
+                // all later samples starts from a mean of the operators before and after this change.
                 "not-constant" if !self.options().method.is_model_of_change() => Severity::Note,
                 _ => finding.severity.min(Severity::Doubt),
             },
@@ -133,7 +133,7 @@ impl Trace {
         Ok(all)
     }
 
-    /// Finding about the parameters of the last row that still have their prior values.
+    /// Returns the finding that the record does not determine omega_nm, zeta_nm or tau_e of the last row.
     fn supposed_finding(&self) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self
@@ -156,8 +156,8 @@ impl Trace {
         })
     }
 
-    /// Rows in which the estimate is updated, evenly spaced, including the last row. For a method that needs no start
-    /// fit, rows before its first estimate are excluded.
+    /// Returns the rows that are examined: rows in which the estimate is updated, evenly spaced, including the last
+    /// row. For a method that needs no start fit, rows before its first estimate are excluded.
     fn rows_judged(&self) -> Vec<usize> {
         let from = self.updated_from_s() - self.sample_time().s() / 2.0;
         let mut first = self.times_s().partition_point(|t| *t < from);
@@ -173,7 +173,8 @@ impl Trace {
 
     /// Finding about a coefficient whose standard error grew far above its median.
     fn covariance_finding(&self, rows: &[usize]) -> Option<Finding> {
-        // A start without knowledge has large standard errors.
+        // Only the second half of the rows is examined: after a start without knowledge, standard errors are large at
+        // first.
         let rows = &rows[rows.len() / 2..];
         let names = self.parameter_names();
         let estimates: Vec<Vec<Estimate>> = rows.iter().map(|row| self.parameters(*row)).collect();

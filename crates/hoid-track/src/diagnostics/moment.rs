@@ -13,7 +13,7 @@ use crate::tracker::Tracker;
 const UNSETTLED_S: f64 = 10.0;
 
 impl Tracker {
-    /// Reliability of the current estimate, for the operator that [`Tracker::operator`] returns.
+    /// Returns the reliability of the current estimate; `operator` is the result of [`Tracker::operator`].
     pub fn level(&self, operator: &Result<OperatorEstimate, NotConvertible>) -> VerdictLevel {
         if self.theta().iter().any(|v| !v.is_finite()) {
             return VerdictLevel::NotDetermined;
@@ -31,7 +31,7 @@ impl Tracker {
         if self.options().method.starts_itself() && self.covariance().is_none() {
             return VerdictLevel::NotDetermined;
         }
-        // If no coefficient has a standard error, the coefficients may be unknown.
+        // If no coefficient has a standard error, the estimate is doubtful.
         let known = |e: &Estimate| e.standard_error.is_some_and(|s| s > 0.0);
         if !self.parameters().iter().any(known) {
             return VerdictLevel::Doubtful;

@@ -9,10 +9,10 @@ use hoid_model::{
 
 use crate::trace::Trace;
 
-/// The operator of one row, or the reason why it has none.
+/// The operator of one row, or the reason why the row has none.
 pub(super) type Operator = Result<OperatorEstimate, NotConvertible>;
 
-/// True if orders or form of the model are not those of the operator.
+/// True if the orders or the form of the model are not those of an operator.
 pub(super) fn is_other(operator: &Operator) -> bool {
     matches!(
         operator,
@@ -45,7 +45,7 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
             "{:.0} % of the rows do not correspond to any operator{reason}",
             100.0 * lacking
         );
-        // A gain of zero in all rows does not indicate another form: no response was found.
+        // If the gain is zero in all rows, the cause is not another form of the operator: no response was found.
         let nothing = operators.iter().all(|o| matches!(o, Err(NotConvertible::ZeroGain)));
         all.push(match nothing {
             true => Finding::undetermined("not-convertible", words),
@@ -54,7 +54,7 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
     }
     let rows_with = |is: &dyn Fn(&OperatorEstimate) -> bool| share(found.iter().filter(|o| is(o)).count(), found.len());
     let remembers = trace.options().method.memories().is_some();
-    // If the response is known, gain and lead are only one description of it, which need not be the right one.
+    // If the response is known, gain and lead are only one description of the response, which may have another form.
     let of_response = |finding: Finding| match trace.response_is_known {
         true => Finding {
             severity: Severity::Note,
@@ -116,7 +116,8 @@ fn sign_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
     })
 }
 
-/// Finding about a negative lead: people have none, but gain and lead that approximate a lag can include one.
+/// Finding about a negative lead: people have no negative lead, but gain and lead that approximate a lag can include
+/// one.
 fn lead_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
     let negative = rows_with(&leads_backwards);
     (negative > NEGATIVE_LEAD).then(|| {
@@ -132,7 +133,7 @@ fn lead_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
     })
 }
 
-/// Share of the rows whose operator has a property.
+/// Returns the share of the rows whose operator has a property.
 type ShareOfRows<'a> = dyn Fn(&dyn Fn(&OperatorEstimate) -> bool) -> f64 + 'a;
 
 /// Finding about gains that are undetermined in most rows. For methods with a memory length, it recommends a longer
@@ -189,7 +190,7 @@ mod tests {
             zeta_nm: Estimate::fixed(0.25),
             tau_e_s: Estimate::fixed(0.2),
         };
-        // Two standard errors are .2.
+        // Two standard errors of each gain are .2.
         for (k_e, k_e_dot, expected) in [
             (1.0, 1.0, false),
             (1.0, -0.3, true),

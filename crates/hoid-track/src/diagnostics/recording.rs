@@ -10,16 +10,17 @@ use crate::{
     trace::Trace,
 };
 
-/// Share of held-back samples beyond which the finding is a warning.
+/// Share of held-back samples beyond which the finding about them is a warning.
 const MANY_HELD_BACK: f64 = 0.01;
-/// Largest number of spans that are listed individually.
+/// Largest number of faulty spans that are listed individually.
 const NAMED: usize = 3;
-/// Lengths of the end of the record with which the last row is compared, s.
+/// Lengths of the spans at the end of the record with which the last row is compared, s.
 const LAST_S: [f64; 2] = [16.0, 30.0];
-/// Smallest number of changes that counts as many, and length of record per change above which it does not, s.
+/// Smallest number of declared changes that counts as many, and length of record per change, s, above which the number
+/// does not count as many.
 const MANY_CHANGES: usize = 3;
 const FOR_EACH_S: f64 = 30.0;
-/// p-value of one comparison, out of ten, below which the end of the record differs from the last row.
+/// p-value of one of ten comparisons below which the end of the record differs from the last row.
 const UNLIKELY: f64 = 1e-4;
 
 impl Trace {
@@ -94,12 +95,14 @@ impl Trace {
     }
 
     /// Compares the last few seconds of the record with the last row: the delay may have changed, or the estimate may
-    /// not have recovered. A step of [`operator_step`] gives a finding if it is [`UNLIKELY`], given its own error and
-    /// that of the row. For a delay in whole samples, the step must also exceed one and a half samples.
+    /// not have recovered. A step of a parameter ([`operator_step`]) gives a finding if its p-value, given the error of
+    /// the step and that of the row, is below [`UNLIKELY`]. For a delay in whole samples, the step must also exceed one
+    /// and a half samples.
     pub(super) fn not_followed(&self, record: &Record) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self.operator(row).ok()?;
-        // If gain and lead approximate another form, their response differs from that of the estimate.
+        // If gain and lead approximate another form, their response differs from that of the estimate, so that they are
+        // not compared.
         if self.response_is_known && (is_open(&operator.k_e) || leads_backwards(&operator)) {
             return None;
         }
@@ -143,7 +146,7 @@ impl Trace {
         worst.map(|(_, words)| Finding::doubt("not-followed", words))
     }
 
-    /// Finding that neither gain is determined at the end, regardless of earlier values.
+    /// Finding that neither gain is determined in the last row, regardless of earlier rows.
     pub(super) fn last_row_finding(&self) -> Option<Finding> {
         let operator = self.operator(self.len().checked_sub(1)?).ok()?;
         let nothing = is_open(&operator.k_e) && is_open(&operator.k_e_dot) && !self.response_is_known;
@@ -155,7 +158,7 @@ impl Trace {
         })
     }
 
-    /// Finding that more changes are declared than people make.
+    /// Finding that changes are declared more often than people change.
     pub(super) fn many_changes_finding(&self) -> Option<Finding> {
         let changes = self.changes().len();
         let length = self.times_s().last()? - self.times_s().first()?;
@@ -190,7 +193,7 @@ impl Trace {
     }
 }
 
-/// Lists the first spans as text.
+/// Lists the first faulty spans as text.
 fn named(faults: &[TrackFault]) -> String {
     let one = |f: &TrackFault| format!("{} in {} at {:.2} to {:.2} s", f.kind, f.channel, f.from_s, f.to_s);
     let mut text = faults.iter().take(NAMED).map(one).collect::<Vec<_>>().join("; ");

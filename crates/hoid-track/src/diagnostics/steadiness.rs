@@ -1,7 +1,7 @@
 //! Tests whether the response is constant where the trace reports no change, and whether e responds to u.
 //!
-//! The gains of the basis and the delay are fitted to each stretch between two declared changes, and tested for jumps,
-//! drifts and slow oscillations ([`hoid_ident::diagnostics::unsteady`]).
+//! The gains of the basis and the delay are fitted to each stretch between two declared changes and are tested for
+//! steps, drifts and slow oscillations ([`hoid_ident::diagnostics::unsteady`]).
 
 use std::ops::Range;
 
@@ -11,21 +11,22 @@ use hoid_model::{Finding, Record};
 use super::structure::columns;
 use crate::trace::Trace;
 
-/// p-values below which the response is considered to vary within a stretch: by a step, a drift or an oscillation. All
-/// instants of a step, and all frequencies and phases of an oscillation, are counted as independent although
-/// neighbouring ones are correlated; fewer than one in a hundred people who do not change are below these limits.
+/// p-values below which the response is considered to vary within a stretch: by a step, a drift or an oscillation. The
+/// p-values count all instants of a step, and all frequencies and phases of an oscillation, as independent although
+/// neighbouring ones are correlated; among people who do not change, fewer than one in a hundred are below these
+/// limits.
 const UNLIKELY_STEP: f64 = 0.02;
 const UNLIKELY_DRIFT: f64 = 0.01;
 const UNLIKELY_SWAY: f64 = 0.05;
-/// Limit on the share of the innovations of e (the part not explained by older e and u) that the latest u explains;
-/// below it, e does not respond to u. The share is above one half in closed loops, and below 0.03 for two runs with the
-/// same forcing function.
+/// Smallest share of the innovations of e (the part of e that older e and u do not explain) that the latest u explains
+/// if e responds to u. The share is above one half in closed loops, and below 0.03 if e and u are from two runs with
+/// the same forcing function.
 const NO_ANSWER: f64 = 0.05;
 /// Time before and after a declared change that is excluded from the stretches, s.
 const EXCLUDED_S: f64 = 5.0;
 
 impl Trace {
-    /// Stretches without a reported change, in samples of the record.
+    /// Returns the stretches without a declared change, as ranges of samples of the record.
     fn stretches(&self, record: &Record) -> Vec<Range<usize>> {
         let ts = self.sample_time().s();
         let sample = |t: f64| ((t - record.time_s(0)) / ts).round().clamp(0.0, record.len() as f64) as usize;
@@ -46,7 +47,8 @@ impl Trace {
         all
     }
 
-    /// Test results for all stretches, the most significant first; the p-values account for the number of stretches.
+    /// Returns the test results of all stretches, the most significant first; the p-values account for the number of
+    /// stretches.
     pub(super) fn unsteady(&self, record: &Record) -> Vec<Unsteady> {
         let Some((_, signals)) = self.signals(record) else {
             return Vec::new();
@@ -111,7 +113,7 @@ impl Trace {
         ))
     }
 
-    /// Response of e to u.
+    /// Estimates how e responds to u.
     pub(super) fn answer(&self, record: &Record) -> Option<LoopResponse> {
         answer(record.input(), record.output(), 0, self.sample_time().s())
     }

@@ -1,9 +1,9 @@
 //! Tests whether the operator of the last row has the structure of the person.
 //!
 //! With the basis for people, the numerator, corrections of the poles and of the delay, and a level can be estimated;
-//! together they span the six signals of its filter. One of these signals, filtered once more by the lag, gives a
-//! correction of the lag, in case only the lag is wrong. The test examines whether earlier errors, since the last
-//! change, carry more information about u ([`hoid_ident::diagnostics::residual_response()`]).
+//! together they span the six signals of the filter of the basis. One of these signals, passed through the lag once
+//! more, gives a correction of the lag, in case only the lag is wrong. The test examines whether earlier errors, since
+//! the last change, carry more information about u ([`hoid_ident::diagnostics::residual_response()`]).
 
 use hoid_core::adaptive::basis::{Basis, Point, Signals};
 use hoid_ident::diagnostics::{ResidualResponse, residual_response};
@@ -11,7 +11,7 @@ use hoid_model::{Finding, Record};
 
 use crate::{guard::GuardKind, trace::Trace};
 
-/// p-value below which part of the structure is considered missing.
+/// p-value of the test below which the operator is considered to lack part of the person's structure.
 const UNLIKELY: f64 = 1e-3;
 /// p-value above which a corrected lag is considered to explain the residual.
 const LAG_EXPLAINS: f64 = 0.02;
@@ -39,7 +39,7 @@ impl Trace {
         })
     }
 
-    /// Result of the test, for methods with a basis.
+    /// Returns the result of the test; `None` for methods without a basis.
     pub(super) fn residual_response(&self, record: &Record) -> Option<ResidualResponse> {
         self.options().method.lag_of_basis_s()?;
         let ts = self.sample_time().s();
@@ -61,15 +61,15 @@ impl Trace {
         of(&columns)
     }
 
-    /// Time from which the filters of the basis have settled; until then they contain samples that do not come from
-    /// tracking.
+    /// Returns the time from which the filters of the basis have settled, s: a settling time after the start of the
+    /// record or after the last faulty span that is neither an outlier nor a step.
     pub(super) fn settled_s(&self, record: &Record) -> f64 {
         let outliers = [GuardKind::Outlier, GuardKind::Step];
         let hostile = self.faults().iter().filter(|fault| !outliers.contains(&fault.kind));
         hostile.fold(record.time_s(0), |last, fault| last.max(fault.to_s)) + SETTLING_S
     }
 
-    /// The basis of the operator of the last row, and its signals over the record.
+    /// Returns the basis of the operator of the last row, and the signals of the basis at each sample of the record.
     pub(super) fn signals(&self, record: &Record) -> Option<(Basis, Vec<Signals>)> {
         let operator = self.operator(self.len().checked_sub(1)?).ok()?;
         let ts = record.sample_time().s();
@@ -89,7 +89,8 @@ impl Trace {
     }
 }
 
-/// Filters a signal by the lag once more, which gives a correction of the lag in addition to those of poles and delay.
+/// Passes a signal through the lag once more. The result serves to correct the lag, as the other columns correct poles
+/// and delay.
 fn slower(signal: &[f64], lag_s: f64, sample_time_s: f64) -> Vec<f64> {
     let pole = (-sample_time_s / lag_s).exp();
     let step = |state: &mut f64, z: &f64| {
@@ -126,7 +127,8 @@ mod tests {
         simulator.run(seed, false).unwrap()
     }
 
-    /// The same record with an additional response to the error: this share of K_e, this many samples later.
+    /// The same record with an additional response to the error in u: `share` times K_e, `later` samples after the
+    /// error.
     fn with_echo(record: &Record, share: f64, later: usize) -> Record {
         let e = record.input();
         let echo = |k: usize| k.checked_sub(later).map_or(0.0, |k| share * 0.09 * e[k]);
@@ -142,11 +144,12 @@ mod tests {
 
     #[test]
     fn chance_is_chance_and_another_response_is_seen() {
-        // Of 30 people of the right form 1.5 are below .05 by chance, standard error 1.2.
+        // Of 30 people of the right form, 1.5 are expected to have a p-value below .05 by chance, with a standard
+        // deviation of 1.2.
         let clean: Vec<f64> = (0..30).map(|i| found(&run(i)).p_value).collect();
         assert!(clean.iter().filter(|p| **p < 0.05).count() <= 6, "{clean:?}");
         assert!(clean.iter().all(|p| *p > UNLIKELY), "{clean:?}");
-        // A third of the gain once more, .85 s after the error: far beyond the delay and its corrections.
+        // An additional third of the gain .85 s after the error: far beyond the delay and its corrections.
         let echoes: Vec<ResidualResponse> = (0..6).map(|i| found(&with_echo(&run(i), 0.33, 85))).collect();
         let seen = echoes.iter().filter(|f| f.p_value < UNLIKELY);
         assert!(seen.count() >= 5, "{echoes:?}");
@@ -157,7 +160,7 @@ mod tests {
         let record = run(0).span(0.0, 25.0).unwrap();
         let trace = track(&record, &TrackOptions::default_for(Method::adaptive(), 29), 50).unwrap();
         assert_eq!(trace.residual_response(&record), None);
-        // A method without this basis is not tested.
+        // A method without a basis is not tested.
         let record = run(0);
         let trace = track(&record, &TrackOptions::default_for(Method::rls(), 29), 50).unwrap();
         assert_eq!(trace.missed_structure(&record), None);

@@ -9,7 +9,7 @@ use super::{FLOOR, Guard, LARGEST, LEAST_AGE, SOUND_EVERY, event::GuardKind};
 use crate::recursion::Recursion;
 
 impl Guard {
-    /// Ends a block.
+    /// Tests the block that has ended; starts a pause if there is a fault, otherwise learns from the block.
     #[cold]
     pub(super) fn end_block(&mut self, recursion: &mut dyn Recursion) {
         self.channels.iter_mut().for_each(ChannelGuard::end_block);
@@ -66,7 +66,7 @@ impl Guard {
         }
     }
 
-    /// Starts to learn the tails of the signals if their typical values are not known yet.
+    /// Starts to learn the quantiles of the differences of both signals if their typical values are not known yet.
     fn learn_tails(&mut self, block: &Block) {
         if !self.profile.is_known() {
             for (channel, means) in self.channels.iter_mut().zip(block.differences) {
@@ -102,7 +102,7 @@ impl Guard {
         };
     }
 
-    /// Sets the limits that follow from the typical values.
+    /// Sets the limits of both signals, which follow from their typical values.
     pub(super) fn set_limits(&mut self) {
         if !self.profile.is_known() {
             return;

@@ -1,6 +1,7 @@
-//! Schedule of the comparison between the estimate and the start model: the first [`COMPARED`] of every [`EVERY`]
-//! blocks are compared, which keeps the cost low, and after something unusual all of the next [`SUSPECT_BLOCKS`]
-//! blocks. The filters of the start model start at rest and have [`SETTLING`] blocks to settle.
+//! Schedule of the comparison between the estimate and the start model. In every round of [`EVERY`] blocks only the
+//! first [`COMPARED`] are compared, which keeps the cost low; after something unusual, all of the next
+//! [`SUSPECT_BLOCKS`] blocks are compared. In a round, the first [`SETTLING`] blocks do not count, because the filters
+//! of the start model start at rest.
 
 use hoid_core::{
     delay::DelayLine,
@@ -11,14 +12,15 @@ use hoid_core::{
     state::{State, visit_all},
 };
 
-/// Number of blocks in a round, and number of these that are compared.
+/// Number of blocks in a round, number of blocks at its start that are compared, and number of the first of these, in
+/// which the filters settle.
 const EVERY: u32 = 44;
 const COMPARED: u32 = 11;
 const SETTLING: u32 = 3;
 /// Number of blocks that are compared after something unusual.
 const SUSPECT_BLOCKS: u32 = 30;
 
-/// The start model with its delay line.
+/// The start model with its delay line, and its place in the round.
 #[derive(Debug, Clone)]
 pub(super) struct Reference {
     model: ReferenceModel,
@@ -53,7 +55,7 @@ impl Reference {
         (self.over, self.compared) = (0, SUSPECT_BLOCKS);
     }
 
-    /// Reports something unusual: this block does not count, and the next blocks are compared.
+    /// Takes note of something unusual: the current block does not count, and the next blocks are compared.
     pub fn suspect(&mut self) {
         if self.over >= self.compared {
             self.begin();
@@ -72,7 +74,7 @@ impl Reference {
         }
     }
 
-    /// Ends a block; true if the estimate has diverged.
+    /// Ends a block; returns true if the estimate has diverged.
     pub fn end_block(&mut self, block: &Block, length: u32) -> bool {
         self.over += 1;
         // Blocks with held-back samples carry no information.

@@ -5,9 +5,9 @@ use hoid_model::SampleTime;
 /// Kind of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardKind {
-    /// One to a few samples that deviate from the prediction, after which the signal returns.
+    /// One or a few samples that deviate from the prediction, after which the signal returns to the prediction.
     Outlier,
-    /// A jump after which the signal does not return.
+    /// A jump after which the signal does not return to the prediction.
     Step,
     /// Samples that are not finite numbers, for longer than an outlier lasts.
     Missing,
@@ -40,15 +40,15 @@ hoid_model::named_choice!(GuardKind, "kind of fault", 9, {
 /// Action of the guard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardAction {
-    /// The samples were replaced by predictions, and the estimate was kept constant.
+    /// The samples were replaced by predictions while the estimate was kept constant.
     Held,
     /// The samples were first held back and then used as recorded; the result is the same as without a guard.
     Accepted,
     /// The estimate stays constant from here on.
     Paused,
-    /// The estimate, which had stayed constant, is updated again.
+    /// The estimate, which had been kept constant, is updated again.
     Resumed,
-    /// The estimate is updated again, from its state before the span.
+    /// The estimate is updated again, from its state before the faulty span.
     Restarted,
     /// The estimate is updated again, after a restart of the recursion from its start.
     Relearnt,
@@ -63,7 +63,7 @@ hoid_model::named_choice!(GuardAction, "action", 6, {
     Relearnt => "relearnt",
 });
 
-/// Signal of an event.
+/// Signal in which an event was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardChannel {
     /// e.
@@ -85,11 +85,11 @@ hoid_model::named_choice!(GuardChannel, "channel", 3, {
 pub struct GuardEvent {
     /// Kind of the event.
     pub kind: GuardKind,
-    /// Signal of the event.
+    /// Signal in which the event was found.
     pub channel: GuardChannel,
     /// Number of samples since the first sample of the span.
     pub ago: u64,
-    /// Number of samples of the span so far.
+    /// Number of samples that the span contains so far.
     pub samples: u64,
     /// Size of the event: largest distance from the prediction for outliers and steps, largest magnitude for levels, in
     /// the unit of the signal; zero for other kinds.
@@ -103,20 +103,20 @@ pub struct GuardEvent {
 pub struct TrackFault {
     /// Kind of the event.
     pub kind: GuardKind,
-    /// Signal of the event.
+    /// Signal in which the event was found.
     pub channel: GuardChannel,
     /// Time of the first sample of the span, s.
     pub from_s: f64,
     /// Time of the first sample after the span, s.
     pub to_s: f64,
-    /// Size, as [`GuardEvent::size`].
+    /// Size of the event, as [`GuardEvent::size`].
     pub size: f64,
     /// Action of the guard.
     pub action: GuardAction,
 }
 
 impl GuardEvent {
-    /// Converts an event that was reported at `now_s` to a fault with times.
+    /// Converts an event that was reported at the time `now_s` to a fault with its start and end.
     pub fn at(&self, now_s: f64, sample_time: SampleTime) -> TrackFault {
         let ts = sample_time.s();
         let from_s = now_s - self.ago as f64 * ts;
@@ -137,7 +137,7 @@ impl TrackFault {
         self.action == GuardAction::Paused
     }
 
-    /// Appends the fault to the earlier faults; the end of a pause replaces its start.
+    /// Appends the fault to the earlier faults; the fault at the end of a pause replaces the one at its start.
     pub(crate) fn append_to(self, faults: &mut Vec<Self>) {
         if faults.last().is_some_and(Self::is_open) {
             faults.pop();

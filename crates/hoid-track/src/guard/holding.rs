@@ -78,8 +78,8 @@ impl Guard {
         }
     }
 
-    /// True if a hand can make an excursion of u that ends with sample x at index `place` of the ring: it starts with a
-    /// jump and returns over several samples.
+    /// True if a movement of the hand can explain an excursion of u that ends with sample x at index `place` of the
+    /// ring: such an excursion starts with a jump and returns over several samples.
     fn is_pulse(&self, place: usize, held: u32, size: f64, x: f64, largest_move: f64) -> bool {
         let Some(last) = place.checked_sub(1).map(|k| self.ring[k].values[1]) else {
             return false;
@@ -132,8 +132,8 @@ impl Guard {
                 ..sample
             };
             // e acts on u only after the delay, so that the current innovation does not contain the interpolated e. A
-            // tenth of a second of interpolated u affects an estimate less than if a bank created no hypotheses for
-            // that time.
+            // tenth of a second of interpolated u affects an estimate less than it would if a bank created no
+            // hypotheses for that time.
             outcome = Some(if raw.moves {
                 recursion.step(taken)
             } else {

@@ -71,11 +71,11 @@ pub(crate) use snapshot::Snapshot;
 
 /// Longest run of held-back samples, s.
 const LONGEST_S: f64 = 0.1;
-/// Settling time beyond the delay, s.
+/// Time beyond the delay in which the filters settle, s.
 pub(crate) const SETTLE_S: f64 = 2.0;
 /// Length of a block, s.
 const BLOCK_S: f64 = 1.0;
-/// Number of sound blocks between two snapshots, and smallest age in blocks of a snapshot that is restored.
+/// Number of blocks without a fault between two snapshots, and smallest age, in blocks, of a snapshot that is restored.
 const SOUND_EVERY: u32 = 5;
 const LEAST_AGE: u64 = 4;
 /// Multiple of the typical mean magnitude beyond which the level of a signal has changed.
@@ -92,13 +92,13 @@ const ACCEPTED_AFTER_S: f64 = 120.0;
 /// Decision of the guard on a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Guarded {
-    /// Outcome of the recursion; `None` if the sample did not reach it as recorded.
+    /// Outcome of the recursion; `None` if the recursion did not take the sample as recorded.
     pub outcome: Option<StepOutcome>,
     /// True if the sample was held back or the estimate is paused.
     pub held: bool,
 }
 
-/// A sample as recorded; NaN for a value that is not a number.
+/// A sample as recorded; a missing or unreadable value is NaN.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Raw {
     values: [f64; CHANNELS],
@@ -120,7 +120,7 @@ struct Pause {
     bad_block: bool,
     /// Number of consecutive samples without a fault.
     good: u64,
-    /// Number of samples of a larger level, of a misfit or of swapped channels.
+    /// Number of samples so far with a larger level, a misfit or swapped channels.
     suspect_samples: u64,
 }
 
@@ -144,20 +144,20 @@ pub(crate) struct Guard {
     channels: [ChannelGuard; CHANNELS],
     profile: Profile,
     resting: Resting,
-    /// The former typical values, from before they were learnt again.
+    /// Typical values before they were last learnt again.
     former: Profile,
     block: Block,
     in_block: u32,
     sound_blocks: u32,
     centre: [f64; CHANNELS],
     largest: [f64; CHANNELS],
-    /// States of recursion and channels before the held-back samples, and these samples.
+    /// States of the recursion and of the channels before the held-back samples, and these samples.
     before: Snapshot,
     channels_before: [ChannelGuard; CHANNELS],
     ring: Vec<Raw>,
     in_ring: usize,
     sound: [Snapshot; 2],
-    /// Sample number at which each snapshot was taken; 0 if it was not.
+    /// Sample number at which each snapshot was taken; 0 if there is no snapshot.
     sound_at: [u64; 2],
     start: Snapshot,
     reference: Option<Reference>,
@@ -198,8 +198,8 @@ impl State for Guard {
         if let Some(reference) = &mut self.reference {
             reference.visit(each);
         }
-        // The ring must have room for the next held-back sample. A pause, a snapshot and a restart cannot be in the
-        // future.
+        // The ring must have room for the next held-back sample. The start of a pause, a snapshot and a restart cannot
+        // be in the future.
         self.in_ring = self.in_ring.min(self.ring.len().saturating_sub(1));
         self.pause.first = self.pause.first.min(self.samples);
         self.sound_at = self.sound_at.map(|at| at.min(self.samples));
@@ -296,7 +296,7 @@ impl Guard {
         guarded
     }
 
-    /// Compares the estimate with the start model from now on.
+    /// Compares the estimate with a start model, with the delay nk, from now on.
     pub fn compare_with(&mut self, model: ReferenceModel, nk: usize) {
         self.reference = Some(Reference::new(model, nk));
     }
@@ -312,7 +312,7 @@ impl Guard {
         });
     }
 
-    /// Returns the event reported at the last sample.
+    /// Returns the event that was reported at the last sample.
     pub fn event(&self) -> Option<GuardEvent> {
         self.event
     }
@@ -322,7 +322,7 @@ impl Guard {
         self.pause.kind > 0
     }
 
-    /// Returns the number of restarts so far.
+    /// Returns the number of restarts by the guard so far.
     pub fn restarts(&self) -> u64 {
         self.restarts
     }

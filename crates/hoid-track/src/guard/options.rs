@@ -8,9 +8,9 @@ use hoid_ident::{
 /// Choice of a guard in front of a recursion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardChoice {
-    /// A guard is in front of the recursion.
+    /// A guard examines the samples before the recursion.
     Yes,
-    /// The samples reach the recursion unchanged.
+    /// No guard: the samples reach the recursion unchanged.
     No,
 }
 
@@ -33,7 +33,7 @@ impl Value for GuardChoice {
 }
 
 settings! {
-    /// Option to keep samples and spans that cannot come from tracking from the recursion.
+    /// Option of a guard, which prevents samples and spans that cannot come from tracking from changing the estimate.
     pub struct GuardOptions {
         /// Guard: outliers of e and u are held back, spans that no tracking produces are excluded, and the estimate
         /// restarts after them

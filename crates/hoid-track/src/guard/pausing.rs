@@ -31,7 +31,7 @@ impl Guard {
         self.tell(kind, channel, samples, size, GuardAction::Paused, 0);
     }
 
-    /// Handles a sample during a pause: it enters the filters if possible.
+    /// Handles a sample during a pause: it enters the filters of the recursion if possible.
     #[cold]
     pub(super) fn paused(&mut self, recursion: &mut dyn Recursion, sample: Sample) -> Guarded {
         self.resting.reject();

@@ -17,7 +17,7 @@ use super::Guard;
 
 /// Quantiles of the magnitude of a Gaussian variable, in standard deviations.
 const QUANTILES: [(f64, f64); 3] = [(0.5, 0.6745), (0.95, 1.96), (0.99, 2.5758)];
-/// Probability of the inner quantile, which is estimated directly.
+/// Probability of the inner quantile of the differences, which is estimated directly.
 const INNER: f64 = 0.9;
 /// Smallest number of blocks of a record from which typical values are learnt.
 const LEAST: usize = 5;
@@ -90,25 +90,26 @@ impl Guard {
     }
 }
 
-/// Median; zero for no values.
+/// Returns the median; zero if there are no values.
 fn middle(values: Vec<f64>) -> f64 {
     quantile(values, 0.5)
 }
 
-/// Quantile of the finite values; zero if there are none.
+/// Returns a quantile of the finite values; zero if there are none.
 fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     values.retain(|v| v.is_finite());
     upper_quantile(&mut values, share).unwrap_or(0.0)
 }
 
-/// Returns true for each first difference that is larger than those of a constant signal.
+/// Returns for each first difference whether it is larger than those of a constant signal.
 fn moving(signal: &[f64]) -> Vec<bool> {
     let sizes: Vec<f64> = signal.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     let mean = mean(&sizes);
     sizes.iter().map(|size| *size > CONSTANT_FRACTION * mean).collect()
 }
 
-/// The 99 % quantile of the magnitudes: the largest of its direct estimate and of those from the inner quantiles.
+/// Returns the 99 % quantile of the magnitudes: the largest of its direct estimate and of two estimates from lower
+/// quantiles.
 fn tail(values: &[f64]) -> f64 {
     let magnitudes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
     let scale = QUANTILES.map(|(share, deviations)| quantile(magnitudes.clone(), share) / deviations);

@@ -7,7 +7,8 @@ use crate::recursion::Recursion;
 /// Largest length of a snapshot that is accepted from saved numbers.
 const LONGEST: usize = 1 << 20;
 
-/// The numbers that are the state of a recursion. Their memory grows to the largest snapshot and is kept.
+/// The numbers that are the state of a recursion. Their memory grows to the size of the largest snapshot and is then
+/// reused.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Snapshot {
     numbers: Vec<f64>,
@@ -23,13 +24,13 @@ impl State for Snapshot {
 }
 
 impl Snapshot {
-    /// Stores the numbers.
+    /// Stores the state of a recursion.
     pub fn take(&mut self, recursion: &mut dyn Recursion) {
         self.numbers.clear();
         recursion.visit(&mut |number| self.numbers.push(*number));
     }
 
-    /// Restores the numbers; false if none are stored.
+    /// Restores the stored state in a recursion; returns false if none is stored.
     pub fn restore(&self, recursion: &mut dyn Recursion) -> bool {
         let mut kept = self.numbers.iter();
         recursion.visit(&mut |number| {

@@ -61,7 +61,7 @@ settings! {
         pub prior: PersonPrior = PersonPrior::Population,
     }
     groups {
-        /// The guard.
+        /// Option of the guard.
         pub guard: GuardOptions,
     }
 }
@@ -85,7 +85,7 @@ impl RecursiveMethod for AdaptiveOptions {
         Some(defaults::ORDER)
     }
 
-    /// Not used: the memory follows from the weights of the drifts.
+    /// Returns an infinite memory, which is not used: the memory follows from the weights of the drifts.
     fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Infinite
     }
@@ -152,7 +152,7 @@ impl RecursiveMethod for AdaptiveOptions {
     }
 
     fn spread_before(&self) -> Option<[f64; DYNAMICS]> {
-        // Parameters that a fit determined are known, regardless of the data.
+        // Parameters that an earlier fit determined count as known, regardless of the data.
         let known = self.prior.fit().is_some();
         let StartingPoint { point, spread } = StartingPoint::of(&self.prior, 0.0, false, SampleTime::HUNDREDTH).ok()?;
         (!known).then_some([spread[0] * point.omega, spread[1] * point.zeta, spread[2]])
@@ -173,7 +173,7 @@ impl RecursiveMethod for AdaptiveOptions {
     }
 }
 
-/// The filter with its reported estimate.
+/// The filter of the method with its reported estimate.
 struct AdaptiveRecursion {
     model: Box<AdaptiveFilter<Vec<f64>>>,
     reported: Reported,
@@ -188,7 +188,7 @@ impl AdaptiveRecursion {
     ) -> Result<Self, IdentError> {
         let ts = sample_time.s();
         let nk = setup.orders.nk;
-        // A delay other than the default was given by the user.
+        // A delay that differs from the default was given by the user.
         let is_given = nk != sample_time.nk(DEFAULT_DELAY_S);
         let beginning = StartingPoint::of(&options.prior, (nk as f64 - 0.5) * ts, is_given, sample_time)?;
         let point = beginning.point;
@@ -234,8 +234,8 @@ impl AdaptiveRecursion {
         self.reported.set_noise(self.model.d());
     }
 
-    /// K_e, K_e_dot, omega, zeta and tau before the last change, and the amounts by which they changed; the amount is
-    /// zero for parameters that did not change.
+    /// Returns K_e, K_e_dot, omega, zeta and tau before the last change, and the amounts by which they changed; the
+    /// amount is zero for parameters that did not change.
     fn of_change(&self) -> [[Estimate; PARAMETERS]; 2] {
         let detector = self.model.detector();
         let map = self.model.gain_and_lead();

@@ -19,9 +19,9 @@ settings! {
     /// Options of recursive least squares.
     pub struct RlsOptions {}
     groups {
-        /// The gain.
+        /// Options of the gain.
         pub gain: GainOptions,
-        /// The guard.
+        /// Option of the guard.
         pub guard: GuardOptions,
     }
 }
@@ -46,7 +46,7 @@ impl RecursiveMethod for RlsOptions {
         }
     }
 
-    /// 256 samples at 100 Hz, as in the thesis.
+    /// Returns 256 samples at 100 Hz, as in the thesis.
     fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Seconds(2.56)
     }
@@ -76,7 +76,7 @@ impl RecursiveMethod for RlsOptions {
         Some(&self.gain)
     }
 
-    /// Off for ARX models with the settings of the thesis.
+    /// The windup guard is off for ARX models with the settings of the thesis.
     fn windup_guard(&self, structure: Structure) -> Option<WindupGuard> {
         match structure {
             Structure::Arx => self.gain.windup_guard(self.limit()),
@@ -88,7 +88,7 @@ impl RecursiveMethod for RlsOptions {
         self.guard.guard
     }
 
-    /// None, as in the thesis.
+    /// Innovations are not limited by default, as in the thesis.
     fn limit(&self) -> f64 {
         self.gain.limit_or(f64::INFINITY)
     }

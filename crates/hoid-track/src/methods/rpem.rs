@@ -25,13 +25,13 @@ settings! {
         pub regressor: Regressor = Regressor::Gradient,
     }
     groups {
-        /// The gain.
+        /// Options of the gain.
         pub gain: GainOptions,
-        /// Stability.
+        /// Options for the stability of the polynomials.
         pub stability: StabilityOptions,
-        /// A tracked delay.
+        /// Options for tracking a delay.
         pub delay: DelayOptions,
-        /// The guard.
+        /// Option of the guard.
         pub guard: GuardOptions,
     }
 }
@@ -90,7 +90,7 @@ impl RecursiveMethod for RpemOptions {
         Some(&self.gain)
     }
 
-    /// Off for Box-Jenkins models with the settings of the thesis.
+    /// The windup guard is off for Box-Jenkins models with the settings of the thesis.
     fn windup_guard(&self, structure: Structure) -> Option<WindupGuard> {
         match structure {
             Structure::BoxJenkins => self.gain.windup_guard(self.limit()),

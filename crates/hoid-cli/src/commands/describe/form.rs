@@ -1,4 +1,4 @@
-//! Text output for a described response.
+//! Text output of `hoid describe`.
 
 use hoid::analysis::Described;
 use hoid::ident::frequency::Realisation;
@@ -7,14 +7,14 @@ use hoid::report::numbers;
 
 use crate::text;
 
-/// A description to display.
+/// A describing function to display, with the controlled element if one was given.
 pub struct Shown<'a> {
     pub described: &'a Described,
     pub element: Option<&'a ContinuousTransferFunction>,
 }
 
 impl Shown<'_> {
-    /// Returns the description of the response in one line.
+    /// Returns the heading in one line: the channels, the number of lines, and the runs or periods.
     pub fn title(&self) -> String {
         let (found, names) = (
             &self.described.found,

@@ -1,5 +1,5 @@
-//! `hoid describe`: the response of an operator at the lines of a periodic excitation. `run`
-//! computes the description from records; `form` formats it as text and JSON.
+//! `hoid describe`: the response of an operator at the lines of a periodic excitation. `run` computes the describing
+//! function from records; `form` formats it as text.
 
 mod form;
 mod run;

@@ -1,4 +1,4 @@
-//! Computes the describing function of records: reading, description, figure.
+//! Execution of `hoid describe`: reading, describing function, figure, output.
 
 use std::path::{Path, PathBuf};
 
@@ -34,7 +34,7 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
             lines_rad_s: args.lines.clone(),
             period_s: args.period,
             controlled_element: args.controlled_element.clone(),
-            // Span and trend were already treated when the records were read.
+            // The span was selected and the trend removed when the records were read.
             ..DescriptionOptions::default()
         },
         offsets,

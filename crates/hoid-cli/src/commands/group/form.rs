@@ -125,7 +125,7 @@ fn person(p: &Person) -> Value {
     Value::Object(map)
 }
 
-/// The response to a further input.
+/// Returns the response to a further input as a JSON object.
 fn channel(of: &PersonChannel) -> Value {
     let parameters: Map<String, Value> = of.parameters.iter().map(|q| (q.name.clone(), parameter(q))).collect();
     json!({
@@ -138,7 +138,7 @@ fn channel(of: &PersonChannel) -> Value {
     })
 }
 
-/// An unbounded end of an interval is null in JSON.
+/// Returns a parameter as a JSON object, in which an unbounded end of the interval is null.
 fn parameter(p: &Parameter) -> Value {
     json!({
         "value": json::number(p.value),

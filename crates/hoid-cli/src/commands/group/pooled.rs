@@ -14,7 +14,8 @@ use crate::{error::CliError, text};
 
 const TABLE: &str = "pooled.csv";
 
-/// Returns the populations and the paths of the files written.
+/// Computes the estimates with partial pooling and writes them to files. Returns the populations and the paths of the
+/// files.
 pub fn pooled(
     manifest: &Manifest,
     summary: &GroupSummary,

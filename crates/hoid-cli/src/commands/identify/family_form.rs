@@ -11,12 +11,13 @@ use hoid::report::{numbers, sentence_of_operator, undetermined};
 
 use crate::{error::CliError, text};
 
-/// Both delays are printed only if half a sample exceeds this number of standard errors of tau_e and the time below, in
-/// s.
+/// The delay for an error that is linear between its samples is printed in addition to tau_e only if the two delays
+/// differ by at least this number of standard errors of tau_e; `LEAST_HALF_S` is the smallest such difference in s.
 const STRAIGHT_ERRORS: f64 = 2.0;
 const LEAST_HALF_S: f64 = 0.007;
 
-/// Frequencies in rad/s at which the response to a target in series with the controlled element is printed.
+/// Frequencies in rad/s at which the product of the response to the target and the response of the controlled element
+/// is printed.
 const AT_RAD_S: [f64; 3] = [1.0, 2.5, 4.0];
 
 /// An identified operator with everything that its page shows.
@@ -132,8 +133,9 @@ impl FamilyReport<'_> {
         page
     }
 
-    /// Returns the response to a target in series with the controlled element. It equals one if the response to the
-    /// target alone makes the output follow the target.
+    /// Returns a sentence with the product of the response to the target and the response of the controlled element;
+    /// empty unless both are known. The product is one if the response to the target alone makes the output follow the
+    /// target.
     fn with_element(&self, channel: &ChannelFit) -> String {
         let Some(element) = self.element.filter(|_| channel.role == ChannelRole::Feedforward) else {
             return String::new();
@@ -166,8 +168,8 @@ impl FamilyReport<'_> {
         )
     }
 
-    /// Returns how tau_e depends on the behaviour of the error between samples: the alternative delay, if half a sample
-    /// is large compared with the standard error.
+    /// Returns a sentence on the behaviour of the error between its samples for which tau_e is valid, with the delay
+    /// for the other behaviour if the two delays differ noticeably; empty if they do not.
     fn between_samples(&self) -> String {
         let fit = self.fit;
         let named = fit.operator(0).parameters.iter().find(|p| p.name == "tau_e");
@@ -188,7 +190,8 @@ impl FamilyReport<'_> {
         )
     }
 
-    /// Returns the standard errors of the person, if they are larger than those of the runs.
+    /// Returns a sentence with the standard errors for the person where they differ from those for the analysed runs;
+    /// empty without run-to-run variation and for a fit with several operators.
     fn of_person(&self) -> String {
         let fit = self.fit;
         if fit.run_to_run == 0.0 || fit.operators.len() > 1 {
@@ -224,7 +227,8 @@ impl FamilyReport<'_> {
         }
     }
 
-    /// Returns the results of the other methods, for comparison.
+    /// Returns a table of the parameters from the other methods next to those by prediction error; empty if no other
+    /// method gave a result.
     fn methods(&self) -> String {
         let fit = self.fit;
         let gain = self.records.first().map(GainUnit::of).unwrap_or_default();

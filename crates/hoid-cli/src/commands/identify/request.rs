@@ -6,7 +6,7 @@ use hoid::analysis::{Request, ResolvedRequest};
 
 use crate::{args::IdentifyArgs, error::CliError, output};
 
-/// The option that gives the roles of inputs other than the error, and its value for the error.
+/// Name of the option that gives the roles of inputs other than the error; `FEEDBACK` is the role of the error.
 pub const ROLE: &str = "role";
 const FEEDBACK: &str = "feedback";
 
@@ -67,8 +67,8 @@ pub fn options(args: &IdentifyArgs) -> Result<BTreeMap<String, String>, CliError
     Ok(all)
 }
 
-/// Returns the first option of reading or writing that does not apply to the request, and the analysis to which the
-/// option belongs.
+/// Returns the first option of reading or writing that does not apply to the request, and the analysis to which that
+/// option does apply; `None` if all options apply.
 fn misplaced(args: &IdentifyArgs, asked: &ResolvedRequest) -> Option<(&'static str, &'static str)> {
     let changing = matches!(asked, ResolvedRequest::Change(_));
     let steady = "a model that does not change";

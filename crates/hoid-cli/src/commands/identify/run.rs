@@ -125,7 +125,8 @@ fn show<F: BatchAnswer>(
     CliError::of_verdict(verdict)
 }
 
-/// Returns the describing function of the records, if they contain a recorded excitation.
+/// Returns the describing function of the records; `None` if they contain no recorded excitation or the computation
+/// fails.
 fn description(args: &IdentifyArgs, data: &Recordings) -> Option<Description> {
     data.described(&Excitation::default(), None, args.faults.faults)
         .ok()
@@ -148,7 +149,7 @@ fn check_places(args: &IdentifyArgs) -> Result<(), CliError> {
     )
 }
 
-/// Returns VAF and NRMSE of the prediction k samples ahead, over all records together.
+/// Returns k with the VAF and NRMSE of the prediction k samples ahead, over all records together.
 fn prediction_ahead(fit: &Fit, records: &[Record], k: usize) -> Result<(usize, f64, f64), CliError> {
     let (mut measured, mut predicted) = (Vec::new(), Vec::new());
     for record in records {

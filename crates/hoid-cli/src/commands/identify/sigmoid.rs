@@ -47,7 +47,8 @@ pub fn run(
     CliError::of_verdict(verdict)
 }
 
-/// Returns the changing parameters over a record, with standard errors if all of them are known.
+/// Returns the changing parameters at each sample of a record, each with its standard error if that is known at all
+/// samples.
 fn trace(fit: &SigmoidFit, record: &Record) -> Result<Record, CliError> {
     let gains = fit.trace(record);
     let mut trace: Option<Record> = None;
@@ -64,7 +65,7 @@ fn trace(fit: &SigmoidFit, record: &Record) -> Result<Record, CliError> {
             });
         }
     }
-    // Every form has at least one gain.
+    // Every form has at least one gain, so that there is a trace.
     Ok(trace.unwrap_or_else(|| record.clone()))
 }
 

@@ -22,7 +22,8 @@ const RATE_TOLERANCE: f64 = 0.05;
 /// Classification of a line by its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Arrival {
-    /// The next sample, after `missing` samples that must be filled in; `left_out` if the gap was longer than this.
+    /// The next sample, after `missing` samples that must be filled in. If the gap is longer than [`LONGEST_GAP_S`],
+    /// `left_out` is true and `missing` is limited to that length.
     Sample { missing: usize, left_out: bool },
     /// A line whose time is not later than that of the last line.
     Behind { last_s: f64 },
@@ -99,9 +100,9 @@ impl Clock {
         }
     }
 
-    /// Returns the rate of the times in Hz if it differs from `--fs`. Called after each line, it returns a value at
-    /// most once in [`RATE_LINES`] lines. The median of the differences is insensitive to single gaps, and their mean
-    /// to rounded times; both have to deviate.
+    /// Returns the rate of the times in Hz if it differs from `--fs`. Called after each line, this function returns a
+    /// value at most once in [`RATE_LINES`] lines. The median of the differences is insensitive to single gaps, and
+    /// their mean to rounded times; both have to deviate.
     pub fn other_rate(&mut self) -> Option<f64> {
         if self.steps.len() < RATE_LINES {
             return None;
@@ -114,7 +115,8 @@ impl Clock {
         (is_off(median) && is_off(mean)).then_some(1.0 / median)
     }
 
-    /// True, once, if the lines have arrived faster than the sampling frequency.
+    /// True, once, after the grid has run ahead of the times by more than [`LARGEST_LEAD`] samples, because the times
+    /// advance by less than the sample time per line.
     pub fn too_fast(&mut self) -> bool {
         std::mem::take(&mut self.too_fast)
     }

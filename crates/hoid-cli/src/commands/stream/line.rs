@@ -22,9 +22,9 @@ pub struct Counts {
     /// Number of samples that were missing according to the column t.
     #[serde(skip)]
     pub bridged: u64,
-    /// Number of steps that were shortened to stay stable or within bounds.
+    /// Number of steps of the recursion that were shortened to stay stable or within bounds.
     pub shortened: u64,
-    /// Number of lines that are not samples.
+    /// Number of lines that were dropped because they are not samples.
     pub dropped: u64,
 }
 
@@ -160,7 +160,7 @@ impl StreamStatus<'_> {
                 names: self.names,
                 estimates: t.parameters(),
             }),
-            // A model with other orders cannot be converted to an operator.
+            // The operator is null if the orders of the model are not those of an operator.
             operator: (operator.zip(tracker))
                 .map(|(o, t)| json::tracked_operator(&o, |o| t.determined(o)))
                 .filter(|o| !o.is_null()),

@@ -82,11 +82,11 @@ pub struct StreamSample {
     pub u: f64,
     /// External signal, if there is a column f_t with a number.
     pub reference: Option<f64>,
-    /// Problem with e or u.
+    /// Problem with the value of e or u; `None` if both values are valid.
     pub fault: Option<String>,
 }
 
-/// Positions of the columns.
+/// Positions of the columns in a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct ColumnPositions {
     count: usize,
@@ -271,7 +271,8 @@ impl Columns {
         }
     }
 
-    /// Returns the columns by their number: `e,u`, `t,e,u` or `t,e,u,f_t`; for a model without input `u` or `t,u`.
+    /// Returns the positions of the columns of a stream without a header, from the number of cells in a line of
+    /// numbers: `e,u`, `t,e,u` or `t,e,u,f_t`; for a model without input `u` or `t,u`. `None` for any other line.
     fn by_position(&self, cells: &[&str]) -> Option<ColumnPositions> {
         let readable = |c: &str| matches!(number(c), Ok(_) | Err(Fault::Missing));
         let any = cells.iter().any(|c| number(c).is_ok_and(f64::is_finite));

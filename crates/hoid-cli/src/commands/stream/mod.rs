@@ -1,5 +1,6 @@
-//! `hoid stream`: an online recursive estimate. Each line of standard input, whatever it contains, gives one line of
-//! JSON on standard output, flushed at once; comments are ignored. With `--udp`, each datagram gives one datagram.
+//! `hoid stream`: an online recursive estimate. By default each line of standard input gives one line of JSON on
+//! standard output, flushed at once, even if the line is not a sample; comments, blank lines and headers give none.
+//! With `--udp`, samples and estimates are datagrams.
 //!
 //! | file | contents |
 //! |---|---|
@@ -77,7 +78,7 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     }
 }
 
-/// Reads lines and writes lines until the input ends.
+/// Reads lines from standard input and writes lines to standard output until the input ends.
 fn over_pipes(session: &Mutex<Session>) -> Result<(), CliError> {
     let mut input = Lines::new(io::stdin().lock());
     let mut buffer = Vec::new();
@@ -126,8 +127,8 @@ fn lock(session: &Mutex<Session>) -> MutexGuard<'_, Session> {
     session.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Ends the stream with a summary at an interrupt, with exit code 0 if there is an estimate. A line that is being
-/// written is completed first.
+/// Ends the stream at an interrupt, with a summary, and with exit code 0 if there is an estimate. A line that is being
+/// written is completed first. If the stream is busy for longer than [`INTERRUPT_WAIT`], it ends without a summary.
 fn end_on_interrupt(session: &Arc<Mutex<Session>>) {
     let session = Arc::clone(session);
     interrupt::on_interrupt(move |_| {

@@ -43,7 +43,7 @@ pub struct Session {
     event: Option<TrackFault>,
     names: Vec<String>,
     faults: VecDeque<String>,
-    /// True if a deviating rate of the times has been reported.
+    /// True once a warning about the rate of the times has been printed.
     rate_reported: bool,
     /// Finding about the rate of the time stamps, if it differs from `--fs`.
     rate: Option<Finding>,
@@ -102,7 +102,7 @@ impl Session {
         output::message(&format!("{when}; {}.", each.join("; ")));
     }
 
-    /// Processes a line of the input; true if the output gets a line for it.
+    /// Processes a line of the input. Returns true if a line of the output is due.
     pub fn take(&mut self, text: Result<String, String>) -> Result<bool, CliError> {
         let line = match text {
             Ok(text) => self.columns.read(&text)?,
@@ -111,7 +111,7 @@ impl Session {
         Ok(self.handle(line))
     }
 
-    /// Processes a parsed line; true if the output gets a line for it.
+    /// Processes a parsed line. Returns true if a line of the output is due.
     fn handle(&mut self, line: ParsedLine) -> bool {
         self.forget_innovation();
         match line {
@@ -214,8 +214,8 @@ impl Session {
         self.sample(self.scale.0 * read.e, self.scale.1 * read.u, read.reference);
     }
 
-    /// Reports once that the rate of the times differs from `--fs`; from then on every line
-    /// contains the finding.
+    /// Prints one warning if the rate of the times differs from `--fs`. Once that rate has been measured, every line of
+    /// the output contains the finding.
     fn check_rate(&mut self, t: f64) {
         let fs = 1.0 / self.sample_time.s();
         let (hurried, other) = (self.clock.too_fast(), self.clock.other_rate());

@@ -29,7 +29,8 @@ pub fn write(args: &TrackArgs, tracked: &Tracked, batch: &[BatchFit]) -> Result<
 }
 
 /// Returns the batch fits with which the page compares the trace: the fits of the given spans, otherwise the start fit
-/// and a fit of the last third. If a default span cannot be fitted, it is omitted with a note.
+/// and a fit of the last third; empty without `--report`. If the last third cannot be fitted, its fit is omitted with a
+/// note.
 pub fn batch_fits(args: &TrackArgs, tracked: &Tracked) -> Result<Vec<BatchFit>, CliError> {
     if args.report.is_none() {
         return Ok(Vec::new());

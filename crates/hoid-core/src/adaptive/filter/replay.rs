@@ -1,18 +1,19 @@
 //! Replays: a new candidate reads the stored record again and then replaces the live candidate.
 //!
 //! In parallel with the live candidate, a second candidate, the trial, reads the stored record from its start,
-//! [`REPLAYED`] samples for each new sample, until it has caught up. It uses a basis at the current estimate, the noise
-//! model of the residuals, and the dispersion of the innovations. When it has caught up, it becomes the live candidate
-//! and the next trial starts. With a delay of a few seconds, the estimate is therefore that of a prediction-error
-//! method over all stored data, iterated as in a Gauss-Newton search (L. Ljung, *System Identification*, 1999, section
-//! 10.2), at a bounded cost per sample and with bit-identical results on every machine.
+//! [`REPLAYED`] samples for each new sample, until it has caught up. Its basis is at the current estimate, its
+//! whitening filter is the noise model of the residuals, and its dispersion is that of the innovations of the live
+//! candidate. When the trial has caught up, it becomes the live candidate and the next trial starts. With a delay of a
+//! few seconds, the estimate is therefore that of a prediction-error method over all stored data, iterated as in a
+//! Gauss-Newton search (L. Ljung, *System Identification*, 1999, section 10.2), at a bounded cost per sample and with
+//! bit-identical results on every machine.
 //!
 //! To escape local minima, every second trial starts from another point. It makes [`STAGES`] passes over the record,
-//! each from the result of the pass before. It replaces the live candidate only if its evidence is better by
+//! each from the result of the previous pass. It replaces the live candidate only if its evidence is better by
 //! [`TAKEOVER_NATS`].
 //!
-//! If the memory suffices for the longest delay only, there are no replays: basis and noise model are those of the
-//! start, except that corrections are added to the basis point and the noise model is renewed in place.
+//! If the memory suffices for the longest delay only, there are no replays: the filters keep the basis of the start,
+//! the corrections are added to its point, and the noise model is updated at regular intervals.
 
 use core::ops::Range;
 
@@ -38,8 +39,8 @@ const TOLERATED_NATS: f64 = 20.0;
 const MIN_ORDERS: u64 = 3;
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
-    /// Makes the first estimate once there are enough samples: the best candidate of all starting points over the
-    /// samples so far or, without replays, the candidate at the point of the person.
+    /// Makes the first estimate once there are enough samples: the best of the candidates from all starting points over
+    /// the samples so far or, without replays, the candidate at the point of the person.
     pub(super) fn begin(&mut self) {
         let (ts, n) = (self.prior.sample_time, self.history.samples());
         let enough = n as f64 * ts >= self.prior.hold && n >= MIN_ORDERS * self.prior.order as u64;
@@ -85,7 +86,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         -0.5 * away.iter().zip(is).map(|(a, v)| a * a / v).sum::<f64>()
     }
 
-    /// Starts a trial if there is none. Otherwise continues the trial, and decides about it when it has caught up.
+    /// Starts a trial if none is running. Otherwise continues the trial, and decides about it when it has caught up.
     pub(super) fn replay(&mut self) {
         if self.replay_stage == 0 {
             self.start_replay();
@@ -118,8 +119,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.start_from(&live, point, stage);
     }
 
-    /// Index of the starting point of this trial or, if this trial started from the estimate, of the last trial from
-    /// another point.
+    /// Index of the starting point of the current trial or, if the current trial started from the estimate, of the last
+    /// trial from another point.
     fn starting_point_index(&self) -> usize {
         (self.replays / 2) as usize % self.prior.starts.len()
     }
@@ -132,8 +133,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             self.replay_stage = 0;
             return;
         };
-        // The guide contains the gains of each segment of the other candidate. With it the residuals for D are right
-        // from the first block, before the trial has estimated the gains itself.
+        // The guide contains the gains of each segment of the other candidate. With the guide, the residuals for D are
+        // right from the first block, before the trial has estimated the gains itself.
         let later = (trial.start.saturating_sub(from.start)) / from.block_samples().max(1);
         let guide = from.mixture.segments();
         let basis = trial.basis().clone();
@@ -150,7 +151,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         if !(evidence.is_finite() && trial.mixture.mean().iter().all(|s| s.is_finite())) {
             return;
         }
-        // Evidence can be compared only over the same samples.
+        // The evidence of two candidates can be compared only over the same samples.
         let same = trial.start == self.live.start;
         self.apply_population_prior(&mut trial);
         if stage > 1 && stage <= STAGES {
@@ -162,7 +163,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             1 => !same || evidence > self.live.evidence - TOLERATED_NATS,
             _ => same && evidence > self.live.evidence + TAKEOVER_NATS,
         };
-        // The rejected operator may predict nearly as well, so it widens the reported errors.
+        // The operator that lost the comparison may predict nearly as well, so it widens the reported errors.
         if stage > 1 && same {
             let loser = if takes_over { &self.live } else { &trial };
             let deficit = (evidence - self.live.evidence).abs();
@@ -178,7 +179,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// Replaces the trust region of a replay by the prior for people.
+    /// Replaces, in a candidate, the trust region of a replay by the prior for a person.
     fn apply_population_prior(&self, candidate: &mut Candidate) {
         if self.initial.is_some() {
             return;

@@ -20,7 +20,7 @@ pub(super) fn of_student(t: f64, freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |d| 2.0 * d.sf(t.abs()))
 }
 
-/// Returns the p-value of the supremum over `instants` instants from the smallest p-value of a single instant;
+/// Returns the p-value of the supremum over `instants` instants, given the p-value of a single instant;
 /// `smallest_share` is pi_0.
 pub(super) fn of_supremum(p_one: f64, instants: usize, smallest_share: f64) -> f64 {
     let bonferroni = p_one * instants as f64;
@@ -32,7 +32,7 @@ pub(super) fn of_supremum(p_one: f64, instants: usize, smallest_share: f64) -> f
     bonferroni.min(continuous).min(1.0)
 }
 
-/// Returns De Long's tail probability of the supremum.
+/// Returns De Long's probability that the supremum exceeds c.
 fn de_long(c: f64, pi_0: f64) -> f64 {
     let log_lambda = 2.0 * ((1.0 - pi_0) / pi_0).ln();
     (0.5 * c / PI).sqrt() * (-0.5 * c).exp() * ((1.0 - 1.0 / c) * log_lambda + 2.0 / c)

@@ -54,14 +54,15 @@ pub(crate) use search::{Constancy, Direction};
 pub use steadiness::{Unsteady, unsteady};
 use stretch::most_influential_block;
 
-/// p-value below which a parameter counts as changed; it applies to the delay and to all other parameters separately.
+/// Largest p-value at which a parameter counts as changed, both in the test of the delay and in the test of the other
+/// parameters.
 const LEVEL: f64 = 5e-4;
-/// Relative variation of people's parameters from run to run, for estimators without an option for it.
+/// Relative variation of people's parameters from run to run, for estimators that have no option for this variation.
 pub(crate) const DEFAULT_RUN_TO_RUN: f64 = 0.06;
 
 impl Constancy<'_> {
-    /// Returns the warnings: a parameter that changes, and a stretch that dominates the fit. The second test assumes
-    /// that the standard errors were computed from the model, not from the scatter of blocks.
+    /// Returns a warning if a parameter changes, and a warning if a stretch dominates the fit. The test for a stretch
+    /// assumes that the standard errors were computed from the model, not from the scatter of blocks.
     pub fn findings(&self) -> Vec<Finding> {
         self.change().into_iter().chain(self.stretch()).collect()
     }
@@ -92,7 +93,7 @@ impl Constancy<'_> {
         ))
     }
 
-    /// Returns a warning that reports which parameter changes and about when.
+    /// Returns a warning if a parameter changes, with the name of the parameter and the approximate time.
     pub fn change(&self) -> Option<Finding> {
         let records = self.blocks.last().map_or(0, |block| block.record + 1);
         let of = |delay: bool| strongest(self, delay).filter(|change| change.p_value < LEVEL);

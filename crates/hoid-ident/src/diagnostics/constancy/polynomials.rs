@@ -1,8 +1,9 @@
 //! Scores of a polynomial fit, including the score of the delay.
 //!
 //! nk is an integer, but the residual also has a derivative with respect to the delay
-//! ([`searched_delay`](crate::searched_delay)). The score of the delay need not sum to zero, because nk is not
-//! optimised between samples. One step to the minimum removes this sum together with those of the other parameters.
+//! ([`searched_delay`](crate::searched_delay)). The scores of the delay need not sum to zero, because nk is not
+//! optimised between samples. One step to the minimum removes this sum together with the sums of the scores of the
+//! other parameters.
 
 use hoid_model::{
     Finding, Record,
@@ -21,12 +22,12 @@ use crate::{
 /// Residuals of a robust fit are limited to this multiple of their scale, as in the robust loss.
 const CLIPPED: f64 = 1.345;
 /// If the sum of the scores of a parameter exceeds this number of standard deviations, the fit is not a least-squares
-/// minimum, for example if it was made for simulation or if a prior has more weight than the data.
+/// minimum, for example because it was made for simulation or a prior has more weight than the data.
 const LARGEST_SCORE_SUM: f64 = 3.0;
 
 impl Fit {
-    /// Returns warnings if the operator changes over the records or a stretch dominates the fit. Models without an
-    /// input or without noise, and fits that do not minimise a sum of squares, have no such findings.
+    /// Returns warnings if the operator changes over the records or a stretch dominates the fit. There are no warnings
+    /// for models without an input or without noise, and for fits that do not minimise a sum of squares.
     pub(in crate::diagnostics) fn constancy_findings(&self, records: &[Record]) -> Vec<Finding> {
         self.constancy(records).unwrap_or_default()
     }

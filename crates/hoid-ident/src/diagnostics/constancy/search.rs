@@ -14,10 +14,10 @@ use super::{
 const FEWEST: usize = 2;
 /// Shortest period of a periodic change, in blocks.
 const SHORTEST: f64 = 5.0;
-/// A change is tested only if the constant parameters leave at least this share of its information.
+/// A change is tested only if at least this share of its information remains after estimating the constant parameters.
 const MIN_INFORMATION_LEFT: f64 = 1e-3;
-/// Combinations of parameters are not determined if their eigenvalue of the information, scaled to a unit diagonal, is
-/// below this limit.
+/// Smallest eigenvalue of the information, scaled to a unit diagonal, for which a combination of parameters is
+/// determined.
 const SINGULAR: f64 = 1e-9;
 
 /// Input data of the test.
@@ -39,8 +39,8 @@ pub(crate) struct Direction {
     pub unit: &'static str,
     pub vector: Vec<f64>,
     pub delay: bool,
-    /// Value of the parameter, to which its variation between runs is proportional; 1 for a logarithm, 0 for a
-    /// parameter that is estimated for each run.
+    /// Value of the parameter, to which its variation between runs is proportional; 1 for a logarithm, 0 if the
+    /// variation between runs does not count, as for a parameter that is estimated for each run.
     pub size: f64,
 }
 
@@ -62,7 +62,7 @@ pub(super) struct Change {
     pub name: String,
     pub unit: &'static str,
     pub record: usize,
-    /// First sample after the change; 0 if a whole record differs from the others.
+    /// First sample after a step; 0 if a whole record differs from the others, and for a drift or a periodic change.
     pub at: usize,
     pub by: f64,
     pub error: f64,
@@ -78,7 +78,7 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// Returns a step with size one in a range of blocks and zero in all other blocks.
+    /// Returns a step: a change of size one in a range of blocks, and zero in all other blocks.
     fn of_blocks(record: usize, at: usize, blocks: std::ops::Range<usize>, all: usize) -> Self {
         let weights = (0..all).map(|c| f64::from(u8::from(blocks.contains(&c)))).collect();
         Self {
@@ -101,13 +101,14 @@ struct Tested {
     between_runs: f64,
 }
 
-/// Returns the change with the smallest p-value, either of the delay or of the other parameters.
+/// Returns the step with the smallest p-value: of the delay if `delay` is true, otherwise of the other parameters.
 pub(super) fn strongest(of: &Constancy<'_>, delay: bool) -> Option<Change> {
     let directions: Vec<_> = of.directions.iter().filter(|d| d.delay == delay).collect();
     strongest_among(of, &directions, &sets(of.blocks))
 }
 
-/// Returns the change with the smallest p-value among these directions and candidates.
+/// Returns the change with the smallest p-value among these directions and candidates, whether or not it is
+/// significant.
 pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], sets: &[Candidate]) -> Option<Change> {
     let (blocks, n) = (of.blocks, of.blocks.len());
     let p = blocks.first()?.score.len();
@@ -120,8 +121,8 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
         .collect();
     let whole = matrices.iter().fold(DMatrix::zeros(p, p), |sum, m| sum + m);
     let inverse = pseudo_inverse(&whole)?;
-    // With a prior or a bound the scores do not sum to zero; one step to the minimum without prior and bound removes
-    // the sum.
+    // With a prior or a bound the scores do not sum to zero; a step to the minimum without prior and bound removes
+    // their sum.
     let sum = blocks
         .iter()
         .fold(DVector::zeros(p), |sum, b| sum + DVector::from_column_slice(&b.score));
@@ -141,8 +142,8 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
         let typical = upper_median(&mut ratios).unwrap_or(1.0);
         let smallest = all.iter().map(|t| t.share.min(1.0 - t.share)).fold(0.5, f64::min);
         for t in &all {
-            // A drift or a periodic change affects all blocks; its variance uses the median scatter over all
-            // candidates.
+            // A drift or a periodic change affects all blocks; the variance for such a change uses the median scatter
+            // over all candidates.
             let (scatter, freedom) = match sets[t.set].course {
                 Course::Step => (t.by_blocks, n - 2),
                 _ => (0.0, 4 * (n - 2)),
@@ -171,8 +172,8 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
     best
 }
 
-/// Returns the candidate steps: each whole record if there are several, and the part of a record after each block
-/// boundary.
+/// Returns the candidate steps: each whole record if there are several records, and the part of a record after each
+/// block boundary.
 pub(super) fn sets(blocks: &[ScoreBlock]) -> Vec<Candidate> {
     let records = blocks.last().map_or(0, |b| b.record + 1);
     let mut all = Vec::new();
@@ -189,7 +190,7 @@ pub(super) fn sets(blocks: &[ScoreBlock]) -> Vec<Candidate> {
     all
 }
 
-/// Returns a linear drift over the blocks of one record, as the only candidate.
+/// Returns the only candidate for a drift: a linear change over the blocks of one record.
 pub(super) fn drifts(blocks: &[ScoreBlock]) -> Vec<Candidate> {
     let n = blocks.len();
     let weight = |c: usize| (c as f64 + 0.5) / n.max(1) as f64 - 0.5;
@@ -203,7 +204,7 @@ pub(super) fn drifts(blocks: &[ScoreBlock]) -> Vec<Candidate> {
     }]
 }
 
-/// Returns sinusoids over the blocks of one record, where `block_s` is the duration of a block: periods from
+/// Returns sinusoidal changes over the blocks of one record, where `block_s` is the duration of a block: periods from
 /// [`SHORTEST`] blocks to two thirds of the record, with frequencies spaced by half the frequency resolution, each in
 /// four phases.
 pub(super) fn periodic_changes(blocks: &[ScoreBlock], block_s: f64) -> Vec<Candidate> {

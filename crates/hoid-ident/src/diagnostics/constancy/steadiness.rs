@@ -2,7 +2,7 @@
 //!
 //! The response is `u = sum b_i z_i + v` with columns `z_{i+1} = dz_i/dt`. A change of the gain has the direction b; a
 //! change of the delay has the direction `-db/dt`, i.e. `-b_i` at `z_{i+1}`. To first order, an increase of the lead is
-//! a decrease of the delay by the same amount.
+//! equivalent to a decrease of the delay by the same amount.
 //!
 //! The scores come from least squares with known columns ([`crate::diagnostics::whitened`]); the test is the same as
 //! for fits. For a drift the regressor is multiplied by `t/T - 1/2`, for a periodic change by a sine with one of
@@ -19,7 +19,7 @@ use crate::diagnostics::whitened::{LIMIT, NOISE, Whitened, thinning};
 /// Minimum number of 2 s blocks for the test.
 const FEWEST: usize = 8;
 
-/// A response that is not constant.
+/// A change of a response.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unsteady {
     /// Time course of the change.
@@ -31,7 +31,7 @@ pub struct Unsteady {
     /// Size of the change (amplitude of a periodic change) and its standard error: for the gain as a share of the gain,
     /// for the delay in s.
     pub by: [f64; 2],
-    /// Probability that chance alone gives a change as significant as this, among all candidates with the same kind of
+    /// Probability that chance alone gives a change at least as significant, among all candidates with the same kind of
     /// time course.
     pub p_value: f64,
 }

@@ -10,7 +10,7 @@
 //! parameter by about `1/sqrt n` of its standard error. A block is reported if it changes a parameter by more than
 //! [`REPORTED_CHANGE`] standard errors and by more than [`REPORTED_CHANGE`] times the root sum of squares
 //! `sqrt(sum delta^2)` of all other blocks. The sum of squares over all blocks estimates the variance of the parameter;
-//! such a block alone makes it several times the stated variance.
+//! a block above these limits alone makes this estimate several times the variance of the model.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -18,7 +18,7 @@ use super::search::{Constancy, pseudo_inverse};
 
 /// A block is reported if it changes a parameter by more than this number of standard errors.
 const REPORTED_CHANGE: f64 = 2.0;
-/// Minimum change for records with few blocks, as a multiple of the change that one block causes by chance.
+/// Minimum change for records with few blocks, as a multiple of the change that a single block causes by chance.
 const MIN_RATIO_TO_CHANCE: f64 = 4.5;
 /// Minimum number of blocks for the test.
 const FEWEST: usize = 5;
@@ -30,11 +30,11 @@ pub(super) struct Stretch {
     /// First sample of the block, and first sample of the next block (`None` at the end of the record).
     pub from: usize,
     pub to: Option<usize>,
-    /// Name of each parameter that the block changes, and the change in standard errors.
+    /// Name of each parameter that changes without the block, and this change in standard errors.
     pub moves: Vec<(String, f64)>,
 }
 
-/// Returns the block with the most influence, if this influence exceeds the threshold.
+/// Returns the block with the most influence; `None` if its influence is below the threshold.
 pub(super) fn most_influential_block(of: &Constancy<'_>) -> Option<Stretch> {
     let (n, m) = (of.blocks.len(), of.directions.len());
     if n < FEWEST || m == 0 || of.variance <= 0.0 {
@@ -55,8 +55,8 @@ pub(super) fn most_influential_block(of: &Constancy<'_>) -> Option<Stretch> {
         .collect();
     let whole = parts.iter().fold(DMatrix::zeros(m, m), |sum, (_, a)| sum + a);
     let inverse = pseudo_inverse(&whole)?;
-    // With a prior, a bound or a delay on the grid the scores do not sum to zero; one step to the minimum removes the
-    // sum.
+    // With a prior, a bound or a delay on the grid of samples the scores do not sum to zero; a step to the minimum
+    // removes their sum.
     let step = &inverse * parts.iter().fold(DVector::zeros(m), |sum, (h, _)| sum + h);
     parts.iter_mut().for_each(|(h, a)| *h -= &*a * &step);
     let moved: Option<Vec<DVector<f64>>> = parts

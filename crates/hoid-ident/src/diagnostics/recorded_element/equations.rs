@@ -5,11 +5,11 @@ use hoid_model::Complex64;
 use super::spectra::Spectra;
 use crate::linalg::least_squares::{LeastSquares, add_scaled, dot};
 
-/// Range of the delay of the element, s, and the step of the scan.
+/// Scan of the delay of the element, s: smallest delay, largest delay, step.
 const DELAYS_S: (f64, f64, f64) = (-0.05, 0.3, 0.01);
 /// Half width of the smoothing window of the residual spectrum, in natural logarithms of the frequency.
 const SMOOTHED: f64 = 0.35;
-/// Number of iterations of the weights.
+/// Number of iterations in which the weights are computed.
 const ROUNDS: usize = 3;
 
 /// Least-squares fit of an element with `m` zeros and `n` poles; coefficients in descending powers of s.
@@ -64,8 +64,8 @@ struct Rows<'a> {
     /// Orthonormal columns that span T.
     transient: Vec<Vec<f64>>,
     m: usize,
-    /// Columns that do not depend on the delay: those of A (`of_e`), those of C (`of_targets`), and the right-hand side
-    /// `s^n E`.
+    /// Columns that do not depend on the delay: the columns of A (`of_e`), the columns of C (`of_targets`), and the
+    /// right-hand side `s^n E`.
     of_e: Vec<Vec<f64>>,
     of_targets: Vec<Vec<f64>>,
     right: Vec<f64>,
@@ -119,7 +119,7 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Returns the columns of B and of `B kappa`, with the delay of u and the delay of the disturbances.
+    /// Returns the columns of B, delayed by `delay_s`, and the columns of `B kappa`, delayed by `of_disturbances_s`.
     fn of_inputs(&self, delay_s: f64, of_disturbances_s: f64) -> Vec<Vec<f64>> {
         let disturbances = self.spectra.disturbances.iter().map(|d| (d, of_disturbances_s));
         let inputs = [(&self.spectra.u, delay_s)].into_iter().chain(disturbances);
@@ -139,12 +139,12 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Returns the real parts, followed by the imaginary parts.
+/// Returns the real parts of all values, followed by their imaginary parts.
 fn stacked(values: impl Iterator<Item = Complex64> + Clone) -> Vec<f64> {
     values.clone().map(|v| v.re).chain(values.map(|v| v.im)).collect()
 }
 
-/// Removes the components of a column along orthonormal columns.
+/// Removes the components of a column along the orthonormal columns.
 fn remove(column: &mut [f64], orthonormal: &[Vec<f64>]) {
     for q in orthonormal {
         let along = dot(q, column);
@@ -152,9 +152,9 @@ fn remove(column: &mut [f64], orthonormal: &[Vec<f64>]) {
     }
 }
 
-/// Least-squares solution of all records for one delay.
+/// Least-squares solution of the loop equations of all records, for one delay.
 struct Solved {
-    /// Coefficients `a_0 .. a_{n-1}`, `b_0 .. b_m` of u, then those of the disturbances and of the targets.
+    /// Coefficients `a_0 .. a_{n-1}`, `b_0 .. b_m` of u, followed by those of the disturbances and of the targets.
     theta: Vec<f64>,
     delay_s: f64,
     sum_of_squares: f64,
@@ -164,8 +164,8 @@ struct Solved {
 }
 
 impl Solved {
-    /// Returns the solution with the disturbances as late as u and, if there are disturbances, the solution with the
-    /// disturbances on time.
+    /// Returns the solution with the same delay for the disturbances as for u and, if there are disturbances, the
+    /// solution without a delay for them.
     fn all(rows: &[Rows<'_>], delay_s: f64) -> impl Iterator<Item = Self> {
         let disturbed = rows.iter().any(|rows| !rows.spectra.disturbances.is_empty());
         let on_time = (disturbed && delay_s != 0.0).then_some(0.0);

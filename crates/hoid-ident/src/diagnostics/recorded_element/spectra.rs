@@ -13,7 +13,7 @@ use crate::{
 const DISTURBANCES: [&str; 3] = ["d", "f_d", "disturbance"];
 /// Range of the tested frequencies, rad/s: the frequencies at which people move u.
 const BAND_RAD_S: (f64, f64) = (0.3, 12.0);
-/// Sufficient number of frequencies; further samples of a record and further records are not used.
+/// Number of frequencies that is sufficient; further samples of a record and further records are not used.
 pub(super) const MOST_FREQUENCIES: usize = 1000;
 
 /// Names of the exogenous channels of the loop.

@@ -19,7 +19,7 @@ use crate::{
     },
 };
 
-/// Probability of a false response: the significance level of the test.
+/// Significance level of the test: the probability of reporting a response that does not exist.
 pub(in crate::family) const BY_CHANCE: f64 = 0.01;
 /// Cost of each parameter of a form, in units of chi^2.
 const COST_PER_PARAMETER: f64 = 4.0;
@@ -37,13 +37,14 @@ pub(in crate::family) struct Compared<'a> {
     pub fits: Vec<ChannelFit>,
     /// Inputs with a response, with starting values for the prediction error search.
     pub channels: Vec<Channel<'a>>,
-    /// The same inputs as required by fits at the lines.
+    /// The same inputs, in the representation that fits at the lines require.
     pub in_form: Vec<InForm>,
 }
 
 impl FurtherInputs<'_> {
-    /// Selects the form of each channel at the lines, combined with the best of these forms of the operator. Returns
-    /// the comparison, and the channels with a response in the selected forms.
+    /// Selects the form of each channel at the lines. Each candidate is fitted with every form in `operators` as the
+    /// form of the operator, and the best of these fits counts. Returns the comparison, and the channels with a
+    /// response in the selected forms.
     ///
     /// # Errors
     /// [`IdentError::NoFiniteLoss`] if no form of a channel could be fitted.
@@ -76,7 +77,7 @@ impl FurtherInputs<'_> {
             let fits: Vec<(Form, Option<(Form, ChannelMinimum)>)> =
                 begun[k].iter().map(|c| (c.form, best_of(&with(c.form)))).collect();
             let found = fits.iter().filter_map(|(form, fit)| Some((*form, fit.as_ref()?)));
-            // At this cost a parameter without effect is included in fewer than one of twenty records.
+            // With this cost a parameter without effect is included in fewer than one in twenty records.
             let excess =
                 (fits.iter().filter_map(|(_, fit)| Some(fit.as_ref()?.1.excess()))).fold(f64::INFINITY, f64::min);
             let cost =

@@ -2,7 +2,7 @@
 //! 15.3, eq. 15.21-15.26).
 //!
 //! 1. The equation `A u = B q^-nk e + v` is fitted by least squares.
-//! 2. Instruments are simulated with this A and B, for a first IV estimate.
+//! 2. Instruments are simulated with the A and B of step 1, for a first IV estimate.
 //! 3. An autoregression `L v = eps` is fitted to the residual.
 //! 4. Instruments are simulated with the A and B of step 2, for an IV estimate of the equation filtered with L.
 //!
@@ -29,14 +29,14 @@ pub(super) const ALGORITHM: Algorithm = Algorithm {
     solve,
 };
 
-/// Order of the autoregression, as a multiple of na + nb.
+/// Order of the autoregression L, as a multiple of na + nb.
 const ORDERS: usize = 4;
-/// Minimum number of rows per term of the autoregression.
+/// Minimum number of rows for each coefficient of the autoregression.
 const ROWS_EACH: usize = 10;
 
 fn solve(problem: &IvProblem<'_>, _: &Criterion<'_>, _: IterationLimits) -> Result<IvSolution, IdentError> {
-    // Step 1: the estimate is biased by the coloured v, but its simulated output is correlated with the true output,
-    // which is sufficient for instruments.
+    // Step 1: the estimate is biased by the coloured v, but the output simulated with it is correlated with the true
+    // output, which is sufficient for instruments.
     let (start, _) = problem.stabilised(&problem.least_squares(Prefilter::default())?)?;
     // Step 2: IV estimate with simulated instruments.
     let second = problem.equation(Prefilter::default(), &start);

@@ -11,7 +11,7 @@ use hoid_model::Structure;
 
 use super::algorithm::Algorithm;
 
-/// Declares the methods: for each, the variant and the module with its algorithm.
+/// Declares the methods: for each method, its variant and the module with its algorithm.
 macro_rules! methods {
     ($($(#[$doc:meta])* $method:ident = $file:ident,)+) => {
         /// An instrumental variable method.
@@ -22,7 +22,7 @@ macro_rules! methods {
         }
 
         impl IvMethod {
-            /// All methods.
+            /// All instrumental variable methods.
             pub const ALL: [Self; [$(stringify!($method)),+].len()] = [$(Self::$method),+];
 
             pub(in crate::iv) fn algorithm(self) -> &'static Algorithm {

@@ -9,7 +9,7 @@
 //! for C and D. With both conditions stacked, `W = [Z, psi]`, and with the gradient psi_theta for all parameters, the
 //! covariance is `sigma^2 (W' psi_theta)^-1 W' W (psi_theta' W)^-1`. In an open loop it separates into Young's
 //! `sigma^2 (Z'Z)^-1` and the covariance of the ARMA model; in a closed loop the errors of the system also affect C and
-//! D. If the noise model is too small, the remaining colour of eps is taken into account for B and F.
+//! D. If the order of the noise model is too low, the remaining colour of eps is taken into account for B and F.
 
 use hoid_model::{Orders, Structure};
 
@@ -92,8 +92,8 @@ fn noise_of(
         weights: None,
         further: Vec::new(),
     };
-    // The search starts from the noise model of the previous iteration and thus stays at the same minimum; otherwise
-    // the iteration would not settle.
+    // The search starts from the noise model of the previous iteration and therefore stays at the same minimum;
+    // otherwise the iteration might not converge.
     let start = before.map_or_else(|| [d.as_slice(), &c].concat(), |n| [n.d.as_slice(), &n.c].concat());
     match minimise(
         &arma,

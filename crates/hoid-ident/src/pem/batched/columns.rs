@@ -49,8 +49,8 @@ impl Columns {
         &signal[(from - lag) * width..(to - lag) * width]
     }
 
-    /// Adds the products over these rows that need a pass: the products of each column that does not follow another
-    /// with all columns.
+    /// Adds the products over these rows that must be summed: the products with all columns of each column that is not
+    /// a shift of the previous column.
     #[inline(always)]
     pub fn add_products<R: Number>(
         &self,
@@ -69,7 +69,7 @@ impl Columns {
             let mut others = [0; 4];
             let mut count = 0;
             for j in 0..p1 {
-                // The products with previous columns that do not follow others are already known.
+                // The products with earlier columns that are not shifts are already known.
                 if j >= i || self.is_shift_of_previous(j) {
                     others[count] = j;
                     count += 1;
@@ -99,8 +99,8 @@ impl Columns {
         }
     }
 
-    /// Adds `sign` times the products in one row, for the columns that follow others. These rows at both ends
-    /// distinguish their products from the products of the previous columns.
+    /// Adds `sign` times the products in one row, for pairs of columns that are shifts of their previous columns. The
+    /// rows at both ends make up the difference between their products and the products of the previous columns.
     #[inline(always)]
     pub fn add_row<R: Number>(&self, zero: R, signals: &SignalBuffers, row: usize, sign: f64, products: &mut [f64]) {
         let (p1, width) = (self.count(), zero.lanes());
@@ -127,7 +127,7 @@ impl Columns {
                 let value = if self.is_shift_of_previous(i) && self.is_shift_of_previous(j) {
                     zero.load(&products[at..]) + zero.load(&products[((i - 1) * p1 + j - 1) * width..])
                 } else if self.is_shift_of_previous(i) || !self.is_shift_of_previous(j) {
-                    // The product was computed for the column that is no shift of another or, if neither is one, for
+                    // The product was computed for the column that is not a shift or, if neither column is a shift, for
                     // the earlier column.
                     zero.load(&products[(j * p1 + i) * width..])
                 } else {

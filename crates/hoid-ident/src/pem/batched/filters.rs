@@ -7,7 +7,7 @@ use super::{lane_products::add_scaled, signal_buffers::SignalBuffers};
 
 /// Computes all signals of a span with a known past in one pass, for two poles and low orders of B and D. The
 /// recursions of s and r run in parallel, and values that are not needed later are not stored. The arithmetic
-/// operations are the same as in separate passes. Returns false for other orders.
+/// operations are the same as in separate passes. Returns false for other orders, without computing anything.
 #[inline(always)]
 pub(super) fn all_at_once<R: Number>(
     zero: R,
@@ -38,7 +38,7 @@ fn row<R: Number>(zero: R, rows: &[f64], index: usize) -> R {
     zero.load(&rows[index * zero.lanes()..])
 }
 
-/// Returns one row, with zeros from row `end` on.
+/// Returns one row, or zeros if its index is not below `end`.
 #[inline(always)]
 fn row_below<R: Number>(zero: R, rows: &[f64], index: usize, end: usize) -> R {
     if index < end { row(zero, rows, index) } else { zero }
@@ -105,7 +105,7 @@ pub(super) fn respond<R: Number>(
 ) {
     let (width, end) = (zero.lanes(), at + e.len());
     if (b.len(), f.len()) == (2 * width, 2 * width) {
-        // For the orders of the operator model, the response is computed in one pass.
+        // For the orders of the operator, the response is computed in one pass.
         let (b0, b1) = (zero.load(b), zero.load(&b[width..]));
         let (f1, f2) = (zero.load(f), zero.load(&f[width..]));
         let (mut s1, mut s2) = (

@@ -67,7 +67,7 @@ pub(crate) fn fit_each(
     )
 }
 
-/// Returns the poles estimated from the averages of each record.
+/// Returns, for each record, the poles estimated from its averaged samples.
 fn poles_of_averages(
     constrained: &[Result<(ConstrainedCriterion<'_, '_>, SampleTime), &IdentError>],
     path: InstructionSet,

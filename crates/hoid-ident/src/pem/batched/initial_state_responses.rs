@@ -21,7 +21,7 @@ use super::{
 const TEST_INTERVAL: usize = 128;
 /// A response has decayed if its last values are below this limit; its first value is 1.
 const DECAYED: f64 = 1e-17;
-/// Minimum share of a column's sum of squares that must lie outside the space of the previous columns.
+/// Minimum share of the sum of squares of a column that must be outside the space of the previous columns.
 const INDEPENDENT: f64 = 1e-12;
 
 /// The responses h and g are stored in [`SignalBuffers::h`] and [`SignalBuffers::g`], preceded and followed by nf
@@ -31,7 +31,7 @@ pub(super) struct InitialStateResponses<R> {
     pub rows: usize,
     nd: usize,
     nf: usize,
-    /// Number of samples of h.
+    /// Number of samples of the impulse response h.
     length: usize,
     /// Cholesky factors by rows: `first` belongs to the original columns, with each column of the factor divided by its
     /// diagonal element; `second` belongs to q.
@@ -224,7 +224,7 @@ impl<R: Number> InitialStateResponses<R> {
     }
 }
 
-/// Replaces the lower triangle of s by its Cholesky factor, and marks the lanes in which there is none.
+/// Replaces the lower triangle of s by its Cholesky factor, and marks the lanes in which there is no such factor.
 #[inline(always)]
 fn factor<R: Number>(zero: R, nf: usize, s: &mut [R], dependent: &mut [bool]) {
     for k in 0..nf {
@@ -269,8 +269,9 @@ fn add_shifts<R: Number>(zero: R, x: &[R], s: &[f64], at: usize, y: &mut [f64]) 
     }
 }
 
-/// Computes the impulse response of 1/F until it has decayed in all lanes or its length is `longest`; it is preceded
-/// and followed by nf zeros. In each lane it is set to zero after its decay. Returns the length of the response.
+/// Computes the impulse response of 1/F until it has decayed in all lanes or its length is `longest`; the response is
+/// preceded and followed by nf zeros. In each lane the response is set to zero after its decay. Returns the length of
+/// the response.
 #[inline(always)]
 fn impulse_response<R: Number>(zero: R, f: &[f64], longest: usize, h: &mut [f64]) -> usize {
     let (width, nf) = (zero.lanes(), f.len() / zero.lanes());

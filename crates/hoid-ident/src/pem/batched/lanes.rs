@@ -41,7 +41,7 @@ pub(super) struct Memory {
 }
 
 thread_local! {
-    /// The memory of the last fits on this thread, which is reused because allocating new pages takes as long as a fit.
+    /// The memory of the last fits on this thread. It is reused, because allocating new pages takes as long as a fit.
     static LAST_MEMORY: Cell<Option<Memory>> = const { Cell::new(None) };
 }
 
@@ -76,7 +76,7 @@ impl Lanes {
         }
     }
 
-    /// Completes all searches; as many run at the same time as there are lanes.
+    /// Completes all searches; one search runs in each lane at a time.
     fn search<A: LinearisationClient>(&mut self, open: Vec<&mut A>, path: InstructionSet, workspace: &mut Workspace) {
         let mut open = open.into_iter();
         let mut searching: Vec<Option<&mut A>> = (0..self.width).map(|_| None).collect();

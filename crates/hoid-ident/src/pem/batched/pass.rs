@@ -1,7 +1,7 @@
 //! The criterion and its derivatives for several records at the same time, each record with its own theta.
 //!
-//! This is the criterion of a Box-Jenkins model without C ([`crate::criterion`]), with the initial states eliminated.
-//! For the record in each lane,
+//! The criterion is the criterion of a Box-Jenkins model without C ([`crate::criterion`]), with the initial states
+//! eliminated. For the record in each lane,
 //!
 //! `s = e(t-nk)/F`,  `w = B s`,  `v = u - w`,  `eps = D v`,  `x_b = D s`,  `r = w/F`,  `x_f = D r`
 //!
@@ -124,8 +124,7 @@ impl LaneTask for Pass<'_> {
                 done = next;
             }
             if to == n {
-                // In the row after the last, a column that follows another has the value of the previous column in the
-                // last row.
+                // In the row after the last row, a shifted column has the last value of the column before it.
                 columns.add_row(zero, signals, history + count, -1.0, products);
                 break;
             }

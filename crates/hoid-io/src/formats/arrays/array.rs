@@ -8,7 +8,8 @@ pub(crate) struct Array {
     pub(crate) numbers: Numbers,
     /// Length of each dimension. Their product is the number of elements.
     pub(crate) dims: Vec<usize>,
-    /// True if the last index varies fastest, as in C; false if the first does, as in Fortran and MATLAB.
+    /// True if the last index varies fastest, as in C; false if the first index varies fastest, as in Fortran and
+    /// MATLAB.
     pub(crate) last_fastest: bool,
 }
 

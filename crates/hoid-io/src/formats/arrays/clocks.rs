@@ -10,12 +10,12 @@ use crate::wording::shown;
 /// A column interpolated to the times of another stream.
 pub(super) struct Aligned {
     pub(super) numbers: Numbers,
-    /// Rows whose time lies within the stream of the column.
+    /// Rows of the other stream whose time lies within the stream of the column.
     pub(super) rows: Range<usize>,
     pub(super) note: String,
 }
 
-/// Interpolates the column `column_path` to the times of the structure `beside`.
+/// Interpolates the column `column_path` to the times of the stream with the path `beside`.
 pub(super) fn aligned(
     column_paths: &[ColumnPath],
     column_path: &ColumnPath,
@@ -64,7 +64,7 @@ pub(super) fn aligned(
     })
 }
 
-/// Evaluates the line through the first two points.
+/// Evaluates the line through the first two points at `at`.
 fn between(t: &[f64], values: &[f64], at: f64) -> f64 {
     match (t, values) {
         ([t0, t1, ..], [v0, v1, ..]) => {

@@ -12,7 +12,7 @@ use crate::wording::shown;
 /// A matrix with more channels than this counts as an image.
 const MOST_LINES: usize = 256;
 
-/// One column.
+/// One column of a file, with its path.
 #[derive(Debug, Clone)]
 pub(crate) struct ColumnPath {
     pub(crate) path: String,
@@ -31,7 +31,7 @@ pub(crate) enum Holds {
 }
 
 impl ColumnPath {
-    /// The number of rows.
+    /// Returns the number of rows; 0 for unsupported content.
     pub(crate) fn len(&self) -> usize {
         match &self.holds {
             Holds::Numbers(numbers) => numbers.len(),
@@ -40,7 +40,7 @@ impl ColumnPath {
         }
     }
 
-    /// Returns the numbers, if the column holds any.
+    /// Returns the numbers of the column; `None` if it does not hold numbers.
     pub(crate) fn numbers(&self) -> Option<&Numbers> {
         match &self.holds {
             Holds::Numbers(numbers) => Some(numbers),
@@ -72,7 +72,7 @@ impl ColumnPath {
         matches!(&self.holds, Holds::Unread(what) if what.starts_with(OBJECT))
     }
 
-    /// Describes the contents in words.
+    /// Describes the contents of the column in words.
     pub(crate) fn what(&self) -> String {
         match &self.holds {
             Holds::Numbers(numbers) => numbers.kind().name().to_owned(),
@@ -97,7 +97,7 @@ pub(crate) fn parent(path: &str) -> &str {
 }
 
 impl Contents {
-    /// All columns.
+    /// Returns the columns of all entries.
     pub(crate) fn column_paths(&self) -> Vec<ColumnPath> {
         self.entries
             .iter()

@@ -67,7 +67,7 @@ pub(crate) struct Contents {
     pub(crate) entries: Vec<Entry>,
     /// Comment lines that hoid wrote with the columns.
     pub(crate) comments: Vec<String>,
-    /// Notes on reading.
+    /// Notes about the reading of the file, for the user.
     pub(crate) notes: Vec<String>,
     /// Notation for the rows and columns of a matrix.
     pub(crate) indexing: Indexing,
@@ -78,7 +78,7 @@ pub(crate) struct Contents {
 
 impl Contents {
     pub(crate) fn new(mut entries: Vec<Entry>, indexing: Indexing) -> Self {
-        // Names are printed and therefore must not contain terminal control characters.
+        // Paths are printed and therefore must not contain terminal control characters.
         for text in entries
             .iter_mut()
             .flat_map(|entry| [&mut entry.path, &mut entry.parent])

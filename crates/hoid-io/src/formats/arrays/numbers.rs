@@ -21,7 +21,7 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// Size of one number in bytes.
+    /// Returns the size of one number in bytes.
     pub(crate) fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -36,12 +36,12 @@ impl Kind {
         !matches!(self, Self::F16 | Self::F32 | Self::F64)
     }
 
-    /// True for single precision or less.
+    /// True for floating-point types of single precision or less.
     pub(crate) fn is_single(self) -> bool {
         matches!(self, Self::F16 | Self::F32)
     }
 
-    /// Name of the type as in numpy and MATLAB.
+    /// Returns the name of the type in numpy and MATLAB.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::F16 => "half",
@@ -114,7 +114,7 @@ impl Numbers {
         self.kind
     }
 
-    /// Selects every `stride`-th number, starting at `first`, `len` in total; numbers beyond the end are omitted.
+    /// Selects `len` numbers, every `stride`-th one from index `first` on; numbers beyond the end are omitted.
     pub(crate) fn line(&self, first: usize, stride: usize, len: usize) -> Self {
         let there = self.len.saturating_sub(first).div_ceil(stride.max(1));
         Self {
@@ -154,7 +154,7 @@ impl Numbers {
         (0..self.len).map(|at| self.value(at)).collect()
     }
 
-    /// Returns all numbers as counts; `None` if any of them is not a count.
+    /// Returns all numbers as counts; `None` if any of them is not a nonnegative integer.
     pub(crate) fn counts(&self) -> Option<Vec<u64>> {
         let count = |at: usize| {
             let n = self.bytes_of(at).map(u64::from_le_bytes)?;

@@ -20,13 +20,13 @@ use crate::wording::{list, shown};
 /// Names of the time column, in order of precedence.
 pub(crate) const TIMES: [&str; 2] = ["t", "time"];
 
-/// Unit of clock times, which are converted to s from the first one.
+/// Unit of clock times, which are converted to seconds since the first clock time.
 pub(crate) const MOMENTS: &str = "s from the first";
 
 /// Maximum number of columns of a record; further columns are left out.
 const MOST_COLUMNS: usize = 1024;
 
-/// Source of the rows of a table.
+/// The arrays of a file as the source of the rows of a table, for messages.
 struct ArraySource<'a> {
     file: &'a str,
     columns: Vec<Numbers>,
@@ -53,7 +53,7 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
     let column_paths = contents.column_paths();
     let expressions: Vec<&ColumnExpression> = options.input.iter().chain([&options.output]).collect();
     let named = Named::of(&column_paths, &expressions, file)?;
-    // The input comes first, the output last.
+    // In `used`, the columns of the input come first and those of the output last.
     let mut used: Vec<usize> = Vec::new();
     for expression in &expressions {
         let resolved = expression.resolve(&named.names(), file).map_err(|error| {
@@ -129,7 +129,7 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
             list(&left_out)
         ));
     }
-    // Only rows for which the other streams also have samples are kept.
+    // Only rows in which all streams have samples are kept.
     let rows = shared.unwrap_or(0..rows);
     if rows.is_empty() {
         return Err(IoError::NoOverlap { file: file.to_owned() });
@@ -248,7 +248,7 @@ fn ends<'a>(column_paths: &'a [ColumnPath], name: &str) -> Vec<&'a ColumnPath> {
     }
 }
 
-/// Returns the time of the given length in the structure of the output or in the nearest enclosing structure.
+/// Returns the time column with `rows` values in the structure of the output or in the nearest enclosing structure.
 fn time_beside<'a>(column_paths: &'a [ColumnPath], beside: &str, rows: usize) -> Option<&'a ColumnPath> {
     let mut place = beside;
     loop {

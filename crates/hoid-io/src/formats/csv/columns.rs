@@ -10,17 +10,17 @@ use crate::results::{ColumnKind, ColumnValues, OutputColumn, OutputTable, TableS
 use crate::table::{Cell, check_names};
 use crate::wording::shown;
 
-/// State of a file between groups of rows.
+/// State of a CSV file that is written in groups of rows.
 struct CsvColumns {
     separator: u8,
 }
 
-/// Writes comments and header, separated by commas.
+/// Writes the comments and the header, with commas between the names.
 pub(super) fn start_with_commas(file: &mut dyn Write, schema: &TableSchema) -> io::Result<Box<dyn RowWriter>> {
     Ok(Box::new(CsvColumns::start(file, schema, b',')?))
 }
 
-/// Writes comments and header, separated by tabs.
+/// Writes the comments and the header, with tabs between the names.
 pub(super) fn start_with_tabs(file: &mut dyn Write, schema: &TableSchema) -> io::Result<Box<dyn RowWriter>> {
     Ok(Box::new(CsvColumns::start(file, schema, b'\t')?))
 }
@@ -33,8 +33,8 @@ impl RowWriter for CsvColumns {
             for column in columns {
                 cell.clear();
                 let written = match column {
-                    // The fewest digits that reproduce the number, with a point or an exponent, which distinguishes
-                    // reals from integers.
+                    // A real number is written with the fewest digits that reproduce it, and with a point or an
+                    // exponent, which distinguishes it from an integer.
                     Values::Real(values) => {
                         (values.get(row).filter(|value| !value.is_nan())).map(|value| write!(cell, "{value:?}"))
                     }
@@ -78,7 +78,7 @@ impl CsvColumns {
     fn writer<'a>(&self, file: &'a mut dyn Write) -> csv::Writer<&'a mut dyn Write> {
         csv::WriterBuilder::new()
             .delimiter(self.separator)
-            // With this setting texts that start with # are quoted.
+            // With this setting, texts that start with # are quoted.
             .comment(Some(b'#'))
             .from_writer(file)
     }

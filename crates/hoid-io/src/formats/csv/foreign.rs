@@ -6,13 +6,13 @@
 use super::text::{is_aside, is_unit, separator};
 use crate::table::{Cell, with_decimal_point};
 
-/// Number of lines at the start of a file in which the header is searched for.
+/// Number of lines at the start of a file in which the header and the line of units are searched for.
 const LINES: usize = 60;
 
 /// Latin 1 letters and signs that occur in units and column names; other non-ASCII bytes count as damage.
 const LATIN: &[u8] = b"\xb0\xb2\xb3\xb5\xc4\xc9\xd6\xdc\xdf\xe0\xe4\xe7\xe8\xe9\xea\xf1\xf6\xfc";
 
-/// Rewrites the bytes of a table and describes the changes made.
+/// Rewrites the bytes of a table as plain CSV; returns a description of each change.
 pub(super) fn made_plain(bytes: &mut Vec<u8>) -> Vec<String> {
     let mut notes = Vec::new();
     if let Some(text) = utf16(bytes) {
@@ -46,7 +46,7 @@ pub(super) fn made_plain(bytes: &mut Vec<u8>) -> Vec<String> {
     notes
 }
 
-/// Decodes UTF-16 text, which is recognised by its byte order mark.
+/// Decodes UTF-16 text, which is recognised by its byte order mark; `None` for other text.
 fn utf16(bytes: &[u8]) -> Option<String> {
     let (unit, rest): (fn([u8; 2]) -> u16, _) = match bytes {
         [0xff, 0xfe, rest @ ..] => (u16::from_le_bytes, rest),
@@ -70,8 +70,8 @@ fn is_number(cell: &str) -> bool {
     )
 }
 
-/// Replaces blanks by tabs in a table separated by blanks, if the header has as many words as each line below it has
-/// numbers.
+/// Replaces blanks by tabs in a table separated by blanks; `None` unless the header has as many words as each line
+/// below it has numbers.
 fn between_tabs(text: &str) -> Option<String> {
     let mut lines = text.lines().filter(|line| !is_aside(line));
     let header = lines.next()?;
@@ -107,7 +107,7 @@ fn unit(cell: &str) -> Option<&str> {
         .into_iter()
         .find_map(|(open, close)| cell.strip_prefix(open)?.strip_suffix(close));
     let unit = inside.unwrap_or(cell).trim();
-    // In the comment commas separate the units.
+    // A unit cannot contain a comma, because commas separate the units in the comment.
     let names_one = unit.is_empty() || is_unit(unit) && !unit.contains(',') && !is_number(unit);
     names_one.then_some(unit)
 }
@@ -116,8 +116,8 @@ fn unquoted(cell: &str) -> &str {
     cell.trim().trim_matches('"').trim()
 }
 
-/// Converts a line of units between the header and the first numbers to the comment `# units: t s, e deg` above the
-/// header.
+/// Moves a line of units between the header and the first numbers into a comment `# units: t s, e deg` above the
+/// header; `None` if there is no such line.
 fn units_above(text: &str) -> Option<String> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let lines = text.lines().take(LINES).enumerate();
@@ -157,8 +157,8 @@ fn cells(line: &str, mark: Option<char>) -> Vec<&str> {
     }
 }
 
-/// True if `names` can be the header of `row`: it has as many cells as `row`, more than half of these are numbers, and
-/// no name is a number.
+/// True if `names` can be the header of `row`: `row` has as many cells as `names`, more than half of these cells are
+/// numbers, and no name is a number.
 fn is_header(names: &[&str], row: &[&str]) -> bool {
     let numbers = row.iter().filter(|cell| is_number(cell)).count();
     names.len() > 1
@@ -223,7 +223,7 @@ mod tests {
             assert_eq!(plain(&bytes), (text.to_owned(), 1));
         }
         assert_eq!(plain(b"t,e [\xb0]\n0,1\n"), (String::from("t,e [°]\n0,1\n"), 1));
-        // Damage remains damage: half a code unit, other bytes.
+        // Damaged text is not converted: half a UTF-16 code unit, or bytes that are not Latin 1 letters.
         for bytes in [&b"\xff\xfet\0e"[..], b"t,e\n0,\xff1\n", b"t,e\n0,\x801\n"] {
             assert_eq!(plain(bytes).1, 0);
         }

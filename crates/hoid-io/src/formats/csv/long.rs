@@ -1,8 +1,9 @@
 //! Reading of a long text of plain numbers, block by block: neither the whole text nor the columns that were not
 //! requested are kept in memory.
 //!
-//! The first lines, with their names, units and notes, are read as in any other table. All further rows must be plain
-//! ([`super::plain`]); if a row is not, no table is returned, and the whole text is read by [`super::table`].
+//! The first lines, which contain names, units and notes, are read as in any other table. All further rows must be
+//! plain ([`super::plain`]); if a row is not plain, no table is returned, and the whole text is read by
+//! [`super::table`].
 //!
 //! Reading stops after the requested span ([`super::span_end`]).
 
@@ -19,16 +20,16 @@ use crate::table::{Cell, Source, Table, check_selected, selected};
 use crate::time::{is_time, may_be_time};
 use crate::wording::shown;
 
-/// Minimum size in bytes of a file that is read block by block.
+/// Minimum size, in bytes, of a file that is read block by block.
 const LONG: u64 = 16 << 20;
 /// Number of bytes read to obtain the header and the first rows.
 const HEAD: usize = 256 << 10;
-/// Size of the first block in bytes; each further block is twice as long as the previous one, up to [`LARGEST`].
+/// Size of the first block in bytes; each further block is twice as long as the previous block, up to [`LARGEST`].
 const BLOCK: usize = 1 << 20;
 const LARGEST: usize = 32 << 20;
 /// Number of positions in the unread part of a file at which the time is probed.
 const PROBES: u32 = 64;
-/// Number of bytes read at such a position; it exceeds the length of a line.
+/// Number of bytes read at a probed position; it exceeds the length of a line.
 const PROBE: usize = 64 << 10;
 
 /// Reads the table of a long text; `None` if the text is short, or if it contains anything other than plain numbers.
@@ -60,7 +61,7 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
     };
     let separator = parsed.separator;
     let names: Vec<String> = parsed.columns.iter().map(|column| column.name.clone()).collect();
-    // The reader of whole texts reports missing columns, with a list of all columns that exist.
+    // If a column is missing, the reader of whole texts reports it with a list of all existing columns.
     let known: Vec<&str> = names.iter().map(String::as_str).collect();
     if check_selected(&known, options, file).is_err() {
         return Ok(None);
@@ -75,7 +76,8 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
         wanted: &wanted,
     };
     let end = SpanEnd::of(&parsed, file, options);
-    // Capacity for all rows, estimated from the length of the first rows: unused capacity takes no physical memory.
+    // The columns get capacity for all rows, whose number is estimated from the length of the first rows: unused
+    // capacity takes no physical memory.
     let parts = text.length as f64 / text.at as f64;
     let rows = if end.is_some() { 0.0 } else { parsed.rows as f64 * parts };
     for (column, _) in parsed.columns.iter_mut().zip(&wanted).filter(|(_, wanted)| **wanted) {
@@ -123,7 +125,7 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
     Ok(Some(selected(table, |at, _| wanted.get(at) == Some(&true))))
 }
 
-/// A file that is read from start to end.
+/// A text file that is read block by block from start to end.
 struct Text {
     file: File,
     /// Position of the next unread byte.
@@ -137,7 +139,7 @@ struct Text {
 }
 
 impl Text {
-    /// Reads the first lines as those of any other table; `None` unless the table contains only numbers with decimal
+    /// Reads the first lines like those of any other table; `None` unless the table contains only numbers with decimal
     /// points.
     fn head(&mut self, file: &str) -> io::Result<Option<Parsed>> {
         let mut bytes = self.bytes(0, HEAD)?;
@@ -162,7 +164,7 @@ impl Text {
         Ok(parsed.filter(is_plain))
     }
 
-    /// Returns the lines that were read last.
+    /// Returns the complete lines of the block that was read last.
     fn lines(&self) -> &[u8] {
         self.buffer.get(..self.lines).unwrap_or(&self.buffer)
     }
@@ -186,7 +188,7 @@ impl Text {
         }
     }
 
-    /// Reads bytes at a given position of the file, regardless of the current reading position.
+    /// Reads up to `most` bytes from position `from` of the file, regardless of the current reading position.
     fn bytes(&mut self, from: usize, most: usize) -> io::Result<Vec<u8>> {
         self.file.seek(SeekFrom::Start(from as u64))?;
         let mut bytes = Vec::with_capacity(most);
@@ -194,16 +196,16 @@ impl Text {
         Ok(bytes)
     }
 
-    /// Returns the values of a column at positions from here to the end of the file, in order; NaN where no value was
-    /// found.
+    /// Returns the values of a column at several positions in the unread part of the file, in the order of the file;
+    /// NaN where no value was found.
     fn probed(&mut self, column: usize, separator: u8) -> io::Result<Vec<f64>> {
         let here = self.at;
         let from = here.saturating_sub(self.buffer.len().saturating_sub(self.lines));
-        // If the file grows while it is read, the position may exceed the original length.
+        // If the file grows while it is read, the reading position may exceed the original length.
         let rest = self.length.saturating_sub(from) as f64;
         let value = |text: &mut Self, part: f64| -> io::Result<f64> {
             let bytes = text.bytes(from.saturating_add((rest * part) as usize), PROBE)?;
-            // The position may be in the middle of a line; the next line is complete.
+            // A probed position may be in the middle of a line; the next line is complete.
             let line = bytes.split(|byte| *byte == b'\n').nth(1).unwrap_or_default();
             let row = nth_row(line, 0, separator);
             let cell = row.as_ref().and_then(|(_, row)| row.get(column)).unwrap_or_default();
@@ -226,7 +228,7 @@ impl Text {
     }
 }
 
-/// The file, which is read again if a message needs a line or a cell.
+/// The file on the disk, from which a line or a cell is read again if a message needs it.
 struct LongSource<'a> {
     file: &'a str,
     path: PathBuf,
@@ -240,7 +242,7 @@ impl LongSource<'_> {
         let (from, behind) = self.starts.before(row)?;
         let mut file = File::open(&self.path).ok()?;
         file.seek(SeekFrom::Start(from as u64)).ok()?;
-        // The text from this row to the next row with a known position, or to the last row.
+        // The bytes read end at the next row with a known position, or a fixed length after the start of the last row.
         let end = self
             .starts
             .before(row.saturating_add(RowStarts::KEPT))
@@ -341,7 +343,7 @@ mod tests {
                 assert_eq!(found.source.cell(row, at), whole.source.cell(row, in_whole));
             }
         }
-        // The word is wanted, or in a quote: the whole text is read.
+        // The whole text is read if the column of words is requested, or if the word is quoted.
         assert!(
             of_length(file.path(), "run.csv", &ReadOptions::default(), 0)
                 .unwrap()
@@ -355,7 +357,7 @@ mod tests {
         assert!(found.is_none());
     }
 
-    /// A recorder may still write to it.
+    /// A recorder may still write to a file that is being read.
     #[test]
     fn a_file_may_grow_while_it_is_read() {
         let written = text(40_000, 40_000);
@@ -373,14 +375,14 @@ mod tests {
         assert_eq!(growing.probed(0, b',').unwrap().len(), PROBES as usize);
     }
 
-    /// Room for the rows of a length that no memory has.
+    /// The size of a sparse file may require more memory for its rows than any computer has.
     #[cfg(target_os = "linux")]
     #[test]
     fn a_file_of_holes_is_left_to_the_reader_of_whole_texts() {
         let rows = "1,2\n".repeat(100_000);
         let file = file(&format!("t,e\n{rows}x,\"y\"\n"));
         let mut whole = File::options().write(true).open(file.path()).unwrap();
-        // Where the file system has no files of this length, there is nothing to test.
+        // If the file system does not support files of this length, there is nothing to test.
         let end = whole.set_len(1 << 43).and_then(|()| whole.seek(SeekFrom::End(-1)));
         if end.and_then(|_| whole.write_all(b"\n")).is_ok() {
             let found = of_length(file.path(), "run.csv", &ReadOptions::default(), 0);
@@ -401,12 +403,12 @@ mod tests {
         assert!((1000..60_000).contains(&first), "{first}");
         assert_eq!(in_span, 1000);
         assert_eq!(rows(&text(200_000, 200_000), &wanting(&[], None)).0, 200_000);
-        // Trials of 2000 s, the same at the end of the first.
+        // In trials of 1000 s, the requested span occurs in each trial, so that the whole file is read.
         assert_eq!(
             rows(&text(200_000, 100_000), &wanting(&[], Some(10.0))),
             (200_000, 2000)
         );
-        // Counted samples, and a time in another unit.
+        // The span also ends the reading if samples are counted, or if the time is in another unit.
         let counted = ReadOptions {
             sampling_hz: Some(100.0),
             ..wanting(&[], Some(10.0))

@@ -13,7 +13,8 @@ use std::thread;
 
 use crate::table::Precision;
 
-/// Size of a part in bytes: large enough to justify a thread, and small compared with the columns.
+/// Size, in bytes, of a part that one thread reads: large enough to justify a thread, and small compared with the
+/// columns.
 const PART: usize = 4 << 20;
 /// Size in bytes of the first part, which is read without a thread: if rows that are not plain are frequent, this part
 /// contains one.
@@ -32,7 +33,7 @@ impl RowStarts {
     /// Interval between rows whose position is kept.
     pub(super) const KEPT: usize = 1024;
 
-    /// Adds the position of a row.
+    /// Adds the position of the next row.
     pub(super) fn push(&mut self, start: usize) {
         if self.rows.is_multiple_of(Self::KEPT) {
             self.kept.push(start);
@@ -41,12 +42,12 @@ impl RowStarts {
         self.last = start;
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub(super) fn len(&self) -> usize {
         self.rows
     }
 
-    /// Position of the last row.
+    /// Returns the position of the last row; `None` if there are no rows.
     pub(super) fn last(&self) -> Option<usize> {
         (self.rows > 0).then_some(self.last)
     }
@@ -57,10 +58,10 @@ impl RowStarts {
     }
 }
 
-/// Consecutive plain rows.
+/// Consecutive plain rows, as read by one thread.
 #[derive(Debug, Default)]
 pub(super) struct Plain {
-    /// Values, one vector per column.
+    /// Values, one vector for each column.
     pub(super) values: Vec<Vec<f64>>,
     /// Precision of the columns for which it was requested.
     pub(super) precision: Vec<Precision>,
@@ -76,7 +77,7 @@ pub(super) struct Plain {
 pub(super) struct Layout<'a> {
     pub(super) separator: u8,
     pub(super) with_precision: &'a [bool],
-    /// Cells of other columns may hold any text without quotes.
+    /// True for each column whose values are requested; cells of other columns may hold any text without quotes.
     pub(super) wanted: &'a [bool],
 }
 
@@ -129,7 +130,7 @@ pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take
     at
 }
 
-/// Returns the end of the part that starts at `start`: the first line end after `length` bytes.
+/// Returns the end of the part that starts at `start`, which is after the first line end beyond `length` bytes.
 fn end_of_part(bytes: &[u8], start: usize, length: usize) -> usize {
     let mut behind = bytes.iter().enumerate().skip(start.saturating_add(length));
     let line = behind.find(|(_, byte)| **byte == b'\n');
@@ -154,7 +155,7 @@ fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
     let mut found = Plain::nothing(layout, part.start);
     let mut rest = bytes.get(part.clone()).unwrap_or_default();
     let at = |rest: &[u8]| part.end.saturating_sub(rest.len());
-    // The other rows are assumed to be about as long as the first one.
+    // Memory is reserved on the assumption that all rows are about as long as the first row.
     let line = rest
         .split_inclusive(|byte| *byte == b'\n')
         .next()
@@ -231,7 +232,7 @@ fn plain_row<'a>(
             _ => return None,
         }
     }
-    // A row without values may be left by a spreadsheet after the end of a table; the full CSV reader handles it.
+    // A row without any value, as spreadsheets may leave after the end of a table, is handled by the full CSV reader.
     (!empty).then_some(rest)
 }
 

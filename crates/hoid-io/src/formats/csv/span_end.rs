@@ -13,11 +13,11 @@ use crate::time::with_time;
 pub(super) enum SpanEnd {
     /// Samples are counted: number of rows up to the end of the span.
     Row(usize),
-    /// Time column, and the bounds of the span in the unit and with the origin of that column.
+    /// Index of the time column, and the bounds of the span in the unit and with the origin of that column.
     Time { column: usize, from: f64, to: f64 },
 }
 
-/// Placeholder source of a table from whose rows no message is created.
+/// Placeholder source for a table whose rows appear in no message.
 struct PlaceholderSource<'a>(&'a str);
 
 impl Source for PlaceholderSource<'_> {
@@ -38,7 +38,7 @@ impl SpanEnd {
     /// Determines the end of the requested span from the first rows; `None` if all rows are needed.
     pub(super) fn of(head: &Parsed, file: &str, options: &ReadOptions) -> Option<Self> {
         let to_s = options.span_s.1?;
-        // Interpolation of a sparse column, or a search for trials, may need rows after the span.
+        // Rows after the span may be needed to interpolate a sparse column or to find trials.
         if !options.sparse.is_empty() || options.trial.is_some() {
             return None;
         }
@@ -93,7 +93,7 @@ impl SpanEnd {
         }
     }
 
-    /// Returns the time column; `None` if rows are counted.
+    /// Returns the index of the time column; `None` if rows are counted.
     pub(super) fn time_column(&self) -> Option<usize> {
         match *self {
             Self::Row(_) => None,

@@ -26,7 +26,7 @@ use crate::table::{Cell, Column, Source, Table, check_names, check_number, read_
 use crate::time::{Moments, is_time};
 use crate::wording::{list, shown};
 
-/// The text of the file, which is read again if an error message needs a line or a cell.
+/// The text of the file, which is parsed again if an error message needs a line or a cell.
 struct CsvSource<'a> {
     file: &'a str,
     text: &'a str,
@@ -37,7 +37,7 @@ struct CsvSource<'a> {
 }
 
 impl CsvSource<'_> {
-    /// Returns the position and the cells of a row.
+    /// Returns the position in the text and the cells of a row.
     fn row(&self, row: usize) -> Option<(usize, csv::ByteRecord)> {
         let (from, behind) = self.starts.before(row)?;
         let (start, record) = nth_row(self.text.as_bytes().get(from..)?, behind, self.separator)?;
@@ -52,7 +52,7 @@ pub(super) fn nth_row(bytes: &[u8], n: usize, separator: u8) -> Option<(usize, c
     Some((row_start(bytes, position(&record)), record))
 }
 
-/// Returns the position of a record, including the bytes that the reader skips before the record.
+/// Returns the position at which the reader starts to read a record, before bytes that it skips.
 fn position(record: &csv::ByteRecord) -> usize {
     record.position().map_or(0, |p| p.byte() as usize)
 }
@@ -189,17 +189,17 @@ fn first_record(bytes: &[u8], separator: u8) -> Option<(csv::ByteRecord, Range<u
     None
 }
 
-/// Number of rows read by the full CSV reader before the fast reader is tried again.
+/// Number of rows that the full CSV reader reads before the fast reader is tried again.
 const WHOLE: usize = 256;
 
-/// Rows to be added to the columns of a table.
+/// Reader that adds the rows of a text to the columns of a table.
 struct Rows<'a> {
     file: &'a str,
     bytes: &'a [u8],
     separator: u8,
     commas: bool,
     open: Option<usize>,
-    /// True for each column that may be the time.
+    /// True for each column that may be a time.
     times: Vec<bool>,
     wanted: Vec<bool>,
     moments: Vec<Moments>,
@@ -295,11 +295,12 @@ impl Rows<'_> {
     }
 }
 
-/// Number of preceding lines with which the length of the last number in the file is compared.
+/// Number of lines with whose last cells the last number of the file is compared.
 const COMPARED: usize = 8;
 
-/// Detects a truncated last number: the last line has no line end, and its last cell is at least two characters shorter
-/// than the last cell of each of the [`COMPARED`] lines before, all of which have a decimal point.
+/// Detects a truncated last number and returns a note; `None` unless the last line has no line end, its last cell is at
+/// least two characters shorter than the last cell of each of the [`COMPARED`] lines before, and these all have a
+/// decimal point.
 fn cut_number(source: &CsvSource<'_>, last: usize) -> Option<String> {
     let last_cell = |row: usize| {
         let (start, _) = source.row(row)?;
@@ -427,8 +428,8 @@ mod tests {
         assert_eq!(names_and_rows(",t,e,u,\n0,0,1,2,\n").0, ["", "t", "e", "u", ""]);
     }
 
-    /// Quoted cells are read by the full CSV reader; without quotes, rows of numbers are read by
-    /// the fast reader, in several parts. Both give the same bits, texts, precision and positions.
+    /// The full CSV reader reads quoted cells; without quotes, the fast reader reads rows of numbers in several parts.
+    /// Both readers give the same bits, texts, precision and positions.
     #[test]
     fn plain_rows_are_those_of_whole_csv() {
         let mut state = 7_u64;
@@ -524,7 +525,7 @@ mod tests {
         let (t, texts, moments) = values("10:11:59.98,1\n10:12:00.00,1\n,1\n10:12:00.04,1\n");
         assert_eq!((t[0], t[1], t[3]), (0.0, 0.02, 0.06));
         assert!(t[2].is_nan() && texts.is_empty() && moments);
-        // A number or another text among them: the column does not hold clock times.
+        // If a number or another text is among the clock times, the column does not hold clock times.
         for other in ["1", "abc"] {
             let (t, texts, moments) = values(&format!("10:11:59,1\n,1\n{other},1\n10:12:00,1\n"));
             assert_eq!(texts, if other == "1" { vec![0, 3] } else { vec![0, 2, 3] });
@@ -538,7 +539,7 @@ mod tests {
         let text = format!("t,e,u\n{rows}");
         let notes = |text: &str| parse(text.as_bytes(), "run.csv").unwrap().notes;
         assert!(notes(&text).is_empty());
-        // A missing line end alone may be a habit of the writing program.
+        // A missing line end alone is not reported, since some programs never write the last line end.
         assert!(notes(text.trim_end()).is_empty());
         let found = notes(&text[..text.len() - 4]);
         assert!(
@@ -550,7 +551,7 @@ mod tests {
             found.contains("run.csv is truncated in line 21, its last: 2 of 3 values"),
             "{found}"
         );
-        // In the middle of a file it is not a truncation.
+        // A short row in the middle of a file is not reported as truncation.
         assert!(message(b"t,e,u\n0,1\n1,2,3").contains("line 2: 2 values, expected 3"));
         let table = parse(b"t,e,u\n0,1,2\n1,2,-", "run.csv").unwrap();
         let error = table.bad_value(2, 1, 0..2).to_string();

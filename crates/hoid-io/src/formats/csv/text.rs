@@ -24,12 +24,12 @@ pub(crate) fn text<'a>(bytes: &'a [u8], file: &str) -> Result<&'a str, IoError> 
 /// First characters at which a spreadsheet executes a cell.
 const RUN: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
 
-/// True if a spreadsheet may execute a cell; it does not execute numbers and a single sign.
+/// True if a spreadsheet may execute a cell; numbers and single signs are not executed.
 fn is_run(cell: &str) -> bool {
     cell.starts_with(RUN) && !["-", "+"].contains(&cell) && !matches!(Cell::parse(cell), Cell::Number(_))
 }
 
-/// Returns a text as it is written to the file: a text that a spreadsheet would execute gets an apostrophe in front,
+/// Returns a text as it is written to the file: a text that a spreadsheet would execute is preceded by an apostrophe,
 /// which marks it as text and which [`unescape_formula`] removes.
 pub(crate) fn escape_formula(cell: &str) -> Cow<'_, str> {
     if is_run(cell.trim_start_matches('\'')) {
@@ -47,7 +47,7 @@ pub(crate) fn unescape_formula(cell: &str) -> &str {
     }
 }
 
-/// Returns the position of the last line if this line has no line end.
+/// Returns the position of the last line if this line has no line end, otherwise `None`.
 pub(crate) fn open_line(text: &str) -> Option<usize> {
     let ends = ['\n', '\r'];
     (!text.ends_with(ends)).then(|| text.trim_end_matches(|c| !ends.contains(&c)).len())
@@ -82,7 +82,7 @@ pub(crate) fn separator(header: &str) -> u8 {
     };
     let plain: Vec<u8> = header.bytes().filter(is_plain).collect();
     let count = |separator: &u8| plain.iter().filter(|byte| *byte == separator).count();
-    // If separators are equally frequent, the last of them is used.
+    // If several separators are equally frequent, the comma precedes the semicolon, and the semicolon the tab.
     [b'\t', b';', b','].into_iter().max_by_key(count).unwrap_or(b',')
 }
 
@@ -145,7 +145,7 @@ pub(crate) fn comments(text: &str) -> impl Iterator<Item = &str> {
     lines.filter_map(|line| line.strip_prefix('#'))
 }
 
-/// Returns the position of a row after the comments and blank lines that the reader skips before it.
+/// Returns the position of the first row at or after `at`; comments and blank lines are skipped, as by the reader.
 pub(crate) fn row_start(bytes: &[u8], at: usize) -> usize {
     let mut rest = bytes.get(at..).unwrap_or_default();
     loop {
@@ -162,7 +162,7 @@ pub(crate) fn row_start(bytes: &[u8], at: usize) -> usize {
 
 pub(crate) fn place(bytes: &[u8], at: usize) -> String {
     let before = bytes.get(..at).unwrap_or(bytes);
-    // A file may have bare carriage returns as line ends.
+    // A file without line feeds has carriage returns as line ends.
     let end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
     format!("line {}", before.split(|b| *b == end).count())
 }

@@ -1,7 +1,7 @@
 //! Conversion between column names and names of MATLAB variables.
 //!
 //! A name that is invalid in MATLAB, such as `K e` or `f-y`, is replaced by a similar valid name, and the original name
-//! is also stored.
+//! is stored in the variable [`NAMES`].
 
 use crate::formats::arrays::{COMMENTS, Entry, Value};
 
@@ -46,7 +46,7 @@ pub(super) fn variables(names: &[&str]) -> Vec<String> {
             _ => format!("x{plain}"),
         };
         let mut variable: String = plain.chars().take(LONGEST_NAME).collect();
-        // A column whose own name is the variable name keeps it.
+        // A column whose original name equals the variable name keeps this name.
         let taken = |variable: &str| {
             variables.iter().any(|v| v == variable)
                 || [COMMENTS, NAMES].contains(&variable)

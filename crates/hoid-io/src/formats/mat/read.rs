@@ -30,7 +30,7 @@ pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Contents, IoError> {
     let entries = match bytes.get(HEADER - 4..HEADER) {
         Some([.., b'I', b'M']) => version5::read(bytes, false, &mut budget, file)?,
         Some([.., b'M', b'I']) => version5::read(bytes, true, &mut budget, file)?,
-        // Version 4 starts with a number below 5000, the later versions start with text.
+        // A file of version 4 starts with a number below 5000, files of later versions start with text.
         _ if bytes.iter().take(4).any(|byte| *byte == 0) => version4::read(bytes, &mut budget, file)?,
         _ => {
             return Err(wrong(start_of(bytes)));

@@ -4,7 +4,7 @@ use crate::IoError;
 use crate::formats::arrays::{Array, Entry, Kind, Numbers, Value};
 use crate::formats::budget::Budget;
 
-/// Size of the five numbers in bytes.
+/// Size, in bytes, of the five numbers in a header.
 const HEADER: usize = 20;
 const LONGEST_NAME: usize = 256;
 
@@ -40,8 +40,8 @@ fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
             u32::from_le_bytes(bytes)
         }
     };
-    // Thousands digit: byte order and machine type; hundreds digit: unused; tens digit: number type; ones digit: kind
-    // of matrix.
+    // In the first number, the thousands digit gives byte order and machine type; the hundreds digit is unused; the
+    // tens digit gives the number type, and the ones digit the kind of matrix.
     let big_endian = number(0, false) > 4999;
     let kinds = number(0, big_endian);
     if kinds > 1999 || !kinds.is_multiple_of(1000) && kinds % 1000 / 100 != 0 {

@@ -21,11 +21,11 @@ const SINGLE: u32 = 7;
 const UINT64: u32 = 15;
 const FUNCTION: u32 = 16;
 const OPAQUE: u32 = 17;
-/// Flag of complex numbers.
+/// Flag that marks an array of complex numbers.
 const COMPLEX: u32 = 0x800;
 /// Longest name accepted, in characters; MATLAB allows 63.
 const LONGEST_NAME: usize = 256;
-/// Approximate memory of an entry in bytes, in addition to its path and its values.
+/// Approximate memory of an entry in bytes, without its path and its values.
 const ENTRY_BYTES: u64 = 256;
 
 /// Reason why a variable cannot be read: a violation of the format, or another error.
@@ -132,7 +132,7 @@ impl Reader<'_> {
 
     /// Reads an array of any class, part by part.
     fn matrix(&mut self, bytes: &[u8], big_endian: bool, place: VariablePath<'_>) -> Result<(), Stop> {
-        // The field is not set.
+        // An element without data is a field that is not set.
         if bytes.is_empty() {
             return self.push(place, place.path, Value::Array(Array::vector(Numbers::from_f64(&[]))));
         }
@@ -181,7 +181,7 @@ impl Reader<'_> {
             }
             CHAR => {
                 let bytes = parts.clone().next().map_or(0, |element| element.bytes.len());
-                // The characters are expanded to four bytes each.
+                // In memory each character takes four bytes.
                 let rows = dims.first().map_or(1, |rows| (*rows).min(bytes));
                 self.budget.take_texts(rows, bytes.saturating_mul(5), self.file)?;
                 let texts = texts(&mut parts, &dims, count)?;

@@ -16,10 +16,10 @@ use crate::wording::short_error;
 
 /// Memory in bytes charged for each visit to a group or dataset, because links may be circular.
 const VISIT: u64 = 1 << 13;
-/// Maximum number of elements at which an array of structures or a cell array is converted to columns.
+/// Maximum number of elements of an array of structures, or of a cell array, that is converted to columns.
 const MOST_REFERENCES: u64 = 1 << 16;
 
-/// Reads the variables of a file, with dimensions in the order of MATLAB or numpy.
+/// Reads the variables of a file; `indexing` determines whether dimensions are in the order of MATLAB or numpy.
 pub(super) fn read(bytes: Vec<u8>, file: &str, indexing: Indexing) -> Result<Vec<Entry>, IoError> {
     guarded(file, || {
         let mut reader = Reader {
@@ -295,7 +295,7 @@ fn texts(units: &[u16], dims: &[usize]) -> Vec<String> {
     }
 }
 
-/// Conversion of a number to little-endian bytes.
+/// Numbers that can be converted to little-endian bytes.
 trait Bytes {
     fn append(&self, bytes: &mut Vec<u8>);
 }

@@ -19,7 +19,7 @@ const LONGEST_HEADER: usize = 1 << 20;
 /// Alignment of the start of the data in bytes.
 const ALIGNMENT: usize = 64;
 
-/// Problems with an array.
+/// Reasons why an array cannot be read.
 #[derive(Debug)]
 pub(super) enum NpyError {
     NoMagic(String),
@@ -101,7 +101,7 @@ impl Item {
         Self::Numbers { kind, big_endian }
     }
 
-    /// Returns the unit implied by the type.
+    /// Returns the unit that the type implies; empty if there is none.
     fn unit(&self) -> String {
         String::from(match self {
             Self::Clock { moments: true, .. } => MOMENTS,

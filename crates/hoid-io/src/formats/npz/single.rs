@@ -5,8 +5,8 @@ use crate::IoError;
 use crate::formats::arrays::{Contents, Indexing};
 use crate::formats::budget::Budget;
 
-/// Reads the array of an NPY file; it gets the name that `numpy.savez` gives an unnamed array. The fields of a
-/// structured array are separate columns.
+/// Reads the array of an NPY file; the array gets the name that `numpy.savez` gives to an unnamed array. The fields of
+/// a structured array become separate columns.
 pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Contents, IoError> {
     let mut budget = Budget::of(bytes.len());
     let entries = entries(bytes, "arr_0", true, (&mut budget, file)).map_err(|error| match error {

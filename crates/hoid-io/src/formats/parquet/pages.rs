@@ -1,11 +1,11 @@
 //! Decompressed size of the pages of a column, determined before decompression.
 //!
-//! The footer states the decompressed size of a column, and each page states its own in its header. Neither need be
-//! correct: a page of a few kB may state 2 GB, which Snappy and LZ4 then fill with zeros, and gzip decompresses to its
-//! end regardless of the stated size. The headers are therefore read here first, in the compact protocol of Thrift
-//! (<https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>): a field starts with a byte
-//! `delta << 4 | type`, numbers are zigzag varints, and a struct ends with a 0. These fields of `PageHeader`
-//! (<https://github.com/apache/parquet-format>, `parquet.thrift`) are read:
+//! The footer states the decompressed size of a column, and the header of each page states that of the page. Neither is
+//! necessarily correct: a page of a few kB may state 2 GB, which Snappy and LZ4 then fill with zeros, and gzip
+//! decompresses to its end regardless of the stated size. The headers are therefore read here first, in the compact
+//! protocol of Thrift (<https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>): a field
+//! starts with a byte `delta << 4 | type`, numbers are zigzag varints, and a struct ends with a 0. These fields of
+//! `PageHeader` (<https://github.com/apache/parquet-format>, `parquet.thrift`) are read:
 //!
 //! | field | contents |
 //! |---|---|
@@ -56,7 +56,7 @@ pub(super) fn decompressed_size(column: &[u8], compression: Compression, values:
         if matches!(compression, Compression::GZIP(_)) && header.is_compressed {
             let packed = page.get(usize::try_from(header.levels).ok()?..)?;
             let stated = header.decompressed.checked_sub(header.levels)?;
-            // Other damage is reported when the page is read.
+            // Other damage of the gzip data is reported when the page is read.
             let mut limited = MultiGzDecoder::new(packed).take(stated.saturating_add(1));
             if io::copy(&mut limited, &mut io::sink()).is_ok_and(|bytes| bytes > stated) {
                 return None;
@@ -131,7 +131,7 @@ impl PageHeader {
         Some(())
     }
 
-    /// Skips a value that is not used here.
+    /// Skips a value that the decompressed size does not depend on.
     fn pass_over(&mut self, bytes: &mut &[u8], kind: u8, depth: usize) -> Option<()> {
         match kind {
             TRUE | FALSE | BYTE => drop(byte(bytes)?),
@@ -163,7 +163,7 @@ impl PageHeader {
     }
 
     fn each(&mut self, bytes: &mut &[u8], count: u64, kinds: &[u8], depth: usize) -> Option<()> {
-        // Each element takes at least one byte.
+        // Each element of a list takes at least one byte.
         if depth > MOST_NESTED || count > bytes.len() as u64 {
             return None;
         }
@@ -211,7 +211,7 @@ mod tests {
 
     const GZIP: fn() -> Compression = || Compression::GZIP(GzipLevel::default());
 
-    /// A data page whose header has a text and a list that are not used.
+    /// Returns a data page whose header also has a text and a list, which are skipped.
     fn page(unpacked: i64, values: i64, packed: &[u8]) -> Vec<u8> {
         let put = |bytes: &mut Vec<u8>, value: i64| {
             let mut rest = ((value << 1) ^ (value >> 63)).cast_unsigned();
@@ -227,7 +227,7 @@ mod tests {
         put(&mut bytes, unpacked);
         bytes.push(0x15);
         put(&mut bytes, packed.len() as i64);
-        // Field 5: values, statistics with a text and a list.
+        // Field 5 contains the number of values, and statistics with a text and a list.
         bytes.extend([0x2c, 0x15]);
         put(&mut bytes, values);
         bytes.extend([0x4c, 0x18, 3, b'a', b'b', b'c', 0x19, 0x25, 2, 4, STOP, STOP, STOP]);
@@ -245,7 +245,7 @@ mod tests {
     fn pages_say_what_they_unpack_to_and_gzip_is_held_to_it() {
         let honest = page(800, 100, &zipped(&[0; 800]));
         assert_eq!(decompressed_size(&honest, GZIP(), 100), Some(800));
-        // Of two pages, the second lies after the last value and is not examined.
+        // The second of two pages lies after the last value and is not examined.
         let two = [honest.clone(), vec![0xff; 40]].concat();
         assert_eq!(decompressed_size(&two, GZIP(), 100), Some(800));
         assert_eq!(decompressed_size(&two, GZIP(), 101), None);
@@ -264,7 +264,7 @@ mod tests {
             assert_eq!(decompressed_size(&whole[..cut], GZIP(), 100), None, "{cut}");
         }
         assert_eq!(decompressed_size(&page(-1, 100, &[]), Compression::SNAPPY, 100), None);
-        // Structures without an end, and a list longer than its data.
+        // The headers have structures without an end, or a list that is longer than its data.
         assert_eq!(decompressed_size(&[0x1c; 100], GZIP(), 1), None);
         assert_eq!(
             decompressed_size(&[0x19, 0xf5, 0xff, 0xff, 0xff, 0x7f, 0, 0], GZIP(), 1),

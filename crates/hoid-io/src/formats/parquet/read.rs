@@ -33,8 +33,7 @@ const TIME: &str = "a date or time";
 /// Number of ns in a µs and in a ms.
 const MICRO: i64 = 1_000;
 const MILLI: i64 = 1_000_000;
-/// Memory in bytes of a value (as a number and as the index of a missing value), and of a text in addition to its
-/// characters.
+/// Memory in bytes of a value (as a number and as the index of a missing value), and of a text without its characters.
 const VALUE: u64 = 16;
 const TEXT: u64 = 24;
 /// Number of values read at a time.
@@ -97,7 +96,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
             budget.take(u64::try_from(chunk.uncompressed_size()).unwrap_or(u64::MAX), file)?;
         }
     }
-    // Every column is converted to numbers, even if it is not used.
+    // All columns are converted to numbers, including those that are not used.
     budget.take((rows as u64).saturating_mul(VALUE).saturating_mul(leaves as u64), file)?;
     let mut grouped = 0_usize;
     for group in reader.metadata().row_groups() {
@@ -126,7 +125,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
                     place()
                 )));
             };
-            // The size stated in the footer has already been counted.
+            // The budget already includes the size stated in the footer.
             let counted = u64::try_from(chunk.uncompressed_size()).unwrap_or(0);
             budget.take(stated.saturating_sub(counted), file)?;
         }
@@ -161,7 +160,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
     })
 }
 
-/// A column over all row groups.
+/// A column in all row groups of a file.
 struct ColumnPath<'a> {
     reader: &'a SerializedFileReader<Bytes>,
     file: &'a str,
@@ -279,14 +278,14 @@ impl ColumnPath<'_> {
         Ok(())
     }
 
-    /// Reserves the memory that values own in addition to their size.
+    /// Reserves the memory that the values own outside their vector.
     fn weigh<V: Weight>(&mut self, values: &[V]) -> Result<(), ParquetError> {
         let bytes = values.iter().map(Weight::bytes).sum();
         let taken = self.budget.take(bytes, self.file);
         taken.map_err(|error| ParquetError::External(Box::new(error)))
     }
 
-    /// Converts an error of the crate `parquet` and adds its place.
+    /// Converts an error of the crate `parquet` and adds the column and the row group.
     fn error(&self, group: usize, error: ParquetError) -> IoError {
         let file = self.file.to_owned();
         let place = format!("column {}, row group {}", shown(&self.name), group.saturating_add(1));
@@ -311,9 +310,9 @@ impl ColumnPath<'_> {
     }
 }
 
-/// Memory that a value owns in addition to its own size.
+/// Memory that a value owns outside the vector in which it is stored.
 trait Weight {
-    /// Number of bytes.
+    /// Returns this memory in bytes.
     fn bytes(&self) -> u64 {
         0
     }
@@ -329,7 +328,7 @@ impl Weight for String {
     }
 }
 
-/// Returns the unit of a column of clock times in ns.
+/// Returns the unit of a column of clock times in ns; `None` if the column does not contain clock times.
 fn clock_ns(column: &ColumnDescriptor) -> Option<i64> {
     let unit = match column.logical_type_ref() {
         Some(LogicalType::Timestamp(clock)) => &clock.unit,

@@ -10,13 +10,13 @@ use crate::table::{Cell, Column, Precision, Source, Table, check_names, read_com
 use crate::time::{Moments, is_time, seconds};
 use crate::wording::shown;
 
-/// Original cells of a file, for messages about values that are not finite numbers.
+/// The original cells of a file, for messages about values that are not finite numbers.
 struct ParquetSource<'a> {
     file: &'a str,
     columns: Vec<Cells>,
 }
 
-/// Cells of a column that its values do not represent.
+/// The cells of a column that its numbers do not represent.
 enum Cells {
     Numbers {
         nulls: Vec<usize>,

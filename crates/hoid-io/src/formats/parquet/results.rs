@@ -29,7 +29,7 @@ pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<OutputTable, IoError> {
             Data::Signed(values) => real(values.into_iter().map(|value| value as f64).collect()),
             Data::Unsigned(values) if nulls.is_empty() => ColumnValues::Whole(values),
             Data::Unsigned(values) => real(values.into_iter().map(|value| value as f64).collect()),
-            // Missing text is read as empty text.
+            // A missing text is read as an empty text.
             Data::Text(values) => ColumnValues::Text(values),
             Data::Moments(_) => return Err(unread(&name, "a date or time")),
             Data::Unread(what) => return Err(unread(&name, what)),

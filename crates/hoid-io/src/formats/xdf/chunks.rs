@@ -23,7 +23,7 @@ pub(super) struct Stream {
     pub(super) samples: Samples,
     /// Measured offsets to the clock of the recorder: time of the measurement and offset, s.
     pub(super) offsets: Vec<(f64, f64)>,
-    /// `None` if the recorder did not close the file, or if the end of the file is lost.
+    /// Footer of the stream; `None` if the recorder did not close the file, or if the end of the file is lost.
     pub(super) footer: Option<Footer>,
     /// Reason why an existing footer cannot be read.
     pub(super) unread_footer: Option<String>,
@@ -52,7 +52,7 @@ impl<'a> Bytes<'a> {
         self.take(N)?.try_into().ok()
     }
 
-    /// Reads a length of 1, 4 or 8 bytes, which is preceded by its number of bytes.
+    /// Reads a length of 1, 4 or 8 bytes, whose number of bytes precedes it.
     fn length(&mut self) -> Option<usize> {
         match self.array::<1>()? {
             [1] => self.array().map(|[n]| usize::from(n)),
@@ -68,7 +68,7 @@ impl<'a> Bytes<'a> {
 }
 
 /// Reads the streams of a file, which starts with the magic bytes. Returns the streams in the order of their headers
-/// and the position of the last chunk if it is truncated; all chunks before it are complete.
+/// and, if the last chunk is truncated, its position; all chunks before it are complete.
 pub(super) fn streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), String> {
     let mut rest = Bytes {
         rest: bytes.get(4..).unwrap_or_default(),
@@ -148,10 +148,10 @@ fn empty(format: &str) -> Option<Samples> {
 }
 
 impl Stream {
-    /// Compares the footer with the data.
+    /// Compares the footer with the samples that were read.
     ///
     /// # Errors
-    /// A description of the missing part.
+    /// A description of the difference, which means that part of the file is missing.
     pub(super) fn check_footer(&self) -> Result<(), String> {
         let Some(footer) = self.footer else { return Ok(()) };
         let read = self.stamps.len();
@@ -170,7 +170,7 @@ impl Stream {
             .into_iter()
             .flat_map(|((from, to), (first, last))| [("first", from, *first), ("last", to, *last)])
         {
-            // Recorders print times with six digits, and may omit time stamps that follow from the sample time.
+            // Recorders print times with six digits, and may omit time stamps that follow from the nominal sample time.
             let slack_s = self.nominal_step_s().max(1e-5 * stated.abs()).max(1e-6);
             if (stated - found).abs() > slack_s {
                 return Err(format!(

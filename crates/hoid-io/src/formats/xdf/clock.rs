@@ -3,9 +3,9 @@
 //!
 //! The offset `o_k` to the recorder's clock was measured at times `c_k`. A line `o = b_0 + b_1 c` is fitted with
 //! Huber's loss by the alternating direction method of multipliers (Boyd et al., 2011, section 6.1.1), in units of 1e-4
-//! s, so that measurements over a busy network have little weight. Then `t <- t + b_0 + b_1 t`. If the clock was reset,
-//! each part between resets has its own line. Finally, in a stream with a nominal rate, the time stamps between two
-//! breaks are replaced by their least-squares line over the sample index.
+//! s, so that measurements over a busy network have little weight. Then each time stamp t is replaced by
+//! `t + b_0 + b_1 t`. If the clock was reset, each part between resets has its own line. Finally, in a stream with a
+//! nominal rate, the time stamps between two breaks are replaced by their least-squares line over the sample index.
 //!
 //! Unlike in pyxdf, lost samples also count as a break: a step of more than [`LOST_SAMPLES`] nominal sample times `T`
 //! after which the time stamps remain late. The lateness is the difference between the medians of `t_k - k T` before
@@ -16,7 +16,7 @@
 use super::chunks::Stream;
 use crate::wording::shown;
 
-/// Unit of the fit, s; the loss is linear for deviations above one unit.
+/// Unit of the offsets in the fit, s; the loss is linear for deviations above one unit.
 const UNIT_S: f64 = 1e-4;
 const ITERATIONS: usize = 1000;
 /// Limits for a reset of the clock (multiple of the median absolute deviation, and s). The time between two offset
@@ -29,9 +29,9 @@ const BREAK_SAMPLES: f64 = 500.0;
 
 /// Step, and subsequent lateness, above which samples count as lost, in nominal sample times.
 const LOST_SAMPLES: f64 = 4.0;
-/// Number of samples on each side of a step whose median gives the lateness.
+/// Number of samples on each side of a step from whose medians the lateness is computed.
 const SAMPLES_PER_SIDE: usize = 25;
-/// Relative deviation of the rate from the stated one above which the deviation is reported.
+/// Relative deviation of the sampling rate from the nominal rate above which the deviation is reported.
 const OFF: f64 = 0.02;
 
 /// Returns the times of the samples, s.
@@ -83,7 +83,7 @@ fn synchronise(times: &mut [f64], offsets: &[(f64, f64)]) -> usize {
     let mut from = 0;
     for &(first, last) in &parts {
         let (b0, b1) = line(&offsets[first..=last]);
-        // The part ends before the first time stamp that is closer to the next part.
+        // A part ends before the first time stamp that is closer to the offsets of the next part.
         let to = match offsets.get(last + 1) {
             Some((next, _)) => {
                 let end = offsets[last].0;
@@ -98,7 +98,7 @@ fn synchronise(times: &mut [f64], offsets: &[(f64, f64)]) -> usize {
     parts.len()
 }
 
-/// Returns the first and the last offset of each part between resets of the clock.
+/// Returns for each part between resets of the clock the indices of its first and last offset.
 fn resets(offsets: &[(f64, f64)]) -> Vec<(usize, usize)> {
     if offsets.is_empty() {
         return Vec::new();
@@ -194,7 +194,7 @@ fn lost(times: &[f64], k: usize, nominal_s: f64) -> bool {
             .collect();
         median(&of)
     };
-    // Samples that would have arrived late together are skipped.
+    // Samples that would have arrived late together are skipped after the step.
     let come = k.saturating_add((late_s / nominal_s).ceil() as usize);
     let from = come.min(times.len().saturating_sub(SAMPLES_PER_SIDE)).max(k);
     let shift_s =
@@ -242,12 +242,12 @@ mod tests {
             .map(|k| (1e5 + 5.0 * f64::from(k), 3.0 - 1e-4 * 5.0 * f64::from(k)))
             .collect();
         let (b0, b1) = line(&offsets);
-        // The offsets near 1e5 s have a rounding error of 1e-11 s.
+        // Offsets near 1e5 s have a rounding error of 1e-11 s.
         assert!(
             (b0 + b1 * 1e5 - 3.0).abs() < 1e-9 && (b1 + 1e-4).abs() < 1e-11,
             "{b0} {b1}"
         );
-        // An outlier of 0.5 s moves the line by a ten-thousandth of it.
+        // An outlier of 0.5 s moves the line by less than a ten-thousandth of the outlier.
         offsets[7].1 += 0.5;
         let (b0, b1) = line(&offsets);
         assert!(

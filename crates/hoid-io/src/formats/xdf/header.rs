@@ -8,7 +8,7 @@ use crate::wording::short_error;
 /// Maximum number of channels of a stream; a larger number counts as damage.
 const MOST_CHANNELS: usize = 1 << 12;
 
-/// Properties of a stream that the file gives before the samples.
+/// Properties of a stream, which the file gives before the samples.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Header {
     pub(super) name: String,
@@ -130,7 +130,7 @@ mod tests {
             let damaged = text.replace(from, to);
             assert!(parse(damaged.as_bytes()).is_err() || to.is_empty(), "{damaged}");
         }
-        // Neither nesting nor entities take memory.
+        // Neither deep nesting nor entities take much memory.
         assert!(parse("<a>".repeat(1_000_000).as_bytes()).is_err());
         let bomb = "<!DOCTYPE a [<!ENTITY b \"bbbb\"><!ENTITY c \"&b;&b;&b;\">]><info>&c;</info>";
         assert!(parse(bomb.as_bytes()).is_err());

@@ -11,7 +11,7 @@
 //! from the first sample of the file.
 
 mod chunks;
-// This module runs a regression over times whose number it has checked.
+// The lint is off because this module computes a regression over times whose number it has checked.
 #[allow(clippy::indexing_slicing, clippy::arithmetic_side_effects)]
 mod clock;
 mod header;

@@ -10,7 +10,7 @@ use crate::formats::arrays::{Array, Contents, Entry, Indexing, Numbers, Value};
 use crate::formats::budget::Budget;
 use crate::wording::{shown, start_of};
 
-/// Approximate memory of an entry in bytes.
+/// Approximate memory of an entry, in bytes.
 const ENTRY: u64 = 512;
 
 /// Reads the streams from the bytes of a file.
@@ -134,7 +134,7 @@ fn entries_of(stream: Stream, parent: &str, times: &[f64]) -> Vec<Entry> {
     entries
 }
 
-/// Makes names unique: a number is appended to the second and each further use of a name.
+/// Makes names unique by appending a number to the second and each further use of a name.
 #[derive(Default)]
 struct Names {
     known: HashSet<String>,
@@ -172,7 +172,7 @@ mod tests {
             for line in expected.lines().filter_map(|line| line.strip_prefix(start.as_str())) {
                 let (row, t) = line.split_once(',').unwrap();
                 let (found, t) = (times[row.parse::<usize>().unwrap()], t.parse::<f64>().unwrap());
-                // The sums have a different order; an offset of 3000 s in units of 1e-4 s leaves a
+                // The reference adds the terms in a different order; an offset of 3000 s in units of 1e-4 s leaves a
                 // rounding error of 1e-9 s.
                 assert!((found - t).abs() < 2e-9, "{} {row}: {found} {t}", stream.header.name);
                 compared += 1;
@@ -235,12 +235,12 @@ mod tests {
                 "{message}"
             );
         }
-        // A footer whose text is truncated, in a chunk of the right length: all samples are there.
+        // The footer is truncated within a chunk of the right length, but all samples are present.
         let cut = &footer(50.0, 59.99, 1000)[..70];
         let contents = read(&file_of(&times, Some(cut)), "a.xdf").unwrap();
         let said = |n: &String| n.contains("its footer") && n.contains("1000 samples are read");
         assert!(contents.notes.iter().any(said), "{:?}", contents.notes);
-        // The file ends between two chunks: this is not a contradiction, but it is reported.
+        // The file ends between two chunks, without a footer: this is not an error, but it is reported.
         let notes = read(&file_of(&times, None), "a.xdf").unwrap().notes;
         assert!(
             notes
@@ -277,7 +277,7 @@ mod tests {
                 "{notes:?}"
             );
         }
-        // Before the first stream there are no data.
+        // A file that ends before the first stream contains no data.
         let message = read(&bytes[..20], "a.xdf").map(drop).unwrap_err().to_string();
         assert!(message.contains("a.xdf is damaged: the chunk at byte"), "{message}");
     }

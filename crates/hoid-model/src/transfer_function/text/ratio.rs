@@ -39,7 +39,7 @@ impl Ratio {
         }
     }
 
-    /// Returns `self + sign other`; `None` if their delays differ.
+    /// Returns `self + sign * other`; `None` if the delays of the two terms differ.
     pub fn plus(&self, other: &Self, sign: f64) -> Option<Self> {
         if self.delay_s != other.delay_s {
             return None;

@@ -2,12 +2,13 @@
 
 use super::{coefficients::EXAMPLES, ratio::Ratio};
 
-/// Degree above which a polynomial is probably a typing error, and its roots are dominated by rounding.
+/// Highest accepted degree; a polynomial of higher degree is probably a typing error, and its roots are dominated by
+/// rounding.
 const HIGHEST_DEGREE: usize = 50;
 /// Largest depth of nested parentheses.
 const DEEPEST: usize = 50;
 
-/// The remaining characters, and the depth of parentheses.
+/// Parser with the remaining characters and the current depth of parentheses.
 pub(super) struct Reader {
     signs: Vec<char>,
     at: usize,
@@ -235,7 +236,7 @@ impl Reader {
         if signs.get(end) == Some(&'.') {
             end += 1 + digits(end + 1);
         }
-        // An e without digits after it belongs to a delay.
+        // An e that is not followed by digits belongs to a delay.
         if matches!(signs.get(end), Some('e' | 'E')) {
             let sign = usize::from(matches!(signs.get(end + 1), Some('+' | '-')));
             let exponent = digits((end + 1 + sign).min(signs.len()));

@@ -7,7 +7,7 @@
 //!   probability of such a change since the last birth;
 //! - **a neighbouring delay**, as an alternative that may have been true throughout: the hypothesis is as old as its
 //!   parent, and the variance of each parameter is increased by the error that the difference in delay causes in it;
-//!   the first such hypotheses are created when the bank starts;
+//!   the first hypotheses with neighbouring delays are created when the bank starts;
 //! - **a change of the delay**: delays spread over all candidates, with the variances of the gains increased as in any
 //!   change, and probabilities proportional to the normal density of the step. The set of proposed delays is shifted by
 //!   one each time, so that each candidate has its turn, and the number of hypotheses is bounded for any number of
@@ -79,8 +79,8 @@ impl<const M: usize> Bank<M> {
         }
     }
 
-    /// Starts from one hypothesis. `None` if M is below two, the start is not finite or not within the bounds, the
-    /// bounds allow omega_nm or zeta_nm to become zero, or a value of the prior is out of range.
+    /// Creates a bank with one hypothesis. `None` if M is below two, the start is not finite or not within the bounds,
+    /// the bounds allow omega_nm or zeta_nm to become zero, or a value of the prior is out of range.
     pub fn new(first: Hypothesis, prior: ChangePrior) -> Option<Self> {
         let within_bounds = first
             .eta
@@ -223,7 +223,8 @@ impl<const M: usize> Bank<M> {
         }
     }
 
-    /// Creates hypotheses with delays close to the likeliest, unless they exist already.
+    /// Creates hypotheses with delays close to the likeliest delay, unless a hypothesis with the same delay and the
+    /// same birth exists already.
     fn spawn_neighbouring_delays(&mut self) {
         let Some((slot, parent)) = self.parent() else { return };
         let delay = self.prior.delay;
@@ -246,7 +247,7 @@ impl<const M: usize> Bank<M> {
         }
     }
 
-    /// Creates hypotheses that the gains and the delay change now, with the given total probability.
+    /// Creates hypotheses that the gains and the delay change now, with at most the given total probability.
     fn spawn_changed_delays(&mut self, probability: f64) {
         let Some((slot, parent)) = self.parent() else { return };
         let delay = self.prior.delay;
@@ -287,15 +288,15 @@ impl<const M: usize> Bank<M> {
         likeliest
     }
 
-    /// Returns a child of the hypothesis that assumes that the operator changes now.
+    /// Returns a child of `parent`; the child assumes that the operator changes now.
     fn with_change(&self, parent: &Hypothesis, neuromuscular: bool) -> Hypothesis {
         let mut child = parent.with_change(self.samples, neuromuscular, &self.prior);
         child.before.delay = self.delay();
         child
     }
 
-    /// Puts a child into an empty slot, or into that of the least likely hypothesis that is old enough to be pruned. If
-    /// that hypothesis is the parent, the child is discarded.
+    /// Puts a child into an empty slot, or into the slot of the least likely hypothesis that is old enough to be
+    /// pruned. If that hypothesis is the parent, the child is discarded.
     fn spawn(&mut self, mut child: Hypothesis, probability: f64, parent: usize) {
         let (mut slot, mut lowest) = (None, f64::INFINITY);
         for (i, h) in self.hypotheses.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! Detection of a change of the operator: its time, and the parameters that changed.
 //!
 //! `Lambda = ln((sum of P(h) over hypotheses born within the last T)/(sum of P(h) over older hypotheses))` is the
-//! logarithm of the posterior odds of a change. It corresponds to the likelihood ratio of Willsky and Jones (A. S.
+//! logarithm of the posterior odds of a change. Lambda corresponds to the likelihood ratio of Willsky and Jones (A. S.
 //! Willsky and H. L. Jones, *IEEE Transactions on Automatic Control* 21 (1976) 108-112), but the size and the time of
 //! the change are averaged out instead of maximised, so that its expectation does not grow with the number of times
 //! that are tried. A change is declared if Lambda exceeds the threshold and the likeliest recent hypothesis is old
@@ -103,7 +103,8 @@ impl ChangeDetector {
         self.log_odds > 0.0 && before <= 0.0
     }
 
-    /// Declares the change of the likeliest recent hypothesis, once it is old enough and if something new has changed.
+    /// Declares the change of the likeliest recent hypothesis, provided that this hypothesis is old enough and that the
+    /// change, or a part of it, has not been declared yet.
     fn declare(&mut self, sums: &Sums<'_>, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) {
         let Some(h) = sums.likeliest.filter(|h| now - h.born >= prior.settling_time) else {
             return;

@@ -44,7 +44,7 @@ impl<const M: usize, const D: usize, B> MultipleModelFilter<M, D, B> {
 }
 
 impl<const M: usize, const D: usize> MultipleModelFilter<M, D> {
-    /// Starts from one hypothesis with filters at rest, for a known delay. `None` if the order of the noise model
+    /// Creates the filter with one hypothesis, at rest and for a known delay. `None` if the order of the noise model
     /// exceeds D or if [`Bank::new`] returns `None`.
     pub fn new(first: Hypothesis, d: &[f64], prior: ChangePrior) -> Option<Self> {
         Self::with_delays(first, d, prior, [[0.0; 6]; 1])
@@ -52,8 +52,8 @@ impl<const M: usize, const D: usize> MultipleModelFilter<M, D> {
 }
 
 impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> MultipleModelFilter<M, D, B> {
-    /// As [`MultipleModelFilter::new`], with several candidate delays. It also returns `None` if the memory is not for
-    /// [`DelayPrior::count`](super::prior::DelayPrior::count) signals.
+    /// As [`MultipleModelFilter::new`], with several candidate delays. It also returns `None` if the size of the memory
+    /// differs from [`DelayPrior::count`](super::prior::DelayPrior::count).
     pub fn with_delays(first: Hypothesis, d: &[f64], prior: ChangePrior, memory: B) -> Option<Self> {
         let ring = SignalRing::new(memory);
         if d.len() > D || ring.count() != prior.delay.count {

@@ -8,7 +8,7 @@
 //!
 //! where `d_omega`, `d_zeta` are the distances from the linearisation point of the filters. The predictive distribution
 //! of eps is Student's t with the variance `v = sigma^2 + psi' P psi` and n degrees of freedom, the number of residuals
-//! in sigma^2. Its density is `v^{-1/2} exp(-(n + 1)/2 ln(1 + eps^2/(n v)) - 1/(4 n))` up to a factor (the Gamma
+//! in sigma^2. The density of eps is `v^{-1/2} exp(-(n + 1)/2 ln(1 + eps^2/(n v)) - 1/(4 n))` up to a factor (the Gamma
 //! functions give `-1/(4 n) + O(n^{-3})`).
 //!
 //! An innovation beyond the limit is replaced by the limit, both in the density and in sigma^2, and the variance of the
@@ -123,8 +123,8 @@ impl Hypothesis {
         }
     }
 
-    /// Starts from an estimate, its covariance and the innovation variance. `None` unless the covariance is positive
-    /// definite.
+    /// Creates a hypothesis from an estimate, its covariance and the innovation variance. `None` unless the covariance
+    /// is positive definite.
     pub fn new(
         eta: [f64; OPERATOR],
         covariance: &[[f64; OPERATOR]; OPERATOR],
@@ -189,7 +189,7 @@ impl Hypothesis {
     }
 
     /// Adds the drift of the parameters between two births, which is faster just after a change. A parameter stops
-    /// drifting when its variance reaches that of a change.
+    /// drifting when its variance reaches the prior variance of a change.
     pub fn drift(&mut self, now: u64, prior: &ChangePrior) {
         let scales = self.gain_scales(prior);
         // The first hypothesis, born at sample 0, does not represent a change.
@@ -225,8 +225,8 @@ impl Hypothesis {
         Self { extra_delay, ..self }
     }
 
-    /// Returns the hypothesis that the delay is, and has always been, another one close to the delay of this
-    /// hypothesis.
+    /// Returns a hypothesis that differs from this one only in its delay, which is assumed to have been valid all
+    /// along, and in the variances, which are increased by the effect of the difference in delay.
     pub fn with_neighbouring_delay(&self, extra_delay: usize, prior: &ChangePrior) -> Self {
         let mut other = self.with_extra_delay(extra_delay);
         let (scales, away) = (self.gain_scales(prior), extra_delay.abs_diff(self.extra_delay) as f64);

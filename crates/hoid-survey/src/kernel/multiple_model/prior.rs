@@ -44,8 +44,8 @@ pub struct ChangePrior {
     pub pruning_age: u64,
     /// Time after its birth during which a hypothesis counts as a recent change, samples.
     pub change_window: u64,
-    /// Number of samples in which the estimates settle after a change. A younger hypothesis cannot identify the changed
-    /// parameters.
+    /// Number of samples in which the estimates settle after a change. A hypothesis that is younger than the settling
+    /// time cannot identify the changed parameters.
     pub settling_time: u64,
     /// Logarithm of the posterior odds above which a change is declared.
     pub log_odds_threshold: f64,

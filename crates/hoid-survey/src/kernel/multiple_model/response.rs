@@ -58,7 +58,7 @@ impl Response {
         }
     }
 
-    /// Returns the signals at one sample for its delayed error.
+    /// Processes one sample of the delayed error and returns the signals at that sample.
     #[inline(always)]
     pub fn step(&mut self, e: f64) -> Signals {
         let ([f1, f2], [x1, x2]) = (&self.f, &self.past);

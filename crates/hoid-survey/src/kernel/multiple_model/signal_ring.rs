@@ -14,7 +14,7 @@ pub struct DelayedSignals<'a> {
 }
 
 impl<'a> DelayedSignals<'a> {
-    /// The signals for a known delay.
+    /// Creates the signals of a model whose delay is known.
     pub fn known(signals: &'a Signals) -> Self {
         Self {
             ring: std::slice::from_ref(signals),
@@ -25,7 +25,7 @@ impl<'a> DelayedSignals<'a> {
     /// Returns the signals for a delay that is `extra_delay` samples longer than the shortest.
     ///
     /// # Panics
-    /// May panic if the delay exceeds the longest delay; if it does not, the signals of another delay are returned.
+    /// A delay that exceeds the longest delay causes a panic or returns the signals of another delay.
     #[inline(always)]
     pub fn at(&self, extra_delay: usize) -> &'a Signals {
         let place = if extra_delay > self.newest {

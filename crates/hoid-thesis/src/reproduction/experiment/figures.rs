@@ -63,7 +63,7 @@ impl Shown {
         }
     }
 
-    /// Value of the quantity in a row; NaN beyond the end.
+    /// Value of the quantity in a row of a recursive estimate; NaN beyond its last row.
     fn of_course(self, course: &RecursiveTrace, row: usize) -> f64 {
         let found = match self {
             Self::Variance(i) => course.variances.get(row).map(|variances| variances[i]),
@@ -152,7 +152,7 @@ fn over_time(
     for (t, [mean, median]) in times_s.iter().zip(&both) {
         data.row(&[name, RECURSIONS[method], subject], &[*t, *mean, *median]);
     }
-    // Higher levels are darker: the median is drawn first, and the mean over it.
+    // Higher levels are darker: the median is drawn first, and the mean on top of it.
     [1, 0]
         .into_iter()
         .enumerate()

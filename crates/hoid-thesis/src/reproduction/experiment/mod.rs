@@ -1,8 +1,8 @@
 //! The experiment with virtual or recorded people: Table 3, Figs. 13, 14 and I.1 to I.18.
 //!
-//! All these items show the same runs, which are made once, before the first item is drawn. A figure of recorded people
-//! has the number of the figure in the text in which the controlled element changes in the same way, followed by the
-//! name of the condition if it differs from that in the text.
+//! All items of the experiment show the same runs, which are made once, before the first item is drawn. A figure of
+//! recorded people has the number of the figure in the text in which the controlled element changes in the same way,
+//! followed by the name of the condition if it differs from that in the text.
 //!
 //! | module | contents |
 //! |---|---|

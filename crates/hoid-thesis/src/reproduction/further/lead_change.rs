@@ -22,7 +22,8 @@ pub(super) fn items() -> Vec<Item> {
     )]
 }
 
-/// Returns the median and the spread of T_L at the last stored time that is not after the given time.
+/// Returns the median of T_L and its standard deviation over the runs, estimated from the quartiles, at the last stored
+/// time that is not after the given time.
 fn at_time(results: &Results, cell: u64, estimator: &str, time_s: f64) -> Option<(f64, f64)> {
     let trace = results.traces(cell, estimator)?;
     let bands = trace.parameters.get("T_L")?;

@@ -7,11 +7,11 @@
 //! `theta = argmin sum_k |(sum_i theta_i h_i(w_k) - Y(w_k))/Y(w_k)|^2`,
 //!
 //! and the derivatives J of the state s = (theta, level, corrections) with respect to x follow from the same problem
-//! for dY/dx, except for the corrections themselves: `S = J C J'`. For the forms with a lag, and for a gain with a
-//! lead, the nearest operator is the operator itself.
+//! for dY/dx, except for the derivatives of the corrections, which are known directly. The covariance of s is
+//! `S = J C J'`. For the forms with a lag, and for a gain with a lead, the nearest operator is the operator itself.
 //!
-//! The remnant of the fit is `v = (C/D) eps` with the impulse response g; its autocovariances divided by the variance
-//! of eps are `r_k = sum_j g_j g_{j+k}`.
+//! The remnant of the fit is `v = (C/D) eps`; with the impulse response g of C/D, the autocovariances of v divided by
+//! the variance of eps are `r_k = sum_j g_j g_{j+k}`.
 
 use hoid_core::adaptive::{
     DYNAMICS, GAINS, LARGEST_ORDER, LINEAR, STATES,
@@ -25,23 +25,25 @@ use hoid_model::{Complex64, FittedOperator, SampleTime, operator_family::Coordin
 
 use crate::person_prior::PersonPrior;
 
-/// Standard deviations of the dynamics without prior knowledge: relative for omega and zeta, in s for the delay.
+/// Standard deviations of the dynamics without prior knowledge: relative for omega and zeta, in s for tau.
 const WIDE: [f64; DYNAMICS] = [0.45, 0.75, 0.15];
-/// Frequencies at which the gains of a fit are computed, rad/s: range and number.
+/// Frequencies at which the gains are fitted to the response of an earlier fit: range in rad/s, and number.
 const FREQUENCIES: ([f64; 2], usize) = ([0.3, 8.0], 24);
 /// Range of the lag of a basis, s. A lag beyond its upper end cannot be distinguished from an integration.
 const LAGS_S: [f64; 2] = [0.05, 10.0];
-/// Root mean square of the relative misfit beyond which the basis is not considered to represent a form.
+/// Root mean square of the relative misfit beyond which the basis cannot approximate a form.
 const MISFIT: f64 = 0.1;
 /// Length of data, in s, that has the same weight as the remnant of a fit.
 const REMNANT_S: f64 = 20.0;
-/// Longest impulse response of the remnant that is summed, s, and the largest share of its power in the second half.
+/// Longest impulse response of the remnant that is summed, s, and the largest share of the power of an impulse response
+/// in its second half.
 const LONGEST_S: f64 = 60.0;
 const LEFT: f64 = 1e-6;
 /// Prior standard deviation of the level of u, in standard deviations of the remnant.
 const LEVEL: f64 = 3.0;
 
-/// The basis at the start, and the prior spread of a person about it.
+/// The point at which the basis is computed at the start, and the prior standard deviations of a person's dynamics
+/// about it.
 pub(super) struct StartingPoint {
     pub point: Point,
     /// Prior standard deviations: relative for omega and zeta, in s for the delay.
@@ -55,7 +57,7 @@ impl StartingPoint {
         let DefaultOperator {
             mut point, mut spread, ..
         } = DefaultOperator::with_delay(tau_s);
-        // A held error is half a sample later than one that is linear between samples.
+        // An error that is held between samples is half a sample later than an error that is linear between samples.
         let hold = 0.5 * sample_time.s();
         let of_delay = |otherwise: f64| if is_given { GIVEN_DELAY_S } else { otherwise };
         spread[2] = of_delay(spread[2]);
@@ -89,7 +91,7 @@ impl StartingPoint {
                 let lag = match rate.map(|i| fit.operator.coordinates()[i]) {
                     Some(rate) => 1.0 / rate.max(1.0 / LAGS_S[1]),
                     None if fit.operator.form().has_pole() => LAGS_S[1],
-                    // A squared lead without a lag is best approximated with a short lag.
+                    // A form with a squared lead and without a lag is best approximated with a short lag of the basis.
                     None if fit.operator.form().degree() == 2 => LAGS_S[0],
                     None => LAG_S,
                 };
@@ -207,16 +209,16 @@ fn remnant(fit: &FittedOperator, sample_time: SampleTime) -> Option<Lags> {
 
 /// The least-squares problem of the nearest gains.
 struct Nearest {
-    /// Responses of the operator after a zero-order hold.
+    /// Responses of the operator, after a zero-order hold, at each frequency.
     responses: Vec<hoid_model::operator_family::FamilyResponse>,
-    /// Responses of the basis, divided by those of the operator.
+    /// Responses of the basis at each frequency, divided by that of the operator.
     basis: Vec<[Complex64; GAINS]>,
 }
 
 impl Nearest {
-    /// Factor by which the covariance of the state must be increased so that the response is at no frequency better
-    /// known than from the fit. It exceeds one because gains with a fixed lag cannot represent how an unknown lag
-    /// varies with frequency.
+    /// Returns the factor by which the covariance of the state must be increased so that the response is at no
+    /// frequency better known than from the fit. The factor exceeds one because gains with a fixed lag cannot represent
+    /// the uncertainty of the response that an unknown lag causes.
     fn lost(&self, fit: &FittedOperator, coordinates: &[Coordinate], columns: &[[f64; STATES]]) -> f64 {
         let p = coordinates.len();
         let sizes = |g: &[Complex64]| -> [f64; 2] {
@@ -269,7 +271,8 @@ impl Nearest {
         }
     }
 
-    /// Returns the gains whose response is nearest to a target, and the root mean square of the relative misfit.
+    /// Returns the gains with which the response of the basis is nearest to a target, and the root mean square of the
+    /// relative misfit.
     fn gains(&self, target: impl Fn(usize) -> Complex64) -> ([f64; GAINS], f64) {
         let count = self.basis.len();
         let relative = |k: usize| target(k) / self.responses[k].value;
@@ -372,8 +375,9 @@ mod tests {
                     (response.phase_deg(), along(|r| r.im).to_degrees()),
                 ] {
                     let ratio = found.standard_error.unwrap() / expected;
-                    // An unknown lag is an unknown phase, which the gains cannot represent at low frequencies, where
-                    // it is small compared with the gain's; elsewhere they carry a little more information.
+                    // An unknown lag makes the phase uncertain, which the gains cannot represent at low frequencies,
+                    // where this uncertainty is small compared with that of the gain; at other frequencies they carry a
+                    // little more information than the fit.
                     assert!((ratio > 0.9 || omega < 1.0) && ratio < 1.5, "{form} {omega}: {ratio}");
                 }
             }
@@ -404,7 +408,7 @@ mod tests {
 
     #[test]
     fn the_remnant_of_a_fit_is_summed() {
-        // An autoregression of order 1 with the pole .8: .8^k/(1 - .64).
+        // For an autoregression of order 1 with the pole .8, `r_k = .8^k/(1 - .64)`.
         let fit = FittedOperator {
             noise: (Vec::new(), vec![-0.8]),
             ..fitted(Form::Lead, &[2.0, 0.4, 2.3, -1.2, 0.18])
