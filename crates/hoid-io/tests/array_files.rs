@@ -277,7 +277,7 @@ fn names_in_the_only_structure() {
     bytes.extend([0, 1, b'I', b'M']);
     fs::write(&path, [bytes, inner].concat()).unwrap();
     let message = read_record(&path, &ReadOptions::default()).unwrap_err().to_string();
-    assert!(message.contains("structures more than 32 deep"), "{message}");
+    assert!(message.contains("structures nested more than 32 deep"), "{message}");
 }
 
 /// A data element of version 5.

@@ -320,7 +320,7 @@ fn files_of_another_program_are_read() {
         let notes = read.notes.join("\n");
         for (column, what) in [
             ("who", "P0"),
-            ("day", "a date or clock time"),
+            ("day", "a date or time"),
             ("pair.list.element", "a list"),
         ] {
             let note = format!("column {column} is left out");
