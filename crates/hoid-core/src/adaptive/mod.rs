@@ -28,10 +28,10 @@
 //!    initial probability of the child is that of the class times the hazard `H = block/mean time between changes`, and
 //!    the covariance of a jump is added to P_j.
 //! 10. **Noise** ([`noise`], `volatility`). D is an autoregression of the residuals, fitted by least squares. The
-//!    spread of the block energies gives the number of samples that count as one independent sample.
+//!     spread of the block energies gives the number of samples that count as one independent sample.
 //! 11. **Replay** (`filter`). A second candidate reads the record again with the new basis point and D, and replaces
-//!    the first candidate when it has caught up. The replays amount to a batch prediction-error fit, repeated at a
-//!    bounded cost per sample.
+//!     the first candidate when it has caught up. The replays amount to a batch prediction-error fit, repeated at a
+//!     bounded cost per sample.
 //! 12. **Change test** ([`detector`], [`contrast`], [`difference`]). Least-squares fits before and after a possible
 //!     change give `T = d' C^-1 d` (Wald; G. C. Chow, *Econometrica* 28 (1960) 591-605; H. White, *Econometrica* 48
 //!     (1980) 817-838).
