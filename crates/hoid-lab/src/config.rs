@@ -335,15 +335,20 @@ impl Condition {
         Ok(())
     }
 
-    /// Returns the role of the target for the person, as a role of `hoid identify`; `None` if the display shows the
-    /// error only.
-    pub(crate) fn role_of_target(&self) -> Option<String> {
+    /// Returns the role of the target for the person, as a role of `hoid identify`; `None` if there is no target or the
+    /// display shows the error only.
+    ///
+    /// # Errors
+    /// As [`Condition::course`].
+    pub(crate) fn role_of_target(&self) -> Result<Option<String>, LabError> {
+        let [has_target, _] = self.course()?.has_lines();
         let feedforward = ChannelRole::Feedforward;
-        match self.display {
+        let role = match self.display {
             Display::Compensatory => None,
             Display::Pursuit => Some(feedforward.to_string()),
             Display::Preview => Some(format!("{feedforward}:{}", self.preview_s)),
-        }
+        };
+        Ok(role.filter(|_| has_target))
     }
 
     /// Checks that the numbers of the condition are valid and that it can be run.

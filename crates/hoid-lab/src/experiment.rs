@@ -160,7 +160,7 @@ pub fn manifest(out: &Path) -> Result<(), LabError> {
 fn known(condition: &Condition) -> Result<ConditionSettings, LabError> {
     let course = condition.course()?;
     let [has_target, has_disturbance] = course.has_lines();
-    let role = condition.role_of_target().filter(|_| has_target);
+    let role = condition.role_of_target()?;
     // At the lines of a displayed target, u/e is not the response to the error.
     let excitation = match (&role, has_target, has_disturbance) {
         (Some(_), _, true) | (None, false, true) => Some("d"),

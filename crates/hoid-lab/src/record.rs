@@ -44,7 +44,7 @@ pub fn record(begun: &RunStart, task: &Task, logged: &Logged) -> Result<Record, 
         channel("u", every(&logged.signals.u)),
     )?
     .starting_at(-(begun.run_in as f64) * TICK_S);
-    let role_of_target = begun.condition.role_of_target().unwrap_or_default();
+    let role_of_target = begun.condition.role_of_target()?.unwrap_or_default();
     for (name, values, role) in [
         (TARGET, &task.target, role_of_target),
         ("d", &task.disturbance, String::new()),

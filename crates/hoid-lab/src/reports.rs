@@ -77,7 +77,6 @@ fn one(program: &Path, config: &Config, stem: &Stem, name: &str) {
     let course = begun.as_ref().and_then(|begun| begun.condition.course().ok());
     // Margins are defined only for a constant controlled element.
     let element = course
-        .as_ref()
         .filter(|course| course.change_s().is_none())
         .and_then(|course| course.element_at(0.0).ok());
     match name {
@@ -90,9 +89,7 @@ fn one(program: &Path, config: &Config, stem: &Stem, name: &str) {
                 .arg(&place);
         }
         "identify" => {
-            let role = begun.as_ref().and_then(|begun| begun.condition.role_of_target());
-            let has_target = course.as_ref().is_some_and(|course| course.has_lines()[0]);
-            if let Some(role) = role.filter(|_| has_target) {
+            if let Some(Ok(Some(role))) = begun.as_ref().map(|begun| begun.condition.role_of_target()) {
                 command.args(["--input", "e", "--input", TARGET]);
                 command.arg(format!("--role={TARGET}={role}"));
             }

@@ -10,7 +10,7 @@ use hoid_model::{Complex64, ContinuousTransferFunction, FamilyOperator, GainUnit
 
 use crate::{
     FitSummary, ModelSection, ParameterRow, Picture, Report, facts,
-    figures::{InputResponse, ModelCurve, describing, responses},
+    figures::{ModelCurve, describing, log_spaced, responses},
     model_figure, sentence,
 };
 
@@ -155,28 +155,25 @@ fn to_all_inputs(found: &Identified) -> Option<String> {
     let fit = &found.fit;
     let (low, high) = CHANNEL_RANGE;
     let high = high.min(0.9 * std::f64::consts::PI / fit.sample_time.s());
-    let step = (high / low).ln() / (CHANNEL_POINTS - 1) as f64;
-    let omega: Vec<f64> = (0..CHANNEL_POINTS).map(|k| low * (step * k as f64).exp()).collect();
-    let further: Vec<InputResponse> = (fit.channels.iter())
+    let omega = log_spaced((low, high), CHANNEL_POINTS);
+    let further: Vec<ModelCurve> = (fit.channels.iter())
         .filter_map(|channel| {
-            let response = channel.response.as_ref()?;
-            Some(InputResponse {
-                title: format!("to {} ({})", channel.name, channel.role),
-                points: channel.frequency_response(&omega, (fit.sample_time, fit.intersample))?,
-                delay_s: response.operator.tau_e_s() - channel.preview_s,
-            })
+            let delay_s = channel.response.as_ref()?.operator.tau_e_s() - channel.preview_s;
+            let points = channel.frequency_response(&omega, (fit.sample_time, fit.intersample))?;
+            let name = format!("to {} ({})", channel.name, channel.role);
+            Some(ModelCurve::of_points(&name, delay_s, &points))
         })
         .collect();
     if further.is_empty() {
         return None;
     }
     let error = found.data.records.first()?.input_channel()?;
-    let feedback = InputResponse {
-        title: format!("to {} (feedback)", error.name),
-        points: fit.frequency_response(0, &omega),
-        delay_s: fit.operator(0).operator.tau_e_s(),
-    };
-    let all: Vec<InputResponse> = std::iter::once(feedback).chain(further).collect();
+    let feedback = ModelCurve::of_points(
+        &format!("to {} (feedback)", error.name),
+        fit.operator(0).operator.tau_e_s(),
+        &fit.frequency_response(0, &omega),
+    );
+    let all: Vec<ModelCurve> = std::iter::once(feedback).chain(further).collect();
     Some(responses("inputs", "Responses to all inputs", &all))
 }
 

@@ -20,6 +20,8 @@ use crate::numbers::Z_95;
 const NAME: &str = "describing function, bars 95 %";
 /// Name in the legend if an error bar is truncated.
 const NAME_OF_CUT: &str = "describing function, bars 95 %, cut at 180 deg";
+/// Name of the abscissa.
+pub(super) const FREQUENCY: &str = "frequency \u{3c9} (rad/s)";
 /// Number of frequencies of a model curve.
 const POINTS: usize = 240;
 
@@ -66,7 +68,11 @@ impl ModelCurve {
         delay_s: f64,
         response: impl Fn(&[f64]) -> Vec<ResponsePoint>,
     ) -> Self {
-        let points = response(&frequencies(found, reach_rad_s));
+        Self::of_points(name, delay_s, &response(&frequencies(found, reach_rad_s)))
+    }
+
+    /// Creates the curve of a response that was computed with its standard errors.
+    pub fn of_points(name: &str, delay_s: f64, points: &[ResponsePoint]) -> Self {
         let value = |p: &ResponsePoint| {
             let gain = 10.0_f64.powf(p.magnitude_db.value / 20.0);
             Complex64::from_polar(gain, p.phase_deg.value.to_radians())
@@ -95,8 +101,26 @@ impl ModelCurve {
         around.iter().zip(&self.standard_errors).map(ends).collect()
     }
 
+    /// Curve of the magnitude (`part` 0) or of the phase (`part` 1), whose values are `y`, with its band.
+    pub(super) fn curve(&self, (kind, shade): (LineKind, Shade), part: usize, y: Vec<f64>) -> Curve {
+        Curve {
+            name: self.name.clone(),
+            kind,
+            shade,
+            x: self.omega_rad_s.clone(),
+            band: self.band(part, &y),
+            y,
+            bars: Vec::new(),
+        }
+    }
+
+    /// Magnitude in dB.
+    pub(super) fn magnitude_db(&self) -> Vec<f64> {
+        self.response.iter().map(|h| 20.0 * h.norm().log10()).collect()
+    }
+
     /// Phase in deg on the branch nearest to the points, given as pairs of frequency and phase.
-    fn phase_deg(&self, points: &[(f64, f64)]) -> Vec<f64> {
+    pub(super) fn phase_deg(&self, points: &[(f64, f64)]) -> Vec<f64> {
         let principal = self.response.iter().map(|h| h.arg().to_degrees());
         let pairs: Vec<(f64, f64)> = self.omega_rad_s.iter().copied().zip(principal).collect();
         let phase = unwrapped_deg(&pairs, self.delay_s);
@@ -122,8 +146,23 @@ fn frequencies(found: &Description, reach_rad_s: f64) -> Vec<f64> {
     let ends = lines.first().zip(lines.last());
     let (low, high) = ends.map_or((0.1, 10.0), |(a, b)| (0.9 * a.omega_rad_s, 1.1 * b.omega_rad_s));
     let high = f64::max(high, reach_rad_s);
-    let step = (high / low).ln() / (POINTS - 1) as f64;
-    (0..POINTS).map(|k| low * (step * k as f64).exp()).collect()
+    log_spaced((low, high), POINTS)
+}
+
+/// Returns `n` frequencies from `low` to `high` at equal ratios.
+pub fn log_spaced((low, high): (f64, f64), n: usize) -> Vec<f64> {
+    let step = (high / low).ln() / (n - 1) as f64;
+    (0..n).map(|k| low * (step * k as f64).exp()).collect()
+}
+
+/// A panel of curves.
+pub(super) fn panel(name: &str, unit: &str, curves: Vec<Curve>) -> CurvePanel {
+    CurvePanel {
+        name: name.to_owned(),
+        unit: unit.to_owned(),
+        curves,
+        ..CurvePanel::default()
+    }
 }
 
 /// Draws the describing function as points with error bars of 1.96 standard errors, and models as lines. `title` is the
@@ -144,25 +183,16 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
         band: Vec::new(),
         bars: values.iter().map(bar).collect(),
     };
-    let line = |(k, model): (usize, &ModelCurve), part: usize, y: Vec<f64>| Curve {
-        name: model.name.clone(),
-        kind: kind_of(k),
-        shade: Shade::of_method(k + 1),
-        x: model.omega_rad_s.clone(),
-        band: model.band(part, &y),
-        y,
-        bars: Vec::new(),
-    };
-    let panel = |name: &str, unit: &str, curves: Vec<Curve>| CurvePanel {
-        name: name.to_owned(),
-        unit: unit.to_owned(),
-        curves,
-        ..CurvePanel::default()
+    let line = |(k, model): (usize, &ModelCurve), part: usize, y: Vec<f64>| {
+        model.curve((kind_of(k), Shade::of_method(k + 1)), part, y)
     };
     let known: Vec<(f64, f64)> = omega.iter().copied().zip(phases.iter().map(|p| p.value)).collect();
-    let gain_of = |model: &ModelCurve| model.response.iter().map(|h| 20.0 * h.norm().log10()).collect();
     // The models come first, so that the points are drawn over them.
-    let mut magnitude: Vec<Curve> = models.iter().enumerate().map(|m| line(m, 0, gain_of(m.1))).collect();
+    let mut magnitude: Vec<Curve> = models
+        .iter()
+        .enumerate()
+        .map(|m| line(m, 0, m.1.magnitude_db()))
+        .collect();
     magnitude.push(points(&magnitudes, name));
     let mut phase: Vec<Curve> = models
         .iter()
@@ -195,7 +225,7 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
         panels,
         columns: 1,
         titles: Vec::new(),
-        abscissa: "frequency \u{3c9} (rad/s)".to_owned(),
+        abscissa: FREQUENCY.to_owned(),
         logarithmic_abscissa: true,
         shared_ordinates: false,
     };

@@ -1,73 +1,29 @@
 //! Frequency responses to several inputs, one column each: magnitude and phase with their 95 % bands.
 
-use hoid_ident::{ResponsePoint, frequency::unwrapped_deg};
-use hoid_model::uncertainty::Estimate;
-
 use super::{
     curves::{Curve, CurveGrid, CurvePanel, LineKind, curves},
+    describing::{FREQUENCY, ModelCurve, panel},
     palette::Shade,
 };
-use crate::numbers::Z_95;
 
-/// Largest half width of a band, dB or deg; a wider band would compress the scale of all curves.
-const WIDEST: f64 = 60.0;
-
-/// The response of a model to one of its inputs.
-#[derive(Debug, Clone, PartialEq)]
-pub struct InputResponse {
-    /// Title of its column.
-    pub title: String,
-    /// The response at frequencies in ascending order.
-    pub points: Vec<ResponsePoint>,
-    /// Delay removed for unwrapping the phase, s.
-    pub delay_s: f64,
-}
-
-/// Responses to several inputs as one figure. `title` is the text for screen readers.
-pub fn responses(id: &str, title: &str, inputs: &[InputResponse]) -> String {
-    let panel = |(k, input): (usize, &InputResponse), is_phase: bool| {
-        let omega: Vec<f64> = input.points.iter().map(|p| p.omega_rad_s).collect();
-        let estimates: Vec<Estimate> = match is_phase {
-            false => input.points.iter().map(|p| p.magnitude_db).collect(),
-            true => {
-                let principal = input.points.iter().map(|p| p.phase_deg.value);
-                let pairs: Vec<(f64, f64)> = omega.iter().copied().zip(principal).collect();
-                let phase = unwrapped_deg(&pairs, input.delay_s);
-                let errors = input.points.iter().map(|p| p.phase_deg.standard_error);
-                let both = phase.into_iter().zip(errors);
-                both.map(|(value, standard_error)| Estimate { value, standard_error })
-                    .collect()
-            }
-        };
-        let band = |e: &Estimate| {
-            let half = e.standard_error.map_or(f64::NAN, |s| (Z_95 * s).min(WIDEST));
-            (e.value - half, e.value + half)
-        };
-        let has_band = estimates.iter().any(|e| e.standard_error.is_some());
-        CurvePanel {
-            name: if is_phase { "phase" } else { "magnitude" }.to_owned(),
-            unit: if is_phase { "deg" } else { "dB" }.to_owned(),
-            curves: vec![Curve {
-                name: String::new(),
-                kind: LineKind::Line,
-                shade: Shade::of_method(k + 1),
-                x: omega,
-                band: match has_band {
-                    true => estimates.iter().map(band).collect(),
-                    false => Vec::new(),
-                },
-                y: estimates.iter().map(|e| e.value).collect(),
-                bars: Vec::new(),
-            }],
-            ..CurvePanel::default()
-        }
+/// Draws the responses to several inputs as one figure; the name of each is the title of its column. `title` is the text
+/// for screen readers.
+pub fn responses(id: &str, title: &str, inputs: &[ModelCurve]) -> String {
+    let curve = |(k, input): (usize, &ModelCurve), part: usize, y: Vec<f64>| Curve {
+        // The column has its name as a title.
+        name: String::new(),
+        ..input.curve((LineKind::Line, Shade::of_method(k + 1)), part, y)
     };
-    let row = |is_phase: bool| inputs.iter().enumerate().map(move |input| panel(input, is_phase));
+    let magnitudes = (inputs.iter().enumerate())
+        .map(|input| panel("magnitude", "dB", vec![curve(input, 0, input.1.magnitude_db())]));
+    let phases =
+        (inputs.iter().enumerate()).map(|input| panel("phase", "deg", vec![curve(input, 1, input.1.phase_deg(&[]))]));
+    let panels: Vec<CurvePanel> = magnitudes.chain(phases).collect();
     let grid = CurveGrid {
-        panels: row(false).chain(row(true)).collect(),
+        panels,
         columns: inputs.len(),
-        titles: inputs.iter().map(|input| input.title.clone()).collect(),
-        abscissa: "frequency \u{3c9} (rad/s)".to_owned(),
+        titles: inputs.iter().map(|input| input.name.clone()).collect(),
+        abscissa: FREQUENCY.to_owned(),
         logarithmic_abscissa: true,
         shared_ordinates: false,
     };
@@ -76,6 +32,9 @@ pub fn responses(id: &str, title: &str, inputs: &[InputResponse]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use hoid_ident::ResponsePoint;
+    use hoid_model::uncertainty::Estimate;
+
     use super::*;
 
     #[test]
@@ -94,10 +53,8 @@ mod tests {
             };
             [0.5, 1.0, 2.0, 4.0, 8.0].map(of).to_vec()
         };
-        let input = |title: &str, standard_error| InputResponse {
-            title: title.to_owned(),
-            points: points(3.0, standard_error),
-            delay_s: 60f64.to_radians(),
+        let input = |title: &str, standard_error| {
+            ModelCurve::of_points(title, 60f64.to_radians(), &points(3.0, standard_error))
         };
         let svg = responses("two", "both", &[input("to e", Some(0.5)), input("to r", None)]);
         assert!(svg.contains("to e") && svg.contains("to r"), "{svg}");

@@ -114,7 +114,7 @@ pub(super) fn columns<'a>(channels: impl Iterator<Item = &'a PersonChannel> + Cl
     for name in names {
         of_text.extend([format!("{name}{ROLE}"), format!("{name}_form")]);
         real.extend([format!("{name}_preview_s"), format!("{name}_p_value")]);
-        let mut own = channels.clone().filter(|channel| channel.name == name);
+        let own = channels.clone().filter(|channel| channel.name == name);
         for (parameter, _) in parameters() {
             if own.clone().any(|channel| channel.parameter(parameter).is_some()) {
                 let column = format!("{name}_{parameter}");
@@ -122,7 +122,6 @@ pub(super) fn columns<'a>(channels: impl Iterator<Item = &'a PersonChannel> + Cl
                 of_text.push(parameter_columns::text_name(&column));
             }
         }
-        debug_assert!(own.next().is_some());
     }
     (of_text, real)
 }

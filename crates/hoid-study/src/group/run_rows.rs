@@ -213,9 +213,7 @@ impl<'a> RunRows<'a> {
     }
 
     fn not_convertible(&mut self, window: Window, estimator: &str, reason: &str) {
-        self.begin(Some(window), estimator);
-        self.estimates.text("status", "not convertible");
-        self.estimates.text("reason", reason);
+        self.without_value(Some(window), estimator, "not convertible", reason);
     }
 
     /// Writes the verdict on a recursion with its reasons, unless the recursion is trustworthy.
@@ -224,22 +222,22 @@ impl<'a> RunRows<'a> {
             return;
         }
         let reasons: Vec<&str> = verdict.reasons().collect();
-        self.begin(None, estimator);
-        self.estimates.text("status", verdict.level.name());
-        self.estimates.text("reason", &reasons.join("; "));
+        self.without_value(None, estimator, verdict.level.name(), &reasons.join("; "));
     }
 
     /// Writes that an estimator failed, and the reason.
     pub fn failed(&mut self, window: Option<Window>, estimator: &str, reason: &str) {
-        self.begin(window, estimator);
-        self.estimates.text("status", "failed");
-        self.estimates.text("reason", reason);
+        self.without_value(window, estimator, "failed", reason);
     }
 
     /// Writes that an estimator does not apply, and the reason.
     pub fn omitted(&mut self, estimator: &str, reason: &str) {
-        self.begin(None, estimator);
-        self.estimates.text("status", "omitted");
+        self.without_value(None, estimator, "omitted", reason);
+    }
+
+    fn without_value(&mut self, window: Option<Window>, estimator: &str, status: &str, reason: &str) {
+        self.begin(window, estimator);
+        self.estimates.text("status", status);
         self.estimates.text("reason", reason);
     }
 }
