@@ -1,7 +1,7 @@
 //! `study`, `group` and `track` on 200 disks each that fill before the output is complete. The
 //! numbers of `research/notes/mutations.md`.
 //!
-//! `cargo xtask slow full-disks [ROUNDS] [SEED]`, on Linux, as an administrator.
+//! `cargo xtask slow full-disks [ROUNDS] [SEED] [study|group|track]`, on Linux, as an administrator.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../../hoid-lab/tests/common/disk.rs"]
@@ -27,7 +27,11 @@ fn main() -> ExitCode {
     let directory = tempfile::tempdir().unwrap();
     let bench = Bench::new(beside_this(), directory.path());
     let mut failed = false;
+    let only = std::env::args().nth(3);
     for work in [STUDY, GROUP, TRACK] {
+        if only.as_ref().is_some_and(|name| name != work.name) {
+            continue;
+        }
         let Some(outcome) = rounds(&bench, &work, count, &mut draw) else {
             println!("skipped: no disk of its own can be mounted here");
             return ExitCode::SUCCESS;

@@ -167,12 +167,12 @@ fn shown(design: &ExperimentDesign) -> Vec<(String, f64)> {
     if !design.wanted.is_empty() {
         return design.wanted.iter().map(|w| (w.name.clone(), 1.0 / w.error)).collect();
     }
-    // A relative error of the phase margin has no meaning.
+    // A relative error of the phase margin, or of a delay that may be zero, has no meaning.
     let names = design
         .expected
         .names()
         .into_iter()
-        .filter(|name| *name != "phase_margin");
+        .filter(|name| !["phase_margin", "tau_f"].contains(name));
     names.map(|name| (name.to_owned(), 100.0)).collect()
 }
 

@@ -61,11 +61,12 @@ impl Expected {
         }
     }
 
-    /// Returns the standard error of a quantity: in deg for `phase_margin`, otherwise relative to its value.
+    /// Returns the standard error of a quantity as accepted errors are given: in deg for `phase_margin`, in s for `tau_f`
+    /// (which may be zero), otherwise relative to its value.
     pub fn relative_error(&self, name: &str) -> Option<f64> {
         let found = self.estimate(name)?;
         match name {
-            "phase_margin" => found.standard_error,
+            "phase_margin" | "tau_f" => found.standard_error,
             _ => Some(found.standard_error? / found.value.abs()),
         }
     }

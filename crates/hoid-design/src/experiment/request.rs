@@ -309,6 +309,24 @@ mod tests {
         assert!(error("tau_e") <= 0.03 && error("crossover") <= 0.01);
     }
 
+    /// The delay relative to the present target may be zero.
+    #[test]
+    fn the_accepted_error_of_the_delay_to_a_target_is_absolute() {
+        let design = DesignRequest {
+            display: Display::Pursuit,
+            designing: Designing {
+                wanted: vec!["tau_f=0.02".parse().unwrap()],
+                ..Designing::default()
+            },
+            ..request()
+        }
+        .run()
+        .unwrap();
+        let error = design.expected.estimate("tau_f").unwrap().standard_error.unwrap();
+        let of_one_fewer = error * (design.runs as f64 / (design.runs as f64 - 1.0)).sqrt();
+        assert!(error <= 0.02 && of_one_fewer > 0.02, "{error} in {} runs", design.runs);
+    }
+
     #[test]
     fn a_seen_target_comes_with_a_disturbance() {
         let pursuit = DesignRequest {

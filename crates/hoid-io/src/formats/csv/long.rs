@@ -169,7 +169,8 @@ impl Text {
         self.buffer.get(..self.lines).unwrap_or(&self.buffer)
     }
 
-    /// Reads the next lines and returns the position of the first of them; `None` at the end of the file.
+    /// Reads the next lines and returns the position of the first of them; `None` at the end of the file. An error if a
+    /// line is longer than [`LARGEST`]: all of it would have to be kept in memory.
     fn advance(&mut self) -> io::Result<Option<usize>> {
         // The same buffer is used for all blocks.
         self.buffer.drain(..self.lines);
@@ -184,6 +185,12 @@ impl Text {
             self.lines = line.map_or(self.buffer.len(), |(at, _)| at.saturating_add(1));
             if line.is_some() || read == 0 {
                 return Ok((self.lines > 0).then_some(base));
+            }
+            if self.buffer.len() > LARGEST {
+                let megabytes = LARGEST >> 20;
+                return Err(io::Error::other(format!(
+                    "no line ends within {megabytes} MB after byte {base}, so that it is not a table"
+                )));
             }
         }
     }
@@ -373,6 +380,22 @@ mod tests {
         growing.advance().unwrap();
         assert!(growing.lines > growing.length);
         assert_eq!(growing.probed(0, b',').unwrap().len(), PROBES as usize);
+    }
+
+    /// A recorder that was stopped by a full disk or a power cut may leave any number of zero bytes.
+    #[test]
+    fn a_line_without_end_is_an_error() {
+        let rows = "1,2\n".repeat(100_000);
+        let file = file(&format!("t,e\n{rows}"));
+        let mut whole = File::options().write(true).open(file.path()).unwrap();
+        whole.set_len(1 << 30).unwrap();
+        whole.seek(SeekFrom::End(-1)).unwrap();
+        whole.write_all(b"\n").unwrap();
+        let error = of_length(file.path(), "run.csv", &ReadOptions::default(), 0)
+            .err()
+            .unwrap();
+        let words = "no line ends within 32 MB after byte 400004";
+        assert!(error.to_string().starts_with(words), "{error}");
     }
 
     /// The size of a sparse file may require more memory for its rows than any computer has.
