@@ -191,7 +191,7 @@ def test_what_is_fitted_is_told_from_the_options(runs: list[pyhoid.Record]) -> N
     with pytest.warns(DeprecationWarning, match="noise remnant"):
         remnant = pyhoid.identify(record, remnant_order=1)
     assert isinstance(remnant, pyhoid.Fit) and remnant.structure == "operator"
-    with pytest.raises(pyhoid.OptionError, match="nk belongs to"):
+    with pytest.raises(pyhoid.OptionError, match="nk applies only to"):
         pyhoid.identify(record, "operator", nk=29)
-    with pytest.raises(pyhoid.OptionError, match="excitation belongs to"):
+    with pytest.raises(pyhoid.OptionError, match="excitation applies only to"):
         pyhoid.identify(record, "bj", excitation="f_t")

@@ -97,7 +97,7 @@ def test_what_a_fit_holds(found: pyhoid.OperatorFit) -> None:
     by_instruments = found.riv_bj["open_loop"]["crossover_rad_s"]
     assert by_instruments.value == pytest.approx(crossover.value, rel=0.2)
     assert all(pair["p_value"] >= found.agreement["p_value"] / 3 for pair in found.agreement["pairs"])
-    assert found.prior["omega_nm"] == (10.5, 0.3) and found.settings["form"].startswith("auto of gain, lead")
+    assert found.prior["omega_nm"] == (10.5, 0.3) and found.settings["form"].startswith("auto among gain, lead")
     text = found.summary()
     for part in (found.verdict.level, found.form, "tau_e (s)", "at the lines", "phase margin", "95 %"):
         assert part in text, part
@@ -206,7 +206,7 @@ def test_guesses_of_coefficients_have_their_own_name(c1: pyhoid.Record) -> None:
     held = pyhoid.identify(c1, "bj", coefficient_prior={"f1": (-1.9, 1e3)}, **orders)
     assert abs(held.parameters["f1"] + 1.9) < abs(free.parameters["f1"] + 1.9)
     of_coefficients: Any = {"f1": (-1.9, 1.0)}
-    with pytest.raises(pyhoid.OptionError, match="prior belongs to"):
+    with pytest.raises(pyhoid.OptionError, match="prior applies only to"):
         pyhoid.identify(c1, "bj", prior=of_coefficients)
 
 

@@ -33,19 +33,19 @@ const BANNED: [(&str, &str); 16] = [
     ),
     ("cmake", "hoid builds with cargo alone"),
     ("bindgen", "hoid builds with cargo alone"),
-    ("openssl", "nothing of hoid speaks to a network"),
-    ("native-tls", "nothing of hoid speaks to a network"),
-    ("rustls", "nothing of hoid speaks to a network"),
-    ("reqwest", "nothing of hoid speaks to a network"),
-    ("hyper", "nothing of hoid speaks to a network"),
-    ("tokio", "nothing of hoid waits for a network"),
-    ("arrow*", "Parquet is read without it, in a fifth of the time to build"),
+    ("openssl", "hoid uses no network"),
+    ("native-tls", "hoid uses no network"),
+    ("rustls", "hoid uses no network"),
+    ("reqwest", "hoid uses no network"),
+    ("hyper", "hoid uses no network"),
+    ("tokio", "hoid uses no network"),
+    ("arrow*", "Parquet is read without it, with a fifth of the build time"),
     ("hdf5", "it links the C library; hdf5-pure reads .mat 7.3"),
-    ("ndarray", "nalgebra is the one crate of matrices"),
-    ("serde_yaml", "it is not maintained; TOML and JSON are what hoid reads"),
-    ("atty", "it is not maintained; std::io::IsTerminal"),
+    ("ndarray", "nalgebra is the only matrix crate"),
+    ("serde_yaml", "it is not maintained; hoid reads TOML and JSON"),
+    ("atty", "it is not maintained; use std::io::IsTerminal"),
     ("ansi_term", "it is not maintained"),
-    ("lazy_static", "std::sync::OnceLock and LazyLock"),
+    ("lazy_static", "use std::sync::OnceLock or LazyLock"),
 ];
 /// Crates of [`BANNED`] that are tolerated, with reasons.
 const TOLERATED: [(&str, &str); 5] = [
@@ -101,14 +101,14 @@ pub fn check() -> Result<(), String> {
     let crates: BTreeSet<&str> = tree.lines().map(|line| line.trim_end_matches(" (*)")).collect();
     if crates.len() > MOST_CRATES {
         wrong.push(format!(
-            "hoid-cli is built of {} crates, expected at most {MOST_CRATES}: leave one out, or raise MOST_CRATES in \
+            "hoid-cli is built from {} crates, expected at most {MOST_CRATES}: leave one out, or raise MOST_CRATES in \
              xtask/src/crates.rs with the reason in ARCHITECTURE.md",
             crates.len()
         ));
     }
     if wrong.is_empty() {
         println!(
-            "{} crates in all, {} in hoid-cli: licences, bans and versions are as stated",
+            "{} crates in all, {} in hoid-cli: licences, bans and versions follow the rules",
             packages.len(),
             crates.len()
         );
@@ -159,9 +159,7 @@ fn licence_of(package: &Package) -> Option<String> {
             "{name} {version} is under {licence}, expected {}: take another crate",
             ALLOWED.join(", ")
         )),
-        None => Some(format!(
-            "{name} {version}: {licence:?} is not an expression of licences"
-        )),
+        None => Some(format!("{name} {version}: {licence:?} is not a licence expression")),
     }
 }
 
@@ -257,7 +255,7 @@ fn several(packages: &[Package]) -> Vec<String> {
         .map(|(name, found)| {
             let found: Vec<&str> = found.iter().copied().collect();
             format!(
-                "{name} is here in {} versions ({}), expected {}: cargo tree --duplicates reports who asks for them",
+                "{name} is present in {} versions ({}), expected {}: cargo tree --duplicates shows which crates need them",
                 found.len(),
                 found.join(", "),
                 stated(name)
@@ -266,7 +264,7 @@ fn several(packages: &[Package]) -> Vec<String> {
         .collect();
     wrong.extend(SEVERAL.iter().filter_map(|(name, n, _)| {
         let found = versions.get(name).map_or(0, BTreeSet::len);
-        (found < *n).then(|| format!("{name} is here in {found} versions, {n} are stated: lower SEVERAL"))
+        (found < *n).then(|| format!("{name} is present in {found} versions, but SEVERAL has {n}: lower it"))
     }));
     wrong
 }
@@ -327,7 +325,7 @@ mod tests {
         let said = several(&two);
         assert!(
             said.iter()
-                .any(|said| said.contains("a is here in 2 versions (1.0.0, 2.0.0)")),
+                .any(|said| said.contains("a is present in 2 versions (1.0.0, 2.0.0)")),
             "{said:?}"
         );
         let stale = several(&two[..1]);

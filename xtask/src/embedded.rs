@@ -149,9 +149,12 @@ fn compared(place: &str, told: &str, track: &str) -> Result<(), String> {
         }
     }
     if table.len() < SHORT_S {
-        return Err(format!("{place} told {} lines only", table.len()));
+        return Err(format!(
+            "{place} printed only {} lines, expected at least {SHORT_S}",
+            table.len()
+        ));
     }
-    println!("{place}: {} lines, the digits of hoid track", table.len() - 1);
+    println!("{place}: {} lines with the same digits as hoid track", table.len() - 1);
     told.lines()
         .filter(|line| line.starts_with('#'))
         .for_each(|line| println!("{line}"));

@@ -94,7 +94,7 @@ pub fn study(script: &str, arguments: &[String]) -> Result<(), String> {
 fn npm_is_there() -> Result<bool, String> {
     let there = npm(&["--version"]).stdout(Stdio::null()).stderr(Stdio::null()).status();
     if !there.is_ok_and(|status| status.success()) {
-        println!("skipped: the page of hoid lab needs npm to be checked (apt-get install npm)");
+        println!("skipped: checking the page of hoid lab requires npm (apt-get install npm)");
         return Ok(false);
     }
     run(&mut npm(&["ci", "--no-fund", "--no-audit"]))?;

@@ -185,13 +185,13 @@ fn slow(arguments: &[String]) -> Result<(), String> {
     };
     let (name, rest) = arguments
         .split_first()
-        .ok_or_else(|| format!("which study: {}", names()))?;
+        .ok_or_else(|| format!("name a study, one of {}", names()))?;
     if let Some((_, script)) = lab::STUDIES.iter().find(|(study, _)| study == name) {
         return lab::study(script, rest);
     }
     let slow = (SLOW.iter())
         .find(|slow| slow.name == name)
-        .ok_or_else(|| format!("no study is called {name}; there is {}", names()))?;
+        .ok_or_else(|| format!("no study is called {name}, expected one of {}", names()))?;
     if let Some(program) = slow.program {
         cargo(&["build", "--profile", slow.profile, "-p", program], &[])?;
     }

@@ -169,7 +169,7 @@ fn install(wheel: Wheel) -> Result<(), String> {
         .filter_map(Result::ok)
         .map(|entry| entry.path())
         .find(|path| path.extension().is_some_and(|e| e == "whl"))
-        .ok_or_else(|| format!("maturin has left no wheel in {}", wheels.display()))?;
+        .ok_or_else(|| format!("maturin wrote no wheel to {}", wheels.display()))?;
     pip(&python, &[&format!("{}[{}]", built.display(), wheel.extra())])
 }
 

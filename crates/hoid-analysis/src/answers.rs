@@ -54,7 +54,7 @@ pub fn asked_for(names: &[String]) -> Result<Vec<String>, AnalysisError> {
         known().find(|known| *known == name).map(str::to_owned).ok_or_else(|| {
             let expected = known().collect::<Vec<_>>().join(", ");
             AnalysisError::Options {
-                reason: format!("for: there is no answer {name:?}, expected one of {expected}"),
+                reason: format!("for: there is no answer {name:?}; expected one of {expected}"),
             }
         })
     };

@@ -190,7 +190,7 @@ fn coupling(
 /// separated.
 fn separate(records: &[Record], pair: &AxisPair, other: &AxisPair, period_s: Option<f64>) -> Result<(), String> {
     let (Some(own), Some(of_other)) = (&pair.excitation, &other.excitation) else {
-        return Err("the excitation is not given for both axes, as in ex,ux,rx".to_owned());
+        return Err("the excitation is not given for both axes; give it as in ex,ux,rx".to_owned());
     };
     let search = LineSearch {
         period_s,

@@ -72,7 +72,7 @@ pub enum AnalysisError {
         reason: String,
     },
     /// An option that belongs to other estimators.
-    #[error("{name} belongs to {}{instead}", .of.join(", "))]
+    #[error("{name} applies only to {}{instead}", .of.join(", "))]
     Misplaced {
         /// Name of the option in the registry.
         name: &'static str,

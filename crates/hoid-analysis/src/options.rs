@@ -41,10 +41,10 @@ pub(crate) fn with_prior_of_fits<E: 'static>(
 
 /// Returns the options for the channel of the excitation and its period.
 pub(crate) fn excitation<E: 'static>() -> [AnalysisOption<E>; 2] {
-    let help = "Column of the recorded disturbance or target, for the fit at its lines; none: no such fit";
+    let help = "Column of the recorded disturbance or target for the fit at its lines; none: no fit at lines";
     let channel = Setting::new("excitation", Kind::Channel, help).default("the first of f_t, d, r ... with lines");
     let period = Setting::new("period", Kind::Number, "Period of the excitation")
-        .default("found in it")
+        .default("detected")
         .unit("s")
         .bounds(Bounds::PositiveFinite);
     [
@@ -61,8 +61,8 @@ pub(crate) fn excitation<E: 'static>() -> [AnalysisOption<E>; 2] {
 
 /// Returns the option for the controlled element.
 pub(crate) fn controlled_element<E: 'static>() -> AnalysisOption<E> {
-    let help = "Controlled element in s, such as 90/(s(s+6)), or NUM/DEN in descending powers of s, such as 90/1,6,0: \
-                adds crossover frequency and margins";
+    let help = "Controlled element, such as 90/(s(s+6)) or 90/1,6,0 (NUM/DEN in descending powers of s): adds \
+                crossover frequency and margins";
     let setting = Setting::new("controlled_element", Kind::Element, help);
     BatchOption::new(setting, |how: &mut Identification<E>, option, text| {
         let element = text.parse();
@@ -74,8 +74,7 @@ pub(crate) fn controlled_element<E: 'static>() -> AnalysisOption<E> {
 
 /// Returns the option for the answers to which the verdict refers.
 pub(crate) fn answers<E: 'static>() -> AnalysisOption<E> {
-    let help =
-        "Quantities that the verdict covers: response, crossover, phase_margin or parameters, such as crossover,tau_e";
+    let help = "Quantities in the verdict: response,crossover,phase_margin or parameters, such as tau_e";
     let setting = Setting::new("answers", Kind::Names, help).default("response and loop");
     BatchOption::new(setting, |how: &mut Identification<E>, option, text| {
         how.answers = asked_for(&option.read::<Vec<String>>(text)?)?;

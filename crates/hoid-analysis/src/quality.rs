@@ -74,7 +74,7 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
             all.push(Finding::doubt(
                 "coarse",
                 format!(
-                    "{channel} is rounded to steps of {:.2} of its standard deviation: intervals and bands are too narrow",
+                    "{channel} is quantised in steps of {:.2} standard deviations: intervals and bands are too narrow",
                     issue.size / deviation
                 ),
             ));

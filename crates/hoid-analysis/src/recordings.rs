@@ -136,7 +136,7 @@ impl Recordings {
         Some(Finding::doubt(
             "displayed",
             format!(
-                "the display showed {name} ({role}), and the model does not have it as an input: the response to the \
+                "the display showed {name} ({role}), but the model lacks this input: the response to the \
                  error, crossover and margins are not those of the person; use hoid identify --input {error} --input \
                  {name} --role {name}={role}"
             ),

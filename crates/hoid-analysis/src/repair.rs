@@ -61,7 +61,7 @@ impl Recordings {
                 findings.push(Finding::note(
                     "short-piece",
                     format!(
-                        "pieces between faults that are shorter than {SHORTEST_PIECE_S} s were left out: {left:.1} s"
+                        "pieces between faults shorter than {SHORTEST_PIECE_S} s were left out: {left:.1} s in total"
                     ),
                 ));
             }

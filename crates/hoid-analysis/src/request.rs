@@ -245,7 +245,7 @@ impl Request {
             (true, Some("arma" | "remnant")) => Err(AnalysisError::Option {
                 name: "noise",
                 reason: format!(
-                    "found {}; an operator that changes has only the noise ar",
+                    "found {}; an operator that changes allows only the noise ar",
                     noise.unwrap_or_default()
                 ),
             }),
@@ -283,7 +283,7 @@ fn misplaced(name: &str, all: &[MethodSpec]) -> AnalysisError {
         name: setting.name,
         of,
         instead: match name {
-            "nk" => "; otherwise give delay in s",
+            "nk" => "; for other estimators, give delay in s",
             _ => "",
         },
     }

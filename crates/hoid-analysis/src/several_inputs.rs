@@ -203,7 +203,7 @@ impl SeveralInputsResult {
             if gains.clone().count() > 0 && gains.clone().all(|(_, e)| open(&e)) {
                 findings.push(Finding::doubt(
                     "undetermined-input",
-                    format!("no coefficient of {name} differs from zero by two standard errors: a response to it is not determined"),
+                    format!("no coefficient of {name} differs from zero by two standard errors: the response to it is not determined"),
                 ));
             }
         }

@@ -29,7 +29,7 @@ pub enum CliError {
     #[error("{0}")]
     Stream(String),
     /// The result could not be printed.
-    #[error("standard output cannot be written: {0}; the requested output is missing or truncated: free space for it")]
+    #[error("standard output cannot be written: {0}; the output is missing or truncated; free space and run again")]
     Output(std::io::Error),
     /// The result was printed, but the data do not determine the requested quantity.
     #[error("the data do not determine the requested quantity: {0}")]
@@ -85,7 +85,7 @@ impl From<AnalysisError> for CliError {
             AnalysisError::Option { name, reason } => Self::Usage(format!("{}: {reason}", typed(name))),
             AnalysisError::Misplaced { name, of, instead } => {
                 let instead = instead.replace("delay", "--delay");
-                Self::Usage(format!("{} belongs to {}{instead}", typed(name), as_text(&of)))
+                Self::Usage(format!("{} applies only to {}{instead}", typed(name), as_text(&of)))
             }
         }
     }

@@ -12,7 +12,7 @@ pub type Converted = Result<FamilyConversion, NotConvertible>;
 pub fn to_text(found: &Converted, gain: &GainUnit) -> String {
     let found = match found {
         Ok(found) => found,
-        Err(reason) => return format!("Operator parameters: not convertible: {reason}.\n"),
+        Err(reason) => return format!("The model does not convert to an operator: {reason}.\n"),
     };
     let all = found.parameters();
     let named = all.iter().map(|(name, unit, e)| (*name, gain.unit(name, unit), *e));

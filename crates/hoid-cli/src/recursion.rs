@@ -99,7 +99,7 @@ fn method(args: &RecursionArgs) -> Result<Method, CliError> {
     for (name, text) in args.settings.given() {
         let of = methods_with(name, &survey::registry()).join(" or ");
         if !method.settings().list().iter().any(|setting| setting.name == name) {
-            return Err(usage(name, &format!("belongs to --method {of}")));
+            return Err(usage(name, &format!("applies only to --method {of}")));
         }
         if name == PRIOR && is_fit_file(text) {
             let fit = read_fit(Path::new(text))?.operator()?;

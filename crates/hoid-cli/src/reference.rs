@@ -42,8 +42,8 @@ fn options_page(methods: &[MethodSpec]) -> String {
     let mut page = "# Options of estimators and recursive methods\n\nThe recursive methods come first, the batch \
                     estimators after them. An option of a recursive method is a flag of `hoid track` and `hoid stream` \
                     (with hyphens), a key of an estimator in a plan, and a keyword of `pyhoid.track` and \
-                    `pyhoid.Tracker`. In a plan a range of times carries its unit (`track_delay_s`); in Python \
-                    `lambda` is called `forgetting_factor`. An option of a batch estimator is a flag of `hoid \
+                    `pyhoid.Tracker`. In a plan, the key of a time range includes the unit (`track_delay_s`); in \
+                    Python, `lambda` is called `forgetting_factor`. An option of a batch estimator is a flag of `hoid \
                     identify` and a keyword of `pyhoid.identify` (where `orders` are `na`, `nb`, ...). Options of \
                     `operator`, with or without a change, and of the instrumental-variable methods are also keys of an \
                     estimator in a plan.\n"
@@ -51,7 +51,7 @@ fn options_page(methods: &[MethodSpec]) -> String {
     for spec in methods.iter().chain(&estimators()) {
         let structures: Vec<&str> = spec.structures.iter().map(|structure| structure.name()).collect();
         page.push_str(&format!(
-            "\n## {}\n\nWhat it is: {}.\nStructures: {}.\nSource: {}.\n\n",
+            "\n## {}\n\nDescription: {}.\nStructures: {}.\nSource: {}.\n\n",
             spec.name,
             spec.help,
             structures.join(", "),
@@ -358,6 +358,6 @@ mod tests {
             ..methods[0].clone()
         });
         assert!(python_settings(&methods, &estimators()).contains("    \"setpoint\",\n"));
-        assert!(options_page(&methods).contains("\n## setpoint\n\nWhat it is: a method that is new.\n"));
+        assert!(options_page(&methods).contains("\n## setpoint\n\nDescription: a method that is new.\n"));
     }
 }

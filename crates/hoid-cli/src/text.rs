@@ -37,13 +37,13 @@ pub fn verdict(verdict: &Verdict) -> String {
 }
 
 /// Hint at the end of a page that has further details.
-pub const MORE: &str = "More with -v: what else was tried, tests, every setting; --report DIR writes a page.\n";
+pub const MORE: &str = "More with -v: other candidates, tests, all settings; --report DIR writes a page.\n";
 
 /// Hint at the end of the page of an operator whose gains change; there is no report about such an operator.
-pub const MORE_CHANGE: &str = "More with -v: search, residual tests, every setting; --trace FILE writes the gains.\n";
+pub const MORE_CHANGE: &str = "More with -v: search, residual tests, all settings; --trace FILE writes the gains.\n";
 
 /// Hint at the end of a page whose only further details are the settings.
-pub const MORE_SETTINGS: &str = "More with -v: every setting.\n";
+pub const MORE_SETTINGS: &str = "More with -v: all settings.\n";
 
 /// Maximum number of records that are listed by name.
 const RECORDS_SHOWN: usize = 4;
@@ -64,7 +64,8 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
             lines.push_str(&format!("  {fault}\n"));
         }
         if account.faults.len() > FAULTS_SHOWN {
-            lines.push_str(&format!("  and {} more faults\n", account.faults.len() - FAULTS_SHOWN));
+            let more = account.faults.len() - FAULTS_SHOWN;
+            lines.push_str(&format!("  and {}\n", counted(more as u64, "more fault")));
         }
         lines
     };
@@ -87,10 +88,10 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
     if !verbose && records.len() > shown {
         let alike = !accounts[0].steps.is_empty() && accounts.iter().all(quiet);
         text.push_str(&format!(
-            "{} records in all, to {}{}\n",
+            "{} records in total, up to {}{}\n",
             records.len(),
             files[files.len() - 1],
-            if alike { ", prepared alike" } else { "" }
+            if alike { ", all prepared the same way" } else { "" }
         ));
     }
     text
@@ -101,7 +102,7 @@ pub fn levels(files: &[String], accounts: &[Account]) -> String {
     let line = |(file, account): (&String, &Account)| {
         let level = account.level.as_ref()?;
         Some(format!(
-            "{file}: level of u in addition to its response to e: {level}\n"
+            "{file}: level of u in addition to the response to e: {level}\n"
         ))
     };
     files.iter().zip(accounts).filter_map(line).collect()
@@ -288,11 +289,11 @@ pub fn operator(found: &Result<OperatorEstimate, NotConvertible>, gain: &GainUni
             let warning = if o.parameters().is_stable() {
                 ""
             } else {
-                "zeta_nm is not positive: not stable.\n"
+                "zeta_nm is not positive: the operator is not stable.\n"
             };
             format!("{rows}\n{warning}")
         }
-        Err(reason) => format!("Operator parameters: {}.\n", not_convertible(reason)),
+        Err(reason) => format!("The model does not convert to an operator: {reason}.\n"),
     }
 }
 
@@ -306,12 +307,8 @@ pub fn remnant(found: &Result<RemnantEstimate, NotConvertible>) -> String {
                 r.order, r.discretisation
             )
         }
-        Err(reason) => format!("Remnant filter: {}.\n", not_convertible(reason)),
+        Err(reason) => format!("The noise model does not convert to a remnant filter: {reason}.\n"),
     }
-}
-
-fn not_convertible(reason: &NotConvertible) -> String {
-    format!("not convertible: {reason}")
 }
 
 /// Gives crossover and margins in one line.
@@ -367,7 +364,7 @@ pub fn loop_shape(shape: &LoopShape, always: bool) -> String {
         && !others.is_empty()
     {
         let each = (others.iter()).map(|(w, m)| format!("{} rad/s ({:.0} deg)", significant(w.value), m.value));
-        parts.push(format!("gain one also at {}", each.collect::<Vec<_>>().join(", ")));
+        parts.push(format!("unit gain also at {}", each.collect::<Vec<_>>().join(", ")));
         parts.push(format!(
             "smallest phase margin {} deg, at {} rad/s",
             plus_minus(&margin),
@@ -387,7 +384,7 @@ pub fn loop_shape(shape: &LoopShape, always: bool) -> String {
     if parts.is_empty() {
         return String::new();
     }
-    format!("Of this loop: {}.\n", parts.join("; "))
+    format!("This loop: {}.\n", parts.join("; "))
 }
 
 /// Lists poles and zeros with their natural frequency and damping.
@@ -467,11 +464,11 @@ pub fn residual_tests(files: &[String], validations: &[Validation]) -> String {
         ),
         (
             missed,
-            "They are correlated with the input at positive lags: the model misses dynamics, or has the wrong delay.\n",
+            "Correlated with the input at positive lags: the model misses dynamics or has the wrong delay.\n",
         ),
         (
             feedback,
-            "They are correlated with the input at negative lags: there is feedback, as in every closed loop.\n",
+            "Correlated with the input at negative lags: there is feedback, as in every closed loop.\n",
         ),
     ] {
         if seen {
@@ -488,7 +485,7 @@ pub fn delay(choice: &Choice) -> String {
     let seconds = |nk: usize| significant((nk as f64 - 1.0).max(0.0) * ts);
     choice.delay_interval().map_or_else(String::new, |(low, high)| {
         format!(
-            "Delay: nk = {low} to {high} (dead time {} to {} s) by the 95 % likelihood interval.\n",
+            "Delay, 95 % likelihood interval: nk = {low} to {high} (dead time {} to {} s).\n",
             seconds(low),
             seconds(high)
         )
@@ -534,7 +531,8 @@ pub fn candidates(choice: &Choice) -> String {
     );
     if failed > 0 {
         text.push_str(&format!(
-            "{failed} candidates could not be fitted; --json lists the reasons.\n"
+            "{} could not be fitted; --json lists the reasons.\n",
+            counted(failed as u64, "candidate")
         ));
     }
     text

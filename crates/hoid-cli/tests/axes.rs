@@ -164,7 +164,7 @@ fn pairs_that_make_no_sense_are_refused() {
         ),
         (
             &["--pair", "ex,ux", "--pair", "ey,uy", "--structure", "bj"],
-            "is for the structure operator",
+            "applies only to the structure operator",
         ),
     ] {
         let (code, said) = bad(at.path(), &[&["identify", "two.csv"], pairs].concat());

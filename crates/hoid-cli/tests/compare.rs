@@ -121,7 +121,7 @@ fn recordings_are_analysed_and_compared_in_one_form() {
     let object: serde_json::Value = serde_json::from_str(&printed).unwrap();
     let form = object["verdict"]["notes"].to_string();
     assert!(
-        form.contains("parameters are those of the form lead-lag for all"),
+        form.contains("parameters are compared in the form lead-lag for all"),
         "{form}"
     );
     let compared_of = |quantity: &str| {

@@ -252,7 +252,7 @@ fn an_offset_is_estimated_and_biases_nothing() {
         let kept = identified(d, &[&BOX_JENKINS[..], &["--detrend", "mean"]].concat());
         assert!(kept["records"][0]["level"].is_null());
         let page = good(d, &[&["identify", "c.csv", "-v"], &BOX_JENKINS[..]].concat());
-        assert!(page.contains("level of u in addition to its response to e: "), "{page}");
+        assert!(page.contains("level of u in addition to the response to e: "), "{page}");
         let family = identified(d, &["--form", "lead"]);
         assert!(family["records"][0]["level"]["value"].is_number());
     }

@@ -245,7 +245,7 @@ fn init_looks_at_the_files_and_says_what_it_saw() {
     assert_eq!(manifest["read"]["input"].as_str(), Some("e"));
     // Each is below its evidence.
     for (evidence, line) in [
-        ("# the tracking error, by its name", "input = "),
+        ("# the tracking error, by name", "input = "),
         ("# d has", "excitation = "),
         ("# e follows from u through the controlled element", "offset_samples = "),
         ("# for the first run BIC chooses nd", "nd = "),

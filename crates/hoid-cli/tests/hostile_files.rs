@@ -166,5 +166,5 @@ fn a_stream_at_another_rate_is_told_once() {
     drop(input);
     let said = String::from_utf8(stream.wait_with_output().unwrap().stderr).unwrap();
     assert_eq!(said.matches("warning").count(), 1, "{said}");
-    assert!(said.contains("the rate of the times is 50.0000 Hz"), "{said}");
+    assert!(said.contains("t gives a sampling rate of 50.0000 Hz"), "{said}");
 }

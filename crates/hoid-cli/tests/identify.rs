@@ -442,7 +442,7 @@ fn a_loop_that_is_not_stable_is_a_doubt() {
     );
     let text = good(d, &arguments);
     assert!(
-        text.contains("Of this loop: gain one also at") && text.contains("is not stable"),
+        text.contains("This loop: unit gain also at") && text.contains("is not stable"),
         "{text}"
     );
 }

@@ -152,11 +152,11 @@ fn inputs_without_a_meaning_are_refused_with_the_remedy() {
         ),
         (
             &["identify", run, "--structure", "bj", "--role", "f_t=feedforward"],
-            "--role belongs to",
+            "--role applies only to",
         ),
         (
             &["track", run, "--input", "e", "--input", "f_t"],
-            "one --input is read here",
+            "give only one --input here",
         ),
     ] {
         let (_, message) = bad(at.path(), options);

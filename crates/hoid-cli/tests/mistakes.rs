@@ -42,7 +42,7 @@ fn info_shows_what_is_inside() {
     let text = good(at, &["info", "run.csv"]);
     for words in [
         "CSV, 4 columns",
-        "1 gaps (5 samples",
+        "1 gap (5 samples",
         "constant",
         "quantised in steps of 0.1",
         "saturated at 0.6",
@@ -51,7 +51,7 @@ fn info_shows_what_is_inside() {
         assert!(text.contains(words), "{words}: {text}");
     }
     fs::write(at.join("bad.mat"), "t,e,u").unwrap();
-    assert!(bad(at, &["info", "bad.mat"]).1.contains("is not in the format MATLAB"));
+    assert!(bad(at, &["info", "bad.mat"]).1.contains("is not in MATLAB format"));
 }
 
 #[test]

@@ -63,7 +63,10 @@ fn an_output_that_is_an_input_is_refused() {
     for name in names {
         let (code, message) = bad(d, &["track", "in.csv", "--method", "rls", "--nk", "29", "--out", name]);
         assert_eq!(code, 2, "{message}");
-        assert!(message.contains("which is read by the same command"), "{message}");
+        assert!(
+            message.contains("of this command and would be overwritten"),
+            "{message}"
+        );
     }
     fs::write(d.join("page.csv"), "").unwrap();
     let mut all: Vec<Vec<&str>> = vec![vec!["simulate", "--scenario", "page.csv", "--out", "page.csv"]];
@@ -80,7 +83,7 @@ fn an_output_that_is_an_input_is_refused() {
     for arguments in all {
         let (code, message) = bad(d, &arguments);
         assert_eq!(code, 2, "{arguments:?}: {message}");
-        assert!(message.contains("read by the same command"), "{arguments:?}: {message}");
+        assert!(message.contains("of this command"), "{arguments:?}: {message}");
     }
     assert_eq!(fs::read(d.join("in.csv")).unwrap(), kept);
     assert_eq!(fs::read(d.join("pages/report.html")).unwrap(), kept);

@@ -133,7 +133,7 @@ fn a_person_is_found_by_default() {
     for part in [
         "K_over_T_I",
         "at the lines",
-        "in front",
+        "chosen",
         "Prior: omega_nm = 10.5",
         "crossover",
     ] {

@@ -126,7 +126,7 @@ fn what_is_done_is_told_in_every_form() {
         ],
     );
     for words in [
-        "u moved earlier by 0.5 samples (0.005 s), by a sinc function, to 1e-4 up to 40 Hz",
+        "u moved earlier by 0.5 samples (0.005 s), interpolated by a sinc function (error below 1e-4 up to 40 Hz)",
         "samples cut at the start",
     ] {
         assert!(text.contains(words), "{words}: {text}");
@@ -194,8 +194,8 @@ fn trouble_is_shown_and_handled_only_as_asked() {
     assert!((gap["places"][0]["from_s"].as_f64().unwrap() - 124.99).abs() < 1e-9);
     let text = good(at, &["info", "run.csv"]);
     for words in [
-        "Trouble:",
-        "7 rows are duplicated, time included",
+        "Problems:",
+        "7 rows are duplicated, including the time",
         "remedy: drop them with --drop-repeated",
         "20 rows missing in 1 place, the first after row",
         "u stays at its largest value, 0.15",
@@ -206,7 +206,7 @@ fn trouble_is_shown_and_handled_only_as_asked() {
     let (code, message) = bad(at, &["identify", "run.csv"]);
     assert!(code == 1 && message.contains("expected increasing time"), "{message}");
     let (code, message) = bad(at, &["identify", "run.csv", "--drop-repeated"]);
-    assert!(code == 1 && message.contains("samples missing"), "{message}");
+    assert!(code == 1 && message.contains("missing samples"), "{message}");
     let masked = identify(at, &["--drop-repeated", "--mask", "gap"]);
     let records = masked["records"].as_array().unwrap();
     assert_eq!(records.len(), 2);

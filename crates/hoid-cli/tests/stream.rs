@@ -261,11 +261,11 @@ fn hostile_lines_are_told_and_counted_and_poison_nothing() {
         ("0.1,-1e300", "u is -1e300"),
         (",", "e is missing; u is missing"),
         ("0.1,", "u is missing"),
-        ("abc,0.1", "e is \"abc\", no number"),
+        ("abc,0.1", "e is \"abc\", not a number"),
         ("complete garbage", "1 cells, expected 2"),
         ("1,2,3", "3 cells, expected 2"),
         (long.as_str(), "longer"),
-        ("e,u", "no number"),
+        ("e,u", "not a number"),
         ("\u{1}\u{2}", "cells"),
     ];
     let mut skipped = 0;
@@ -419,7 +419,7 @@ fn a_stream_without_a_sample_is_no_success() {
     let (status, _, said) = stream.end();
     assert_eq!(status.code(), Some(1), "{said}");
     assert!(
-        said.contains("no line of the stream was a sample, 5 lines dropped"),
+        said.contains("no line of the stream was a sample (5 lines dropped)"),
         "{said}"
     );
 }
@@ -465,7 +465,7 @@ fn a_warm_up_that_fails_goes_on_until_there_is_something_to_fit() {
     let (lines, _) = answers(&arguments, &(input + &",\n".repeat(101) + "0.1,0.2\n"));
     let last = &lines.last().unwrap()["warm_up"];
     assert!(
-        last["collected"] == 1 && last["reason"].as_str().unwrap().contains("started again"),
+        last["collected"] == 1 && last["reason"].as_str().unwrap().contains("was restarted"),
         "{last}"
     );
 }
@@ -578,7 +578,7 @@ fn wrong_usage_and_wrong_headers() {
         assert_eq!(code, 2, "{arguments:?}: {message}");
     }
     for (more, expected) in [
-        (&["--warm-up", "5"][..], "estimates from the start"),
+        (&["--warm-up", "5"][..], "estimates from the first sample"),
         (&["--start", "nothing", "--nk", "29"], "a prior instead"),
         (&["--prior", "omega_nm=1"], "CENTRE:SPREAD"),
     ] {

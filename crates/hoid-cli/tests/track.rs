@@ -666,7 +666,7 @@ fn a_second_run_chooses_the_start_covariance() {
     assert_eq!(Some(said), choice["covariance"].as_f64());
     let page = good(d, &arguments);
     assert!(
-        page.contains("P0") && page.contains("taken") && page.contains("second.csv"),
+        page.contains("P0") && page.contains("chosen") && page.contains("second.csv"),
         "{page}"
     );
     let (status, says) = bad(d, &with(&["--covariance", "0.1"]));
@@ -718,7 +718,7 @@ fn a_delay_is_followed_by_rpem_and_the_windup_guard_is_told() {
         json(d, &arguments)
     };
     let memory = |found: &Value| setting(found, "memory");
-    assert!(memory(&of(&[])).contains("without a guard against windup"));
+    assert!(memory(&of(&[])).contains("without a windup guard"));
     let guarded = of(&["--windup-guard", "1e4"]);
     assert!(!memory(&guarded).contains("without"));
     assert_eq!(setting(&guarded, "windup guard"), "1e4");

@@ -92,7 +92,7 @@ fn a_delay_at_the_end_of_its_range_is_the_first_line_of_the_page() {
     let page = good(d, &arguments);
     assert!(page.starts_with("Verdict: doubtful\n- "), "{page}");
     assert!(
-        page.contains("lies at an end of its search range, 0.190 to 0.230 s"),
+        page.contains("is at an end of its search range, 0.190 to 0.230 s"),
         "{page}"
     );
     let oe = json(d, &["identify", "c.csv", "--structure", "oe", "--nk", "29", "--json"]);
@@ -243,7 +243,7 @@ fn a_controlled_element_that_the_recording_refutes_is_a_doubt_in_every_command()
         assert_eq!(found(command, "90/(s(s+6))"), [""; 0], "{command:?}");
         let [message] = found(command, "45/(s(s+6))").try_into().unwrap();
         assert!(
-            message.starts_with("e follows from u through 90/(s^2 + 6s), not through 45/(s^2 + 6s)"),
+            message.starts_with("the recorded element is 90/(s^2 + 6s), not 45/(s^2 + 6s)"),
             "{command:?}: {message}"
         );
     }

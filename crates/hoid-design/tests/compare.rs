@@ -106,7 +106,7 @@ fn what_is_missing_is_named() {
     assert!(
         reasons
             .iter()
-            .any(|r| r.starts_with("without P11 in so: they have no run there")),
+            .any(|r| r.starts_with("without P11 in so: there is no run")),
         "{reasons:?}"
     );
     assert!(

@@ -60,7 +60,7 @@ pub(crate) unsafe fn bytes<'a>(pointer: *const u8, length: usize, what: &str) ->
     if length > isize::MAX as usize {
         return Err(Failure::new(
             HOID_TOO_SMALL,
-            format!("{what}: no memory has {length} bytes"),
+            format!("{what} has a length of {length} bytes, expected at most {}", isize::MAX),
         ));
     }
     // SAFETY: the pointer is not null and the length is valid for a slice; the caller guarantees that `length` bytes

@@ -184,7 +184,7 @@ fn a_fit_is_what_a_tracker_begins_with() {
     // The sample time is that of the fit.
     let (status, said) = of(0.02, fit).err().unwrap();
     assert_eq!(status, HOID_BAD_OPTION);
-    assert!(said.contains("samples here come at"), "{said}");
+    assert!(said.contains("these samples are at"), "{said}");
     assert!(of(0.01, "{}").is_err());
 }
 

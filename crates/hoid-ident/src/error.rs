@@ -14,10 +14,7 @@ pub enum IdentError {
     #[error("no record was given; a fit needs at least one record")]
     NoRecords,
     /// The structure has an input, but a record has none.
-    #[error(
-        "{structure} describes how an output follows an input, but record {label} has no input; give an input, or use \
-         ar, ma or arma"
-    )]
+    #[error("{structure} needs an input, but record {label} has no input; give an input, or use ar, ma or arma")]
     NoInput {
         /// Name of the structure.
         structure: String,
@@ -26,7 +23,8 @@ pub enum IdentError {
     },
     /// The records have different sample times and therefore cannot share a discrete-time model.
     #[error(
-        "record {label} has the sample time {found} s, the first record {expected} s; resample them to one rate, for example with --new-fs {rate}, or fit them separately",
+        "record {label} has a sample time of {found} s, but the first record has {expected} s; resample them to one \
+         rate, for example with --new-fs {rate}, or fit them separately",
         rate = lower_rate(*found, *expected)
     )]
     MixedSampling {
@@ -39,7 +37,8 @@ pub enum IdentError {
     },
     /// The number of residuals does not exceed the number of unknowns.
     #[error(
-        "record {label} has {samples} samples; {orders} with its delay and initial states needs more than {needed}; use a longer record or lower orders"
+        "record {label} has {samples} samples, but {orders} with the delay and initial states needs more than \
+         {needed}; use a longer record or lower orders"
     )]
     TooFewSamples {
         /// Label of the record.
@@ -52,7 +51,9 @@ pub enum IdentError {
         needed: usize,
     },
     /// The delay is at least as long as the record.
-    #[error("the delay nk = {nk} is not shorter than record {label} with {samples} samples; check nk and the sampling")]
+    #[error(
+        "the delay nk = {nk} must be below the {samples} samples of record {label}; check nk and the sampling rate"
+    )]
     DelayTooLong {
         /// Delay in samples.
         nk: usize,
@@ -75,7 +76,8 @@ pub enum IdentError {
     },
     /// The regressors are linearly dependent.
     #[error(
-        "the regressors are singular: {columns}; the record does not excite so many parameters: lower the orders or use a record with more frequencies"
+        "the regressors are singular: {columns}; the record does not excite this many parameters: lower the orders or \
+         use a record with more frequencies"
     )]
     SingularRegressors {
         /// Names of the dependent columns.
@@ -83,15 +85,15 @@ pub enum IdentError {
     },
     /// The instruments are linearly dependent or uncorrelated with the regressors.
     #[error(
-        "the instruments are singular: {dependence}; the signal from which they are made does not excite so many \
-         parameters: lower the orders or use a signal with more frequencies"
+        "the instruments are singular: {dependence}; their source signal does not excite this many parameters: lower \
+         the orders or use a signal with more frequencies"
     )]
     SingularInstruments {
         /// The dependence between instruments.
         dependence: String,
     },
     /// A record lacks a requested channel.
-    #[error("record {label} has no channel {channel} to make instruments from; it has {available}")]
+    #[error("record {label} has no channel {channel} for the instruments; its channels are {available}")]
     NoChannel {
         /// Name of the requested channel.
         channel: String,
@@ -173,7 +175,8 @@ pub enum IdentError {
     },
     /// A channel has no power at a line of the excitation.
     #[error(
-        "{channel} of record {label} has no power at the line {omega_rad_s} rad/s; leave this line out, or check the period and the span"
+        "{channel} of record {label} has no power at the line of {omega_rad_s} rad/s; omit this line, or check the \
+         period and the span"
     )]
     NoLinePower {
         /// Name of the channel.
@@ -185,8 +188,8 @@ pub enum IdentError {
     },
     /// A line is at or above the Nyquist frequency.
     #[error(
-        "the line {omega_rad_s} rad/s is not below half the sampling frequency of record {label}, {nyquist_rad_s} \
-         rad/s; leave this line out"
+        "the line at {omega_rad_s} rad/s must be below the Nyquist frequency of record {label}, {nyquist_rad_s} \
+         rad/s; omit this line"
     )]
     LineBeyondNyquist {
         /// Frequency of the line, rad/s.

@@ -274,7 +274,7 @@ impl Fit {
         if let Some(physical) = &self.physical {
             return physical.remnant.ok_or_else(|| NotConvertible::NotARemnantFilter {
                 order: 0,
-                reason: "m = 0, the remnant is white".to_owned(),
+                reason: "with m = 0 the remnant is white".to_owned(),
             });
         }
         let variance_of_sd = self.innovation_variance / (2.0 * self.residuals as f64);

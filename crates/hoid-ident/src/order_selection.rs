@@ -55,7 +55,7 @@ pub fn check_order(name: &str, range: &RangeInclusive<usize>) -> Result<(), Iden
         true => Ok(()),
         false => Err(bad(
             format!("{name} = {}", range.end()),
-            format!("at most {most} is possible: give a smaller number or range"),
+            format!("at most {most}; give a smaller number or range"),
         )),
     }
 }
@@ -150,7 +150,7 @@ impl OrderRanges {
         let all: f64 = numbers.iter().product();
         if all > MOST_CANDIDATES as f64 {
             return Err(IdentError::BadOption {
-                option: "the search of orders and delay".to_owned(),
+                option: "the search over orders and delay".to_owned(),
                 found: format!("{all} candidates ({self})"),
                 expected: format!("at most {MOST_CANDIDATES} candidates: narrow --nk and --orders"),
             });

@@ -41,15 +41,15 @@ pub fn noise<E: 'static>(set: impl Fn(&mut E, &Setting, &str) -> Result<(), Iden
 
 /// Returns the option for a change of the operator; this option also determines which estimator is used.
 pub fn change<E: 'static>() -> BatchOption<E> {
-    let help = "Change of the operator: none, or one change of its gains along a sigmoid, for which hoid identify \
-                refuses --figure, --validate, --horizon and --report";
+    let help = "Change of the operator: none, or one sigmoid change of its gains (hoid identify then rejects \
+                --figure, --validate, --horizon and --report)";
     let setting = Setting::new("change", Kind::Choice(&["none", "sigmoid"]), help).default("none");
     BatchOption::new(setting, |_, _, _| Ok(()))
 }
 
 /// Returns the option for the form of an operator; the text `auto` means `None`.
 pub fn form<E: 'static>(set: fn(&mut E, Option<Form>)) -> BatchOption<E> {
-    let help = "Form of the operator; auto: average over the forms that the data allow, lead for --change sigmoid";
+    let help = "Form of operator; auto: average over the forms that the data allow; lead with --change sigmoid";
     let setting = Setting::new("form", Kind::Choice(&FORMS), help).default("auto");
     BatchOption::new(setting, move |how, option, text| {
         let form = match text {
@@ -82,8 +82,8 @@ pub fn yes_words(yes: bool) -> String {
 
 /// Returns the option for prior knowledge of the person.
 pub fn prior<E: 'static>(default: &str, field: Field<E, OperatorPrior>) -> BatchOption<E> {
-    let help = "Prior knowledge of the person: population (published people), none, a JSON result of another fit, or \
-     NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_L, T_I, such as omega_nm=10.5:0.3 (relative spread)";
+    let help = "Prior knowledge of the person: population (published data), none, a JSON result of another fit, or \
+     NAME=CENTRE:SPREAD for omega_nm, zeta_nm, tau_e, T_L, T_I, such as omega_nm=10.5:0.3 (relative spread)";
     let setting = Setting::new("prior", Kind::Prior, help).default(default);
     BatchOption::new(setting, move |how, _, text| {
         *field(how) = text.parse()?;
@@ -99,7 +99,7 @@ pub fn orders(default: &str) -> Setting {
 
 /// Returns the setting for the delay in s.
 pub fn delay(default: &str) -> Setting {
-    let help = "Delay tau_e, or a range to search; for polynomials it replaces nk = tau_e/Ts + 1";
+    let help = "Delay tau_e (for polynomials instead of nk = tau_e/Ts + 1) or a range to search";
     Setting::new("delay", Kind::NumberOrSpan, help)
         .default(default)
         .unit("s")

@@ -3,7 +3,7 @@
 use hoid_model::ModelError;
 use thiserror::Error;
 
-use crate::wording::{list, sparse_option};
+use crate::wording::{counted, list, sparse_option};
 
 /// Reason why a file could not be read or written. Each message gives the file, the place in it, the contents found,
 /// the expected contents and the remedy. A `place` is "line 12" if the format has lines, otherwise "row 12".
@@ -27,9 +27,7 @@ pub enum IoError {
         source: std::io::Error,
     },
     /// A result that would overwrite its own input.
-    #[error(
-        "{file} is {input}, which is read by the same command and would be lost; choose another file for the result"
-    )]
+    #[error("{file} is the input {input} of this command and would be overwritten; choose another file for the result")]
     OutputIsInput {
         /// Path of the result.
         file: String,
@@ -38,8 +36,8 @@ pub enum IoError {
     },
     /// A directory of results that contains an input, which might be overwritten.
     #[error(
-        "{directory} holds {input}, which is read by the same command and may be lost; choose another directory for \
-         the results"
+        "{directory} contains the input {input} of this command, which may be overwritten; choose another directory \
+         for the results"
     )]
     OutputAmongInputs {
         /// Path of the directory of results.
@@ -66,8 +64,8 @@ pub enum IoError {
     },
     /// A shared library without the functions required by an FMU.
     #[error(
-        "{file} is a shared library, but not that of hoid: it has no {missing}; give the library that `cargo xtask \
-         ffi` built"
+        "{file} is not the shared library of hoid: the function {missing} is missing; give the library that `cargo \
+         xtask ffi` built"
     )]
     OtherLibrary {
         /// Name of the file.
@@ -76,7 +74,7 @@ pub enum IoError {
         missing: &'static str,
     },
     /// A directory in use by another process.
-    #[error("another process is working on {directory}: wait until it ends, or choose another directory")]
+    #[error("another process is using {directory}; wait for that process to end, or choose another directory")]
     InUse {
         /// Name of the directory.
         directory: String,
@@ -123,7 +121,7 @@ pub enum IoError {
     },
     /// Numbers in the line where the column names are expected.
     #[error(
-        "{file}, {place}: the first line holds numbers ({found}), expected the names of the columns; put a header such as t,e,u above it, without # in front"
+        "{file}, {place}: the first line holds numbers ({found}), expected the names of the columns; insert a header such as t,e,u above this line, without a leading #"
     )]
     NoHeader {
         /// Name of the file.
@@ -186,8 +184,8 @@ pub enum IoError {
     },
     /// A truncated last line.
     #[error(
-        "{file} is truncated in {place}, its last: {found} of {expected} values; copy or record it again, or remove \
-         that line and use the lines above it"
+        "{file} is truncated in {place}, the last one: {found} of {expected} values; copy or record the file again, or \
+         remove that line"
     )]
     CutRow {
         /// Name of the file.
@@ -201,8 +199,8 @@ pub enum IoError {
     },
     /// A column that does not exist in the file.
     #[error(
-        "{file} has no column {missing} (asked for: {asked}{meant}); it has {available}; choose with --input and \
-         --output by NAME, -NAME or NAME-NAME"
+        "{file} has no column {missing} (requested: {asked}{meant}); it has {available}; select columns with --input \
+         and --output as NAME, -NAME or NAME-NAME"
     )]
     NoSuchColumn {
         /// Name of the file.
@@ -262,7 +260,7 @@ pub enum IoError {
     },
     /// Missing values in a column.
     #[error(
-        "{file}, {place}, column {column}: the value is missing ({found}), as are {count} of {rows} in this column; bridge them linearly with --fill, or leave them out with --from and --to"
+        "{file}, {place}, column {column}: the value is missing ({found}; {count} of {rows} missing in this column); bridge missing values linearly with --fill, or exclude the rows with --from and --to"
     )]
     Missing {
         /// Name of the file.
@@ -280,9 +278,9 @@ pub enum IoError {
     },
     /// Values missing in many places, as in a topic with another rate.
     #[error(
-        "{file}, {place}, column {column}: the value is missing ({found}), as are {count} of {rows} in this column; if \
-         the column was logged at its own instants, read it with {} (or linear, drop); otherwise bridge the missing \
-         values linearly with --fill, or leave them out with --from and --to",
+        "{file}, {place}, column {column}: the value is missing ({found}; {count} of {rows} missing in this column); \
+         if the column was logged at its own times, read it with {} (or linear or drop); otherwise bridge missing \
+         values linearly with --fill, or exclude the rows with --from and --to",
         sparse_option(column)
     )]
     Sparse {
@@ -301,7 +299,7 @@ pub enum IoError {
     },
     /// Missing values at the start or the end of the record.
     #[error(
-        "{file}, {place}, column {column}: the values are missing up to the {end} of the record, so that --fill has nothing to bridge to; leave them out with --from and --to"
+        "{file}, {place}, column {column}: the values at the {end} of the record are missing, so --fill has no value to bridge to; exclude these rows with --from and --to"
     )]
     NothingToBridgeTo {
         /// Name of the file.
@@ -315,8 +313,8 @@ pub enum IoError {
     },
     /// Neither a time column nor a given sampling frequency.
     #[error(
-        "{file} has no column t (time in s), and no sampling frequency was given; name the column of the time with \
-         --time COLUMN, or give --fs HZ; it has {available}"
+        "{file} has no column t (time in s), and no sampling frequency was given; select the time column with \
+         --time COLUMN, or give --fs HZ; the file has {available}"
     )]
     NoSampling {
         /// Name of the file.
@@ -332,8 +330,9 @@ pub enum IoError {
     },
     /// Too few samples to determine the sampling.
     #[error(
-        "{file}: {found} sample, expected at least 2 to determine the sampling from t; check the file and the span, or \
-         give --fs HZ"
+        "{file}: {}, expected at least 2 to determine the sampling rate from t; check the file and the span, or give \
+         --fs HZ",
+        counted(*found, "sample")
     )]
     TooFewSamples {
         /// Name of the file.
@@ -379,9 +378,9 @@ pub enum IoError {
     },
     /// Missing samples.
     #[error(
-        "{file}: samples missing after {place}, t = {after_s} s: {missing} (the next is at {next_s} s, the sample time \
-         is {sample_time_s:.6} s; number of gaps: {gaps}); interpolate over them with --resample, or use the part \
-         before or after with --from and --to"
+        "{file}: gap after {place}, t = {after_s} s (missing samples: {missing}; next sample at {next_s} s; sample time \
+         {sample_time_s:.6} s; total number of gaps: {gaps}); interpolate with --resample, or use the part before or \
+         after the gap with --from and --to"
     )]
     Gap {
         /// Name of the file.
@@ -401,7 +400,7 @@ pub enum IoError {
     },
     /// Samples that deviate from the evenly spaced grid.
     #[error(
-        "{file}: t is uneven: at {place}, t = {found} s, it is {deviation_s:.3e} s off the even grid with sample time {sample_time_s:.6} s, more than the allowed {tolerance_s:.3e} s; interpolate onto the grid with --resample, or give --fs HZ if the samples were taken evenly and only t is wrong"
+        "{file}: t is unevenly spaced: t = {found} s at {place} is {deviation_s:.3e} s off the even grid with sample time {sample_time_s:.6} s, expected at most {tolerance_s:.3e} s; interpolate onto the grid with --resample, or give --fs HZ if the samples were taken evenly and only t is wrong"
     )]
     Jitter {
         /// Name of the file.
@@ -419,7 +418,7 @@ pub enum IoError {
     },
     /// A resampled record that would consist almost entirely of interpolated samples.
     #[error(
-        "{file}: resampling from t = {start_s} s to {end_s} s would make {samples:.0} samples out of {rows}, expected at most {factor} times as many; look for a wrong time in t, or use a part with --from and --to"
+        "{file}: resampling from t = {start_s} s to {end_s} s would turn {rows} samples into {samples:.0}, expected at most {factor} times as many; check t for a wrong time, or use a part with --from and --to"
     )]
     ResampledTooLong {
         /// Name of the file.
@@ -513,7 +512,7 @@ pub enum IoError {
     },
     /// Streams that do not overlap in time.
     #[error(
-        "{file}: input and output were recorded one after the other, expected a time in which both have samples; choose other streams with --input and --output"
+        "{file}: input and output were recorded one after the other, expected streams that overlap in time; choose other streams with --input and --output"
     )]
     NoOverlap {
         /// Name of the file.
@@ -536,7 +535,9 @@ pub enum IoError {
         file: String,
     },
     /// Rows that do not match the columns of the file.
-    #[error("{file}: rows of {found} cannot follow {expected}; append tables of the same columns in the same order")]
+    #[error(
+        "{file}: the appended rows have the columns {found}, expected {expected}; append tables with the same columns in the same order"
+    )]
     ColumnsDiffer {
         /// Name of the file.
         file: String,
@@ -557,7 +558,7 @@ pub enum IoError {
     },
     /// Contents whose format differs from the extension.
     #[error(
-        "{file} is not in the format {format}: {found}, expected {expected}; copy or write it again if it was cut \
+        "{file} is not in {format} format: {found}, expected {expected}; copy or write it again if it was cut \
          short, or give it the extension of its format"
     )]
     WrongFormat {

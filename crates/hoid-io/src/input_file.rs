@@ -43,8 +43,8 @@ pub(crate) fn settings_text(path: &Path) -> io::Result<String> {
         return Ok(text);
     }
     Err(io::Error::other(format!(
-        "more than {} MB of settings; if this length is intended, set HOID_MAX_UNPACKED_MB in the environment to {} \
-         times its size in MB",
+        "the settings exceed {} MB; if this size is intended, set HOID_MAX_UNPACKED_MB in the environment to {} times \
+         the size in MB",
         longest >> 20,
         kind.share()
     )))

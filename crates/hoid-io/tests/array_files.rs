@@ -340,12 +340,12 @@ fn what_cannot_be_meant_says_so() {
     assert!(message.contains("no samples"), "{message}");
     let dir = tempfile::tempdir().unwrap();
     for (name, bytes, word) in [
-        ("a.npz", &b"t,e,u\n0,1,2\n"[..], "is not in the format NPZ"),
-        ("a.npz", b"", "is not in the format NPZ"),
+        ("a.npz", &b"t,e,u\n0,1,2\n"[..], "is not in NPZ format"),
+        ("a.npz", b"", "is not in NPZ format"),
         ("a.npz", b"PK\x05\x06", "is damaged"),
-        ("a.npy", b"t,e,u\n0,1,2\n", "is not in the format NPY"),
-        ("a.mat", b"t,e,u\n0,1,2\n", "is not in the format MATLAB"),
-        ("a.mat", b"", "is not in the format MATLAB"),
+        ("a.npy", b"t,e,u\n0,1,2\n", "is not in NPY format"),
+        ("a.mat", b"t,e,u\n0,1,2\n", "is not in MATLAB format"),
+        ("a.mat", b"", "is not in MATLAB format"),
         ("a.mat", &[0; 64], "is damaged: variable 4"),
     ] {
         fs::write(dir.path().join(name), bytes).unwrap();

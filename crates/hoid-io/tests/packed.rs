@@ -64,7 +64,7 @@ fn packed_tables_and_sidecars() {
             .unwrap_err()
             .to_string()
     };
-    assert!(message("cut.csv.gz").contains("not a whole gzip file"));
+    assert!(message("cut.csv.gz").contains("not a complete gzip file"));
     std::fs::write(desk.path("run.npz.gz"), &packed).unwrap();
     assert!(message("run.npz.gz").contains("unpack it first"));
 }

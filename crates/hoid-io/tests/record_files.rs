@@ -184,7 +184,7 @@ fn expressions_choose_and_combine() {
 
     assert!(
         desk.error(text, &defaults())
-            .contains("has no column \"e\" (asked for: e); it has t, r, y, stick")
+            .contains("has no column \"e\" (requested: e); it has t, r, y, stick")
     );
     assert!(
         desk.error(text, &options("r-y", "r-y"))
@@ -205,7 +205,7 @@ fn decimal_commas_give_the_same_record() {
     ] {
         let comma = of(text);
         assert_eq!(comma.record, point.record);
-        assert_eq!(comma.notes, ["the commas in its numbers are taken as decimal commas"]);
+        assert_eq!(comma.notes, ["the commas in the numbers are taken as decimal commas"]);
     }
     // Before three digits a comma may separate thousands.
     let message = desk.error("t,e,u\n0,\"1,500\",\"2,000\"\n1,\"1,250\",\"3,000\"\n", &defaults());
@@ -236,14 +236,11 @@ fn errors_name_line_column_and_remedy() {
     );
     says(
         "t,e,u\nframes,counts,counts\n0,1,2\n1,1,2\n",
-        &[
-            "line 2, column t: found \"frames\"",
-            "remove it and give them with --unit",
-        ],
+        &["line 2, column t: found \"frames\"", "remove it and give --unit"],
     );
     says(
         "t,e,u\n2024-03-01 10:00:00.00,1,2\n0.02,1,2\n",
-        &["line 2, column t", "a date or clock time among numbers", "--fs HZ"],
+        &["line 2, column t", "mixes numbers with dates or clock times", "--fs HZ"],
     );
     says(
         "t e\n0.00 1.5 2\n0.01 1.6 2\n",
@@ -251,11 +248,14 @@ fn errors_name_line_column_and_remedy() {
     );
     says(
         "t,e,u\n0,1,2\n#\n1,NaN,2\n2,,2\n",
-        &["line 4, column e: the value is missing (NaN), as are 2 of 3", "--fill"],
+        &[
+            "line 4, column e: the value is missing (NaN; 2 of 3 missing in this column)",
+            "--fill",
+        ],
     );
     says(
         "t,e,u\n0,1,2\n1,2,\n",
-        &["line 3, column u: the value is missing (empty)"],
+        &["line 3, column u: the value is missing (empty; "],
     );
     says(
         "t,e,u\n0,1,2\n1,2,-inf\n",
@@ -272,16 +272,16 @@ fn errors_name_line_column_and_remedy() {
     says(
         "t,e,u\n0.0,1,2\n0.1,1,2\n0.2,1,2\n0.6,1,2\n0.7,1,2\n0.8,1,2\n0.9,1,2\n",
         &[
-            "samples missing after line 4, t = 0.2 s: 3 (the next is at 0.6 s",
-            "number of gaps: 1",
+            "gap after line 4, t = 0.2 s (missing samples: 3; next sample at 0.6 s",
+            "total number of gaps: 1",
             "--resample",
         ],
     );
     says(
         "t,e,u\n0.000,1,2\n0.100,1,2\n0.230,1,2\n0.300,1,2\n",
         &[
-            "at line 4, t = 0.23 s, it is 3.000e-2 s off",
-            "more than the allowed 1.000e-3 s",
+            "t = 0.23 s at line 4 is 3.000e-2 s off",
+            "expected at most 1.000e-3 s",
             "--resample",
         ],
     );
@@ -302,7 +302,7 @@ fn other_columns_that_are_no_numbers_are_left_out_with_a_note() {
     assert_eq!(read.notes.len(), 3, "{:?}", read.notes);
     assert!(read.notes[0].contains("column 6 has no name"));
     assert!(read.notes[1].contains("column who is left out") && read.notes[1].contains("found \"P1\""));
-    assert!(read.notes[2].contains("column d is left out") && read.notes[2].contains("missing (empty)"));
+    assert!(read.notes[2].contains("column d is left out") && read.notes[2].contains("missing (empty; "));
 }
 
 /// For any content of a file, the result is a record of finite numbers or an error that names the file.

@@ -41,9 +41,7 @@ fn values_are_held_between_their_own() {
     }
     assert_eq!(
         read.notes,
-        [
-            "1 rows at the start and 1 at the end are cut: a sparse column has no value before its first or after its last"
-        ]
+        ["1 row at the start and 1 at the end cut: a sparse column has no values there"]
     );
     let [
         Step::Sparse {
@@ -71,7 +69,7 @@ fn values_are_held_between_their_own() {
     );
     let text = read.steps[0].to_string();
     assert!(
-        text.starts_with("column e: 10 values of its own, 18 rows between them hold the last value"),
+        text.starts_with("column e: 10 values of its own, 18 rows between them filled with the last value"),
         "{text}"
     );
 }
@@ -210,7 +208,7 @@ fn what_cannot_be_done_is_refused() {
         &[("e", Sparse::Hold), ("u", Sparse::Hold)],
     );
     assert!(
-        apart.contains("no row between the first and the last value of each of e, u"),
+        apart.contains("no row lies between the first and the last value of every column of e, u"),
         "{apart}"
     );
     assert!(

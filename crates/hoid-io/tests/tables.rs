@@ -364,7 +364,7 @@ fn missing_values_in_parquet_are_named() {
     };
     let null = message("e");
     assert!(
-        null.contains("missing.parquet, row 4, column e: the value is missing (null), as are 44 of 300"),
+        null.contains("missing.parquet, row 4, column e: the value is missing (null; 44 of 300 missing"),
         "{null}"
     );
     assert!(null.contains("--fill"), "{null}");

@@ -140,7 +140,7 @@ fn a_given_frequency_wins_over_t() {
     );
     let clock = desk.read("t,e,u\n12:00:01,1,0\n12:00:02,2,0\n", &with(2.0)).unwrap();
     assert_eq!(clock.record.time_s(1), 0.5);
-    assert_eq!(clock.notes[0], "t is in s from its first moment");
+    assert_eq!(clock.notes[0], "t is in s from its first time");
     let none = desk.read("t,e,u\nx,1,0\n12:00:02,2,0\n", &with(2.0)).unwrap();
     assert!(
         none.notes[0].contains("t is not a number in line 2"),
@@ -183,12 +183,12 @@ fn fill_bridges_and_says_so() {
     );
     let open = desk.error("t,e,u\n0,1,2\n1,,2\n", &fill(FILL));
     assert!(
-        open.contains("line 3, column e: the values are missing up to the end"),
+        open.contains("line 3, column e: the values at the end of the record are missing"),
         "{open}"
     );
     let open = desk.error("t,e,u\n0,,2\n1,1,2\n", &fill(FILL));
     assert!(
-        open.contains("line 2, column e: the values are missing up to the start"),
+        open.contains("line 2, column e: the values at the start of the record are missing"),
         "{open}"
     );
     // Text and infinite values are errors and not gaps.
@@ -232,9 +232,9 @@ fn two_topics_in_one_table_are_read_where_both_have_values() {
     assert_eq!(
         read.notes,
         [
-            "1 rows at the start and 0 at the end are left out: not all of e and u have a value there to bridge to",
-            "column e lacks values at many places, as if logged at its own instants: --fill draws straight lines, \
-             --sparse e=hold holds the last value"
+            "1 row at the start and 0 at the end left out: --fill has no value to bridge to there (columns: e, u)",
+            "column e lacks many values, as if logged at its own times: --fill interpolates linearly, --sparse e=hold \
+             holds the last value"
         ]
     );
     // On separate clocks, 50 and 40 Hz, without a common time stamp: the grid is that of the faster one.
@@ -261,7 +261,7 @@ fn two_topics_in_one_table_are_read_where_both_have_values() {
     // No overlap at all: the error reports it.
     assert!(
         desk.error("t,e,u\n0,1,\n1,2,\n2,,1\n3,,2\n", &ask(FILL))
-            .contains("missing up to")
+            .contains("of the record are missing")
     );
 }
 
@@ -313,7 +313,7 @@ fn resample_goes_over_gaps_and_jitter() {
         desk.read(even, &defaults()).unwrap()
     );
     let away = desk.error("t,e,u\n0,1,2\n1,1,2\n2,1,2\n1e9,1,2\n", &ask(RESAMPLE, None));
-    assert!(away.contains("would make 1000000001 samples out of 4"), "{away}");
+    assert!(away.contains("would turn 4 samples into 1000000001"), "{away}");
     let back = desk.error("t,e,u\n0,1,2\n1,1,2\n0.5,1,2\n", &ask(RESAMPLE, None));
     assert!(back.contains("expected increasing time"), "{back}");
 }

@@ -184,7 +184,7 @@ impl Default for Condition {
     fn default() -> Self {
         Self {
             name: "rate".to_owned(),
-            text: "The farther you move from the middle, the faster it goes; in the middle it stays where it is."
+            text: "Your hand sets the speed: the farther from the middle, the faster. In the middle, the motion stops."
                 .to_owned(),
             scenario: None,
             scenario_text: None,
@@ -216,8 +216,8 @@ const DEFAULT_METHOD: &str = "adaptive";
 /// Default consent text.
 const CONSENT: &str = "You will follow a moving target by hand for a few short runs. The program stores where your \
 hand was, what was on the screen and when, under a made-up name, on this computer only. It stores no name, no picture \
-and no sound. You may stop at any time with the Escape key or by closing the window; what was stored can be deleted \
-with its folder. Do not take part if moving patterns make you unwell.";
+and no sound. You may stop at any time with the Escape key or by closing the window; the stored data can be deleted \
+with their folder. Do not take part if moving patterns make you unwell.";
 
 impl Default for Config {
     /// Returns a configuration with a single run of about two minutes for trying out the lab.
@@ -391,7 +391,7 @@ impl Condition {
         }
         for (key, s) in [("run_in_s", run_in), ("measurement_s", measured)] {
             if ((s * 100.0).round() / 100.0 - s).abs() > 1e-9 {
-                return wrong(format!("{key} is {s}, expected whole hundredths of a second"));
+                return wrong(format!("{key} is {s}, expected a multiple of 0.01 s"));
             }
         }
         let states = course.element_at(0.0)?.den().len().saturating_sub(1);
@@ -402,7 +402,7 @@ impl Condition {
         }
         if course.has_lines() == [false, false] {
             return wrong(
-                "without target and disturbance the person would have nothing to do; give a target or a disturbance"
+                "without a target and a disturbance the person would have nothing to do; give at least one of them"
                     .to_owned(),
             );
         }

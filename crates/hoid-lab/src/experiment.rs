@@ -19,7 +19,7 @@ sub-P01/ses-01/             one session of one person, \
                       who has a made-up name
   lab.toml                  the experiment, its order, browser and \
                       screen
-  lab.copy.toml             the same, for when lab.toml is damaged
+  lab.copy.toml             a copy, in case lab.toml is damaged
   runs.csv             \
                       each run that ended: verified, or unverified and why
   ..._run.json              the task of a \
@@ -28,7 +28,7 @@ sub-P01/ses-01/             one session of one person, \
                       disturbance at each tick of 1 ms
   ..._ticks.csv             u (hand) and e (error) at each \
                       tick
-  ..._events.csv            input events: the tick that took them, their own time stamp, \
+  ..._events.csv            input events: the tick that used them, their own time stamp, \
                       when the page
                             received them (ms from tick 0), what the device \
                       reported
@@ -36,7 +36,7 @@ sub-P01/ses-01/             one session of one person, \
                       the tick and the
                             error that they show
   ..._live.csv              \
-                      the estimate while the run continued
+                      the estimate during the run
   ..._end.json              how the run ended, SHA-256 of \
                       ticks, events and frames
   ..._beh.parquet           the run at 100 Hz: t, e, u, f_t (target), d \

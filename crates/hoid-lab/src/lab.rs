@@ -219,12 +219,14 @@ impl Lab {
             return shared.hello(id, role, browser);
         }
         if matches!(shared.mode, Mode::Replay(_)) {
-            return Err(LabError::Order("a session is replayed; nothing is measured".to_owned()));
+            return Err(LabError::Order(
+                "a session is being replayed; nothing is measured".to_owned(),
+            ));
         }
         let mut state = shared.state();
         if state.person != Some(id) {
             return Err(LabError::Order(
-                "This window only watches; the session runs in another window.".to_owned(),
+                "This window is view-only; the session runs in another window.".to_owned(),
             ));
         }
         // Neither of these messages changes the state of the session.
@@ -306,11 +308,11 @@ impl Shared {
             let before = state.person.filter(|before| *before != id);
             self.hand_over(&mut state, id)?;
             if let Some(before) = before {
-                let words = "The session continues in another window; this window only watches.".to_owned();
+                let words = "The session continues in another window; this window is view-only.".to_owned();
                 self.tell(&ToPage::Refused { words, elsewhere: true }, |page, _| page == before);
             }
         } else if role == Role::Person {
-            let words = "A run continues in another window; this window only watches.".to_owned();
+            let words = "A run is in progress in another window; this window is view-only.".to_owned();
             self.tell(&ToPage::Refused { words, elsewhere: true }, |page, _| page == id);
         }
         drop(state);
@@ -369,10 +371,10 @@ impl Shared {
 
     fn consent(&self, state: &mut Current, subject: &str, agreed: bool, cc0: bool) -> Result<(), LabError> {
         if !agreed {
-            return Err(LabError::Order("without consent nothing is measured".to_owned()));
+            return Err(LabError::Order("nothing is measured without consent".to_owned()));
         }
         if state.run.is_some() || matches!(self.mode, Mode::Replay(_)) {
-            return Err(LabError::Order("another session continues".to_owned()));
+            return Err(LabError::Order("another session is in progress".to_owned()));
         }
         state.enter(Session::begin(&self.out, &self.config, subject, cc0)?);
         experiment::list(&self.out)

@@ -133,7 +133,7 @@ impl LiveRun {
             Stage::Collecting(warm_up) => {
                 let left = warm_up.needed.saturating_sub(warm_up.collected) as f64 * self.ts.s();
                 line.waiting = Some(format!(
-                    "the first {DEFAULT_WARM_UP_S} s are collected, {left:.0} s to go"
+                    "collecting the first {DEFAULT_WARM_UP_S} s, {left:.0} s remain"
                 ));
                 return line;
             }

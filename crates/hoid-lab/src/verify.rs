@@ -180,12 +180,12 @@ fn events_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
             "does not fit into the sequence of ticks".to_owned()
         } else if !((0.0..).contains(&late) && (event.stamp_ms..).contains(&event.handled_ms)) {
             format!(
-                "was taken at tick {} before its time stamp of {:.3} ms",
+                "was used at tick {}, before its time stamp of {:.3} ms",
                 event.tick, event.stamp_ms
             )
         } else if late > begun.limits.input_ms {
             let limit = begun.limits.input_ms;
-            format!("was taken {late:.1} ms after its time stamp, expected at most {limit} ms")
+            format!("was used {late:.1} ms after its time stamp, expected at most {limit} ms")
         } else {
             last = event.tick;
             continue;
@@ -201,7 +201,8 @@ fn inputs_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
         .collect();
     let made = held_inputs(&events, logged.signals.u.len());
     differing(&made, &logged.signals.u).map(|(first, count)| {
-        let words = format!("u of {count} ticks does not match the input events, first at tick {first}");
+        let all = logged.signals.u.len();
+        let words = format!("u does not match the input events at {count} of {all} ticks, first at tick {first}");
         Finding::doubt("lab-input", words)
     })
 }
@@ -209,7 +210,8 @@ fn inputs_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
 fn errors_of(task: &Task, logged: &Logged) -> Option<Finding> {
     let made = task.run(&logged.signals.u);
     differing(&made.e, &logged.signals.e).map(|(first, count)| {
-        let words = format!("e of {count} ticks does not match the controlled element, first at tick {first}");
+        let all = logged.signals.e.len();
+        let words = format!("e does not match the controlled element at {count} of {all} ticks, first at tick {first}");
         Finding::doubt("lab-tick", words)
     })
 }

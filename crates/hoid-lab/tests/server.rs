@@ -222,12 +222,7 @@ fn a_run_goes_through_and_its_live_estimate_is_told() {
     assert_eq!(verdict["done"]["verdict"], "verified", "{verdict}");
     // A second window cannot control the session.
     other.say(&json!({"type": "next"}));
-    assert!(
-        other.hear("refused")["words"]
-            .as_str()
-            .unwrap()
-            .contains("only watches")
-    );
+    assert!(other.hear("refused")["words"].as_str().unwrap().contains("view-only"));
     let zip = at.get(&format!("/{}/export.zip", at.token), "");
     assert!(status(&zip) == "200" && zip.contains("sub-P01/ses-01/lab.toml"));
     let data = at.get(&format!("/{}/data/{number}.json", at.token), "");
@@ -325,7 +320,7 @@ fn one_experiment_has_one_server() {
     let dir = tempfile::tempdir().unwrap();
     let _at = served(dir.path(), Mode::Sessions);
     let second = Lab::open(dir.path(), config(), Mode::Sessions, None);
-    assert!(second.is_err_and(|error| error.to_string().contains("another process is working on")));
+    assert!(second.is_err_and(|error| error.to_string().contains("another process is using")));
 }
 
 /// Connections that the server has not accepted yet wait for it. The system drops what its queue does not hold, and the

@@ -162,8 +162,8 @@ pub enum NotConvertible {
     },
     /// A pole on the closed negative real axis has no real logarithm.
     #[error(
-        "the pole z = {pole:.6} lies on the closed negative real axis, so that no real continuous-time system \
-         corresponds to the model"
+        "the pole z = {pole:.6} lies on the closed negative real axis, so no real continuous-time system corresponds \
+         to the model"
     )]
     NegativeRealPole {
         /// Value of the pole in z.
@@ -180,7 +180,7 @@ pub enum NotConvertible {
         a2: f64,
     },
     /// `b0 + b1 = 0`: the model does not respond to a constant error, so that T_L = K_e_dot / K_e does not exist.
-    #[error("the gain K_e is zero (b0 + b1 = 0), so that the lead time T_L = K_e_dot / K_e does not exist")]
+    #[error("the gain K_e is zero (b0 + b1 = 0), so the lead time T_L = K_e_dot / K_e does not exist")]
     ZeroGain,
     /// Polynomial orders that differ from those of the operator model.
     #[error("the operator model has two coefficients in B and two poles, found nb = {nb} and {poles} poles")]
@@ -199,7 +199,7 @@ pub enum NotConvertible {
         nf: usize,
     },
     /// A model without delay: after a zero-order hold the delay is at least one sample.
-    #[error("nk = 0: a zero-order hold delays by at least one sample, so that tau_e = (nk - 1) Ts would be negative")]
+    #[error("nk = 0: a zero-order hold delays by at least one sample, so tau_e = (nk - 1) Ts would be negative")]
     NoDelay,
     /// A coefficient that is not a finite number.
     #[error("the coefficient {name} is {value}")]

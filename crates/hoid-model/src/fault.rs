@@ -113,11 +113,11 @@ impl Fault {
     /// Returns advice on how to remove the fault by hand.
     pub fn remedy(&self) -> &'static str {
         match self.kind {
-            FaultKind::TimeUnit => "t must be in s: divide a t in ms by 1000, or give the sampling frequency with --fs",
-            FaultKind::Exchanged => "exchange them: --input and --output",
+            FaultKind::TimeUnit => "give t in s (divide a t in ms by 1000), or give the sampling frequency with --fs",
+            FaultKind::Exchanged => "exchange them with --input and --output",
             FaultKind::Sign => "reverse the sign of one of them: --output=-u, or --input=-e",
-            FaultKind::Step => "cut there with --from and --to, or --faults cut",
-            _ => "look at the recording there; cut it out with --from and --to or --faults cut",
+            FaultKind::Step => "cut the record there with --from and --to, or use --faults cut",
+            _ => "look at the recording there; cut the fault out with --from and --to or --faults cut",
         }
     }
 }
@@ -141,12 +141,12 @@ impl fmt::Display for Fault {
             )?,
             FaultKind::Dropout => write!(f, "{channel} drops out, {span}")?,
             FaultKind::Frozen => write!(f, "{channel} is frozen, {span} ({size} s)")?,
-            FaultKind::Idle if channel.is_empty() => write!(f, "nothing happens, {span} ({size} s)")?,
+            FaultKind::Idle if channel.is_empty() => write!(f, "all channels are idle, {span} ({size} s)")?,
             FaultKind::Idle => write!(f, "{channel} is idle, {span} ({size} s)")?,
             FaultKind::Wrap => write!(f, "{channel} wraps around by {size}, {span}")?,
             FaultKind::Step => write!(f, "the level of {channel} steps by {size} at {} s", time(self.from_s))?,
             FaultKind::Scale => write!(f, "{channel} is {size} times larger than elsewhere, {span}")?,
-            FaultKind::TimeUnit => write!(f, "a sample time of {size} s: too long for the recording of a person")?,
+            FaultKind::TimeUnit => write!(f, "the sample time of {size} s is too long for a recording of a person")?,
             FaultKind::Exchanged => {
                 f.write_str(
                     "input and output seem exchanged: the output responds immediately, and the input responds late",

@@ -51,7 +51,7 @@ impl HeldSystem {
         if den.first() != Some(&1.0) || num.len() > den.len() {
             return Err(ModelError::TransferFunction {
                 found: format!("{num:?} / {den:?}"),
-                expected: "a monic denominator and a numerator of no higher degree".to_owned(),
+                expected: "expected a monic denominator and a numerator of no higher degree".to_owned(),
             });
         }
         let order = den.len() - 1;

@@ -43,7 +43,7 @@ pub fn name<'de, D: Deserializer<'de>>(reader: D) -> Result<Name, D::Error> {
     let text = String::deserialize(reader)?;
     interned(&text).ok_or_else(|| {
         D::Error::custom(format!(
-            "found a name of {} bytes, expected {LONGEST} at most",
+            "found a name of {} bytes, expected at most {LONGEST}",
             text.len()
         ))
     })

@@ -36,7 +36,7 @@ pub trait NamedChoice: Copy + PartialEq + Sized + 'static {
 
 /// A name that is not one of the available names.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("there is no {what} {found}; expected {expected}")]
+#[error("unknown {what} {found}; expected {expected}")]
 pub struct UnknownName {
     /// Kind of the choice, such as "structure".
     pub what: &'static str,
@@ -60,7 +60,7 @@ pub struct UnknownName {
 /// assert_eq!("hann".parse(), Ok(Window::Hann));
 /// assert_eq!(Window::Rectangular.to_string(), "none");
 /// let error = "hamming".parse::<Window>().unwrap_err();
-/// assert_eq!(error.to_string(), "there is no window hamming; expected hann or none");
+/// assert_eq!(error.to_string(), "unknown window hamming; expected hann or none");
 /// ```
 #[macro_export]
 macro_rules! named_choice {
@@ -119,7 +119,7 @@ mod tests {
         let error = "arxx".parse::<Structure>().unwrap_err().to_string();
         assert_eq!(
             error,
-            "there is no structure arxx; expected fir, ar, ma, arx, arma, armax, ararx, ararmax, oe, bj or general"
+            "unknown structure arxx; expected fir, ar, ma, arx, arma, armax, ararx, ararmax, oe, bj or general"
         );
     }
 }

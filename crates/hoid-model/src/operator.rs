@@ -62,12 +62,12 @@ impl OperatorParameters {
             )));
         }
         let find = |name: &str| pairs.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
-        let need = |name: &str| find(name).ok_or_else(|| wrong(format!("{name} is lacking")));
+        let need = |name: &str| find(name).ok_or_else(|| wrong(format!("{name} is missing")));
         let k_e = need("K_e")?;
         let t_l_s = match (find("T_L"), find("K_e_dot")) {
             (Some(t_l), None) => t_l,
             (None, Some(k_e_dot)) if k_e != 0.0 => k_e_dot / k_e,
-            (None, Some(_)) => return Err(wrong("K_e = 0 has no T_L = K_e_dot/K_e".to_owned())),
+            (None, Some(_)) => return Err(wrong("T_L = K_e_dot/K_e does not exist for K_e = 0".to_owned())),
             (Some(_), Some(_)) => return Err(wrong("give T_L or K_e_dot, not both".to_owned())),
             (None, None) => return Err(wrong("T_L (or K_e_dot) is missing".to_owned())),
         };

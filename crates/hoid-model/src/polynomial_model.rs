@@ -54,13 +54,17 @@ impl PolynomialModel {
         if theta.len() != orders.parameters() {
             return Err(ModelError::Orders {
                 found: orders.to_string(),
-                expected: format!("theta of {} coefficients, found {}", orders.parameters(), theta.len()),
+                expected: format!(
+                    "expected {} coefficients in theta, found {}",
+                    orders.parameters(),
+                    theta.len()
+                ),
             });
         }
         if let Some(i) = theta.iter().position(|v| !v.is_finite()) {
             return Err(ModelError::TransferFunction {
                 found: format!("{} = {}", orders.parameter_names()[i], theta[i]),
-                expected: "finite coefficients".to_owned(),
+                expected: "expected finite coefficients".to_owned(),
             });
         }
         Ok(Self {

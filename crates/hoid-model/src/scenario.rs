@@ -309,7 +309,7 @@ impl Scenario {
             return Err(ModelError::OutOfRange {
                 quantity: "run-in and measurement time in s",
                 found: self.run_in_s + self.measurement_s,
-                expected: "at most 1e8 samples: shorten the run or take a longer sample time",
+                expected: "at most 1e8 samples; shorten the run or use a longer sample time",
             });
         }
         let mut delay_samples = [0; 2];

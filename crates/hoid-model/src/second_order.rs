@@ -160,7 +160,7 @@ pub fn hold_biproper(
     if den[0] == 0.0 {
         return Err(ModelError::TransferFunction {
             found: format!("{num:?} / {den:?}"),
-            expected: "a denominator of second order, with a nonzero leading coefficient".to_owned(),
+            expected: "expected a denominator of second order, with a nonzero leading coefficient".to_owned(),
         });
     }
     let [d, n1, n2] = num.map(|c| c / den[0]);

@@ -239,7 +239,7 @@ impl Orders {
         }
         if !structure.has_input() && self.nk > 0 {
             return refuse(format!(
-                "the structure {structure} has no input, so that a delay has no meaning; set nk = 0"
+                "the structure {structure} has no input, so a delay has no meaning; set nk = 0"
             ));
         }
         if self.parameters() == 0 {
@@ -275,7 +275,7 @@ impl fmt::Display for Orders {
 pub fn theta_of(names: &[String], start: &BTreeMap<String, f64>) -> Result<Vec<f64>, String> {
     if let Some(unknown) = start.keys().find(|name| !names.contains(name)) {
         return Err(format!(
-            "names {unknown}, which the model does not have; it has {}",
+            "contains {unknown}, which is not a parameter of the model; expected {}",
             names.join(", ")
         ));
     }
@@ -285,7 +285,7 @@ pub fn theta_of(names: &[String], start: &BTreeMap<String, f64>) -> Result<Vec<f
         .collect();
     if !missing.is_empty() {
         return Err(format!(
-            "lacks {}; give all coefficients, or none for the program's own starts",
+            "lacks {}; give all coefficients, or none to let the program choose the start",
             missing.join(", ")
         ));
     }
@@ -370,7 +370,7 @@ mod tests {
         assert_eq!(of(&[("f1", -1.9), ("b0", 0.04)]), Ok(vec![0.04, -1.9]));
         for (start, reason) in [
             (&[("f1", 1.0)][..], "lacks b0"),
-            (&[("a1", 1.0)], "names a1"),
+            (&[("a1", 1.0)], "contains a1"),
             (&[("b0", f64::NAN), ("f1", 1.0)], "b0 = NaN"),
         ] {
             assert!(of(start).unwrap_err().contains(reason), "{reason}");

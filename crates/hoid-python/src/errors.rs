@@ -114,7 +114,7 @@ impl From<AnalysisError> for Failure {
             ))),
             AnalysisError::Misplaced { name, of, instead } => {
                 let of: Vec<String> = of.into_iter().map(estimator).collect();
-                bad_option(format!("{name} belongs to {}{instead}", of.join(", ")))
+                bad_option(format!("{name} applies only to {}{instead}", of.join(", ")))
             }
             AnalysisError::InAnotherFile { .. } => Self(FormatError::new_err(text)),
             AnalysisError::SameSamples { .. } | AnalysisError::NotAResult { .. } => Self(DataError::new_err(text)),

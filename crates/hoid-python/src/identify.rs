@@ -88,7 +88,7 @@ pub fn identify_axes(
     };
     let (ResolvedRequest::Operator(how), _) = request.resolve()? else {
         return Err(bad_option(
-            "axes have operators: options of other structures do not apply",
+            "axes are identified as operators: options of other structures do not apply",
         ));
     };
     let pairs: Vec<AxisPair> = (pairs.iter())

@@ -90,7 +90,7 @@ fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
                 .filter(has)
                 .map(|spec| format!("\"{}\"", spec.name));
             let of = of.collect::<Vec<_>>().join(", ");
-            return Err(bad_option(format!("{keyword} belongs to method={of}")));
+            return Err(bad_option(format!("{keyword} applies only to method={of}")));
         }
         let wrong = |error: IdentError| bad_option(format!("{keyword}: {error}"));
         method.set(setting.name, &text).map_err(wrong)?;

@@ -21,7 +21,11 @@ pub fn facts(names: &[String], settings: &[Setting], accounts: &[Account]) -> Ve
         let steps: Vec<String> = account.steps.iter().map(Step::to_string).collect();
         let issues: Vec<String> = account.quality_issues.iter().map(QualityIssue::to_string).collect();
         let faults: Vec<String> = account.faults.iter().map(Fault::to_string).collect();
-        for (what, parts) in [("preparation", steps), ("sampling trouble", issues), ("faults", faults)] {
+        for (what, parts) in [
+            ("preparation", steps),
+            ("sampling problems", issues),
+            ("faults", faults),
+        ] {
             if !parts.is_empty() {
                 rows.push((name(what, file), parts.join("; ")));
             }

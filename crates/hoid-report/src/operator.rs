@@ -95,8 +95,8 @@ fn remark(p: &Parameter) -> String {
     let words = undetermined(p);
     match (words, p.prior_share > 0.01) {
         (_, false) => words.to_owned(),
-        ("", true) => format!("{:.0} % of it prior", 100.0 * p.prior_share),
-        (_, true) => format!("{words}, {:.0} % of it prior", 100.0 * p.prior_share),
+        ("", true) => format!("{:.0} % from the prior", 100.0 * p.prior_share),
+        (_, true) => format!("{words}, {:.0} % from the prior", 100.0 * p.prior_share),
     }
 }
 
@@ -222,8 +222,8 @@ fn through_describing_function(fit: &FamilyFit, described: &Description) -> Pict
         svg: picture(fit, described),
         caption:
             "The describing function at the lines of the excitation, with 95 % intervals from its scatter, and the \
-                  operator: by prediction error, the mean over its forms with their 95 % band; in the best form fitted \
-                  at the lines, and by instrumental variables (RIV-BJ) where these converge."
+                  operator: by prediction error (the mean over the forms, with a 95 % band), by a fit of the best form \
+                  at the lines, and by instrumental variables (RIV-BJ) if they converge."
                 .to_owned(),
     }
 }

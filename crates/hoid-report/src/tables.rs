@@ -232,7 +232,7 @@ pub fn course(fit: &Fit, records: &[Record]) -> Vec<Value> {
             format!("{}({})", fit.model().structure().label(), fit.orders()),
         ),
         ("end of the search", format!("{}; {steps}", end.reason)),
-        ("start that won", fit.start().to_owned()),
+        ("best start", fit.start().to_owned()),
         ("initial states", initial),
         (
             "innovation variance",

@@ -125,8 +125,8 @@ fn three_methods_over_each_other_show_all_that_is_asked_for() {
     }
     let operator = figure(&html, "operator");
     assert!(operator.contains(">truth<") && operator.contains(">batch fit<"));
-    assert!(html.contains("Dashed: the truth") && html.contains("Dots in colour: batch fits"));
-    assert!(html.contains("Shaded") && html.contains("Upright dots"));
+    assert!(html.contains("Dashed: the truth") && html.contains("Coloured dots: batch fits"));
+    assert!(html.contains("Shaded") && html.contains("Vertical dots"));
     assert!(
         figure(&html, "coefficients").contains(", f</tspan><tspan"),
         "a and f share a panel"
@@ -189,7 +189,7 @@ fn a_recording_has_no_truth() {
     check_page(&html);
     assert!(!html.contains("<b>") && !html.contains("<deg>"));
     assert!(!html.contains(">truth<") && !html.contains("Relative error"));
-    assert!(!html.contains("Dashed") && !html.contains("dashes") && !html.contains("Dots in colour"));
+    assert!(!html.contains("Dashed") && !html.contains("dashes") && !html.contains("Coloured dots"));
     // Only the parameters of the operator are estimated, so that their errors are shown.
     assert!(html.contains("Standard errors of the parameters of the operator"));
 }
@@ -205,7 +205,7 @@ fn a_start_from_nothing_and_shortened_steps_are_told() {
     let html = report(&record, vec![section("RPEM", &trace, &[])]).to_html().unwrap();
     check_page(&html);
     assert!(html.contains("There was no start fit") && html.contains("from nothing"));
-    assert!(!html.contains("Shaded") && !html.contains("Upright"));
+    assert!(!html.contains("Shaded") && !html.contains("Vertical"));
     assert!(figure(&html, "shortened").contains(">steps"));
     assert!(html.contains(&format!("<td class=\"n\">{}</td>", trace.counts().shortened)));
 }

@@ -26,7 +26,7 @@ pub enum SimError {
     #[error(
         "the operator of {scenario} responds to an error within the same sample: its delay is {tau_e_s} s, it has no \
          neuromuscular part and its response is not strictly proper; expected a delay of at least half a sample \
-         ({half_a_sample_s} s): make tau_e longer or the sample time shorter, or give omega_nm and zeta_nm"
+         ({half_a_sample_s} s): increase tau_e, reduce the sample time, or give omega_nm and zeta_nm"
     )]
     DirectResponse {
         /// Name of the scenario.

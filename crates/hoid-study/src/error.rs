@@ -51,8 +51,8 @@ pub enum StudyError {
     },
     /// The parts have no checksums.
     #[error(
-        "the blocks of {directory} have no checksums, because an earlier hoid wrote them: run that shard again with \
-         --resume, which computes the blocks again"
+        "the blocks in {directory} have no checksums because an earlier version of hoid wrote them: run that shard again \
+         with --resume to recompute them"
     )]
     Unsealed {
         /// Directory of the parts.
@@ -88,7 +88,7 @@ pub enum StudyError {
     },
     /// The study is already complete, so there is nothing to merge.
     #[error(
-        "{directory} holds a complete study, so that there is nothing to merge: expected directories written with \
+        "{directory} holds a complete study, so there is nothing to merge: expected directories written with \
              --shard"
     )]
     Whole {
@@ -96,7 +96,7 @@ pub enum StudyError {
         directory: String,
     },
     /// Two directories contain the same block.
-    #[error("block {block} is both in {first} and in {second}: name each shard once")]
+    #[error("block {block} is in both {first} and {second}: name each shard once")]
     DuplicateBlock {
         /// Number of the block.
         block: u64,
@@ -107,7 +107,7 @@ pub enum StudyError {
     },
     /// Some blocks are missing.
     #[error(
-        "{missing} of {blocks} blocks of {plan} are missing, the first is {first}: run the missing shards, or finish the stopped shards with --resume"
+        "{missing} of {blocks} blocks of {plan} are missing, starting with {first}: run the missing shards, or finish the stopped shards with --resume"
     )]
     MissingBlocks {
         /// Number of missing blocks.
@@ -120,7 +120,7 @@ pub enum StudyError {
         plan: String,
     },
     /// The operating system cannot provide the threads.
-    #[error("no threads: {reason}; try --jobs 1")]
+    #[error("the threads cannot be started: {reason}; use --jobs 1")]
     Threads {
         /// Error reported by the operating system.
         reason: String,
@@ -134,7 +134,7 @@ pub enum StudyError {
         reason: String,
     },
     /// The manifest of a group is missing.
-    #[error("there is no {path}; `hoid group init DIR` writes one")]
+    #[error("there is no {path}; write one with `hoid group init DIR`")]
     NoManifest {
         /// Path where the manifest was expected.
         path: String,
@@ -147,7 +147,7 @@ pub enum StudyError {
     },
     /// No file of the directory matches the pattern.
     #[error(
-        "no file in {directory} matches {pattern}; it has {found}: describe the file names with --pattern, such as \
+        "no file in {directory} matches {pattern}; found {found}: describe the file names with --pattern, such as \
          {{subject}}_{{run}}.csv"
     )]
     NoRuns {

@@ -83,7 +83,7 @@ pub fn merge(shards: &[PathBuf], directory: &Path, csv: bool) -> Result<Outcome,
         return Err(StudyError::OtherStudy {
             directory: shards[0].display().to_string(),
             reason: format!(
-                "it was made by hoid {}, this is {}",
+                "it was made by hoid {}, but this is hoid {}",
                 manifest.hoid,
                 env!("CARGO_PKG_VERSION")
             ),

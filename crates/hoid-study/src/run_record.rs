@@ -49,7 +49,7 @@ impl RunRecord {
     pub fn note_on_seals(&self) -> Option<String> {
         let unsealed = !self.sealed && !self.complete;
         unsealed.then(|| {
-            "its blocks have no checksums, because an earlier hoid wrote them: all were computed again".to_owned()
+            "the blocks had no checksums because an earlier version of hoid wrote them: all were recomputed".to_owned()
         })
     }
 

@@ -76,7 +76,7 @@ pub(crate) fn on_disk(directory: &Path, plan_sha256: &str, block: u64) -> OnDisk
     for (table, sum) in &seal.tables {
         match hoid_io::read_bytes(&part(directory, block, table)) {
             Ok(bytes) if sha256(&bytes) == *sum => {}
-            Ok(_) => return OnDisk::Damaged(format!("its table {table} is not as it was written")),
+            Ok(_) => return OnDisk::Damaged(format!("its table {table} was changed after it was written")),
             Err(_) => return OnDisk::Damaged(format!("its table {table} cannot be read")),
         }
     }
@@ -96,11 +96,11 @@ pub(crate) fn notes_on(damaged: &[(u64, String)]) -> Vec<String> {
     let mut notes: Vec<String> = damaged
         .iter()
         .take(MOST_NAMED)
-        .map(|(block, why)| format!("block {block} is damaged ({why}) and was computed again"))
+        .map(|(block, why)| format!("block {block} is damaged ({why}) and was recomputed"))
         .collect();
     if damaged.len() > MOST_NAMED {
         notes.push(format!(
-            "{} more blocks are damaged and were computed again",
+            "further damaged blocks that were recomputed: {}",
             damaged.len() - MOST_NAMED
         ));
     }

@@ -123,7 +123,12 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
         &|_| (),
         &|| true,
     );
-    assert!(among.unwrap_err().to_string().contains("read by the same command"));
+    assert!(
+        among
+            .unwrap_err()
+            .to_string()
+            .contains("of this command, which may be overwritten")
+    );
 
     // Delay and gain of each person: nk = 29, K_e = 0.09 and 0.108 in C1 within four standard
     // errors of the mean of two runs.
@@ -226,7 +231,7 @@ fn a_polynomial_model_that_is_not_asked_for_is_in_no_table() {
     manifest.analysis.polynomials = vec!["armax".to_owned()];
     let refused = Manifest::parse(&manifest.text(), "group.toml").unwrap_err().to_string();
     assert!(
-        refused.contains("analysis.polynomials has \"armax\", expected some of arx, bj"),
+        refused.contains("analysis.polynomials has \"armax\", expected one or more of arx, bj"),
         "{refused}"
     );
 }
@@ -259,7 +264,7 @@ fn a_bad_file_is_a_row_and_a_bad_manifest_an_error() {
 
     let text = manifest.text();
     for (from, to, words) in [
-        ("run = \"2\"", "run = \"1\"", "duplicated"),
+        ("run = \"2\"", "run = \"1\"", "appears twice"),
         ("subject = \"A\"", "subject = \"\"", "no subject"),
         ("trace_every = 16", "trace_every = 0", "trace_every is 0"),
         ("trace_every = 16", "trace_evry = 16", "unknown field"),

@@ -163,7 +163,7 @@ fn a_record_is_cut_where_it_is_masked() {
     }
     assert_eq!(segments[0].quality_issues.len(), 2);
     for (mask, shortest, words) in [
-        (&[QualityIssueKind::Clock][..], 1.0, "some of missing, gap"),
+        (&[QualityIssueKind::Clock][..], 1.0, "one or more of missing, gap"),
         (&[QualityIssueKind::Gap], f64::NAN, "NaN"),
         (&[QualityIssueKind::Gap], 1e6, "no segment of 1000000 s"),
     ] {

@@ -423,7 +423,7 @@ fn damaged_blocks_are_computed_again() {
         let outcome = run(&plan(), &again, &resumed, &|_| (), &|| true).unwrap();
         assert!(outcome.finished);
         assert_eq!(outcome.notes.len(), 1, "{kind}: {:?}", outcome.notes);
-        assert!(outcome.notes[0].contains("was computed again"), "{:?}", outcome.notes);
+        assert!(outcome.notes[0].contains("was recomputed"), "{:?}", outcome.notes);
         assert!(content(&whole) == content(&again), "{kind}");
     }
     // Block 1 replaced by block 0, with all that belongs to it.
@@ -493,7 +493,7 @@ fn blocks_of_an_earlier_program_are_computed_again_or_refused() {
         ..RunOptions::default()
     };
     let outcome = run(&plan(), &old, &resumed, &|_| (), &|| true).unwrap();
-    assert!(outcome.notes[0].contains("have no checksums"), "{:?}", outcome.notes);
+    assert!(outcome.notes[0].contains("had no checksums"), "{:?}", outcome.notes);
     assert!(content(&whole) == content(&old));
 }
 
@@ -522,7 +522,7 @@ fn two_runs_do_not_share_a_directory_and_no_plan_is_written_over() {
             .finished
     );
     let message = second.into_inner().unwrap().unwrap().unwrap_err().to_string();
-    assert!(message.contains("another process is working on"), "{message}");
+    assert!(message.contains("another process is using"), "{message}");
 
     let own = out.path().join("own");
     fs::create_dir(&own).unwrap();

@@ -35,7 +35,7 @@ settings! {
     /// Options of least squares with the poles of the prediction-error method.
     pub struct FusedOptions {
         /// Initial covariance P: X times the unit matrix, in units of the innovation variance (thesis: 0.1)
-        #[setting(bounds(Bounds::PositiveFinite), default("that of the start fit, else 1e6"))]
+        #[setting(bounds(Bounds::PositiveFinite), default("from the start fit, else 1e6"))]
         pub covariance: Option<f64> = None,
         /// Limit on innovations, in standard deviations
         #[setting(bounds(Bounds::Positive), default("5"))]

@@ -30,7 +30,7 @@ pub(crate) fn check_model_of_change(name: &str, setup: &Setup) -> Result<(), Ide
         return Err(bad(
             &format!("the start of {name}"),
             "no batch fit".to_owned(),
-            "the batch fit of a span, whose noise model and covariance it needs",
+            "the batch fit of a span, which provides the noise model and the covariance",
         ));
     }
     Ok(())

@@ -107,7 +107,7 @@ impl RecursiveMethod for LinearNetworkOptions {
 
     fn memory_as_text(&self) -> Option<String> {
         Some(format!(
-            "a weight is learned with a time constant of {} s",
+            "weights are learned with a time constant of {} s",
             self.learning
         ))
     }

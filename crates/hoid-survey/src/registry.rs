@@ -145,8 +145,8 @@ pub fn set(method: &mut Method, name: &str, text: &str) -> Result<(), IdentError
         [] => method.set(name, text),
         of => Err(bad(
             name,
-            format!("with the method {}", method.name()),
-            &format!("the method {}, whose option it is", of.join(" or ")),
+            format!("the method {}", method.name()),
+            &format!("the method {}, which has this option", of.join(" or ")),
         )),
     }
 }

@@ -13,7 +13,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum ThesisError {
     /// A name that belongs to no table, figure, appendix or study of the reproduction.
-    #[error("{name}: there is no table, figure or study of this name; expected {CLAIMS}, or a name, study or appendix of: {known}", CLAIMS = crate::CLAIMS)]
+    #[error("{name}: there is no table, figure or study of this name; expected {CLAIMS}, or a name, study or appendix from: {known}", CLAIMS = crate::CLAIMS)]
     UnknownItem {
         /// The unknown name.
         name: String,
@@ -21,7 +21,7 @@ pub enum ThesisError {
         known: String,
     },
     /// Recordings were given, but something other than the experiment was requested.
-    #[error("recordings apply to the experiment only: make only \"experiment\" with them")]
+    #[error("recordings apply only to the experiment; request only \"experiment\" with them")]
     NotTheExperiment,
     /// Recordings to which the procedure of the text cannot be applied.
     #[error("{place}: {reason}")]

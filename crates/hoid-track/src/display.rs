@@ -17,7 +17,7 @@ impl TrackOptions {
         match method.forgetting() {
             ForgettingRule::Exponential => {
                 let unbounded = match method.windup_guard(self.structure) {
-                    Some(WindupGuard::Off) => ", P without a guard against windup",
+                    Some(WindupGuard::Off) => ", P without a windup guard",
                     _ => "",
                 };
                 format!("exponential forgetting, memory {}{unbounded}", memories())
@@ -80,7 +80,7 @@ impl Memory {
         match self {
             Self::Samples(n) => format!("{} samples ({} s)", round(n), round(n * ts)),
             Self::Seconds(s) => format!("{s} s ({} samples)", round(s / ts)),
-            Self::Infinite => "without end".to_owned(),
+            Self::Infinite => "infinite".to_owned(),
         }
     }
 }
@@ -111,11 +111,11 @@ mod tests {
         assert_eq!(of(&[]), "exponential forgetting, memory 2.56 s (256 samples)");
         assert_eq!(
             of(&[("memory_of", "b=inf")]),
-            "exponential forgetting, memory a1 a2 2.56 s (256 samples), b0 b1 without end"
+            "exponential forgetting, memory a1 a2 2.56 s (256 samples), b0 b1 infinite"
         );
         assert_eq!(
             of(&[("covariance", "0.1")]),
-            "exponential forgetting, memory 2.56 s (256 samples), P without a guard against windup"
+            "exponential forgetting, memory 2.56 s (256 samples), P without a windup guard"
         );
         assert!(of(&[("forgetting", "gradient")]).ends_with("rate 0.1"));
     }

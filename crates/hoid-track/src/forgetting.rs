@@ -78,7 +78,7 @@ impl ForgettingRule {
         Setting::of("drift", &BTreeMap::<String, f64>::new())
             .bounds(Bounds::NonNegative)
             .help(&[
-                "For forgetting by a random walk: drift of a parameter in one second (standard deviation),",
+                "For random-walk: drift of a parameter in one second (standard deviation),",
                 "such as K_e=.01,K_e_dot=.01",
             ])
     }
@@ -105,7 +105,7 @@ impl ForgettingRule {
         match self {
             Self::RandomWalk(drift) if drift.is_empty() => Err(IdentError::BadOption {
                 option: "forgetting".to_owned(),
-                found: "random-walk, which needs drift".to_owned(),
+                found: "random-walk without drift".to_owned(),
                 expected: "the standard deviation of the drift in one second, such as drift K_e=.01".to_owned(),
             }),
             Self::Gradient(rate) if !Self::rate().bounds.hold(*rate) => Err(IdentError::BadOption {

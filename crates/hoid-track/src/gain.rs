@@ -92,7 +92,7 @@ impl<const N: usize> Gain<N> {
                 if !samples.is_finite() {
                     return Err(IdentError::BadOption {
                         option: "the sliding window".to_owned(),
-                        found: "a memory without end".to_owned(),
+                        found: "an infinite memory".to_owned(),
                         expected: "a memory in samples or seconds".to_owned(),
                     });
                 }

@@ -80,11 +80,7 @@ impl Live {
         let sample_time = plan.sample_time();
         let samples = (warm_up_s / sample_time.s()).round();
         if !(1.0..=LONGEST_WARM_UP).contains(&samples) {
-            return Err(bad(
-                "warm_up",
-                format!("{warm_up_s} s"),
-                "a time of one sample to 10 million",
-            ));
+            return Err(bad("warm_up", format!("{warm_up_s} s"), "1 to 10 million samples"));
         }
         Ok(Self {
             stage: Stage::new(plan.options(), samples as usize, sample_time)?,
@@ -103,7 +99,7 @@ impl Live {
         if !record.sample_time().matches(self.sample_time) {
             return Err(IdentError::BadStart {
                 reason: format!(
-                    "the start record has the sample time {} s, but the tracker has {} s",
+                    "the start record has a sample time of {} s, but the tracker has {} s; resample the record",
                     record.sample_time().s(),
                     self.sample_time.s()
                 ),

@@ -102,7 +102,7 @@ pub struct CommonMemory(pub Option<Memory>);
 impl CommonMemory {
     fn memory() -> Setting {
         Setting::of("memory", &None::<Memory>).help(&[
-            "Memory of all parameters, in which the weight of a sample falls to 1/e:",
+            "Memory of all parameters, after which the weight of a sample is 1/e:",
             "samples (256), seconds (2.56s) or inf",
         ])
     }

@@ -183,7 +183,7 @@ impl TrackOptions {
             return Err(bad(
                 "the range of the delay",
                 format!("{:?} s", (low, high)),
-                "two finite times, the shorter time first",
+                "two finite nonnegative times, the shorter time first",
             ));
         }
         if let Some(p) = setup.covariance
@@ -200,12 +200,12 @@ impl TrackOptions {
             return Err(bad(
                 "windup_guard",
                 "a guard with window or gradient forgetting, in which no P grows".to_owned(),
-                "forgetting = exponential, random-walk, variable or directional; or leave it out",
+                "forgetting = exponential, random-walk, variable or directional; or omit windup_guard",
             ));
         }
         if setup.limit.is_nan() || setup.limit <= 0.0 {
             return Err(bad(
-                "the limit of innovations",
+                "the limit on innovations",
                 setup.limit.to_string(),
                 "a positive multiple of sigma, or inf",
             ));

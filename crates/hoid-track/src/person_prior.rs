@@ -87,9 +87,11 @@ impl Value for PersonPrior {
                     .parse()
                     .map_err(|error: IdentError| format!("{expected} ({error})"))?;
                 if prior.entries().iter().any(|entry| entry.parameter == "T_L") {
-                    return Err("no prior of T_L: the gains, and with them the lead, come from the first second; name omega_nm, \
-                                zeta_nm, tau_e or T_I, or give the file of a fit"
-                        .to_owned());
+                    return Err(
+                        "no prior for T_L: the gains, and with them the lead, are estimated from the first \
+                         second; name omega_nm, zeta_nm, tau_e or T_I, or give the file of a fit"
+                            .to_owned(),
+                    );
                 }
                 Self::Named(prior)
             }

@@ -79,7 +79,8 @@ impl Tracker {
     pub fn restored(options: &TrackOptions, sample_time: SampleTime, numbers: &[f64]) -> Result<Self, IdentError> {
         options.check_at(sample_time)?;
         let wrong = || IdentError::BadStart {
-            reason: "the saved numbers belong to a tracker with other options; save it again".to_owned(),
+            reason: "the state was saved by a tracker with other options; use the same options, or save it again"
+                .to_owned(),
         };
         let numbers = opened(numbers).ok_or_else(|| IdentError::BadStart {
             reason: "the saved tracker was changed or truncated after it was saved; save it again".to_owned(),

@@ -51,14 +51,15 @@ settings! {
     /// Options of the gain of a recursion in the kernel.
     pub struct GainOptions {
         /// Initial covariance P: X times the unit matrix, in units of the innovation variance (thesis: 0.1)
-        #[setting(bounds(Bounds::PositiveFinite), default("that of the start fit, else 1e6"))]
+        #[setting(bounds(Bounds::PositiveFinite), default("from the start fit, else 1e6"))]
         pub covariance: Option<f64> = None,
         /// Limit on innovations, in standard deviations
         #[setting(bounds(Bounds::Positive))]
         pub limit: Option<f64> = None,
-        /// How far each variance in P may grow where nothing excites its parameter, as a multiple of its initial value;
+        /// Limit on the growth of each variance in P while its parameter is not excited, relative to the initial value;
         /// off: no limit
-        #[setting(bounds(Bounds::AtLeast(1.0)), default("1e4 with a covariance or without a start fit, else 10 times the value for the memory under the excitation of that fit"))]
+        #[setting(bounds(Bounds::AtLeast(1.0)), default("1e4 with a covariance or without a start fit, else 10 times \
+                                                         the steady value of P with the excitation of that fit"))]
         pub windup_guard: Option<WindupGuard> = None,
     }
     groups {
@@ -114,9 +115,8 @@ settings! {
 settings! {
     /// Options for tracking a delay.
     pub struct DelayOptions {
-        /// Also track the delay tau_e within this range: as a parameter (physical) or in whole samples (rpem,
-        /// multiple-model)
-        #[setting(name("track_delay"), unit("s"), bounds(Bounds::NonNegative), default("nk stays"))]
+        /// Range in which tau_e is also tracked (physical: as a parameter; rpem, multiple-model: in whole samples)
+        #[setting(name("track_delay"), unit("s"), bounds(Bounds::NonNegative), default("nk is fixed"))]
         pub track_delay_s: Option<(f64, f64)> = None,
     }
 }

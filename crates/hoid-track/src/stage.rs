@@ -217,7 +217,7 @@ impl WarmUp {
         if self.faulty as f64 * self.sample_time.s() > LONGEST_FAULT_S {
             *self = Self::new(self.length, self.sample_time);
             self.trouble = Some(format!(
-                "more than {LONGEST_FAULT_S} s of faulty samples: the warm-up started again"
+                "more than {LONGEST_FAULT_S} s of faulty samples: the warm-up was restarted"
             ));
             return;
         }
@@ -239,7 +239,7 @@ impl WarmUp {
         self.samples.drain(..idle.min(self.samples.len()));
         self.needed = self.collected.saturating_add(idle);
         self.trouble = Some(format!(
-            "neither e nor u moved for {:.1} s: this span is left out, and the warm-up continues",
+            "neither e nor u moved for {:.1} s: this span is excluded, and the warm-up continues",
             idle as f64 * self.sample_time.s()
         ));
         true

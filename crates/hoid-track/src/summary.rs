@@ -23,11 +23,11 @@ impl fmt::Display for Trace {
         let counts = self.counts();
         writeln!(
             f,
-            "samples {}, of which {} were faulty, and {} steps were shortened",
+            "samples {} ({} faulty), steps shortened: {}",
             counts.samples, counts.skipped, counts.shortened
         )?;
         let Some(last) = self.len().checked_sub(1) else {
-            return write!(f, "no row");
+            return write!(f, "no rows");
         };
         for (t, change) in self.changes() {
             writeln!(f, "change declared at {} s, log odds {}", plain(*t), plain(change.odds))?;

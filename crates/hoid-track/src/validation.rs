@@ -208,7 +208,7 @@ pub fn choose_covariance(
     let Some((_, covariance, options)) = best.filter(|(most, ..)| *most > 0.0) else {
         return Err(bad(
             "the run for validation",
-            format!("a VAF of 0 % of {} with every covariance", validation.label()),
+            format!("a VAF of 0 % for {} with every covariance", validation.label()),
             "a run of the same person in the same task, with the same columns, signs and units",
         ));
     };
@@ -266,7 +266,7 @@ pub fn track_validated(
         return Err(bad(
             "the run for validation",
             format!("{} samples", validation.len()),
-            &format!("the {} of the tracked run, or more", record.len()),
+            &format!("at least {}, as in the tracked run", record.len()),
         ));
     }
     let samples = |time_s: f64| ((time_s / ts.s()).round() as usize).max(1);

@@ -243,7 +243,7 @@ fn a_guard_that_is_none_is_refused_with_what_to_do() {
 #[test]
 fn other_settings_keep_their_guard() {
     let words = |options: TrackOptions| options.memory_as_text(hoid_model::SampleTime::HUNDREDTH);
-    let is_off = |options: TrackOptions| words(options).ends_with("without a guard against windup");
+    let is_off = |options: TrackOptions| words(options).ends_with("without a windup guard");
     assert!(is_off(of_the_text(Method::rls(), &[])));
     assert!(is_off(of_the_text(Method::rpem(), &[])));
     assert!(!is_off(TrackOptions::default_for(Method::rpem(), NK)));

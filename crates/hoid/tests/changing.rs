@@ -170,7 +170,7 @@ fn a_delay_that_changes_is_followed_and_named() {
         assert!(says.contains("shorter time first"), "{says}");
     }
     let says = refused(tracked.with(&[("smooth", "true")]).unwrap());
-    assert!(says.contains("one delay"), "{says}");
+    assert!(says.contains("the same delay"), "{says}");
 }
 
 #[test]

@@ -47,7 +47,7 @@ def signal(values: Any, name: str) -> FloatArray:
             try:
                 array = array.astype(np.float64)
             except (TypeError, ValueError) as error:
-                raise DataError(f"{name} holds something that is not a number: {error}") from error
+                raise DataError(f"{name} contains a value that is not a number: {error}") from error
         else:
             raise DataError(f"{name} has the type {array.dtype}, expected real numbers")
     if array.ndim != 1:

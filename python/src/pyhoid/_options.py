@@ -58,7 +58,7 @@ def controlled_element(
     """Return a controlled element as text, or as numerator and denominator."""
     if isinstance(element, str):
         if den is not None:
-            raise OptionError(f"the controlled element {element!r} is complete, expected no den")
+            raise OptionError(f"the controlled element {element!r} already has a denominator: leave den out")
         return element
     try:
         parts: tuple[Any, ...] = tuple(element) if den is None else (element, den)

@@ -223,8 +223,8 @@ def describing_function(
     signals = (several[0].input_name, several[0].output_name) if several else ()
     if not given and several and channel is not None and channel not in (*there, *signals):
         raise OptionError(
-            f"channel is {channel}, and the records have {', '.join(there) or 'no others than e and u'};"
-            " name the recorded excitation, or take pyhoid.describe, which looks for it"
+            f"channel is {channel}, but the records have {', '.join(there) or 'only e and u'};"
+            " name the recorded excitation, or use pyhoid.describe, which searches for it"
         )
     return DescribingFunction(
         _pyhoid.describing_function(

@@ -75,7 +75,7 @@ def stream(
     pylsl = _pylsl()
     found = pylsl.resolve_byprop("name", lsl_in, timeout=patience)
     if not found:
-        raise DataError(f"no stream {lsl_in!r} appeared within {patience} s; is it on this network?")
+        raise DataError(f"no stream {lsl_in!r} appeared within {patience} s; check its name and the network")
     inlet = pylsl.StreamInlet(found[0], processing_flags=pylsl.proc_clocksync)
     try:
         info = inlet.info(timeout=patience)
@@ -83,7 +83,7 @@ def stream(
         rate = info.nominal_srate()
         if rate > 0 and abs(rate * tracker.sample_time - 1) > 0.05:
             raise OptionError(
-                f"the stream goes at {rate} Hz, the tracker at {1 / tracker.sample_time} Hz; "
+                f"the stream has a rate of {rate} Hz, the tracker {1 / tracker.sample_time} Hz; "
                 "make the tracker with the sample time of the stream"
             )
         outlet = _outlet(pylsl, lsl_out, 1 / tracker.sample_time)

@@ -409,7 +409,7 @@ class OperatorFit(Model, Result):
                 _text.DASH if f["criterion"] is None else f"+{f['criterion'] - least:.1f}",
                 _text.number(f["held_out"], 4),
                 _text.number(f["chi2"], 4),
-                "in front" if f["form"] == self.form else "",
+                "chosen" if f["form"] == self.form else "",
             ]
             for f in self.forms
         ]

@@ -92,7 +92,7 @@ class OperatorParameters(Named[OperatorParameter]):
         return _text.html_table("Operator", _HEADER, self._rows())
 
 
-_HEADER = ["parameter", "value", "95 % from", "to", "of it prior", ""]
+_HEADER = ["parameter", "value", "95 % from", "to", "from prior", ""]
 
 
 def _end(value: float) -> str:

@@ -56,7 +56,7 @@ def _seconds(times: npt.NDArray[Any]) -> npt.NDArray[Any]:
         except (TypeError, ValueError):
             raise DataError(
                 f"the times are not numbers (the first is {times[0]!r}), expected s, dates or durations;"
-                " pandas.to_datetime makes dates of text"
+                " convert text with pandas.to_datetime"
             ) from None
     if np.isnat(times).any():
         row = int(np.flatnonzero(np.isnat(times))[0])
@@ -255,7 +255,7 @@ class Record:
                 meant = f"; did you mean {near[0]}?" if near else ""
                 raise DataError(
                     f"the table has no column {name}{meant}; it has {', '.join(columns)};"
-                    " choose by input and output"
+                    " choose columns with input and output"
                 )
         times = columns.pop("t", None)
         if times is None and (sample_time is None or _is_instant(index)):

@@ -73,13 +73,13 @@ pub fn tables(tasks: &Path, hoid: &Path, work: &Path, quick: bool) -> Result<Str
         ),
         (
             "rls",
-            "RLS by `track`, a row with standard errors a sample",
+            "RLS by `track`, one row with standard errors per sample",
             "samples",
             powers(largest.min(6)),
         ),
         (
             "rpem",
-            "RPEM by `track`, a row with standard errors a sample",
+            "RPEM by `track`, one row with standard errors per sample",
             "samples",
             powers(largest.min(6)),
         ),

@@ -59,7 +59,7 @@ pub fn gate(program: &Path, data: &Path, keep: bool) -> Result<(), String> {
             100.0 * ALLOWED
         )),
         (true, false) => {
-            println!("{KEPT} was made by another compiler than {compiler}: nothing follows");
+            println!("{KEPT} was made with a compiler other than {compiler}: the numbers cannot be compared");
             Ok(())
         }
     }

@@ -78,7 +78,7 @@ impl BatchOptions for Polynomials {
 
 /// Returns the options for orders and delay.
 fn searched() -> Vec<BatchOption<Polynomials>> {
-    let default = "the operator's: bj nb=2,nd=1..4,nf=2; arx na=2,nb=2";
+    let default = "bj nb=2,nd=1..4,nf=2; arx na=2,nb=2";
     let nk = "Delay of b0 in samples (29) or dead time in s (0.28s), or a range (20..40, 0.1s..0.4s) to search";
     let criterion = "Criterion that selects among searched candidates";
     vec![
@@ -130,9 +130,8 @@ fn searched() -> Vec<BatchOption<Polynomials>> {
 /// Returns the options that only the prediction error method has.
 fn by_prediction() -> Vec<BatchOption<Polynomials>> {
     let focus = "Purpose of the model: one-step prediction, or simulation from the input alone";
-    let start = "Start of the search, all coefficients, such as f1=-1.9,f2=.92,b0=.04,...";
-    let guess = "Prior values of coefficients with a weight W, such as f1=-1.9:0.5, which adds W (f1 + 1.9)^2 to the \
-                 loss";
+    let start = "Start of the search: all coefficients, such as f1=-1.9,f2=.92,b0=.04,...";
+    let guess = "Prior values and weights of coefficients: f1=-1.9:0.5 adds 0.5 (f1 + 1.9)^2 to the loss";
     let robust = "Huber loss instead of squares: linear beyond X standard deviations; 1.345 if X is not given";
     let stable = "Accept only models that are stable from e to u (C and F are always stable)";
     let mut all = vec![
@@ -146,7 +145,7 @@ fn by_prediction() -> Vec<BatchOption<Polynomials>> {
         .printed("focus", |how, _| Some(how.template.focus.to_string())),
         BatchOption::new(
             Setting::new("start", Kind::Named(&Kind::Number), start)
-                .default("own starts")
+                .default("automatic starts")
                 .bounds(Bounds::Finite),
             |how: &mut Polynomials, option, text| {
                 how.start = Some(option.read(text)?);

@@ -35,7 +35,7 @@ pub fn written<T: Serialize>(value: &T) -> Option<String> {
 pub fn read<T: DeserializeOwned>(text: &str) -> Result<T, String> {
     let (stated, text) = text.split_at_checked(DIGITS).ok_or("its state is truncated")?;
     if stated != sum(text) {
-        return Err("its state differs from the state that was written: it was truncated or changed".to_owned());
+        return Err("its state was truncated or changed after it was written".to_owned());
     }
     let version = env!("CARGO_PKG_VERSION");
     let table: Table<T> = toml::from_str(text)

@@ -55,7 +55,7 @@ impl Roles {
         let asked = |name: &str| Role::new(name, "as requested", true);
         let input = match (input, error_among(columns), targets.first().zip(outputs.first())) {
             (Some(name), ..) => asked(name),
-            (_, Some(name), _) => Role::new(name, "the tracking error, by its name", true),
+            (_, Some(name), _) => Role::new(name, "the tracking error, by name", true),
             (_, _, Some((r, y))) => Role::new(
                 format!("{r}-{y}"),
                 format!("no column is called e: target {r} minus output {y}"),
@@ -63,14 +63,14 @@ impl Roles {
             ),
             _ => Role::new(
                 "e",
-                "not found by its name: write the column, or a difference such as r-y",
+                "not found by name: give the column, or a difference such as r-y",
                 false,
             ),
         };
         let output = match (output, control_among(columns)) {
             (Some(name), _) => asked(name),
-            (_, Some(name)) => Role::new(name, "the control, by its name", true),
-            _ => Role::new("u", "not found by its name: write the column", false),
+            (_, Some(name)) => Role::new(name, "the control, by name", true),
+            _ => Role::new("u", "not found by name: give the column", false),
         };
         Self { input, output }
     }

@@ -56,7 +56,7 @@ pub(super) fn search(record: &Record, known: &LookOptions) -> Result<Periods, St
     };
     if let Some(missing) = candidates.iter().find(|name| record.channel(name).is_none()) {
         return Err(format!(
-            "there is no column {missing}; there are {}",
+            "there is no column {missing}; the columns are {}",
             channels.join(", ")
         ));
     }

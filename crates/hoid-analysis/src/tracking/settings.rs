@@ -89,7 +89,7 @@ impl OwnSettings<'_> {
         match self.covariance {
             Some(Covariance::Chosen(file, choice)) => {
                 let words = format!(
-                    "of {} values the one whose trace explains most of {file} from {:.2} to {:.2} s, VAF {:.2} %",
+                    "the one of {} values whose trace explains most of {file} from {:.2} to {:.2} s, VAF {:.2} %",
                     choice.candidates.len(),
                     choice.span_s.0,
                     choice.span_s.1,

@@ -113,7 +113,7 @@ impl Tracked {
             self.account()
                 .quality_issues
                 .iter()
-                .map(|one| format!("sampling trouble: {one}")),
+                .map(|one| format!("sampling problems: {one}")),
         );
         comments.extend(self.account().steps.iter().map(|step| format!("preparation: {step}")));
         comments.extend(trace.faults().iter().map(|fault| {
@@ -159,8 +159,8 @@ impl Tracked {
                 _ if self.trace.is_before_the_first(row) => ("none yet", "there is no estimate yet".to_owned()),
                 NotConvertible::NegativeRealPole { .. } => (
                     "pole",
-                    "a pole lies on the closed negative real axis, so that no real continuous-time system corresponds \
-                     to the model"
+                    "a pole lies on the closed negative real axis, so no real continuous-time system corresponds to \
+                     the model"
                         .to_owned(),
                 ),
                 NotConvertible::NoNaturalFrequency { .. } => (

@@ -20,7 +20,7 @@ use super::{
 /// Human-operator identification: estimates how a person controls a machine.
 ///
 /// Estimates gain, lead, delay, neuromuscular dynamics and remnant from the tracking error e and the control output u,
-/// with standard errors and a verdict on their reliability.
+/// with standard errors, and gives a verdict on the reliability of the result.
 #[derive(Debug, Parser)]
 #[command(name = "hoid", version, max_term_width = 110)]
 pub struct Cli {
@@ -32,7 +32,7 @@ pub struct Cli {
 pub enum Command {
     /// Run the whole analysis on a simulated run, with reports
     ///
-    /// Simulates a run in which the controlled element changes, and identifies and tracks the operator.
+    /// Simulates a run in which the controlled element changes, then identifies and tracks the operator.
     Demo(DemoArgs),
     /// Simulate one closed-loop run
     Simulate(SimulateArgs),
@@ -42,7 +42,7 @@ pub enum Command {
     Identify(Box<IdentifyArgs>),
     /// Estimate gain and phase at the excited frequencies, without a model
     ///
-    /// Computes describing function, crossover, margins and remnant from records with a periodic excitation.
+    /// Computes the describing function, crossover, margins and remnant from records with a periodic excitation.
     Describe(Box<DescribeArgs>),
     /// Track the operator over a record, sample by sample
     ///
@@ -72,7 +72,7 @@ pub enum Command {
     /// Run a tracking experiment in the browser
     ///
     /// Serves a tracking task as a page on this computer and prints its address. Identifies the operator during each
-    /// run, and verifies every run to the last bit. Included in release binaries; other builds need --features lab.
+    /// run, and verifies every run bit for bit. Included in release binaries; other builds need --features lab.
     Lab(LabArgs),
     /// Analyse many recorded runs by subject and condition
     ///
@@ -81,13 +81,13 @@ pub enum Command {
     Group(Box<GroupArgs>),
     /// Test differences between conditions or people
     ///
-    /// Combines the results of `hoid group` over people, and estimates differences with intervals, tests, effect sizes
-    /// and a sentence each.
+    /// Combines the results of `hoid group` over people and estimates differences, each with an interval, a test, an
+    /// effect size and a summary sentence.
     Compare(CompareArgs),
     /// Design the most informative forcing function for a person
     ///
-    /// Computes frequencies, amplitudes and phases of a forcing function, and the standard errors expected from a
-    /// number of runs, from approximate values for the person and the controlled element.
+    /// From approximate values for the person and the controlled element, computes the frequencies, amplitudes and
+    /// phases of a forcing function, and the standard errors to expect from a number of runs.
     Design(DesignArgs),
     /// Simulate a virtual experiment for `hoid group`
     ///
@@ -98,7 +98,7 @@ pub enum Command {
     Study(StudyCommand),
     /// Reproduce the thesis (Ortiz Moya 2023)
     ///
-    /// Computes its tables, figures and claims, each from a named study.
+    /// Reproduces its tables, figures and claims, each from a named study.
     Reproduce(ReproduceArgs),
     /// Write shell completions (bash, zsh, fish, PowerShell, Elvish)
     ///

@@ -9,11 +9,11 @@ use super::{choices::choice_of, figure::FigureArgs, show::ShowArgs};
 
 #[derive(Debug, Args)]
 pub struct CompareArgs {
-    /// Recordings with their manifest (group.toml), analysed first; or results: the directory written by
-    /// `hoid group DIR --out`, or the output of `hoid group --json`
+    /// Directory written by `hoid group DIR --out`, output of `hoid group --json`, or recordings with a manifest
+    /// (group.toml), which are analysed first
     #[arg(value_name = "DIR|MANIFEST|RESULTS.json")]
     pub results: PathBuf,
-    /// Factor to compare: NAME:LEVEL=A,B;LEVEL=C, with conditions or people of the group; repeat for several factors
+    /// Factor to compare: NAME:LEVEL=A,B;LEVEL=C, where A, B, C are conditions or people; repeat for several factors
     /// and their interactions [default: factor condition, with each condition as a level]
     #[arg(long, value_name = "FACTOR")]
     pub factor: Vec<Factor>,
@@ -24,8 +24,8 @@ pub struct CompareArgs {
     #[arg(long)]
     pub between: bool,
     /// Quantities to compare, comma-separated: crossover, phase_margin, tau_e, gain_db@W and phase_deg@W at W rad/s,
-    /// rms_e, rms_u, or parameters such as K, T_L, for which recordings are analysed in one form, chosen by the
-    /// evidence of all people [default: crossover,phase_margin,tau_e]
+    /// rms_e, rms_u, or parameters such as K, T_L (recordings are then analysed in one form, chosen on the evidence of
+    /// all people) [default: crossover,phase_margin,tau_e]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub of: Vec<Quantity>,
     /// Remove the trend over this covariate from the estimates, and report its slope
@@ -34,12 +34,12 @@ pub struct CompareArgs {
     /// Adjustment for multiple tests
     #[arg(long, value_name = "METHOD", default_value = "holm", value_parser = choice_of(&Adjustment::ALL))]
     pub adjust: Adjustment,
-    /// Variance between people in the weights: kept away from zero (penalised), or by restricted likelihood (reml),
-    /// whose intervals are too short for few people
+    /// Estimate of the variance between people: kept away from zero (penalised), or restricted likelihood (reml), whose
+    /// intervals are too short for few people
     #[arg(long, value_name = "METHOD", default_value = "penalised", value_parser = choice_of(&Weights::ALL))]
     pub weights: Weights,
     /// Directory for all results: comparison.json, differences.csv, .md and .tex, people.svg, sentences.txt, and the
-    /// results of recordings, which are then not analysed again
+    /// analysis of recordings, which is not repeated next time
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Threads for the analysis of recordings [default: one per core]

@@ -27,7 +27,7 @@ pub struct DescribeArgs {
     #[command(flatten)]
     pub faults: FaultArgs,
     #[arg(long, value_name = "COLUMN", help = format!(
-        "Column of the recorded disturbance or target, in which the lines are found; the span must be whole periods \
+        "Column of the disturbance or target that defines the lines; the span must be a whole number of periods \
          [default: the first of {} with lines]",
         COMMON_EXCITATIONS.join(", ")
     ))]
@@ -38,8 +38,8 @@ pub struct DescribeArgs {
     /// Period of the excitation in s [default: shortest common period of the lines found]
     #[arg(long, value_name = "S")]
     pub period: Option<f64>,
-    /// Controlled element in s, such as 90/(s(s+6)), or NUM/DEN in descending powers of s, such as 90/1,6,0: adds
-    /// crossover frequency and margins
+    /// Controlled element, such as 90/(s(s+6)) or 90/1,6,0 (NUM/DEN in descending powers of s): adds crossover
+    /// frequency and margins
     #[arg(long, value_name = "ELEMENT", allow_hyphen_values = true)]
     pub controlled_element: Option<ContinuousTransferFunction>,
     #[command(flatten)]

@@ -12,12 +12,12 @@ use super::{choices::choice_of, figure::FigureArgs, parse::parse_span, show::Sho
 
 #[derive(Debug, Args)]
 pub struct DesignArgs {
-    /// The people: population (people in general, adapted to the controlled element), a scenario of the family (.toml),
-    /// a fit (`hoid identify --json`), the directory of `hoid group --out`, its JSON or its population.json. For
-    /// several people, the errors of the typical and the worst person are reported
+    /// People to design for: population (people in general, adapted to the controlled element), a family scenario
+    /// (.toml), a fit (`hoid identify --json`), or a group (directory of `hoid group --out`, its JSON or
+    /// population.json). For several people, reports the errors of the typical and the worst
     #[arg(long, value_name = "population|FILE|DIR", default_value = "population")]
     pub people: People,
-    /// Condition, for a group with several conditions
+    /// Condition to use, for a group with several
     #[arg(long, value_name = "NAME")]
     pub condition: Option<String>,
     /// Form of the population's operator [default: the form that people use with the element]
@@ -26,8 +26,8 @@ pub struct DesignArgs {
     /// Controlled element, such as 90/(s(s+6)) or 90/1,6,0 [default: that of the scenario or group]
     #[arg(long, value_name = "TF")]
     pub controlled_element: Option<ContinuousTransferFunction>,
-    /// Quantities with their accepted standard errors: crossover=3%,tau_e=5%,phase_margin=2 (deg), tau_f=0.02 (s)
-    /// [default: all parameters equally]
+    /// Required standard errors: crossover=3%,tau_e=5%,phase_margin=2 (deg), tau_f=0.02 (s) [default: all parameters
+    /// equally]
     #[arg(long = "for", value_name = "LIST", value_delimiter = ',')]
     pub wanted: Vec<RequestedQuantity>,
     /// Apply the forcing function as a disturbance at the input of the controlled element, not as a target
@@ -45,7 +45,7 @@ pub struct DesignArgs {
     /// Number of runs [default: the number needed for --for, else 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub runs: Option<u32>,
-    /// Lines of each forcing function
+    /// Lines per forcing function
     #[arg(long, value_name = "N", default_value_t = 10)]
     pub lines: usize,
     /// Minimum distance between lines, in multiples of the fundamental 1/length
@@ -54,11 +54,11 @@ pub struct DesignArgs {
     /// Lowest and highest frequency of the lines, rad/s
     #[arg(long, value_name = "LO..HI", default_value = "0.2..18", value_parser = parse_span)]
     pub band: (f64, f64),
-    /// Largest amplitude of a line above the crossover, as a fraction of the mean amplitude below it; above this
-    /// fraction, people lower their crossover
+    /// Largest amplitude of a line above the crossover, relative to the mean amplitude below it; with larger ones,
+    /// people lower their crossover
     #[arg(long, value_name = "PART", default_value_t = 0.2)]
     pub shelf: f64,
-    /// Largest rms of the error; without this and --max-u, the forcing function has an rms of 1
+    /// Largest rms of the error; with neither this nor --max-u, the forcing function has rms 1
     #[arg(long, value_name = "RMS")]
     pub max_rms_e: Option<f64>,
     /// Largest rms of the control
@@ -69,7 +69,7 @@ pub struct DesignArgs {
     #[arg(long, value_name = "FORCING.toml|.csv|reference")]
     pub against: Option<Against>,
     /// Difference to detect between two conditions, with each person in both: crossover=.5 (rad/s), phase_margin=5
-    /// (deg), tau_e=10% (of its value). Reports the number of people, and of runs in each condition
+    /// (deg), tau_e=10% (of tau_e). Reports the number of people needed, and of runs per condition
     #[arg(long, value_name = "NAME=SIZE")]
     pub difference: Option<TargetDifference>,
     /// Power: probability of detecting the difference
@@ -78,12 +78,12 @@ pub struct DesignArgs {
     /// Two-sided significance level of the test
     #[arg(long, value_name = "P", default_value_t = ALPHA, requires = "difference")]
     pub alpha: f64,
-    /// Standard deviation of the difference between people, as a fraction of the quantity (phase margin: as caused by
-    /// this spread of the gain), or a file that contains it: output of `hoid compare --json`, the result of a group
-    /// with several conditions, or a population.json [default: from --people if available, else .1]
+    /// Standard deviation of the difference across people, as a fraction of the quantity (for phase margin: of the gain
+    /// that causes it), or a file that contains it: output of `hoid compare --json`, the result of a group with several
+    /// conditions, or a population.json [default: from --people if available, else .1]
     #[arg(long, value_name = "PART|FILE", requires = "difference")]
     pub between_people: Option<Between>,
-    /// Standard deviation from run to run of the same person, as a fraction in the same way
+    /// Run-to-run standard deviation of one person, as a fraction like --between-people
     #[arg(long, value_name = "PART", default_value_t = RUN_TO_RUN, requires = "difference")]
     pub run_to_run: f64,
     /// Display of the task: compensatory (error only), pursuit (target and output), preview (also the future target).
@@ -91,7 +91,7 @@ pub struct DesignArgs {
     /// error and target
     #[arg(long, value_name = "NAME", default_value = "compensatory", value_parser = choice_of(&Display::ALL))]
     pub display: Display,
-    /// Seed of the phase search: another seed gives other phases of the same lines, the same seed the same design
+    /// Seed of the phase search: the same seed repeats the design, another seed changes only the phases
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// Directory for the design: design.json, scenario.toml, lab.toml, forcing.csv, design.csv and .md, design.svg,

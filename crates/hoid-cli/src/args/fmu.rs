@@ -32,11 +32,11 @@ pub struct FmuArgs {
     #[arg(long, value_name = "NAME", default_value_t = Method::default().name().to_owned(),
           value_parser = method_names(), conflicts_with = "operator")]
     pub method: String,
-    /// Prior knowledge of the person: population, none, NAME=CENTRE:SPREAD..., or a fit (file of hoid identify --json),
-    /// which becomes part of the unit [default: population]
+    /// Prior knowledge of the person: population, none, NAME=CENTRE:SPREAD..., or a fit (file from hoid identify
+    /// --json), stored in the unit [default: population]
     #[arg(long, value_name = "PRIOR", conflicts_with = "operator")]
     pub prior: Option<String>,
-    /// Controlled element in s, such as 90/(s(s+6)): adds crossover and phase margin
+    /// Controlled element, such as 90/(s(s+6)): adds crossover and phase margin
     #[arg(
         long,
         value_name = "ELEMENT",

@@ -20,7 +20,7 @@ pub struct GroupArgs {
 
 #[derive(Debug, Subcommand)]
 pub enum GroupCommand {
-    /// Write a manifest of the files in a directory, to be checked and completed
+    /// Write a manifest of a directory's files, for you to check and complete
     Init(GroupInitArgs),
 }
 
@@ -41,8 +41,8 @@ pub struct GroupRunArgs {
     /// Write CSV as well as Parquet
     #[arg(long)]
     pub csv: bool,
-    /// Also estimate each person with the data of all people: pooled.csv, and population.json (population-NAME.json for
-    /// several conditions), which --prior reads
+    /// Also estimate each person using the data of all people; writes pooled.csv and population.json
+    /// (population-NAME.json for several conditions) for --prior
     #[arg(long)]
     pub pool: bool,
     #[command(flatten)]
@@ -56,14 +56,14 @@ pub struct GroupInitArgs {
     /// Directory with one file per run
     #[arg(value_name = "DIR")]
     pub directory: PathBuf,
-    /// Pattern of the file names: {subject}, {condition}, {axis} and {run} are read from them, * matches anything; the
-    /// condition of an axis is CONDITION-AXIS
+    /// Pattern of the file names: gives {subject}, {condition}, {axis} and {run}; * matches anything. With {axis}, the
+    /// condition is CONDITION-AXIS
     #[arg(long, value_name = "PATTERN", default_value = "{subject}_{condition}_{run}.csv")]
     pub pattern: String,
     #[command(flatten)]
     pub look: LookArgs,
-    /// Controlled element of the named conditions; if it changes, also the new element, the time in s and the rate G in
-    /// 1/s (without G: sudden); * matches anything. May be repeated
+    /// Controlled element of the named conditions (* matches all); if it changes, also the new element, the time in s
+    /// and the rate G in 1/s (without G: sudden). May be repeated
     #[arg(
         long,
         value_name = "NAMES=ELEMENT[>ELEMENT@S[:G]]",
@@ -92,7 +92,7 @@ pub struct SimulateGroupArgs {
     /// Number of subjects
     #[arg(long, value_name = "N", default_value_t = 3)]
     pub subjects: u64,
-    /// Simulate realistic people instead of subjects near the thesis: drawn from the family of operators, with the
+    /// Simulate realistic people, drawn from the operator family, instead of subjects near the thesis; uses the
     /// elements of --plants and columns t, e, u, d, y
     #[arg(long, conflicts_with_all = ["conditions", "between_subjects", "remnant_order", "noise_level"])]
     pub people: bool,
@@ -169,5 +169,5 @@ fn parse_trouble(text: &str) -> Result<SamplingDefect, String> {
     SamplingDefect::ALL
         .into_iter()
         .find(|trouble| trouble.name() == text.trim())
-        .ok_or_else(|| format!("{text:?} is not a recording problem; expected some of {}", names()))
+        .ok_or_else(|| format!("{text:?} is not a recording problem; expected one of {}", names()))
 }

@@ -380,7 +380,7 @@ fn first_page(program: &mut Command) -> String {
     let about = |name: &str| {
         let command = program.get_subcommands().find(|c| c.get_name() == name);
         let text = command.and_then(Command::get_about).map(ToString::to_string);
-        text.unwrap_or_else(|| "Help of a command".to_owned())
+        text.unwrap_or_else(|| "Show help for a command".to_owned())
     };
     let mut page = "{about-with-newline}\n{usage-heading} {usage}\n".to_owned();
     for (heading, commands) in GROUPS {

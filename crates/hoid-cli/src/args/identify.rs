@@ -25,27 +25,32 @@ use super::{
 
 #[derive(Debug, Args)]
 pub struct IdentifyArgs {
-    #[arg(required = true, value_name = "RECORD", help = format!(
-        "Record files: {}; several files share one model, each with its own initial states",
-        readable_endings()
-    ))]
+    #[arg(
+        required = true,
+        value_name = "RECORD",
+        help = "Record files, such as .csv, .parquet or .mat; several files share one model",
+        long_help = format!(
+            "Record files: {}; several files share one model, each with its own initial states",
+            readable_endings()
+        )
+    )]
     pub records: Vec<PathBuf>,
     #[command(flatten)]
     pub read: ReadArgs,
-    /// Error and control of an axis, such as ex,ux, or with its recorded excitation, such as ex,ux,rx. Repeat for each
-    /// axis: each has its own operator, and the coupling between axes is tested
+    /// Error and control of an axis, such as ex,ux, or also its recorded excitation, such as ex,ux,rx. Repeat for each
+    /// axis: each has its own operator, and coupling between axes is tested
     #[arg(long, value_name = "INPUT,OUTPUT[,EXCITATION]", conflicts_with_all = ["input", "output"], allow_hyphen_values = true)]
     pub pair: Vec<AxisPair>,
     #[command(flatten)]
     pub mask: MaskArgs,
     #[command(flatten)]
     pub faults: FaultArgs,
-    /// Model to fit: operator (human operator) or a polynomial structure [default: operator; the structure of --method;
-    /// bj with options that only polynomials have, such as --nk]
+    /// Model to fit: operator (human operator) or a polynomial structure [default: operator, the structure of --method,
+    /// or bj with options only for polynomials, such as --nk]
     #[arg(long, value_name = "NAME", value_parser = structures(), ignore_case = true)]
     pub structure: Option<String>,
-    /// Fitting method for polynomials: pem (prediction error), or instrumental variables: iv4 (for arx), sriv (for oe),
-    /// rivbj (for bj)
+    /// Fitting method for polynomials: pem (prediction error), or instrumental variables (iv4 for arx, sriv for oe,
+    /// rivbj for bj)
     #[arg(long, value_name = "NAME", default_value = PEM, value_parser = PossibleValuesParser::new(fit_methods()))]
     pub method: String,
     #[command(flatten)]
@@ -55,7 +60,7 @@ pub struct IdentifyArgs {
         writable_endings()
     ))]
     pub trace: Option<PathBuf>,
-    /// Discretisation inverted to get T_n and K_n from the noise model
+    /// Discretisation assumed to get T_n and K_n from the noise model
     #[arg(long, value_name = "NAME", default_value = "zoh", value_parser = choice_of(&RemnantDiscretisation::ALL))]
     pub remnant_discretisation: RemnantDiscretisation,
     #[command(flatten)]
@@ -63,7 +68,7 @@ pub struct IdentifyArgs {
     /// Also evaluate the prediction K samples ahead
     #[arg(long, value_name = "K", value_parser = parse_horizon)]
     pub horizon: Option<usize>,
-    /// Evaluate the model on this other record
+    /// Also evaluate the model on this record
     #[arg(long, value_name = "FILE")]
     pub validate: Option<PathBuf>,
     /// Write an HTML report to this directory

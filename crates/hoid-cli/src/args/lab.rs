@@ -6,7 +6,7 @@ use clap::Args;
 
 #[derive(Debug, Args)]
 pub struct LabArgs {
-    /// Folder of the experiment: one folder per session, and the manifest of `hoid group`. Unfinished sessions can be
+    /// Folder of the experiment: one folder per session, and the manifest for `hoid group`. Unfinished sessions can be
     /// resumed
     #[arg(long, value_name = "DIR", default_value = "hoid-lab")]
     pub out: PathBuf,

@@ -19,15 +19,15 @@ pub struct LookArgs {
     /// Excitation column, or none [default: the column with a line spectrum]
     #[arg(long, value_name = "COLUMN|none")]
     pub excitation: Option<String>,
-    /// Controlled element in s, such as 90/(s(s+6)) or 90/1,6,0: finds by how many samples the control was recorded
-    /// late, if every target and disturbance is recorded
+    /// Controlled element, such as 90/(s(s+6)) or 90/1,6,0: finds how many samples late the control was recorded, if
+    /// every target and disturbance is recorded
     #[arg(long, value_name = "ELEMENT", value_parser = parse_element, allow_hyphen_values = true)]
     pub controlled_element: Option<(String, ContinuousTransferFunction)>,
     /// Time column, and its unit: s, ms, us, ns, min, h, iso, sec+nanosec [default: t, or a column recognised as time]
     #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
     pub time: Option<TimeChoice>,
-    /// Column that numbers the trials; each trial becomes a separate record (t: a trial starts where time restarts).
-    /// COLUMN=VALUE, such as trial=3, reads one trial [default: where t restarts]
+    /// Column that numbers the trials, or t (time restarts at each trial); each trial becomes a record. COLUMN=VALUE,
+    /// such as trial=3, reads one trial [default: t if time restarts]
     #[arg(long, value_name = "COLUMN[=VALUE]", value_parser = parse_trial)]
     pub trial: Option<TrialChoice>,
     /// Sampling frequency in Hz; replaces the column t

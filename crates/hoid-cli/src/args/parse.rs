@@ -33,7 +33,9 @@ const MOST_AHEAD: usize = 1_000_000;
 /// A number of samples ahead.
 pub fn parse_horizon(text: &str) -> Result<usize, String> {
     let samples = text.trim().parse().ok().filter(|k| (1..=MOST_AHEAD).contains(k));
-    samples.ok_or_else(|| format!("{text:?} is not a number of samples ahead; write 1 to {MOST_AHEAD}"))
+    samples.ok_or_else(|| {
+        format!("{text:?} is not a number of samples ahead; write a whole number from 1 to {MOST_AHEAD}")
+    })
 }
 
 #[cfg(test)]

@@ -25,8 +25,8 @@ pub struct ReadArgs {
     /// [default: t, or a column recognised as time]
     #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
     pub time: Option<TimeChoice>,
-    /// Column that numbers the trials; each trial becomes a separate record (t: a trial starts where time restarts).
-    /// COLUMN=VALUE, such as trial=3, reads one trial [default: where t restarts]
+    /// Column that numbers the trials, or t (time restarts at each trial); each trial becomes a record. COLUMN=VALUE,
+    /// such as trial=3, reads one trial [default: t if time restarts]
     #[arg(long, value_name = "COLUMN[=VALUE]", value_parser = parse_trial)]
     pub trial: Option<TrialChoice>,
     /// Sampling frequency in Hz [default: from column t, in s]
@@ -48,8 +48,7 @@ pub struct ReadArgs {
     /// those rows. May be repeated
     #[arg(long, value_name = "COLUMN=hold|linear|drop", value_parser = parse_sparse, value_delimiter = ',', allow_hyphen_values = true)]
     pub sparse: Vec<(String, Sparse)>,
-    /// Columns to keep besides input, output and time, such as f_t,r, or none; saves time and memory for long CSV files
-    /// [default: all]
+    /// Further columns to keep, such as f_t,r, or none; saves time and memory for long CSV files [default: all]
     #[arg(long, value_name = "COLUMN,...", value_delimiter = ',')]
     pub columns: Option<Vec<String>>,
     #[command(flatten)]
@@ -83,14 +82,17 @@ impl ReadArgs {
 /// Treatment of a record before it is used, in this order.
 #[derive(Debug, Clone, Args)]
 pub struct PrepareArgs {
-    /// Units that the file lacks, such as e=deg,u=deg; only declared units are printed
+    /// Units missing from the file, such as e=deg,u=deg
+    ///
+    /// Only declared units are printed.
     #[arg(long, value_name = "CHANNEL=UNIT", value_parser = parse_unit, value_delimiter = ',')]
     pub unit: Vec<(String, String)>,
     /// Drop duplicate rows (time included)
     #[arg(long)]
     pub drop_repeated: bool,
-    /// Scale a channel by a factor (u=12.5), to a unit (u=12.5:deg), or from unit to unit (e=rad:deg). A channel is a
-    /// column, or e or u for input or output. May be repeated
+    /// Scale a channel by a factor (u=12.5), also with its new unit (u=12.5:deg), or convert its unit (e=rad:deg)
+    ///
+    /// A channel is a column, or e for the input and u for the output. May be repeated.
     #[arg(long, value_name = "CHANNEL=FACTOR", value_parser = parse_scale, allow_hyphen_values = true)]
     pub scale: Vec<(String, Scaling)>,
     /// Advance a channel recorded late, by samples (u=1) or seconds (u=0.0167s); fractions by band-limited
@@ -110,8 +112,8 @@ pub struct PrepareArgs {
 /// Whether the sampling rate is lowered.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct DecimateArgs {
-    /// Keep every M-th sample after a linear-phase low-pass filter on all channels; auto: reduces rates above 200 Hz to
-    /// nearly 100 Hz, except for polynomial structures and delays in samples
+    /// Keep every M-th sample after a linear-phase low-pass filter on all channels; auto: reduce rates above 200 Hz to
+    /// about 100 Hz, except for polynomial structures and delays in samples
     #[arg(long, value_name = "auto|off|M", default_value_t = Decimation::Auto)]
     pub decimate: Decimation,
 }
@@ -141,9 +143,9 @@ pub struct MaskArgs {
 /// Treatment of faults of a recording.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct FaultArgs {
-    /// Recording faults (spikes, dropouts, frozen and idle stretches, wraps, steps): bridge faults up to 0.1 s and cut
-    /// the record at longer faults (bridge), cut at every fault (cut), only report faults (report), or do not search
-    /// for them (keep)
+    /// Treatment of recording faults (spikes, dropouts, frozen and idle stretches, wraps, steps): bridge those up to
+    /// 0.1 s and cut the record at longer ones (bridge), cut at all (cut), only report them (report), or do not search
+    /// (keep)
     #[arg(long, value_name = "WHAT", default_value = "bridge", value_parser = choice_of(&FaultHandling::ALL))]
     pub faults: FaultHandling,
 }

@@ -30,22 +30,22 @@ pub struct RecursionArgs {
     /// Polynomial structure [default: arx for rls, else bj]
     #[arg(long, value_name = "NAME", value_parser = choice_of(&Structure::ALL))]
     pub structure: Option<Structure>,
-    /// Orders, or ranges to search on the start span, such as nb=2,nc=0,nd=1..4,nf=2 [default: the operator's: bj
-    /// nb=2,nd=1..4,nf=2, for adaptive nd=16, for multiple-model nd=6; arx na=2,nb=2]
+    /// Orders, or ranges to search on the start span, such as nb=2,nc=0,nd=1..4,nf=2 [default: bj nb=2,nd=1..4,nf=2
+    /// (adaptive: nd=16; multiple-model: nd=6); arx na=2,nb=2]
     #[arg(long, value_name = "LIST")]
     pub orders: Option<String>,
     /// Delay of b0 in samples (29) or dead time in s (0.28s), or a range (20..40, 0.1s..0.4s) to search on the start
     /// span [default: 0.05 to 0.6 s; adaptive starts at 0.2 s and tracks the delay]
     #[arg(long, value_name = "N|Ss|LO..HI")]
     pub nk: Option<DelayRange>,
-    /// Dead time tau_e in s instead of --nk: .28, or a range (0.1..0.4) to search on the start span
+    /// Delay tau_e in s, instead of --nk: .28, or a range (0.1..0.4) to search on the start span
     #[arg(long, value_name = "S|LO..HI", conflicts_with = "nk")]
     pub delay: Option<OneOrSpan>,
     /// Criterion that selects among searched candidates
     #[arg(long, value_name = "NAME", default_value = "bic", value_parser = choice_of(&Criterion::ALL))]
     pub criterion: Criterion,
-    /// Start of the recursion: all coefficients, such as f1=-1.9,f2=.92,b0=.04,..., or `nothing` [default: a batch fit
-    /// of the start span or warm-up; adaptive starts from --prior]
+    /// Initial values of all coefficients, such as f1=-1.9,f2=.92,b0=.04,..., or `nothing` [default: a batch fit of the
+    /// start span or warm-up; adaptive starts from --prior]
     #[arg(long, value_name = "LIST|nothing", allow_hyphen_values = true)]
     pub start: Option<String>,
     #[command(flatten)]
@@ -56,8 +56,8 @@ pub struct RecursionArgs {
     /// Report gain and phase, with errors, at these frequencies in rad/s, such as 0.5,1,2.5
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub at: Vec<f64>,
-    /// Controlled element in s, such as 90/(s(s+6)), or NUM/DEN in descending powers of s, such as 90/1,6,0: adds
-    /// crossover frequency and phase margin, with errors
+    /// Controlled element, such as 90/(s(s+6)) or 90/1,6,0 (NUM/DEN in descending powers of s): adds crossover
+    /// frequency and phase margin, with errors
     #[arg(long, value_name = "ELEMENT", allow_hyphen_values = true)]
     pub controlled_element: Option<ContinuousTransferFunction>,
 }
@@ -69,23 +69,23 @@ pub struct TrackArgs {
     pub record: Option<PathBuf>,
     #[command(flatten)]
     pub read: ReadArgs,
-    /// List all methods, including those for comparison, with description, structures and source. Reads no RECORD
+    /// List all methods, including those for comparison, with description, structures and source. Needs no RECORD
     #[arg(long, conflicts_with = "record")]
     pub methods: bool,
     #[command(flatten)]
     pub recursion: RecursionArgs,
-    /// Span of the start fit, s, for methods with a start fit [default: the first third of the record]
+    /// Span of the start fit, s, for methods that have one [default: the first third of the record]
     #[arg(long, value_name = "S..S", value_parser = parse_span, allow_hyphen_values = true)]
     pub start_span: Option<(f64, f64)>,
     /// Time from which the estimate is updated, s; before it, only the filters run [default: the end of the start span;
     /// the first sample with --covariance or --start]
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub update_from: Option<f64>,
-    /// Second run of the same person in the same task: selects the start covariance (--covariance) whose trace explains
-    /// this run best (VAF) [for methods with --covariance]
+    /// Second run of the same person in the same task: selects the initial covariance (--covariance) whose estimates
+    /// explain this run best (VAF) [for methods with --covariance]
     #[arg(long, value_name = "FILE")]
     pub validate: Option<PathBuf>,
-    /// With --validate: instead of selecting P at the start, reduce it after every half second in which the estimate
+    /// With --validate: instead of selecting the initial P, reduce P after every half second in which the estimate
     /// explains less of the second run than before
     #[arg(long, requires = "validate")]
     pub update_covariance: bool,
@@ -105,8 +105,8 @@ pub struct TrackArgs {
     pub report: Option<PathBuf>,
     #[command(flatten)]
     pub picture: FigureArgs,
-    /// Spans in s, such as 0..30.72,51.2..81.92, whose batch fits are dashed lines in the report [default: the start
-    /// span and the last third]
+    /// Spans in s, such as 0..30.72,51.2..81.92, whose batch fits are shown as dashed lines [default: the start span
+    /// and the last third]
     #[arg(long, value_name = "S..S", value_parser = parse_span, value_delimiter = ',', allow_hyphen_values = true)]
     pub batch: Vec<(f64, f64)>,
     #[command(flatten)]
@@ -123,7 +123,7 @@ pub struct StreamArgs {
     pub rate: DecimateArgs,
     #[command(flatten)]
     pub recursion: RecursionArgs,
-    /// Seconds to collect before the start fit, for methods with a start fit [default: 20; none with --start]
+    /// Seconds to collect before the start fit, for methods that have one [default: 20; none with --start]
     #[arg(long, value_name = "S", conflicts_with = "start")]
     pub warm_up: Option<f64>,
     /// Print a line only for every N-th sample
@@ -135,9 +135,9 @@ pub struct StreamArgs {
     /// Output column (control) in the header line, if there is one
     #[arg(long, value_name = "NAME", default_value = "u")]
     pub output: String,
-    /// Use UDP datagrams instead of standard input and output: a line of text, a JSON object as {"t": 0.01, "e": 0.5,
-    /// "u": -1}, or a C struct, each answered in kind (text by JSON). Ports on 127.0.0.1, or addresses and ports, such
-    /// as 0.0.0.0:5005:192.168.1.7:5006
+    /// Use UDP datagrams instead of standard input and output: a line of text, a JSON object such as {"t": 0.01, "e":
+    /// 0.5, "u": -1}, or a C struct, answered in the same format (text: JSON). Ports on 127.0.0.1, or addresses and
+    /// ports, such as 0.0.0.0:5005:192.168.1.7:5006
     #[arg(long, value_name = "IN:OUT")]
     pub udp: Option<UdpPlaces>,
     /// Stream of LabStreamingLayer: in Python, by pyhoid.lsl
@@ -183,7 +183,9 @@ pub(super) fn method_names() -> impl TypedValueParser<Value = String> {
 fn parse_count(text: &str) -> Result<usize, String> {
     match text.trim().parse::<usize>() {
         Ok(n) if n > 0 => Ok(n),
-        _ => Err(format!("{text:?} is not a number of samples; write 1 or more")),
+        _ => Err(format!(
+            "{text:?} is not a number of samples; write a whole number, 1 or more"
+        )),
     }
 }
 

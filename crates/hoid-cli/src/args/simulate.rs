@@ -53,8 +53,8 @@ pub struct SimulateArgs {
     /// Sample time Ts in s [default: 0.01, or the scenario's]
     #[arg(long, value_name = "S")]
     pub sample_time: Option<f64>,
-    /// Place of a changing K_c: in the input matrix (x stays continuous) or the output matrix (as in the thesis)
-    /// [default: input, or the scenario's]
+    /// Where a changing K_c acts: input matrix (x stays continuous) or output matrix (as in the thesis) [default:
+    /// input, or the scenario's]
     #[arg(long, value_name = "WHERE", value_parser = choice_of(&Realisation::ALL))]
     pub realisation: Option<Realisation>,
     /// Seed of the random streams

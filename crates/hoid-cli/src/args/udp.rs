@@ -19,7 +19,7 @@ impl FromStr for UdpPlaces {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let wrong = || {
             format!(
-                "{text:?} is not a pair of ports; write 5005:5006 for ports of this computer, or \
+                "{text:?} is not a pair of ports; write 5005:5006 for ports on this computer, or \
                  0.0.0.0:5005:192.168.1.7:5006 with addresses (IPv4)"
             )
         };
@@ -43,7 +43,7 @@ impl FromStr for UdpPlaces {
         };
         if output.port() == 0 {
             return Err(format!(
-                "{text:?}: nothing can listen on port 0; give the port for the answers"
+                "{text:?}: nothing can listen on port 0; give another output port"
             ));
         }
         // Code that listens on 0.0.0.0 listens on every address of this computer, and 0.0.0.0 leads there too.
@@ -54,7 +54,7 @@ impl FromStr for UdpPlaces {
                 && is_here(output.ip());
         if input.port() == output.port() && heard {
             return Err(format!(
-                "{text:?}: answers would come back as samples; name another port for them"
+                "{text:?}: answers would come back as samples; give another output port"
             ));
         }
         Ok(Self { input, output })

@@ -82,7 +82,7 @@ fn of_recordings(comparing: &Comparing, path: &Path, args: &CompareArgs) -> Resu
         match analysed(manifest, path, place, &options) {
             // This command has no --resume: with --out, runs already analysed are kept; otherwise they are removed.
             Err(CliError::Stopped(_)) => Err(CliError::Stopped(
-                "the comparison was stopped; with --out, the same command continues and keeps the runs already analysed"
+                "the comparison was stopped; with --out, the same command resumes and keeps the runs already analysed"
                     .to_owned(),
             )),
             outcome => outcome.map(|_| ()),
@@ -108,7 +108,7 @@ fn write_all(found: &Comparison, out: &Path) -> Result<(), CliError> {
             table.write(&out.join(name))?;
         }
     }
-    output::notice("", format!("all of it: {}", out.display()));
+    output::notice("", format!("results: {}", out.display()));
     Ok(())
 }
 
@@ -123,11 +123,11 @@ fn page(found: &Comparison, verbose: bool) -> String {
         differences(found, verbose)
     );
     page.push_str(
-        "Mean over people ± standard error; people are weighted by their errors and the variance between them; 95 % \
-         intervals by Hartung and Knapp.\n",
+        "Mean over people ± standard error; people are weighted by their errors and the variance between them; \
+         Hartung-Knapp 95 % intervals.\n",
     );
     if !found.learning.is_empty() {
-        page.push_str(&format!("\nChange a run\n{}\n", learning(found)));
+        page.push_str(&format!("\nChange per run\n{}\n", learning(found)));
     }
     if verbose {
         page.push_str(&format!(
@@ -202,7 +202,7 @@ fn with_unit(d: &Difference) -> String {
 }
 
 fn learning(found: &Comparison) -> Rows {
-    let mut rows = text::table(&["quantity", "condition", "a run", "95 % from", "to", "p", "n"]);
+    let mut rows = text::table(&["quantity", "condition", "per run", "95 % from", "to", "p", "n"]);
     for l in &found.learning {
         let error = Some(l.estimate.standard_error);
         let digits = |v: f64| with_uncertainty(v, error).0;
@@ -228,7 +228,7 @@ fn means(found: &Comparison) -> Rows {
         "mean",
         "95 % from",
         "to",
-        "SD of people",
+        "SD between people",
         "n",
     ]);
     for m in &found.means {

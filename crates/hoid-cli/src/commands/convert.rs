@@ -84,10 +84,10 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
             }
             text.push_str(&format!("{table}\n"));
             if !o.is_stable() {
-                text.push_str("zeta_nm is not positive: this operator is not stable.\n");
+                text.push_str("zeta_nm is not positive: the operator is not stable.\n");
             }
         }
-        Err(reason) => text.push_str(&format!("Operator parameters: not convertible: {reason}.\n")),
+        Err(reason) => text.push_str(&format!("The model does not convert to an operator: {reason}.\n")),
     }
     output::show(&text)?;
     Ok(())

@@ -74,7 +74,7 @@ fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, Cl
             let structure = method.default_structure();
             let (options, told) = if method.starts_itself() {
                 let options = TrackOptions::without_prior(method.clone(), record.sample_time());
-                (options, "told nothing".to_owned())
+                (options, "no prior information".to_owned())
             } else {
                 let options = TrackOptions {
                     start: StartAt::Span(Some((from, to))),

@@ -95,8 +95,8 @@ fn write_all(found: &ExperimentDesign, out: &Path) -> Result<(), CliError> {
         Some(lab) => write("lab.toml", &lab)?,
         None => output::notice(
             "",
-            "lab.toml is not written, because runs of the lab last whole hundredths of a second; choose --length \
-             accordingly"
+            "lab.toml was not written: a run in the lab lasts a whole number of hundredths of a second; choose \
+             --length accordingly"
                 .to_owned(),
         ),
     }
@@ -111,7 +111,7 @@ fn write_all(found: &ExperimentDesign, out: &Path) -> Result<(), CliError> {
             table.write(&out.join(name))?;
         }
     }
-    output::notice("", format!("the design: {}", out.display()));
+    output::notice("", format!("design: {}", out.display()));
     Ok(())
 }
 
@@ -223,10 +223,12 @@ fn needed(found: &ExperimentDesign) -> String {
         text::counted(found.runs_needed as u64, "run")
     );
     if let Some(worst) = &found.worst {
-        needed.push_str(&format!("For {} they require {}.\n", worst.name, worst.runs_needed));
+        let runs = text::counted(worst.runs_needed as u64, "run");
+        needed.push_str(&format!("For {} they require {runs}.\n", worst.name));
     }
     if let Some(other) = &found.against {
-        needed.push_str(&format!("With {} they require {}.\n", other.name, other.runs_needed));
+        let runs = text::counted(other.runs_needed as u64, "run");
+        needed.push_str(&format!("With {} they require {runs}.\n", other.name));
     }
     needed
 }
@@ -262,7 +264,8 @@ fn difference(plan: &DifferencePlan) -> String {
     }
     format!(
         "\nDetecting a difference in {size} between two conditions requires {answer} (power {}, alpha {}).\n{rows}\n\
-         Power of the paired t test of n people. A person's difference: {} between people ({}), {} from run to run, {} expected error of a run.\n",
+         Power of the paired t test of n people. Standard deviations of a person's difference: {} between people ({}), {} \
+         from run to run, {} from the expected error of a run.\n",
         plan.request.power,
         plan.request.alpha,
         text::significant(plan.between_people),
@@ -273,7 +276,7 @@ fn difference(plan: &DifferencePlan) -> String {
 }
 
 fn lines(found: &ExperimentDesign) -> Rows {
-    let mut lines = text::table(&["line (rad/s)", "periods a run", "amplitude", "phase (rad)", "enters"]);
+    let mut lines = text::table(&["line (rad/s)", "periods per run", "amplitude", "phase (rad)", "enters"]);
     for designed in &found.lines {
         let line = designed.line;
         lines.add_row([

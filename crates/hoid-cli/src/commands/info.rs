@@ -160,7 +160,7 @@ fn words(file: &str, found: &FileSurvey) -> String {
         text.push_str(&format!("{}\n", line.trim_end()));
     }
     if !found.quality_issues.is_empty() {
-        text.push_str("\nTrouble:\n");
+        text.push_str("\nProblems:\n");
     }
     for issue in &found.quality_issues {
         text.push_str(&format!("  {issue}\n    remedy: {}\n", issue.kind.remedy()));
@@ -184,17 +184,24 @@ fn sampled(s: &SamplingSurvey) -> String {
     );
     if let Some(first) = s.first_gap_s {
         line.push_str(&format!(
-            ", {} gaps ({} samples, the first after {first} s)",
-            s.gaps, s.missing
+            ", {} ({}, the first after {first} s)",
+            text::counted(s.gaps as u64, "gap"),
+            text::counted(s.missing, "sample")
         ));
     } else {
         line.push_str(", no gaps");
     }
     if s.not_increasing > 0 {
-        line.push_str(&format!(", t does not increase in {} rows", s.not_increasing));
+        line.push_str(&format!(
+            ", t does not increase in {}",
+            text::counted(s.not_increasing as u64, "row")
+        ));
     }
     if s.repeated > 0 {
-        line.push_str(&format!(", {} rows repeat the row before", s.repeated));
+        line.push_str(&format!(
+            ", {} identical to the previous row",
+            text::counted(s.repeated as u64, "row")
+        ));
     }
     line.push('\n');
     line
@@ -214,7 +221,8 @@ fn remarks(v: &ValueSurvey) -> String {
     }
     for (rows, end) in [(v.saturated_low, v.min), (v.saturated_high, v.max)] {
         if rows > 0 {
-            remarks.push(format!("saturated at {} in {rows} rows", numbers::plain(end)));
+            let rows = text::counted(rows as u64, "row");
+            remarks.push(format!("saturated at {} in {rows}", numbers::plain(end)));
         }
     }
     remarks.join(", ")

@@ -38,7 +38,9 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
             bar.set_position(progress.done);
         }
         ReproductionEvent::Study(study) => {
-            let took = study.seconds.map_or("was there".to_owned(), |s| format!("{s:.1} s"));
+            let took = study
+                .seconds
+                .map_or("already present".to_owned(), |s| format!("{s:.1} s"));
             bar.suspend(|| output::message(&format!("{:22} {} estimates, {took}", study.name, study.estimates)));
             bar.reset();
         }
@@ -64,7 +66,8 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
     };
     if let Some([hold, more_so, in_part, not, untestable]) = found.tally {
         output::print(&format!(
-            "{} claims: {hold} hold, {more_so} hold, and more so, {in_part} in part, {not} do not, {untestable} cannot be tested\n",
+            "{} claims: {hold} hold, {more_so} hold and more so, {in_part} hold in part, {not} do not hold, \
+             {untestable} cannot be tested\n",
             hold + more_so + in_part + not + untestable
         ))?;
     }

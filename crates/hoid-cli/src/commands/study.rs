@@ -74,7 +74,7 @@ fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
     text.push_str(&format!("{}: {} estimates made\n", plan.name, outcome.estimates));
     if let Some(shard) = args.shard {
         text.push_str(&format!(
-            "shard {shard} is in {}; join all {} with `hoid study merge`\n",
+            "shard {shard} is in {}; join all {} shards with `hoid study merge`\n",
             args.out.display(),
             shard.of
         ));
@@ -108,7 +108,7 @@ pub fn with_progress(
         Ok(outcome)
     } else {
         Err(CliError::Stopped(format!(
-            "{name} was stopped; completed parts are in {}, continue with --resume",
+            "{name} was stopped; completed parts are in {}; continue with --resume",
             directory.display()
         )))
     }

@@ -116,11 +116,12 @@ fn words(summary: &OutputTable) -> String {
     }
     let more = match rows.len().checked_sub(MOST_ROWS) {
         None | Some(0) => String::new(),
-        Some(more) => format!("and {more} more rows\n"),
+        Some(more) => format!("and {}\n", text::counted(more as u64, "more row")),
     };
     format!(
         "{table}\n{more}Relative bias in %: median over the fits that give an operator (of all), and its Monte Carlo \
-         error. Other parameters and their spread: table summary. hoid study check lists the cells by number.\n"
+         error. The table summary has the other parameters and their spread. hoid study check lists the cells by \
+         number.\n"
     )
 }
 

@@ -54,7 +54,7 @@ impl CommonForm {
         Finding::note(
             "common-form",
             format!(
-                "parameters are those of the form {} for all people, the form with the most evidence over {} fits (its sum of criteria is {:.1} above that of the best form of each fit: {best})",
+                "parameters are compared in the form {} for all people, the form with the most evidence over {} fits (the sum of its criteria is {:.1} above that of the best form of each fit: {best})",
                 self.form.name(),
                 self.cells,
                 self.criterion,

@@ -136,7 +136,7 @@ impl Comparing {
         if result.differences.is_empty() {
             findings.push(Finding::undetermined(
                 "nothing-compared",
-                "no difference can be estimated: too few people have an estimate in all levels of the factor",
+                "no difference can be estimated: too few people have an estimate at every level of the factor",
             ));
         }
         let parameters = quantities.iter().any(|quantity| !quantity.is_of_any_form());
@@ -288,7 +288,7 @@ impl Work<'_> {
             self.findings.push(Finding::doubt(
                 "prior-weighs",
                 format!(
-                    "{quantity} is mostly prior ({}): one prior for all people draws them together and differences towards zero; prior = \"none\" under [analysis] in group.toml leaves it out",
+                    "{quantity} comes mostly from the prior ({}), which is the same for all people and shrinks their differences towards zero; write prior = \"none\" under [analysis] in group.toml to leave it out",
                     prior.join(", ")
                 ),
             ));
@@ -367,7 +367,7 @@ impl Work<'_> {
                             quantity: quantity.clone(),
                             subject: subject.clone(),
                             condition: condition.clone(),
-                            reason: "they have no run there".to_owned(),
+                            reason: "there is no run".to_owned(),
                         };
                         if !self.result.left_out.contains(&out) {
                             self.result.left_out.push(out);
@@ -409,7 +409,7 @@ impl Work<'_> {
             self.findings.push(Finding::doubt(
                 "few-people",
                 format!(
-                    "{name}: {} people leave one degree of freedom, and an interval from so few people carries little information",
+                    "{name}: {} people leave one degree of freedom, so the interval carries little information; record more people",
                     people.len()
                 ),
             ));
@@ -527,7 +527,7 @@ fn doubtful(group: &GroupEstimates, result: &Comparison) -> Option<Finding> {
         Finding::note(
             "person-doubtful",
             format!(
-                "the operator of {} is doubtful, and is included in the comparison",
+                "the operator of {} is doubtful, but is included in the comparison",
                 names.join(", ")
             ),
         )

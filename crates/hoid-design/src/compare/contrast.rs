@@ -75,7 +75,7 @@ impl Resolved {
         };
         if levels.len() < 2 {
             return Err(bad(format!(
-                "there is one level, {}",
+                "there is only one level, {}",
                 levels.first().map_or("", |l| &l.name)
             )));
         }
@@ -103,13 +103,13 @@ impl Resolved {
             (Some(Variation::Between), Some(subject)) => {
                 let both = resolved.levels_of(subject, group);
                 return Err(bad(format!(
-                    "{subject} is in {}: it varies within people",
+                    "{subject} is in {}: the factor varies within people",
                     both.join(" and ")
                 )));
             }
             (Some(Variation::Within), None) => {
                 return Err(bad(
-                    "no person is in two of its levels: it varies between people".to_owned()
+                    "no person is in two levels: the factor varies between people".to_owned()
                 ));
             }
             (_, Some(_)) => Variation::Within,
@@ -159,7 +159,7 @@ pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<
     if let [_, second, ..] = between[..] {
         return Err(CompareError::Factor {
             name: second.name.clone(),
-            reason: "a second factor between people: compare one of them at a time".to_owned(),
+            reason: "it is a second factor between people: compare one at a time".to_owned(),
         });
     }
     let within: Vec<&Resolved> = factors.iter().filter(|f| f.variation == Variation::Within).collect();
@@ -344,7 +344,7 @@ mod tests {
         for (factors, word) in [
             (&["display"][..], "levels are not known"),
             (&["x:a;z"], "z is neither a condition"),
-            (&["who:one=P;two=Q", "else:1=P;2=Q"], "one of them at a time"),
+            (&["who:one=P;two=Q", "else:1=P;2=Q"], "compare one at a time"),
         ] {
             let error = of(&people, factors).unwrap_err().to_string();
             assert!(error.contains(word), "{error}");

@@ -24,7 +24,7 @@ pub enum CompareError {
     #[error("the covariates cannot be distinguished (one is constant, or a sum of other covariates): leave one out")]
     Collinear,
     /// All values are equal, so the error of a mean cannot be estimated.
-    #[error("all estimates are equal: there is no scatter to judge a difference by; is a run given twice?")]
+    #[error("all estimates are equal: there is no scatter to test a difference against; give each run only once")]
     NoScatter,
     /// The requested quantity does not exist.
     #[error(
@@ -46,7 +46,7 @@ pub enum CompareError {
     },
     /// The path does not hold the result of a group.
     #[error(
-        "{place} holds no result of a group ({reason}); expected recordings with their manifest group.toml, a directory that `hoid group DIR --out` wrote, or what `hoid group --json` printed"
+        "{place} holds no result of a group ({reason}); expected recordings with their manifest group.toml, a directory that `hoid group DIR --out` wrote, or the output of `hoid group --json`"
     )]
     NoGroup {
         /// Path that was given.

@@ -89,14 +89,14 @@ impl GroupEstimates {
         let path = place.join(MANIFEST);
         if !path.exists() {
             return Err(none(format!(
-                "there is no {MANIFEST} in it; for recordings `hoid group init {}` writes it",
+                "there is no {MANIFEST} in it; for recordings, write one with `hoid group init {}`",
                 place.display()
             )));
         }
         let manifest = Manifest::read(&path)?;
         if !place.join("people.parquet").exists() {
             return Err(none(
-                "there is no table people: it is not finished; continue with `hoid group --resume`".to_owned(),
+                "there is no table people: the group is not finished; continue with `hoid group --resume`".to_owned(),
             ));
         }
         let summary = GroupSummary::read(&manifest, place)?;
@@ -197,7 +197,7 @@ impl GroupEstimates {
             .filter(|k| k.value.is_finite() || !k.determined)
             .ok_or_else(|| match quantity {
                 Quantity::Crossover | Quantity::PhaseMargin => format!(
-                    "it has no {}: its condition names no controlled element, or the loop does not cross",
+                    "it has no {}: its condition names no controlled element, or the loop gain does not cross 1",
                     quantity.words()
                 ),
                 _ => format!("its form {} has no {name}", cell.form),

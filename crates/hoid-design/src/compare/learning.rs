@@ -73,9 +73,9 @@ impl Practice {
             .collect();
         match meta_regression(&observations, &x, Weights::default()) {
             Ok(found) => Ok([found.coefficients[0], found.coefficients[1]]),
-            Err(CompareError::TooFew { found, .. }) => {
-                Err(format!("{found} of its runs have an estimate, expected 3 for learning"))
-            }
+            Err(CompareError::TooFew { found, .. }) => Err(format!(
+                "estimates from {found} of the runs, expected at least 3 for learning"
+            )),
             Err(error) => Err(format!("its runs: {error}")),
         }
     }

@@ -112,7 +112,7 @@ fn of_file(path: &Path, (name, value): (&str, f64)) -> Result<Spread, DesignErro
         let text = hoid_io::read_settings(path)?;
         let object: Value = serde_json::from_str(&text).map_err(|error| none(format!("it is not JSON: {error}")))?;
         if object["kind"] == "population" {
-            let spread = in_population(&object, name).ok_or_else(|| none("its parameters are different".to_owned()))?;
+            let spread = in_population(&object, name).ok_or_else(|| none("it has no such parameter".to_owned()))?;
             return Ok(Spread {
                 value: spread * value,
                 source: format!("at most the spread between people within one condition, from {shown}"),

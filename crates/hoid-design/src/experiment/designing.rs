@@ -85,7 +85,7 @@ impl Designing {
             return Err(DesignError::OutOfRange {
                 quantity: "highest frequency of the lines in whole periods of the forcing function",
                 found: largest,
-                expected: "above the lowest, which is one or more, and below 100000",
+                expected: "more than the lowest (1 or more), and less than 100000",
             });
         }
         let (least, largest) = (least as u32, largest as u32);
@@ -153,7 +153,7 @@ impl Designing {
             })?;
             if !(wanted.error.is_finite() && wanted.error > 0.0) {
                 return Err(DesignError::OutOfRange {
-                    quantity: "error that is accepted",
+                    quantity: "accepted error",
                     found: wanted.error,
                     expected: "a positive number",
                 });

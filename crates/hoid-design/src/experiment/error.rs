@@ -29,7 +29,7 @@ pub enum DesignError {
     NoCrossover,
     /// The lines do not determine the parameters of the person.
     #[error(
-        "{lines} lines do not determine {coordinates} parameters: add lines, each of which gives two numbers, and spread them over the frequencies at which the person works"
+        "{lines} lines do not determine {coordinates} parameters: add lines, each of which gives two numbers, and spread them over the frequencies at which the person responds"
     )]
     NotIdentifiable {
         /// Number of lines.
@@ -75,7 +75,7 @@ pub enum DesignError {
     },
     /// People have no typical response to a displayed target with this controlled element.
     #[error(
-        "with {element} people have no typical response to a target that they see: give a person with [feedforward] (--people scenario.toml), design the disturbance alone (--disturbance), or design for a compensatory display"
+        "no typical response to a visible target is known for {element}: give a person with [feedforward] (--people scenario.toml), design the disturbance alone (--disturbance), or design for a compensatory display"
     )]
     NoFeedforward {
         /// The controlled element.
@@ -101,7 +101,7 @@ pub enum DesignError {
     },
     /// The form has no typical values.
     #[error(
-        "people have no typical values of the form {form}: expected gain, lead, lead2, lag, lead-lag or lead2-lag, or a person of that form from a file"
+        "no typical values are known for the form {form}: expected gain, lead, lead2, lag, lead-lag or lead2-lag, or a person of that form from a file"
     )]
     NoTypicalPerson {
         /// The form given.
@@ -128,7 +128,7 @@ pub enum DesignError {
         reason: String,
     },
     /// The given condition is not one of the group, or no condition is given although the group has several.
-    #[error("the group has several conditions, and the given one is {found}: choose one (--condition) of {expected}")]
+    #[error("the group has several conditions, and the given one is {found}: choose one of {expected} (--condition)")]
     Condition {
         /// The condition given.
         found: String,

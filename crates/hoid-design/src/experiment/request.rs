@@ -220,7 +220,7 @@ impl DesignRequest {
                 "{}={}{}",
                 of.sought.name,
                 of.sought.size,
-                if of.sought.relative { " of it" } else { "" }
+                if of.sought.relative { " (relative)" } else { "" }
             );
             all.extend([
                 Setting::new("difference", size).given(true),
@@ -242,7 +242,7 @@ fn lines_below_remnant(lines: &[DesignedLine], is_seen: bool) -> Option<Finding>
     let weak: Vec<String> = weak.map(|l| format!("{:.2}", l.line.omega_rad_s)).collect();
     let message = format!(
         "in one run the power of the lines at {} rad/s is less than {MIN_LINE_TO_REMNANT} times that of the remnant in e, \
-         so that the errors predicted there are too small: use fewer lines or longer runs",
+         so the predicted errors there are too small: use fewer lines or longer runs",
         weak.join(", ")
     );
     (!weak.is_empty()).then(|| Finding::note("lines-drown", message))

@@ -15,7 +15,7 @@ pub enum InitialState {
     Backcast,
 }
 
-hoid_model::named_choice!(InitialState, "rule for initial states", 3, {
+hoid_model::named_choice!(InitialState, "choice of initial states", 3, {
     Zero => "zero", Estimate => "estimate", Backcast => "backcast",
 });
 

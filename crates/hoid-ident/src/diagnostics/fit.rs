@@ -37,7 +37,8 @@ impl Fit {
             all.push(Finding::note(
                 "no-noise",
                 format!(
-                    "there is no noise: the model explains u to within {:.0e} of its size; error bars only reflect the rounding of the data",
+                    "the data contain no noise: the model fits u to within {:.0e} of its size; error bars only \
+                     reflect the rounding of the data",
                     share.sqrt()
                 ),
             ));
@@ -62,7 +63,8 @@ impl Fit {
             Finding::undetermined(
                 "too-few",
                 format!(
-                    "{} residuals for {unknowns} unknowns: the record is too short for these orders and nk = {}",
+                    "{} residuals for {unknowns} unknowns with nk = {}, fewer than {FEWEST_RESIDUALS} for each; use a \
+                     longer record or lower orders",
                     self.residuals,
                     self.orders().nk
                 ),
@@ -76,8 +78,8 @@ impl Fit {
         if !self.model.is_stable() {
             all.push(Finding::doubt(
                 "unstable",
-                "the model is unstable: a person's response to a short error dies out; lower the orders, or ask for a stable \
-                 model",
+                "the model is unstable, but a person's response to a brief error dies out; lower the orders, or \
+                 require a stable model",
             ));
         }
         if !self.model.structure().has_input() {
@@ -103,7 +105,7 @@ impl Fit {
         if self.responds() == Some(false) {
             all.push(Finding::undetermined(
                 "gain",
-                "B does not differ significantly from zero (5 % level): there is too little response to e",
+                "B does not differ significantly from zero (5 % level): u responds too little to e",
             ));
         }
         all

@@ -62,7 +62,7 @@ impl GreyBoxFit {
                 Ok(operator) => operators.push((label, operator)),
                 Err(reason) => all.push(Finding::doubt(
                     "not-convertible",
-                    format!("there is no operator{label}: {reason}"),
+                    format!("the coefficients{label} do not correspond to any operator: {reason}"),
                 )),
             }
         }

@@ -66,9 +66,9 @@ impl Response {
             Finding::undetermined(
                 "no-response",
                 format!(
-                    "no response of u to e can be distinguished from chance: {} of {} pairs of unrelated records with \
-                     the same spectra show as large a response (p = {:.2}); check that both channels are from the same \
-                     run and are not exchanged",
+                    "the response of u to e cannot be distinguished from chance: {} of {} pairs of unrelated records \
+                     with the same spectra respond at least as strongly (p = {:.2}); check that both channels are \
+                     from the same run and are not exchanged",
                     self.reached_by,
                     self.surrogates,
                     self.p_value()

@@ -43,7 +43,7 @@ pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
     if all_open {
         return vec![Finding::undetermined(
             "gain",
-            "no gain differs from zero by two standard errors: there is too little response to e",
+            "no gain differs from zero by two standard errors: u responds too little to e",
         )];
     }
     let backwards = operators.iter().filter(|(_, o)| leads_backwards(o));
@@ -59,12 +59,14 @@ pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
 /// Returns a finding about a negative lead. People have no negative lead; a negative lead arises if a gain and a lead
 /// are fitted to a lag.
 fn negative_lead(negative: &[String]) -> Option<Finding> {
+    let verb = if negative.len() == 1 { "is" } else { "are" };
     (!negative.is_empty()).then(|| {
         Finding::doubt(
             "negative-lead",
             format!(
-                "{} below zero, by two standard errors of K_e and of K_e_dot: a gain and a lead do not describe this \
-                 person, who may have a lag; only the response is valid (--structure operator finds the form)",
+                "{} {verb} below zero by two standard errors of K_e and of K_e_dot: a gain and a lead do not describe \
+                 this person, who may have a lag; only the response is valid; use --structure operator to find the \
+                 form",
                 negative.join(", ")
             ),
         )
@@ -122,7 +124,7 @@ pub(super) fn delay_finding(tau_s: f64, (low, high): (f64, f64), of: &str) -> Op
         Finding::doubt(
             "delay-at-bound",
             format!(
-                "the delay{of} {tau_s:.3} s lies at an end of its search range, {low:.3} to {high:.3} s; widen this \
+                "the delay{of}, {tau_s:.3} s, is at an end of its search range, {low:.3} to {high:.3} s; widen this \
                  range"
             ),
         )
@@ -134,14 +136,15 @@ pub(super) fn search_finding(termination: Termination) -> Option<Finding> {
     match termination.reason {
         Reason::Border => Some(Finding::doubt(
             "border",
-            "a root of C or F lies on the unit circle, so that standard errors are unreliable; lower the orders",
+            "a root of C or F lies on the unit circle, so standard errors are unreliable; lower the orders",
         )),
         Reason::ExactFit => Some(Finding::note(
             "exact-fit",
-            "the residuals are zero up to rounding: there is no noise, and there are no error bars",
+            "the residuals are zero up to rounding: the data contain no noise, and there are no error bars",
         )),
-        _ => (!termination.converged())
-            .then(|| Finding::doubt("not-converged", format!("the search did not converge: {termination}"))),
+        _ => {
+            (!termination.converged()).then(|| Finding::doubt("not-converged", format!("the search has {termination}")))
+        }
     }
 }
 

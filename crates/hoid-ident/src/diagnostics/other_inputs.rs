@@ -85,15 +85,15 @@ fn finding(name: &str, chance: f64, nonlinear: bool) -> Finding {
             "other-input",
             format!(
                 "u follows {name} more closely than the response to the error explains (p = {chance:.0e}): a stick \
-                 with a dead zone has this effect; if the person saw {name}, add --input {name}"
+                 with a dead zone can cause this; if the person saw {name}, add --input {name}"
             ),
         );
     }
     Finding::doubt(
         "other-input",
         format!(
-            "u responds to {name} besides the error (p = {chance:.0e}): with one input the response to the error, \
-             crossover and margins are not those of the person; add --input {name}"
+            "u responds to {name} as well as to the error (p = {chance:.0e}): with one input, the response to the \
+             error, the crossover and the margins are wrong; add --input {name}"
         ),
     )
 }

@@ -72,17 +72,17 @@ impl RecordedElement {
         let (omega, ratio) = self.difference;
         let late = 1e3 * self.delay_s;
         let beyond = match self.delay_s.abs() > self.aligned_s {
-            true if late > 0.0 => format!(", {late:.0} ms later"),
-            true => format!(", u recorded {:.0} ms late", -late),
+            true if late > 0.0 => format!(" with an additional delay of {late:.0} ms"),
+            true => format!(" with u recorded {:.0} ms late", -late),
             false => String::new(),
         };
         let loop_lost = "crossover and phase margin are not those of the recorded loop";
         let message = match (self.is_given(), beyond.is_empty()) {
             (true, true) => return None,
-            (true, false) => format!("e follows from u through {given}{beyond}: {loop_lost}"),
+            (true, false) => format!("the recorded element is {given}{beyond}: {loop_lost}"),
             (false, _) => format!(
-                "e follows from u through {}{beyond}, not through {given}: at {omega} rad/s the gain of the first is \
-                 {} times that of the second and its phase differs by {:+.0} deg; {loop_lost}",
+                "the recorded element is {}{beyond}, not {given}: at {omega} rad/s the recorded gain is {} \
+                 times the given gain and the phase differs by {:+.0} deg; {loop_lost}",
                 self.element,
                 three_digits(ratio.norm()),
                 ratio.arg().to_degrees()

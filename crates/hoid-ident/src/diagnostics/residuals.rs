@@ -132,8 +132,8 @@ impl ResidualMeasures {
             Finding::doubt(
                 "leverage",
                 format!(
-                    "one sample (record {}, residual {}) contributes {:.0} % of the sum of squares: look at this \
-                     sample, or leave it out",
+                    "one sample (record {}, residual {}) contributes {:.0} % of the sum of squares: inspect this \
+                     sample, or exclude it",
                     self.at.0 + 1,
                     self.at.1,
                     100.0 * self.leverage

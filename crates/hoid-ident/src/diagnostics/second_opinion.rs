@@ -70,16 +70,16 @@ impl Without {
             Self::Outliers => Finding::doubt(
                 "leverage",
                 format!(
-                    "the fit depends on a few samples: with each sample limited by its neighbours it differs in \
-                     {differ} standard errors; look at the recording"
+                    "the fit depends on a few samples: limiting each sample by its neighbours changes {differ} \
+                     standard errors; look at the recording"
                 ),
             ),
             Self::SlowComponents(period_s) => Finding::doubt(
                 "slow",
                 format!(
-                    "the fit depends on a drift or a step that the person does not follow: without components slower \
-                     than {period_s:.0} s it differs in {differ} standard errors; look at the recording, or choose a \
-                     span without this drift or step"
+                    "the fit depends on a drift or a step that the person does not follow: removing components slower \
+                     than {period_s:.0} s changes {differ} standard errors; look at the recording, or choose a span \
+                     without this drift or step"
                 ),
             ),
         })
@@ -205,8 +205,8 @@ pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record
     if fit.change_found() != other.change_found() {
         return Some(Finding::doubt(
             "leverage",
-            "the fit depends on a few samples: with each sample limited by its neighbours the records give another \
-             result about a change; look at the recording",
+            "the fit depends on a few samples: limiting each sample by its neighbours determines whether a change is \
+             found; look at the recording",
         ));
     }
     if fit.change_found() {

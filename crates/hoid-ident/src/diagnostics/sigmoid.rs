@@ -59,7 +59,8 @@ impl SigmoidFit {
         } else if self.is_change_point() {
             all.push(Finding::note(
                 "change-point",
-                "the change is too fast for the errors of t_M and G to be normal: use the likelihood intervals",
+                "the change is too fast for t_M and G to have normally distributed errors: use the likelihood \
+                 intervals",
             ));
         }
         for parameter in self.parameters() {
@@ -67,12 +68,12 @@ impl SigmoidFit {
             match parameter.remark {
                 Some(Remark::AtBound) if name == "tau_e" => all.push(Finding::doubt(
                     "delay-at-bound",
-                    format!("the delay {value:.3} s lies at an end of its search range; widen this range"),
+                    format!("the delay, {value:.3} s, is at an end of its search range; widen this range"),
                 )),
                 // At a bound of T_I the operator is equivalent to a pure integration, or has no lag.
                 Some(Remark::AtBound) if name == "T_I" => all.push(Finding::note(
                     "lag",
-                    format!("T_I and K are not determined, only K/T_I is: T_I is at a bound, {value:.3} s"),
+                    format!("only K/T_I is determined, not T_I or K: T_I is at a bound, {value:.3} s"),
                 )),
                 Some(Remark::PriorAlone) => all.push(Finding::note(
                     "prior",
@@ -80,7 +81,10 @@ impl SigmoidFit {
                 )),
                 Some(Remark::AtBound) => all.push(Finding::doubt(
                     "parameter-at-bound",
-                    format!("{name} = {} rests at a bound", hoid_model::numbers::plain(value)),
+                    format!(
+                        "{name} = {} is at a bound; widen this bound",
+                        hoid_model::numbers::plain(value)
+                    ),
                 )),
                 Some(Remark::Undetermined) => all.push(Finding::doubt(
                     "undetermined-parameter",
@@ -132,7 +136,7 @@ fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTi
     if !known {
         all.push(Finding::undetermined(
             "gain",
-            "no gain differs from zero by two standard errors: there is too little response to e",
+            "no gain differs from zero by two standard errors: u responds too little to e",
         ));
     } else if !open.is_empty() {
         let verb = if open.len() == 1 { "is" } else { "are" };
@@ -148,7 +152,7 @@ fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTi
     if first.get("T_I").as_ref().is_some_and(is_open) {
         all.push(Finding::note(
             "lag",
-            "T_I and K are not determined, only K/T_I is: 1/T_I is less than two standard errors from zero",
+            "only K/T_I is determined, not T_I or K: 1/T_I is less than two standard errors from zero",
         ));
     }
     if let (Some(omega), Some(zeta)) = (first.get("omega_nm"), first.get("zeta_nm")) {

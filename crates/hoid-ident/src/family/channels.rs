@@ -188,9 +188,9 @@ impl<'s> FurtherInputs<'s> {
             }
             if dot(&left, &left) <= LEAST_OWN_PART * power {
                 return refuse(
-                    format!("{} is a sum of {}", channel.name, names.join(" and ")),
+                    format!("{} is a linear combination of {}", channel.name, names.join(" and ")),
                     format!(
-                        "inputs of which none is a sum of others (as r = e + y is); drop one of {}, {}",
+                        "linearly independent inputs (r = e + y is not independent of e and y); drop one of {}, {}",
                         names.join(", "),
                         channel.name
                     ),
@@ -274,7 +274,7 @@ impl<'s> FurtherInputs<'s> {
                 return Ok(found);
             }
             orders = halved(orders).ok_or_else(|| IdentError::SingularRegressors {
-                columns: format!("e, {} and their pasts", self.names().join(", ")),
+                columns: format!("e, {} and their past samples", self.names().join(", ")),
             })?;
         }
     }

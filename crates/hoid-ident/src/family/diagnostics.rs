@@ -72,27 +72,27 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
     if !judged.termination.converged() {
         all.push(Finding::doubt(
             "not-converged",
-            format!("the search did not converge: {}", judged.termination),
+            format!("the search has {}", judged.termination),
         ));
     }
     if !judged.has_covariance {
         all.push(Finding::undetermined(
             "singular",
-            "the data do not determine a combination of parameters: there are no error bars",
+            "the data leave a combination of parameters undetermined: there are no error bars",
         ));
     }
     let (tau, (low, high)) = judged.delay;
     if high > low && (tau <= low || tau >= high) {
         all.push(Finding::doubt(
             "delay-at-bound",
-            format!("the delay {tau:.3} s lies at an end of its search range, {low} to {high} s; widen this range"),
+            format!("the delay, {tau:.3} s, is at an end of its search range, {low} to {high} s; widen this range"),
         ));
     }
     if !judged.apart {
         all.push(Finding::doubt(
             "inputs-together",
-            "no excitation with its own lines separates the error from the other inputs: both responses depend on the \
-             assumed forms; record a target and a disturbance with separate lines, over whole periods",
+            "no excitation with separate lines distinguishes the error from the other inputs: the responses depend on \
+             the assumed forms; record a target and a disturbance with separate lines, over whole periods",
         ));
     }
     determined(judged, &mut all);
@@ -102,8 +102,8 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
         all.push(Finding::note(
             "no-noise",
             format!(
-                "there is no noise: the operator explains u to within {:.0e} of its size, as in a simulation and not \
-                 with a person; error bars only reflect the rounding of the data",
+                "the data contain no noise: the operator fits u to within {:.0e} of its size, as happens with a \
+                 simulation but not with a person; error bars only reflect the rounding of the data",
                 share.sqrt()
             ),
         ));
@@ -137,7 +137,8 @@ fn unsettled(weighed: &[WeighedForm]) -> Option<Finding> {
     Some(Finding::note(
         "form",
         format!(
-            "the form is not determined: {}; parameters are named as in {}, and all errors include the differences between the forms",
+            "the form is not determined: the weights are {}; parameters are named as in {}, and all errors include \
+             the differences between the forms",
             named.join(", "),
             front.form
         ),
@@ -180,8 +181,8 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
         all.push(Finding::undetermined(
             "response",
             format!(
-                "the response of the person is not determined: its error is {:.0} % even at the frequency where it is \
-                 smallest",
+                "the person's response is not determined: even at the best frequency, the error of the response is \
+                 {:.0} %",
                 100.0 * error
             ),
         ));
@@ -208,7 +209,7 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
         && !t_i.determined
     {
         let words = if high.is_infinite() {
-            format!("T_I and K are not determined, only K/T_I is: T_I is longer than {low:.2} s (95 %)")
+            format!("only K/T_I is determined, not T_I or K: T_I is longer than {low:.2} s (95 %)")
         } else {
             format!("T_I is not determined: {low:.2} to {high:.2} s (95 %)")
         };
@@ -249,10 +250,7 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
     if !pulled.is_empty() {
         all.push(Finding::note(
             "prior-pull",
-            format!(
-                "the prior shifts {}; --prior none omits the prior",
-                pulled.join(" and ")
-            ),
+            format!("the prior shifts {}; use --prior none to omit it", pulled.join(" and ")),
         ));
     }
     if !open.is_empty() {
@@ -278,7 +276,7 @@ fn methods(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
             Some(pair) => (
                 format!("{} and {}", pair.methods.0.words(), pair.methods.1.words()),
                 format!(
-                    ", most in {} by {:.1} standard errors of the difference",
+                    "; {} differs most, by {:.1} standard errors of the difference",
                     pair.most.0.name(),
                     pair.most.1.abs()
                 ),

@@ -35,7 +35,7 @@ use crate::{
 const MOST_NOISE_PAIRS: usize = 60;
 
 /// Reason why the lines are not used if there is little noise.
-const TOO_LITTLE_NOISE: &str = "there is less noise than leakage";
+const TOO_LITTLE_NOISE: &str = "the noise is weaker than the leakage";
 
 /// Starts of the searches for one form.
 struct Start {

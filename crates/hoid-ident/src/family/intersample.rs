@@ -27,7 +27,7 @@ pub enum Intersample {
     Foh,
 }
 
-named_choice!(Intersample, "course between samples", 3, {
+named_choice!(Intersample, "behaviour between samples", 3, {
     Auto => "auto",
     Zoh => "zoh",
     Foh => "foh",

@@ -125,19 +125,19 @@ impl LoopShape {
     /// come from a stable loop, which has a crossover and a positive phase margin, and a person's phase margin is at
     /// most 120 deg. `reach_deg` is half the width of the 95 % interval of the margin at the lowest crossover.
     pub fn doubt(&self, reach_deg: f64) -> Option<Finding> {
-        let remedy = "check the controlled element, the signs and units of e and u and the time shift between them";
+        let remedy = "check the controlled element, the signs and units of e and u, and the time shift between e and u";
         let (Some((crossover, _)), Some(margin)) = (self.crossovers.first(), self.followed_deg) else {
             return Some(Finding::doubt(
                 "no-crossover",
-                format!("the gain of the loop with this controlled element does not cross 1 from above: {remedy}"),
+                format!("with this controlled element, the loop gain does not cross 1 from above: {remedy}"),
             ));
         };
         if margin + reach_deg <= 0.0 || margin > LARGEST_MARGIN_DEG {
             return Some(Finding::doubt(
                 "unstable-loop",
                 format!(
-                    "the loop with this controlled element has a phase margin of {margin:.0} deg at {:.1} rad/s, which \
-                     no stable loop with a person has: {remedy}",
+                    "the loop with this controlled element has a phase margin of {margin:.0} deg at {:.1} rad/s, \
+                     which is impossible in a stable loop with a person: {remedy}",
                     crossover.value
                 ),
             ));

@@ -138,7 +138,7 @@ pub fn family_of_polynomials(
     let Some((mismatch, found, form, reading)) = best else {
         return Err(NotConvertible::NotOfTheFamily {
             reason: match form {
-                Some(form) => format!("the form {form} does not have the {poles} poles found"),
+                Some(form) => format!("the form {form} does not match the number of poles found, {poles}"),
                 None => "no operator with these poles was found".to_owned(),
             },
         });
@@ -146,7 +146,7 @@ pub fn family_of_polynomials(
     if mismatch > LARGEST_MISMATCH {
         return Err(NotConvertible::NotOfTheFamily {
             reason: format!(
-                "the nearest operator, of the form {form}, is off by {:.0} % of the response between {} and {} rad/s",
+                "the response of the nearest operator, of the form {form}, is off by {:.0} % between {} and {} rad/s",
                 100.0 * mismatch,
                 BAND_RAD_S.0,
                 points.last().map_or(BAND_RAD_S.1, |p| p.omega_rad_s).round()
@@ -509,8 +509,8 @@ mod tests {
         assert!(refused(&polynomials(0, &[0.1], &[-0.5]), None).contains("nk = 0"));
         // A resonance in B that no form has.
         let notch = polynomials(9, &[1.0, -1.98, 0.995], &[-1.7, 0.75]);
-        assert!(refused(&notch, None).contains("of the response"));
+        assert!(refused(&notch, None).contains("the response of the nearest operator"));
         let lead_lag = exact(&operators()[3]);
-        assert!(refused(&lead_lag, Some(Form::Lead)).contains("does not have the"));
+        assert!(refused(&lead_lag, Some(Form::Lead)).contains("does not match"));
     }
 }

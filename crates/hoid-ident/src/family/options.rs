@@ -131,7 +131,7 @@ impl BatchOptions for FamilyEstimator {
             shared::prior("population", |how: &mut Self| &mut how.prior)
                 .printed("prior", |how, _| Some(how.prior.to_string())),
             BatchOption::new(
-                shared::orders("nc=0,nd=0..24 of its noise model"),
+                shared::orders("nc=0,nd=0..24 (noise model)"),
                 |how: &mut Self, option, text| {
                     let mut named: NamedOrders = option.read(text)?;
                     if *how.nc.end() > 0 {
@@ -204,15 +204,15 @@ impl FamilyEstimator {
         let names: Vec<&str> = self.forms.iter().map(|form| form.name()).collect();
         match names.as_slice() {
             [only] => (*only).to_owned(),
-            all => format!("auto of {}", all.join(", ")),
+            all => format!("auto among {}", all.join(", ")),
         }
     }
 }
 
 fn intersample() -> Setting {
     let help = "Behaviour of e between samples: held (zoh), linear (foh: e was logged from a faster or continuous \
-                signal; tau_e is half a sample longer), or smooth with the delay for a held e, unless noise-free data \
-                show zoh or foh (auto)";
+                signal; tau_e is half a sample longer), or (auto) zoh or foh if noise-free data show it, else smooth \
+                with the delay for a held e";
     Setting::new("intersample", Kind::Choice(&Intersample::NAMES), help).default("auto")
 }
 
@@ -224,8 +224,8 @@ fn role() -> Setting {
 }
 
 fn run_to_run(default: f64) -> Setting {
-    let help = "Run-to-run variation of a person's gain, relative to the gain; included in the error bars for fewer \
-                than five records";
+    let help = "Relative run-to-run variation of a person's gain; added to the error bars if there are fewer than five \
+                records";
     Setting::new("run_to_run", Kind::Number, help)
         .default(&default.to_string())
         .bounds(Bounds::AtLeast(0.0))

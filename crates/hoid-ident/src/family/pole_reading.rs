@@ -77,7 +77,7 @@ pub(super) fn pole_assignments(f: &[f64], sample_time: SampleTime) -> Result<Vec
     for z in roots {
         if z.norm() >= 1.0 {
             return Err(other(format!(
-                "the pole at |z| = {:.6} is neither a lag nor a neuromuscular pole: it is not stable",
+                "the pole at |z| = {:.6} is not stable, so it is neither a lag nor a neuromuscular pole",
                 z.norm()
             )));
         }

@@ -58,8 +58,8 @@ fn coordinate_of(parameter: &str) -> Option<Coordinate> {
 }
 
 /// Source of the population prior.
-const NEUROMUSCULAR: &str = "published pilots: D. T. McRuer et al., IEEE Trans. Man-Machine Systems 9 (1968) 61-71; P. M. T. Zaal et al., \
-                             J. Guidance, Control, and Dynamics 32 (2009) 1089-1099";
+const NEUROMUSCULAR: &str = "published pilot data: D. T. McRuer et al., IEEE Trans. Man-Machine Systems 9 (1968) \
+                             61-71; P. M. T. Zaal et al., J. Guidance, Control, and Dynamics 32 (2009) 1089-1099";
 
 impl OperatorPrior {
     /// Returns an empty prior.

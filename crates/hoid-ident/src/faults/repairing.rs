@@ -85,7 +85,7 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
         nothing.findings.push(Finding::undetermined(
             "faults",
             format!(
-                "{} has no {SHORTEST_S} s without a fault: none of it is usable",
+                "{} has no fault-free span of {SHORTEST_S} s: the whole record is unusable",
                 record.label()
             ),
         ));

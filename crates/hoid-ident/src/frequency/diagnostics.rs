@@ -81,8 +81,8 @@ pub(super) fn findings(found: &DiagnosticInputs<'_>, records: &[Record]) -> Resu
     if found.channel.is_none() {
         findings.push(Finding::note(
             "no-reference",
-            "the channel of the excitation is not known: the ratios of u to e are averaged, and the remnant biases \
-             this average where it is large compared with e",
+            "the excitation channel is unknown: the ratios u/e are averaged, and this average is biased where \
+             the remnant is large compared with e",
         ));
     }
     findings.extend(leakage(found, records)?);
@@ -122,8 +122,8 @@ fn of_runs(found: &DiagnosticInputs<'_>, records: usize) -> Option<Finding> {
         _ if periods => Some(Finding::note(
             "periods-as-runs",
             format!(
-                "the errors are computed from {n} {what}, which differ less than runs do; from three runs on, the \
-                 errors include the differences between runs"
+                "the errors are computed from {n} {what}, which differ less than runs do; record three or more runs \
+                 to include the differences between runs"
             ),
         )),
         _ => None,
@@ -157,8 +157,8 @@ fn of_coherence(found: &DiagnosticInputs<'_>) -> Option<Finding> {
     }
     let at: Vec<String> = low.iter().map(|k| format!("{:.2}", lines[*k].omega_rad_s)).collect();
     let words = format!(
-        "at {} rad/s u may be unrelated to the excitation: the coherence is below {least:.2}, a value that one in \
-         twenty sets of {n} unrelated runs exceeds",
+        "at {} rad/s u may be unrelated to the excitation: the coherence is below {least:.2}, a value that 5 % of \
+         sets of {n} unrelated runs exceed",
         at.join(", ")
     );
     let crossover = found.in_loop.and_then(|(_, m)| m.crossover_rad_s);
@@ -182,14 +182,11 @@ fn of_loop(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
     };
     let Some(crossover) = margins.crossover_rad_s else {
         let where_ = if sizes.iter().all(|l| *l < 1.0) {
-            format!(
-                "the gain of the open loop is below 1 at all lines: the crossover lies below {low:.3} rad/s, if it \
-                 exists"
-            )
+            format!("the open-loop gain is below 1 at all lines: any crossover is below {low:.3} rad/s")
         } else if sizes.iter().all(|l| *l >= 1.0) {
-            format!("the gain of the open loop is above 1 at all lines: the crossover lies above {high:.3} rad/s")
+            format!("the open-loop gain is above 1 at all lines: the crossover is above {high:.3} rad/s")
         } else {
-            "the gain of the open loop does not cross 1 from above between the lines".to_owned()
+            "the open-loop gain does not cross 1 from above between the lines".to_owned()
         };
         return vec![Finding::doubt(
             "no-crossover",
@@ -201,7 +198,10 @@ fn of_loop(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
     if again > 1 {
         findings.push(Finding::note(
             "several-crossovers",
-            format!("the gain of the open loop crosses 1 from above {again} times between the lines; the lowest crossover is given"),
+            format!(
+                "the open-loop gain crosses 1 from above {again} times between the lines; the lowest crossover is \
+                 reported"
+            ),
         ));
     }
     let large = |name: &str, unit: &str, e: hoid_model::uncertainty::Estimate, part: f64| {

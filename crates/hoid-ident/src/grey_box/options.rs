@@ -96,6 +96,6 @@ impl BatchOptions for GreyBox {
 }
 
 fn remnant_order() -> Setting {
-    let help = "Order m of the remnant, a number or a range to search";
+    let help = "Order m of the remnant, or a range to search";
     Setting::new("remnant_order", Kind::Counts, help).default(&shared::range_words(&DEFAULT_ORDERS))
 }

@@ -34,18 +34,19 @@ impl fmt::Display for Reason {
             Self::Direct => "solved directly (linear least squares)",
             Self::SmallDecrease => "converged: the next step would not decrease the loss",
             Self::Border => {
-                "converged at the border of stability: a root of C or F lies on the unit circle, so that standard errors are unreliable"
+                "converged at the border of stability: a root of C or F lies on the unit circle, so standard errors \
+                 are unreliable"
             }
             Self::ExactFit => "converged: the residuals are zero up to rounding",
             Self::IterationLimit => "not converged: iteration limit reached",
-            Self::NoDescent => "not converged: no step inside the region of stable C and F lowers the loss",
+            Self::NoDescent => "not converged: no step with stable C and F lowers the loss",
             Self::Settled => "converged: a further iteration does not change the parameters",
             Self::InstrumentsHeld => {
                 "converged with the instruments kept constant: new instruments still change the parameters, by less \
                  than half a standard error"
             }
             Self::UnstableEstimate => {
-                "not converged: the estimate had a pole outside the unit circle, which was reflected into it"
+                "not converged: a pole of the estimate was outside the unit circle and was reflected inside"
             }
         })
     }

@@ -71,7 +71,7 @@ impl<'q, 'a> FitProblem<'q, 'a> {
             if let Some(lower) = others.min_by(|a, b| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares))
                 && lower.at.sum_of_squares < known
             {
-                start.push_str(", C drawn inside");
+                start.push_str(", roots of C moved inside");
                 minimum = lower;
             }
         }

@@ -18,7 +18,7 @@ impl Value for RangeInclusive<usize> {
         };
         match ends {
             Some((low, high)) if low <= high => Ok(low..=high),
-            Some(_) => Err("a nonempty range: LO..HI, the smaller number first".to_owned()),
+            Some(_) => Err("a range LO..HI with LO <= HI".to_owned()),
             None => Err("a nonnegative whole number, or LO..HI".to_owned()),
         }
     }
@@ -104,7 +104,7 @@ impl Value for DelayRange {
     fn read(text: &str) -> Result<Self, String> {
         if !text.trim_end().ends_with('s') {
             let samples = RangeInclusive::read(text).map(Self::Samples);
-            return samples.map_err(|expected| format!("{expected}, or seconds as 0.28s"));
+            return samples.map_err(|expected| format!("{expected}, or seconds such as 0.28s"));
         }
         let expected = || "samples (29, 20..40) or seconds (0.28s, 0.1s..0.4s)".to_owned();
         let seconds = |part: &str| {

@@ -167,7 +167,7 @@ impl SigmoidChange {
             return Err(IdentError::BadOption {
                 option: "the form of the operator".to_owned(),
                 found: format!("{} without neuromuscular dynamics", self.form),
-                expected: "a form other than a pure derivative: with neuromuscular dynamics, or with a lag".to_owned(),
+                expected: "a form with a lag, or neuromuscular dynamics".to_owned(),
             });
         }
         let (low, high) = self.delay_range_s;
@@ -187,7 +187,7 @@ impl SigmoidChange {
             return Err(IdentError::BadOption {
                 option: "the records".to_owned(),
                 found: "no time in common".to_owned(),
-                expected: "records whose time axes overlap around the change: t_M is a time on each of them".to_owned(),
+                expected: "records whose time axes overlap around the change, because all share one t_M".to_owned(),
             });
         }
         let frame = Frame {

@@ -54,12 +54,12 @@ impl fmt::Display for Remark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Fixed => "fixed",
-            Self::AtBound => "rests at a bound",
+            Self::AtBound => "is at a bound",
             Self::Abrupt => {
-                "at its upper bound: the change takes no longer than two samples, so that its rate cannot be determined"
+                "at its upper bound: the change takes two samples or less, so its rate cannot be determined"
             }
             Self::NoChange => "the records show no change: use the fit without a change",
-            Self::ChangePoint => "the change is too fast for its error to be normal: use the likelihood interval",
+            Self::ChangePoint => "the change is too fast for a normally distributed error: use the likelihood interval",
             Self::Undetermined => "not determined by the data",
             Self::PriorAlone => "determined by the prior alone",
         })

@@ -44,9 +44,9 @@ pub(super) fn without_advance(signals: &Signals<'_>, grid: &Grid, found: &mut Ve
         let places: Vec<RowSpan> = rows.iter().map(|row| signals.place(&(*row..row + 1))).collect();
         let Some(first) = places.first() else { continue };
         let what = if kind == QualityIssueKind::Repeated {
-            "duplicated, time included"
+            "duplicated, including the time"
         } else {
-            "not later than the row before, but with other values"
+            "not later than the row before, with other values"
         };
         found.push(QualityIssue {
             kind,
@@ -56,7 +56,7 @@ pub(super) fn without_advance(signals: &Signals<'_>, grid: &Grid, found: &mut Ve
             size: rows.len() as f64,
             unit: "rows".to_owned(),
             text: format!(
-                "{} {} {what}, the first is {}",
+                "{} {} {what}; the first is {}",
                 counted(rows.len(), "row"),
                 if rows.len() == 1 { "is" } else { "are" },
                 at(first)
@@ -146,7 +146,7 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
         size,
         unit: "s".to_owned(),
         text: format!(
-            "all channels hold their values in {} ({} %), in {}; the longest is {} from {}",
+            "all channels hold their values in {} ({} %), in {}; the longest hold lasts {} from {}",
             counted(total, "row"),
             short(100.0 * total as f64 / rows as f64),
             counted(places.len(), "place"),

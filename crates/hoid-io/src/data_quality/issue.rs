@@ -47,7 +47,7 @@ impl QualityIssueKind {
     pub fn remedy(self) -> &'static str {
         match self {
             Self::Missing => {
-                "bridge empty cells with --fill, read a column logged at its own instants with --sparse COLUMN=hold, \
+                "bridge empty cells with --fill, read a column logged at its own times with --sparse COLUMN=hold, \
                  or exclude the rows with --from and --to or --mask missing"
             }
             Self::Unordered => {
@@ -64,7 +64,7 @@ impl QualityIssueKind {
             }
             Self::Stalled => "exclude the rows with --mask stalled or --from and --to",
             Self::Saturated => "exclude the rows with --mask saturated; a bias remains, see the page on record files",
-            Self::Quantised => "nothing; it adds noise of variance step^2 / 12",
+            Self::Quantised => "none needed; quantisation adds noise of variance step^2 / 12",
             Self::Constant => "choose another column",
         }
     }

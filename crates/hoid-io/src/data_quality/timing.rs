@@ -55,7 +55,7 @@ pub(super) fn find(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIs
             size: rms,
             unit: "s".to_owned(),
             text: format!(
-                "the times jitter by {} s RMS around an even grid of {} s ({} % of a sample), at most by {} s at {}",
+                "t has a jitter of {} s RMS about an even grid of {} s ({} % of the sample time); the largest deviation is {} s at {}",
                 short(rms),
                 short(ts),
                 short(100.0 * rms / ts),
@@ -132,7 +132,14 @@ fn rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec
         return;
     }
     let way = if off > 0.0 { "slow" } else { "fast" };
-    let what = if given { "where" } else { "which would be" };
+    let (what, unless) = if given {
+        ("expected", String::new())
+    } else {
+        (
+            "close to the common rate of",
+            format!(", unless the recorder does run at {hz:.4} Hz"),
+        )
+    };
     found.push(QualityIssue {
         kind: QualityIssueKind::Clock,
         channel: String::new(),
@@ -141,15 +148,9 @@ fn rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec
         size: off,
         unit: "1".to_owned(),
         text: format!(
-            "t gives {hz:.4} Hz {what} {} Hz {}: the clock of t runs {way} by {} %{}",
+            "t gives {hz:.4} Hz, {what} {} Hz: the clock of t runs {way} by {} %{unless}",
             short(expected),
-            if given { "were expected" } else { "is common" },
-            short(100.0 * off.abs()),
-            if given {
-                ""
-            } else {
-                ", unless that is the rate of the recorder"
-            }
+            short(100.0 * off.abs())
         ),
         places: Vec::new(),
     });
@@ -184,7 +185,7 @@ fn drift(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Ve
         size: change,
         unit: "1".to_owned(),
         text: format!(
-            "the sample time changes along the record: {} s in its first third, {} s in its last ({} %)",
+            "the sample time changes over the record: {} s in the first third, {} s in the last third ({} %)",
             decimal(first),
             decimal(last),
             short(100.0 * change)

@@ -274,7 +274,7 @@ fn missing(
     let Some(first) = places.first() else { return };
     let rows: usize = gone.iter().map(Range::len).sum();
     let text = format!(
-        "{} has no finite value in {} ({} %), the first {}",
+        "{} has no finite value in {} ({} %); the first is {}",
         signal.name,
         counted(rows, "row"),
         short(100.0 * rows as f64 / signal.values.len() as f64),

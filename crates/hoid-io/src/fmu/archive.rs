@@ -166,7 +166,7 @@ pub fn write_fmu(
         let name = format!("binaries/{folder}/{MODEL}.{}", platform.ending);
         if parts.iter().any(|(other, _)| *other == name) {
             return Err(wrong(format!(
-                "two libraries are for {folder}; give one for each platform"
+                "two libraries are for {folder}; give only one for each platform"
             )));
         }
         parts.push((name, &library.bytes));
@@ -295,7 +295,7 @@ mod tests {
             fs::write(&path, other).unwrap();
             let refused = Library::read(&path).err().unwrap().to_string();
             assert!(
-                refused.contains("not that of hoid: it has no fmi2Instantiate"),
+                refused.contains("not the shared library of hoid: the function fmi2Instantiate is missing"),
                 "{refused}"
             );
         }

@@ -107,14 +107,14 @@ impl FmuSettings {
         for (name, given) in &self.parameters {
             let parameter = (all.iter_mut())
                 .find(|variable| variable.role == Role::Parameter && variable.name == name)
-                .ok_or_else(|| format!("{FMU_SETTINGS}: the unit has no parameter {name}"))?;
+                .ok_or_else(|| format!("{FMU_SETTINGS}: the FMU has no parameter {name}"))?;
             parameter.start = match (&parameter.start, given) {
                 (FmuStart::Real(_), SettingValue::Real(value)) => FmuStart::Real(*value),
                 (FmuStart::Real(_), SettingValue::Integer(value)) => FmuStart::Real(f64::from(*value)),
                 (FmuStart::Integer(_), SettingValue::Integer(value)) => FmuStart::Integer(*value),
                 (FmuStart::Boolean(_), SettingValue::Boolean(value)) => FmuStart::Boolean(*value),
                 (FmuStart::Text(_), SettingValue::Text(text)) => FmuStart::Text(text.clone()),
-                _ => return Err(format!("{FMU_SETTINGS}: the parameter {name} is of another type")),
+                _ => return Err(format!("{FMU_SETTINGS}: the parameter {name} has the wrong type")),
             };
         }
         Ok(all)

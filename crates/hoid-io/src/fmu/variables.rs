@@ -20,7 +20,7 @@ pub enum FmuKind {
     Operator,
 }
 
-hoid_model::named_choice!(FmuKind, "kind of unit", 2, {
+hoid_model::named_choice!(FmuKind, "kind of FMU", 2, {
     Tracker => "tracker",
     Operator => "operator",
 });
@@ -95,7 +95,7 @@ fn tracker() -> Vec<FmuVariable> {
             "sample_time",
             "s",
             Real(0.01),
-            "sample time; steps may be shorter, not longer",
+            "sample time; steps may be shorter, but not longer",
         ),
         parameter("method", "", text("adaptive"), "recursive method, as for hoid track"),
         parameter(
@@ -122,29 +122,32 @@ fn tracker() -> Vec<FmuVariable> {
         input("f_t", "excitation: target or disturbance"),
     ];
     for [(name, unit, help), (error, _, error_help)] in [
-        [("K_e", "", "gain"), ("K_e_se", "", "its standard error")],
-        [("T_L", "s", "lead time"), ("T_L_se", "s", "its standard error")],
+        [("K_e", "", "gain"), ("K_e_se", "", "standard error of K_e")],
+        [("T_L", "s", "lead time"), ("T_L_se", "s", "standard error of T_L")],
         [
             ("K_e_dot", "s", "gain of the rate"),
-            ("K_e_dot_se", "s", "its standard error"),
+            ("K_e_dot_se", "s", "standard error of K_e_dot"),
         ],
         [
             ("omega_nm", "rad/s", "natural frequency of the neuromuscular system"),
-            ("omega_nm_se", "rad/s", "its standard error"),
+            ("omega_nm_se", "rad/s", "standard error of omega_nm"),
         ],
-        [("zeta_nm", "", "its damping"), ("zeta_nm_se", "", "its standard error")],
-        [("tau_e", "s", "delay"), ("tau_e_se", "s", "its standard error")],
+        [
+            ("zeta_nm", "", "damping ratio of the neuromuscular system"),
+            ("zeta_nm_se", "", "standard error of zeta_nm"),
+        ],
+        [("tau_e", "s", "delay"), ("tau_e_se", "s", "standard error of tau_e")],
         [
             (
                 "crossover_rad_s",
                 "rad/s",
                 "crossover frequency with the controlled element",
             ),
-            ("crossover_rad_s_se", "rad/s", "its standard error"),
+            ("crossover_rad_s_se", "rad/s", "standard error of crossover_rad_s"),
         ],
         [
             ("phase_margin_deg", "deg", "phase margin with the controlled element"),
-            ("phase_margin_deg_se", "deg", "its standard error"),
+            ("phase_margin_deg_se", "deg", "standard error of phase_margin_deg"),
         ],
     ] {
         all.push(output(name, unit, Real(f64::NAN), help));
@@ -201,7 +204,7 @@ fn operator() -> Vec<FmuVariable> {
         ),
         variable(Role::Input, "e", "deg", Real(0.0), "tracking error"),
         variable(Role::Output, "u", "deg", Real(0.0), "control output"),
-        variable(Role::Output, "n", "deg", Real(0.0), "remnant in it"),
+        variable(Role::Output, "n", "deg", Real(0.0), "remnant in u"),
     ]
 }
 

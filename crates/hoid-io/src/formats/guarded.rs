@@ -21,7 +21,7 @@ pub(super) fn guarded<T>(file: &str, read: impl FnOnce() -> Result<T, IoError>) 
     without_panic(read).unwrap_or_else(|what| {
         Err(IoError::Damaged {
             file: file.to_owned(),
-            found: format!("it could not be read to its end ({})", short_error(&what)),
+            found: format!("it could not be read to the end ({})", short_error(&what)),
         })
     })
 }

@@ -74,7 +74,7 @@ const ELSEWHERE: [(&[&str], &str); 12] = [
     ),
     (
         &["sav"],
-        "read it with pandas.read_spss and give the table to pyhoid.Record.from_pandas",
+        "read it with pandas.read_spss and pass the table to pyhoid.Record.from_pandas",
     ),
     (&["rds", "rda"], "write it as CSV or Parquet in R"),
     (&["mlx", "slx"], "save the variables in MATLAB: save run1.mat e u t"),
@@ -133,7 +133,7 @@ pub(crate) fn format_to_write(path: &Path) -> Result<&'static Format, IoError> {
     };
     Err(IoError::UnknownFormat {
         file: path.display().to_string(),
-        found: format!("the extension is .{}, {what}", format.extensions[0]),
+        found: format!(".{} cannot be written ({what})", format.extensions[0]),
         expected: writable_endings(),
         remedy: String::new(),
     })

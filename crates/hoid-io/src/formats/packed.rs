@@ -31,7 +31,7 @@ pub(super) fn decompressed(bytes: &[u8], file: &str) -> Result<Vec<u8>, IoError>
     loop {
         let read = reader.read(&mut part).map_err(|error| IoError::Damaged {
             file: file.to_owned(),
-            found: format!("it is not a whole gzip file: {error}"),
+            found: format!("it is not a complete gzip file: {error}"),
         })?;
         if read == 0 {
             return Ok(text);

@@ -50,7 +50,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let first = DirectoryLock::take(dir.path()).unwrap();
         let message = DirectoryLock::take(dir.path()).unwrap_err().to_string();
-        assert!(message.contains("another process is working on"), "{message}");
+        assert!(message.contains("another process is using"), "{message}");
         drop(first);
         DirectoryLock::take(dir.path()).unwrap();
         assert!(DirectoryLock::take(&dir.path().join("none")).is_err());

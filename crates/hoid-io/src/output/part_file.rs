@@ -72,7 +72,7 @@ impl Part {
     /// Renames the temporary file to its final path.
     pub(super) fn persist(mut self, file: File, place: &Path, permissions: Option<fs::Permissions>) -> io::Result<()> {
         let Some(path) = self.path.take() else {
-            return Err(io::Error::other("the file was already put in its place"));
+            return Err(io::Error::other("the file was already moved to its final path"));
         };
         let name = path.to_path_buf();
         let part = NamedTempFile::from_parts(file, path);

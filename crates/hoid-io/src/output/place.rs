@@ -110,7 +110,10 @@ mod tests {
         let input = path("in.csv");
         for name in &names {
             let message = check_output(name, &[&input]).unwrap_err().to_string();
-            assert!(message.contains("is read by the same command"), "{message}");
+            assert!(
+                message.contains("of this command and would be overwritten"),
+                "{message}"
+            );
         }
         check_output(&path("out.csv"), &[&input]).unwrap();
         assert!(check_output_directory(dir.path(), &[&input]).is_err());

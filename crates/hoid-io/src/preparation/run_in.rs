@@ -22,7 +22,7 @@ impl RecordParts {
             return Err(self.error(
                 STEP,
                 format!(
-                    "{run_in_s} s leave nothing of {} s",
+                    "{run_in_s} s in a record of {} s",
                     decimal(self.start_s + self.len() as f64 * ts - begin_s)
                 ),
                 "a run-in shorter than the record",

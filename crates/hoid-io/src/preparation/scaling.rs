@@ -135,7 +135,7 @@ impl FromStr for Scaling {
             return Err(refused(
                 text,
                 &format!(
-                    "two units of the same kind, but {} is {} and {} is {}",
+                    "two units of the same kind, but {} is a unit of {} and {} of {}",
                     from.0, from.1, to.0, to.1
                 ),
             ));

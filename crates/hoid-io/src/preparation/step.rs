@@ -5,7 +5,7 @@ use std::fmt;
 use hoid_model::{Decimated, Detrend};
 use serde::Serialize;
 
-use crate::wording::{decimal, short};
+use crate::wording::{counted, decimal, short};
 
 /// A preparation step that was applied to a record, or a repair made in reading.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -173,7 +173,8 @@ impl fmt::Display for Step {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::DropRepeated { rows, first_row } => {
-                write!(f, "{rows} repeated rows dropped, the first of them row {first_row}")
+                let rows = counted(*rows, "repeated row");
+                write!(f, "{rows} dropped; the first is row {first_row}")
             }
             Self::Mask { what, from_s, to_s } => write!(
                 f,
@@ -192,18 +193,20 @@ impl fmt::Display for Step {
             } => {
                 write!(
                     f,
-                    "column {channel}: {own} values of its own, {rows} rows between them "
+                    "column {channel}: {} of its own, {} between them ",
+                    counted(*own, "value"),
+                    counted(*rows, "row")
                 )?;
                 match *how {
                     "drop" => write!(f, "dropped"),
-                    "hold" => write!(f, "hold the last value"),
-                    _ => write!(f, "on straight lines"),
+                    "hold" => write!(f, "filled with the last value"),
+                    _ => write!(f, "interpolated linearly"),
                 }?;
-                write!(f, "; at most {} s from one to the next", decimal(*longest_s))?;
+                write!(f, "; at most {} s between values", decimal(*longest_s))?;
                 mean_age_s.iter().try_for_each(|age| {
                     write!(
                         f,
-                        "; a value is {} s old on average, which is the delay of the signal",
+                        "; a value is {} s old on average, which delays the signal by as much",
                         short(*age)
                     )
                 })
@@ -214,7 +217,8 @@ impl fmt::Display for Step {
                 longest,
             } => write!(
                 f,
-                "column {channel}: {values} missing values bridged linearly, at most {longest} in a row"
+                "column {channel}: {} bridged linearly, at most {longest} in a row",
+                counted(*values, "missing value")
             ),
             Self::Interpolate {
                 from_samples,
@@ -228,7 +232,7 @@ impl fmt::Display for Step {
                 decimal(*to_hz)
             ),
             Self::Scale { channel, factor, unit } => {
-                write!(f, "{channel} times {}", decimal(*factor))?;
+                write!(f, "{channel} multiplied by {}", decimal(*factor))?;
                 unit.iter().try_for_each(|unit| write!(f, " (now in {unit})"))
             }
             Self::Offset {
@@ -240,16 +244,22 @@ impl fmt::Display for Step {
                 cut_samples: (start, end),
             } => {
                 let way = if *samples > 0.0 { "earlier" } else { "later" };
+                let unit = if samples.abs() == 1.0 { "sample" } else { "samples" };
                 write!(
                     f,
-                    "{channel} moved {way} by {} samples ({} s)",
+                    "{channel} moved {way} by {} {unit} ({} s)",
                     decimal(samples.abs()),
                     decimal(seconds.abs())
                 )?;
                 if let (true, Some(pass)) = (interpolated, pass_hz) {
-                    write!(f, ", by a sinc function, to 1e-4 up to {} Hz", decimal(*pass))?;
+                    write!(
+                        f,
+                        ", interpolated by a sinc function (error below 1e-4 up to {} Hz)",
+                        decimal(*pass)
+                    )?;
                 }
-                write!(f, "; {start} samples cut at the start, {end} at the end")
+                let start = counted(*start, "sample");
+                write!(f, "; {start} cut at the start, {end} at the end")
             }
             Self::Rate {
                 factor,
@@ -296,7 +306,7 @@ impl fmt::Display for Step {
                 }
                 write!(
                     f,
-                    "; {} s cut at the start, {} s at the end; the longer hold makes the delay of a model {} by {} s",
+                    "; {} s cut at the start, {} s at the end; the hold at the new rate makes the delay of a model {} by {} s",
                     decimal(cut_s.0),
                     decimal(cut_s.1),
                     if *delay_s > 0.0 { "shorter" } else { "longer" },

@@ -70,7 +70,7 @@ fn scales_and_units() {
     let (found, steps) = preparation.apply(record(5, |_| PI, |_| 2.0)).unwrap();
     assert!((found.input()[0] - 180.0).abs() < 1e-12 && found.output()[0] == 25.0);
     assert_eq!((found.output_channel().unit.as_str(), steps.len()), ("deg", 2));
-    assert_eq!(steps[1].to_string(), "stick times 12.5 (now in deg)");
+    assert_eq!(steps[1].to_string(), "stick multiplied by 12.5 (now in deg)");
     // Forwards and backwards, for all pairs.
     for (from, to) in [("rad", "deg"), ("deg", "mrad"), ("in", "cm"), ("V", "mV"), ("lbf", "N")] {
         let there: Scaling = format!("{from}:{to}").parse().unwrap();
@@ -254,7 +254,7 @@ fn what_cannot_be_done_is_said() {
         (rate(NewRate::Hz(1e-9)), 200, "a longer record"),
         (with(|p| p.run_in_s = -1.0), 10, "run-in: -1 s"),
         (with(|p| p.run_in_s = f64::NAN), 10, "run-in: NaN s"),
-        (with(|p| p.run_in_s = 0.1), 10, "0.1 s leave nothing of 0.1 s"),
+        (with(|p| p.run_in_s = 0.1), 10, "0.1 s in a record of 0.1 s"),
         (
             moved("u", Offset::Samples(10.0)),
             10,

@@ -96,7 +96,7 @@ fn check_names(record: &Record, file: impl Fn() -> String) -> Result<(), IoError
         let reason = match name {
             "t" => "t is the time of the samples",
             "" => "it has no name",
-            padded if padded != padded.trim() => "there are blanks around the name",
+            padded if padded != padded.trim() => "its name starts or ends with a blank",
             _ => continue,
         };
         return Err(IoError::ChannelName {

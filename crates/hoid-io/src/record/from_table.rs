@@ -54,8 +54,7 @@ pub(super) fn record_of(
             steps.extend(step);
         }
         (true, None) => table.notes.push(String::from(
-            "there is no column t, so that a row written twice cannot be distinguished from a held value: no row is \
-             dropped",
+            "no rows were dropped: without a column t, a repeated row cannot be distinguished from held values",
         )),
         _ => {}
     }

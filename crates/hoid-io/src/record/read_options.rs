@@ -134,7 +134,7 @@ impl FromStr for TrialChoice {
         if column.is_empty() || value.as_ref().is_some_and(String::is_empty) {
             return Err(IoError::Expression {
                 found: text.to_owned(),
-                expected: String::from("expected the column that numbers the trials, or one of them, such as trial=3"),
+                expected: String::from("expected the column that numbers the trials, or one trial, such as trial=3"),
             });
         }
         Ok(Self {

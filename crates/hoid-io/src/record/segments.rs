@@ -91,7 +91,7 @@ fn read_trial(
     };
     if let Some(kind) = mask.iter().find(|kind| !QualityIssueKind::MASKABLE.contains(kind)) {
         let names = QualityIssueKind::MASKABLE.map(QualityIssueKind::name).join(", ");
-        return Err(refuse(kind.name().to_owned(), &format!("some of {names}")));
+        return Err(refuse(kind.name().to_owned(), &format!("one or more of {names}")));
     }
     if preparation.run_in_s != 0.0 {
         return Err(refuse("a run-in".to_owned(), "a span that starts after it (--from)"));

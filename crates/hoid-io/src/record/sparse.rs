@@ -19,7 +19,7 @@ use super::read_options::{ReadOptions, Sparse};
 use crate::IoError;
 use crate::preparation::Step;
 use crate::table::{Column, ColumnExpression, Signal, Table, kept};
-use crate::wording::{list, named};
+use crate::wording::{counted, list, named};
 
 const STEP: &str = "sparse";
 
@@ -49,7 +49,7 @@ pub(super) fn without_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> R
             return Err(refused(&table, found, "a column with some values; check the recording"));
         };
         if gaps.missing.is_empty() {
-            let note = format!("column {name} has a value in every row: --sparse changes nothing in it");
+            let note = format!("column {name} has a value in every row: --sparse has no effect on it");
             table.notes.push(note);
             continue;
         }
@@ -69,7 +69,7 @@ pub(super) fn without_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> R
         let named = columns.iter().filter_map(|(at, _)| table.columns.get(*at));
         let names: Vec<&str> = named.map(|column| column.name.as_str()).collect();
         let found = format!(
-            "no row between the first and the last value of each of {}",
+            "no row lies between the first and the last value of every column of {}",
             list(&names)
         );
         return Err(refused(&table, found, "columns that were logged at the same time"));
@@ -85,7 +85,8 @@ fn note_cut(table: &mut Table<'_>, bounds: &Range<usize>) {
     let (before, behind) = (bounds.start, table.rows.saturating_sub(bounds.end));
     if (before, behind) != (0, 0) {
         table.notes.push(format!(
-            "{before} rows at the start and {behind} at the end are cut: a sparse column has no value before its first or after its last"
+            "{} at the start and {behind} at the end cut: a sparse column has no values there",
+            counted(before, "row")
         ));
     }
 }

@@ -9,7 +9,7 @@ use super::repair::{self, OpenEnd};
 use crate::IoError;
 use crate::preparation::Step;
 use crate::table::{Column, Table};
-use crate::wording::{named, sparse_option};
+use crate::wording::{counted, named, sparse_option};
 
 /// The table to be converted, and the steps applied to it.
 pub(super) struct TableReader<'a> {
@@ -50,9 +50,9 @@ impl TableReader<'_> {
             let columns = self.signals.iter().filter_map(|column| self.table.columns.get(*column));
             let names: Vec<String> = columns.map(|column| named(&column.name)).collect();
             self.table.notes.push(format!(
-                "{before} rows at the start and {behind} at the end are left out: not all of {} have a value there to \
-                 bridge to",
-                names.join(" and ")
+                "{} at the start and {behind} at the end left out: --fill has no value to bridge to there (columns: {})",
+                counted(before, "row"),
+                names.join(", ")
             ));
         }
         // A missing value in the first or the last row of the range has a neighbour outside the range, and is
@@ -139,8 +139,8 @@ impl TableReader<'_> {
         })?;
         if bridged.values > 0 && lacks && self.signals.contains(&column) {
             self.table.notes.push(format!(
-                "column {} lacks values at many places, as if logged at its own instants: --fill draws straight lines, \
-                 {} holds the last value",
+                "column {} lacks many values, as if logged at its own times: --fill interpolates linearly, {} holds the \
+                 last value",
                 named(&source.name),
                 sparse_option(&source.name)
             ));

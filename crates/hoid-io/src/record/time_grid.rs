@@ -57,7 +57,7 @@ impl TableReader<'_> {
         match (t, first) {
             (None, _) if self.options.repair.resample => {
                 self.table.notes.push(String::from(
-                    "there is no column t to resample along: the samples are taken as evenly spaced",
+                    "there is no column t for resampling: the samples are taken as evenly spaced",
                 ));
             }
             (Some(t), Some(first)) if first.is_finite() => {
@@ -164,8 +164,8 @@ impl TableReader<'_> {
         // At half the frequency or less, signal power above the new Nyquist frequency aliases.
         if 2.0 * samples <= t.len() as f64 {
             self.table.notes.push(String::from(
-                "resampling to the lower frequency applied no low-pass filter: read at the old frequency and give the \
-                 new frequency with --new-fs if the recording holds power above half of it",
+                "resampling to the lower frequency applied no low-pass filter: if the recording has power above half the \
+                 new frequency, read it at the old frequency and give the new one with --new-fs",
             ));
         }
         Ok(TimeGrid {

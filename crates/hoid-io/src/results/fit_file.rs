@@ -203,7 +203,7 @@ impl FitObject {
         }
         let form = Form::of_name(&form).map_err(|error| error.to_string())?;
         let covariance = self.covariance.ok_or("it has no covariance")?;
-        let neuromuscular = self.neuromuscular.ok_or("neuromuscular is lacking")?;
+        let neuromuscular = self.neuromuscular.ok_or("it has no key neuromuscular")?;
         let names: Vec<&str> = form.coordinates(neuromuscular).iter().map(|c| c.name()).collect();
         if covariance.coordinates != names {
             return Err(format!(
@@ -212,7 +212,7 @@ impl FitObject {
                 names.join(", ")
             ));
         }
-        let record = self.records.first().ok_or("it names no record")?;
+        let record = self.records.first().ok_or("it has no record")?;
         let sample_time = record.sample_time.ok_or("its record has no sample_time")?;
         let operator = FamilyOperator::new(form, neuromuscular, &covariance.values).map_err(|e| e.to_string())?;
         let noise = self.noise.ok_or("it has no noise model")?;

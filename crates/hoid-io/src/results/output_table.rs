@@ -156,7 +156,7 @@ impl TableSchema {
             let reason = if name.is_empty() {
                 Some("it has no name")
             } else if name != name.trim() {
-                Some("there are blanks around the name")
+                Some("its name starts or ends with a blank")
             } else {
                 None
             };

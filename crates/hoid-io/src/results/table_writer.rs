@@ -183,7 +183,7 @@ impl TableWriter {
 fn broken(name: &str) -> IoError {
     IoError::Unwritable {
         file: name.to_owned(),
-        source: io::Error::other("writing it failed earlier"),
+        source: io::Error::other("an earlier write failed"),
     }
 }
 

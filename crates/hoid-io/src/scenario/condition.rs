@@ -95,7 +95,7 @@ impl Source<'_> {
             return Ok(());
         }
         Err(self.keys(&format!(
-            "missing {}: give them, or start from a condition such as condition = \"C1\"",
+            "missing {}: give them, or start from a condition, such as condition = \"C1\"",
             missing.join(", ")
         )))
     }
@@ -144,7 +144,7 @@ impl Source<'_> {
         let rate = self.limited("schedule.rate_per_s", given.rate_per_s, Limits::CHANGE_PER_S)?;
         let midpoint = self.limited("schedule.midpoint_s", given.midpoint_s, Limits::INSTANT_S)?;
         let (of_base, at_base) = (base.rate_per_s(), base.change_s());
-        let missing = |key: &str| self.keys(&format!("[schedule] lacks {key}: there is no change to take it from"));
+        let missing = |key: &str| self.keys(&format!("[schedule] lacks {key}, which has no default: add it"));
         let rate_per_s = rate.or(of_base).ok_or_else(|| missing("rate_per_s"))?;
         let midpoint_s = midpoint.or(at_base).ok_or_else(|| missing("midpoint_s"))?;
         Ok(
@@ -195,9 +195,9 @@ impl Source<'_> {
             }
             ([Some(initial), last], strength) => {
                 if last.is_none() && scenario.schedule != Schedule::Constant {
-                    return Err(
-                        self.keys("[remnant] has K_n_initial_deg but no K_n_last_deg for the state after the change")
-                    );
+                    return Err(self.keys(
+                        "[remnant] has K_n_initial_deg but no K_n_last_deg for the state after the change: add it",
+                    ));
                 }
                 *strength = RemnantStrength::Gain {
                     initial,
@@ -214,7 +214,7 @@ impl Source<'_> {
     fn forcing(&self, tables: Vec<SinusoidTable>, measurement_s: f64) -> Result<ForcingFunction, ScenarioFileError> {
         if tables.len() > MOST_LINES {
             return Err(self.keys(&format!(
-                "{} tables [[forcing]], expected at most {MOST_LINES}",
+                "there are {} tables [[forcing]], expected at most {MOST_LINES}",
                 tables.len()
             )));
         }

@@ -33,10 +33,9 @@ impl Source<'_> {
             (Some(ts), None) => SampleTime::new(ts).map_err(|error| self.model(error))?,
             (None, Some(rate)) => SampleTime::new(1.0 / rate).map_err(|error| self.model(error))?,
             (Some(_), Some(_)) => {
-                return Err(self.keys(
-                    "sample_time_s and sampling_rate_hz specify the same quantity: give only one of \
-                                      the two",
-                ));
+                return Err(
+                    self.keys("sample_time_s and sampling_rate_hz specify the same quantity: give only one of the two")
+                );
             }
         };
         let initial = self.family_state(form, file.neuromuscular, "initial", &file.initial)?;
@@ -74,7 +73,7 @@ impl Source<'_> {
         }
         if let Some(table) = file.feedforward {
             if scenario.target.function.sinusoids().is_empty() {
-                return Err(self.keys("[feedforward] is given, but no displayed [target]"));
+                return Err(self.keys("[feedforward] is given, but no displayed [target]: add [target]"));
             }
             scenario.feedforward = Some(self.feedforward(table, &scenario)?);
         }
@@ -176,7 +175,7 @@ impl Source<'_> {
             .find(|(key, value)| value.is_some() && !used.contains(key))
         {
             return Err(self.keys(&format!(
-                "[{table}] has {}, which the form {form} does not have, or which repeats another key; it takes {}",
+                "[{table}] has {}, which the form {form} does not use, or which repeats another key; the form takes {}",
                 key.0,
                 used.join(", ")
             )));
@@ -272,7 +271,7 @@ impl Source<'_> {
         let of_primes = given.interleaved.is_some() || given.largest_multiple.is_some();
         if given.period_s.is_some() || of_primes || given.rms.is_some() {
             return Err(self.keys(&format!(
-                "[{name}] has its own lines and keys of a multi-sine: give only one of them"
+                "[{name}] has both lines and the keys of a multi-sine: give only one of the two"
             )));
         }
         if lines.len() > MOST_LINES {
@@ -370,11 +369,11 @@ impl Source<'_> {
             ("coefficients", given.coefficients.is_some()),
         ] {
             if is_there && !used.contains(&key) {
-                return refuse(format!("its shape has no {key}: it takes {takes}"));
+                return refuse(format!("its shape does not use {key}; it takes {takes}"));
             }
         }
         let Some(shape) = shape else {
-            return refuse(format!("its shape takes {takes}"));
+            return refuse(format!("it lacks a key of its shape, which takes {takes}"));
         };
         let behind = |owner: &str, is_there: bool, others: bool| {
             if others && !is_there {

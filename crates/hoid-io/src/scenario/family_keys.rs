@@ -89,7 +89,7 @@ pub(super) struct FeedforwardTable {
     /// Delay relative to the present target, s; at least `-preview_s`.
     #[serde(default)]
     pub(super) tau_f_s: f64,
-    /// Time for which the future target is displayed ahead, s. Default: zero.
+    /// Time by which the target is displayed ahead, s. Default: zero.
     #[schemars(with = "Option<f64>")]
     pub(super) preview_s: Option<Number>,
 }

@@ -115,7 +115,7 @@ fn what_does_not_fit_is_refused_with_its_remedy() {
         ),
         (
             more("[[remnant]]\nshape = \"white\"\nshare = 0.1\nzeta = 0.2"),
-            "has no zeta",
+            "does not use zeta",
         ),
         (more("[[remnant]]\nshape = \"white\""), "give share"),
         (
@@ -123,7 +123,7 @@ fn what_does_not_fit_is_refused_with_its_remedy() {
             "lacks off_s",
         ),
         (more("[[remnant]]\nshape = \"white\"\nshare = 1.1"), "below one"),
-        (more("[disturbance]\nrms = 1\nlines = []"), "give only one of them"),
+        (more("[disturbance]\nrms = 1\nlines = []"), "give only one of the two"),
     ] {
         let message = parse(&text).unwrap_err().to_string();
         assert!(

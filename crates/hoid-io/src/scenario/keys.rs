@@ -73,7 +73,7 @@ pub(super) struct ScheduleTable {
     pub(super) rate_per_s: Option<Number>,
     #[schemars(with = "Option<f64>")]
     pub(super) midpoint_s: Option<Number>,
-    /// Time from one change to the next, for a person who changes back and forth.
+    /// Time between changes, s, for a person who alternates between the two states.
     #[schemars(with = "Option<f64>")]
     pub(super) interval_s: Option<Number>,
 }

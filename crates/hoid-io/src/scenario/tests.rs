@@ -133,11 +133,11 @@ fn bad_values_name_line_key_and_remedy() {
         ),
         (
             "condition = \"C1\"\nsample_time_s = 0.03",
-            ["tau_e_s is 0.28", "does not give it", "0.03 s"],
+            ["tau_e_s is 0.28", "by default", "0.03 s"],
         ),
         (
             "condition = \"C1\"\nmeasurement_s = 1e12",
-            ["line 2", "measurement_s", "1e7 samples"],
+            ["line 2", "measurement_s", "1 to 1e7"],
         ),
         (
             "condition = \"C1\"\nsample_time_s = 0",

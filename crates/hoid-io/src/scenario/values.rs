@@ -99,14 +99,12 @@ impl Source<'_> {
             return Ok(time_s);
         }
         let expected = format!(
-            "{least} to 1e7 samples of {} s, a whole number of samples: round it or change sample_time_s",
+            "a whole number of samples of {} s, from {least} to 1e7: round the value or change sample_time_s",
             sample_time.s()
         );
         Err(match given {
             Some(given) => self.value(key, given.span().start, &in_short(time_s), &expected),
-            None => self.keys(&format!(
-                "{key} is {time_s} if the file does not give it, expected {expected}"
-            )),
+            None => self.keys(&format!("{key} is {time_s} by default, expected {expected}")),
         })
     }
 

@@ -129,7 +129,7 @@ impl ColumnExpression {
             _ => Err(IoError::Expression {
                 found: self.text.clone(),
                 expected: format!(
-                    "it can be read as more than one difference of the columns of {file}; rename a column so that no name holds a hyphen"
+                    "it matches more than one difference of columns of {file}; rename a column so that no name contains a hyphen"
                 ),
             }),
         }
@@ -201,10 +201,10 @@ mod tests {
     #[test]
     fn what_is_missing_is_named() {
         let message = |text| resolve(text).unwrap_err().to_string();
-        assert!(message("q").contains("no column \"q\" (asked for: q); it has t, r, y, stick-x, r-d"));
-        assert!(message("r-q").contains("no column \"q\" (asked for: r-q)"));
+        assert!(message("q").contains("no column \"q\" (requested: q); it has t, r, y, stick-x, r-d"));
+        assert!(message("r-q").contains("no column \"q\" (requested: r-q)"));
         assert!(message("p-q").contains("no column \"p\" and no \"q\""));
-        assert!(message("-q").contains("no column \"q\" (asked for: -q)"));
+        assert!(message("-q").contains("no column \"q\" (requested: -q)"));
         for empty in ["", "  ", "-", " - - "] {
             assert!(matches!(resolve(empty), Err(IoError::Expression { .. })), "{empty:?}");
         }

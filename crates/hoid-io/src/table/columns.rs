@@ -129,13 +129,13 @@ impl Table<'_> {
             let remedy = if has_decimal_comma(&found) {
                 DECIMAL_COMMA
             } else if is_moment(&found) {
-                "a date or clock time among numbers: write the whole column in one format, or give --fs HZ if the \
+                "the column mixes numbers with dates or clock times: write it in one format, or give --fs HZ if the \
                  samples are evenly spaced"
             } else if row == 0 && self.rows > 1 && self.has_no_number_in(row) {
                 UNITS_ROW
             } else if is_last_cell && self.source.is_open(row) {
-                "the file is truncated there, in the middle of its last line: copy or record it again, or remove that \
-                 line"
+                "the file is truncated in the middle of this line, the last one: copy or record the file again, or \
+                 remove that line"
             } else {
                 "correct the cell, empty it and bridge it with --fill, or choose another column"
             };
@@ -181,7 +181,7 @@ impl Table<'_> {
 
 /// Remedy for a first row of the data without numbers.
 pub(crate) const UNITS_ROW: &str =
-    "no column has a number there: if that line names the units, remove it and give them with --unit e=deg,u=deg";
+    "no column has a number in this row: if it contains the units, remove it and give --unit e=deg,u=deg";
 
 /// Checks that the names are unique, and adds a note on columns without a name.
 pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>) -> Result<(), IoError> {

@@ -80,7 +80,7 @@ impl FromStr for TimeChoice {
                 None if unit.starts_with([')', ',', ']']) => (text, None),
                 None => {
                     return Err(refuse(
-                        "expected the column of the time, and after a colon s, ms, us, ns, min, h, iso or sec+nanosec",
+                        "expected the time column, and after a colon its unit: s, ms, us, ns, min, h, iso or sec+nanosec",
                     ));
                 }
             },

@@ -288,7 +288,7 @@ fn make_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
         Unit::Iso => {
             time.moments = false;
             let taken = if was_t { "" } else { "taken as t, " };
-            format!("{name} is {taken}in s from its first moment")
+            format!("{name} is {taken}in s from its first time")
         }
         Unit::SecondsAndNanoseconds => {
             let (other, ns) = nanoseconds.unwrap_or_default();
@@ -298,7 +298,7 @@ fn make_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
             }
             time.precision = Precision::default();
             format!(
-                "{name} and {} are taken as t, in s from the first of them",
+                "{name} and {} are taken as t, in s from their first time",
                 named(&other)
             )
         }
@@ -313,7 +313,7 @@ fn make_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
             let from_first = first / parts >= STAMP;
             scale(time, parts, if from_first { first } else { 0.0 }, true);
             time.precision = time.precision.shifted(power);
-            let origin = if from_first { " from its first stamp" } else { "" };
+            let origin = if from_first { " from its first time stamp" } else { "" };
             let taken = if was_t { "" } else { "taken as t, " };
             format!("{name} is {taken}in s{origin}, from {unit}")
         }

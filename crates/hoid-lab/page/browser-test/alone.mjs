@@ -53,7 +53,7 @@ try {
   await page.locator("canvas.task").waitFor();
   await page.evaluate(operator, { injected: true });
   await heading("Done. Thank you.");
-  await page.getByText("no program has recomputed the run").first().waitFor();
+  await page.getByText("this page cannot recompute the run").first().waitFor();
   await page.getByText("You, as the program sees you").waitFor();
   await page.waitForTimeout(500);
   await picture("done");

@@ -158,7 +158,7 @@ const steps = {
     await picture(page, "broken-off");
     // A second window takes over while nothing runs; the first looks on.
     const second = await open(server.address);
-    await heading(page, "This window only watches");
+    await heading(page, "This window is view-only");
     await picture(page, "looks-on");
     await second.close();
     await server.end("SIGKILL");
@@ -248,7 +248,7 @@ const steps = {
     const cells = lines[5000].split(",");
     lines[5000] = [cells[0], cells[1], String(Number(cells[2]) + 1e-9)].join(",");
     writeFileSync(join(session, ticks), lines.join("\n"));
-    await show(/e of 1 ticks does not match the controlled element, first at tick 4999/, "replay-corrupted");
+    await show(/e does not match the controlled element at 1 of \d+ ticks, first at tick 4999/, "replay-corrupted");
     writeFileSync(join(session, ticks), text);
   },
 

@@ -189,7 +189,7 @@ class Alone implements Wire {
       gain: operator[0],
       lead_s: operator[1],
       lag_s: [null, null],
-      lag_waiting: "not searched for here",
+      lag_waiting: "not estimated here",
       omega_nm_rad_s: operator[3],
       delay_s: operator[5],
       crossover_rad_s: openLoop[0],
@@ -214,7 +214,7 @@ class Alone implements Wire {
       training: going.planned.training,
       how,
       verdict: "unverified",
-      reasons: "no program has recomputed the run; hoid lab does",
+      reasons: "this page cannot recompute the run; hoid lab can",
       notes: measures.missed_frames > 0 ? `${measures.missed_frames} of ${measures.frames} frames were missed` : "",
       rms_e,
       score,
@@ -318,5 +318,5 @@ async function start(): Promise<void> {
 
 start().catch((error: unknown) => {
   const main = document.getElementById("main");
-  main?.replaceChildren(h("h1", {}, "This browser cannot run the page"), h("p", {}, String(error)), h("p", {}, "A browser of 2023 or later can; or install hoid and run hoid lab."));
+  main?.replaceChildren(h("h1", {}, "This browser cannot run the page"), h("p", {}, String(error)), h("p", {}, "Use a browser from 2023 or later, or install hoid and run hoid lab."));
 });

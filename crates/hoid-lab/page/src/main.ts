@@ -80,7 +80,7 @@ function hear(message: FromServer): void {
     case "refused":
       if (message.elsewhere) {
         elsewhere = true;
-        show("", h("h1", {}, "This window only watches"), h("p", {}, message.words), button("Try here", () => location.reload()));
+        show("", h("h1", {}, "This window is view-only"), h("p", {}, message.words), button("Try here", () => location.reload()));
       } else if (screen === "run") {
         // As where the disk is full: there is no use in going on.
         stop(message.words);
@@ -129,7 +129,7 @@ function consent(): void {
   const name = h("input", { type: "text", id: "subject", value: s.calibrate ? "calibration" : "P01", maxlength: "20", autocomplete: "off" });
   const agree = h("input", { type: "checkbox", id: "agree", change: () => (go.disabled = !agree.checked) });
   const cc0 = h("input", { type: "checkbox", id: "cc0" });
-  const go = button("Begin", () => wire.say({ type: "consent", subject: name.value.trim(), agreed: agree.checked, cc0: cc0.checked }), {
+  const go = button("Start", () => wire.say({ type: "consent", subject: name.value.trim(), agreed: agree.checked, cc0: cc0.checked }), {
     disabled: true,
     id: "begin",
   });
@@ -142,7 +142,7 @@ function consent(): void {
     open.length > 0 && h("div", { class: "box" }, h("p", {}, "A session was not finished."), ...open),
     h("p", {}, s.consent),
     h("label", {}, "Made-up name (letters and digits)", name),
-    h("label", { class: "check" }, agree, h("span", {}, s.calibrate ? "Start it." : "I have read this and take part.")),
+    h("label", { class: "check" }, agree, h("span", {}, s.calibrate ? "Start it." : "I have read this and agree to take part.")),
     wire.alone && h("p", {}, "Your runs stay in this window until you close it. Nothing is sent, and nothing is stored unless you save it."),
     !s.calibrate && !wire.alone && h("label", { class: "check" }, cc0, h("span", {}, "My data may be shared with anyone, without conditions (CC0). Leave this box empty if you are not sure.")),
     go,
@@ -218,9 +218,9 @@ addEventListener("keydown", (event) => {
 });
 
 const DISPLAYS: Record<Condition["display"], string> = {
-  compensatory: "The ring in the middle is you, the line is where you should be. Move to the side where the line is.",
-  pursuit: "The ring is you, the line is where you should be. Bring the ring onto the line.",
-  preview: "The ring is you. The line comes down to you: you see ahead where it will be.",
+  compensatory: "The ring in the middle is you; the line is where you should be. Move towards the line.",
+  pursuit: "The ring is you; the line is where you should be. Move the ring onto the line.",
+  preview: "The ring is you. The line comes down to you, so you can see where it will be.",
 };
 
 function ready(): void {
@@ -285,7 +285,7 @@ async function estimate(number: number): Promise<void> {
   const run = await wire.data(number);
   const last = run?.live[run.live.length - 1];
   if (!place || !run || !last) return;
-  const shown = run.condition.display === "compensatory" ? "" : "The display shows the target: this is the response to the error alone. The page of identify has both.";
+  const shown = run.condition.display === "compensatory" ? "" : "The display shows the target: this is the response to the error alone. The report of hoid identify shows both responses.";
   const cell = (name: string, told: [number | null, number | null], unit: string, none = "–") =>
     h("div", {}, name, h("b", {}, told[0] === null ? none : `${digits(told[0])} ${unit}`), told[1] === null ? "" : `± ${digits(told[1])}`);
   place.replaceChildren(

@@ -23,7 +23,7 @@ export function facts(done: Done, measures: Measures): HTMLElement[] {
       "p",
       { class: "soft" },
       `Frames of ${measures.frame_ms.toFixed(1)} ms, the longest ${measures.longest_frame_ms.toFixed(1)} ms, ${measures.missed_frames} missed; ` +
-        `${measures.input_hz.toFixed(0)} events a second, ${measures.input_age_ms.toFixed(1)} ms old when they came.`,
+        `${measures.input_hz.toFixed(0)} events a second, ${measures.input_age_ms.toFixed(1)} ms old on arrival.`,
     ),
   ];
 }
@@ -38,7 +38,7 @@ export function runsTable(done: Done[], pick?: (number: number) => void): HTMLEl
       h("td", {}, d.how === "finished" ? percent(d.score) : "ended early"),
       h("td", {}, worth(d)),
     );
-  const head = ["Run", "Task", "Score", "Worth"].map((text) => h("th", { scope: "col" }, text));
+  const head = ["Run", "Task", "Score", "Verdict"].map((text) => h("th", { scope: "col" }, text));
   return h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ...head)), h("tbody", {}, ...done.map(row))));
 }
 

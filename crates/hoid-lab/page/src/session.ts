@@ -53,7 +53,7 @@ export function start(wire: Wire, given: Given, own: Settings, ended: (finished:
     if (event.key === "Escape") end(false, "You ended the run.");
   };
   const hidden = () => {
-    if (document.hidden) end(false, "The window was covered; nothing can be measured then.");
+    if (document.hidden) end(false, "The window was hidden, so nothing could be measured.");
   };
   const sized = () => surface.fit();
   addEventListener("keydown", keys);

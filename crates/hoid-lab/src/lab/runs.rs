@@ -20,7 +20,7 @@ use crate::{
 impl Shared {
     pub(super) fn send_run(&self, state: &mut Current, id: u64) -> Result<(), LabError> {
         if state.run.is_some() {
-            return Err(LabError::Order("a run continues".to_owned()));
+            return Err(LabError::Order("a run is already in progress".to_owned()));
         }
         let session = session_of(state)?;
         let next = session
@@ -174,7 +174,7 @@ impl Shared {
         if run.log.ticks() != run.begun.ticks {
             let (ticks, all) = (run.log.ticks(), run.begun.ticks);
             return Err(LabError::Order(format!(
-                "the run has {ticks} of {all} ticks and cannot be finished"
+                "the run has only {ticks} of {all} ticks and cannot be finished"
             )));
         }
         if counted.len() > 16 || counted.values().any(|v| !v.is_finite()) {

@@ -79,5 +79,5 @@ fn rows<const N: usize>(path: &Path, mut each: impl FnMut([f64; N])) -> Result<O
         each(values);
     }
     let cut = whole.len() < bytes.len() || whole.is_empty();
-    Ok(cut.then(|| format!("{} is cut", name())))
+    Ok(cut.then(|| format!("{} is truncated", name())))
 }

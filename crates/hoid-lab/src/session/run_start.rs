@@ -135,8 +135,8 @@ impl RunStart {
         let order = self.phases.first().map(|phase| phase.plant.order());
         let fits = |phase: &Phase| phase.plant.is_valid() && Some(phase.plant.order()) == order;
         if order.is_none() || !self.phases.iter().all(fits) {
-            let reason = "the matrices of its controlled element do not fit each other; the file is not as hoid lab \
-                          wrote it";
+            let reason = "the matrices of its controlled element do not fit each other; the file was changed after \
+                          hoid lab wrote it";
             return Err(LabError::damaged(&stem.file("run.json"), reason));
         }
         Ok(Task {
@@ -198,5 +198,5 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<(), LabError> {
 
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, LabError> {
     serde_json::from_str(&hoid_io::read_settings(path)?)
-        .map_err(|error| LabError::damaged(path, format!("{error}; the file is not as hoid lab wrote it")))
+        .map_err(|error| LabError::damaged(path, format!("{error}; the file was changed after hoid lab wrote it")))
 }

@@ -70,7 +70,7 @@ impl SessionPlan {
         let conditions = facts.config.condition.len();
         if let Some(wrong) = facts.plan.iter().find(|run| run.condition >= conditions) {
             let reason = format!(
-                "the plan names condition {} of {conditions}; the file is not as hoid lab wrote it",
+                "the plan names condition {} of {conditions}; the file was changed after hoid lab wrote it",
                 wrong.condition
             );
             return Err(LabError::damaged(path, reason));
@@ -293,7 +293,7 @@ impl Session {
             how: RunEnd::Interrupted,
             utc: utc::now(),
             verdict: "unverified".to_owned(),
-            reasons: "run.json is truncated or not as hoid lab wrote it".to_owned(),
+            reasons: "run.json is truncated or was changed after hoid lab wrote it".to_owned(),
             notes: String::new(),
             rms_e: 0.0,
             score: 0.0,

@@ -91,7 +91,7 @@ pub fn discretise(
 fn no_finite_result(h: &ContinuousTransferFunction) -> ModelError {
     ModelError::TransferFunction {
         found: format!("{:?} / {:?}", h.num(), h.den()),
-        expected: "poles whose image e^{s Ts} is a finite number; use a shorter sample time or slower unstable poles"
+        expected: "expected poles with a finite e^{s Ts}; use a shorter sample time or slower unstable poles"
             .to_owned(),
     }
 }
@@ -108,7 +108,7 @@ fn substitute(h: &ContinuousTransferFunction, c: f64, q: [f64; 2]) -> Result<(Ve
         return Err(ModelError::TransferFunction {
             found: format!("{:?} / {:?}", h.num(), h.den()),
             expected: format!(
-                "no pole at s = {c} 1/s, which this method sends to infinity; use a shorter sample time or a hold"
+                "the pole at s = {c} 1/s becomes infinite with this method; use a shorter sample time or a hold"
             ),
         });
     }

@@ -242,7 +242,7 @@ impl RemnantPart {
             return Err(ModelError::Operator {
                 reason:
                     "a part of the remnant follows u and is intermittent: u is larger while this part is present, so \
-                     that its strength would differ from the requested strength; split it into two parts"
+                     the strength would differ from the requested value; split this part into two"
                         .to_owned(),
             });
         }

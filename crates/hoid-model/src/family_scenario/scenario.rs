@@ -105,14 +105,14 @@ impl FamilyScenario {
         let run_in_samples = whole("run-in time t_0 in s", self.run_in_s)?;
         let all = run_in_samples + measurement_samples;
         if measurement_samples == 0 || all > MOST_SAMPLES {
-            let expected = "one to 1e8 samples with the run-in";
+            let expected = "one to 1e8 samples including the run-in";
             return Err(wrong("measurement time T_m in s", self.measurement_s, expected));
         }
         if !self.initial.is_like(&self.last) {
             return Err(ModelError::Operator {
                 reason: format!(
-                    "the state changes from the form {} and {} poles of the controlled element to {} and {}; \
-                     expected the same form and orders before and after",
+                    "the form of the operator and the number of poles of the controlled element change from {} and {} \
+                     to {} and {}; expected the same before and after",
                     self.initial.operator.form(),
                     self.initial.controlled_element.den().len() - 1,
                     self.last.operator.form(),
@@ -144,7 +144,7 @@ impl FamilyScenario {
             whole("displayed future of the target in s", seen.preview_s)?;
             if seen.preview_s > LONGEST_PREVIEW_S {
                 let quantity = "displayed future of the target in s";
-                return Err(wrong(quantity, seen.preview_s, "60 s at most"));
+                return Err(wrong(quantity, seen.preview_s, "at most 60 s"));
             }
         }
         self.remnant.iter().try_for_each(RemnantPart::check)?;

@@ -64,9 +64,9 @@ impl FittedOperator {
         let wrong = |reason: String| Err(ModelError::Operator { reason });
         if !self.sample_time.matches(sample_time) {
             return wrong(format!(
-                "{} was identified at {:.6} Hz, but the samples here come at {:.6} Hz: the noise model of the fit is \
-                 not valid here; identify the person at this rate, or resample the record to the rate of the fit \
-                 with --resample",
+                "{} was identified at {:.6} Hz, but these samples are at {:.6} Hz: the noise model of the fit is not \
+                 valid here; identify the person at this rate, or resample the record to the rate of the fit with \
+                 --resample",
                 self.source,
                 1.0 / self.sample_time.s(),
                 1.0 / sample_time.s()
@@ -75,8 +75,8 @@ impl FittedOperator {
         for (signal, (of_fit, here)) in ["e", "u"].into_iter().zip(self.units.iter().zip(units)) {
             if !of_fit.is_empty() && !here.is_empty() && of_fit != here {
                 return wrong(format!(
-                    "{} was identified with {signal} in {of_fit}, but {signal} of this record is in {here}, so its \
-                     gains are not valid here; convert one of the signals, for example with --scale \
+                    "{} was identified with {signal} in {of_fit}, but {signal} of this record is in {here}, so the \
+                     gains of the fit are not valid here; convert {signal}, for example with --scale \
                      {signal}={here}:{of_fit}",
                     self.source
                 ));

@@ -121,7 +121,7 @@ impl FamilyOperator {
         let expected = form.coordinates(neuromuscular);
         if coordinates.len() != expected.len() {
             return wrong(format!(
-                "{} coordinates for the form {form}; expected {}",
+                "found {} coordinates for the form {form}; expected {}",
                 coordinates.len(),
                 expected.len()
             ));

@@ -67,7 +67,7 @@ impl<const C: usize> Decimator<C> {
             return Err(ModelError::Decimation {
                 label: "stream".to_owned(),
                 found: format!("a factor of {factor}"),
-                expected: "2 to a few thousand; decimate off keeps the rate".to_owned(),
+                expected: "2 to a few thousand; use decimate off to keep the rate".to_owned(),
             });
         };
         let lane = |held: bool| {

@@ -42,7 +42,7 @@ impl Record {
                     "{n} samples for a filter that reaches {} to each side",
                     half.map_or_else(|| "too many".to_owned(), |half| half.to_string())
                 ),
-                "a longer record, or a smaller factor; decimate off keeps the rate".to_owned(),
+                "a longer record, or a smaller factor; use decimate off to keep the rate".to_owned(),
             ));
         };
         // The duration is preserved to within half a new sample, so that whole periods remain whole.

@@ -51,7 +51,7 @@ impl FigureFormat {
             Self::Png => converted::png(svg),
             #[cfg(not(feature = "pdf-png"))]
             Self::Pdf | Self::Png => Err(ReportError::Figure {
-                reason: "this hoid was built without PDF and PNG (feature pdf-png)".to_owned(),
+                reason: "this build of hoid cannot write PDF or PNG (feature pdf-png)".to_owned(),
             }),
         }
     }

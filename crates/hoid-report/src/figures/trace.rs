@@ -161,7 +161,8 @@ impl TraceGrid {
             entries.push(Entry::new(&name, DOTS, Sample::Dashed));
         }
         if let Some(more) = self.changes.len().checked_sub(CHANGES_NAMED).filter(|more| *more > 0) {
-            entries.push(Entry::new(&format!("{more} changes more"), DOTS, Sample::Dashed));
+            let changes = if more == 1 { "change" } else { "changes" };
+            entries.push(Entry::new(&format!("{more} more {changes}"), DOTS, Sample::Dashed));
         }
         add_legend_by(scene, &entries, self.levels.len());
     }
@@ -332,7 +333,7 @@ mod tests {
         let dashes = |n: usize| trace_panels("g", "t", &with(n)).matches("dasharray=\"6 3\"").count();
         assert!(dashes(0) == 0 && dashes(2) >= 4, "{}", dashes(2));
         let many = trace_panels("g", "t", &with(8));
-        assert!(many.contains("change 6, 0.0 s") && !many.contains("change 7") && many.contains("2 changes more"));
+        assert!(many.contains("change 6, 0.0 s") && !many.contains("change 7") && many.contains("2 more changes"));
     }
 
     #[test]

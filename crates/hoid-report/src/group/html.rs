@@ -44,6 +44,7 @@ impl GroupReport<'_> {
         if left_out == 0 {
             return Vec::new();
         }
-        vec![format!("{left_out} runs do not count and were left out.")]
+        let all = self.manifest.runs.len();
+        vec![format!("Left out: {left_out} of {all} runs, marked counts = false.")]
     }
 }

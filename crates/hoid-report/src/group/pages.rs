@@ -178,7 +178,7 @@ fn page_names(subjects: &[&str]) -> Vec<String> {
 /// Preparation of the runs and problems of their sampling; all files with the same text are combined in one row.
 fn account(preparation: &OutputTable, trouble: &OutputTable) -> Vec<(String, String)> {
     let mut rows: Vec<(String, String)> = Vec::new();
-    for (table, what) in [(preparation, "preparation"), (trouble, "sampling trouble")] {
+    for (table, what) in [(preparation, "preparation"), (trouble, "sampling problems")] {
         let mut files: Vec<(&str, String)> = Vec::new();
         for (file, words) in texts(table, "file").iter().zip(texts(table, "what")) {
             match files.iter_mut().find(|(known, _)| known == file) {

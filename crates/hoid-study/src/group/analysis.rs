@@ -73,7 +73,7 @@ impl FromCell {
         let names: Vec<&str> = self.channels.iter().map(|channel| channel.name.as_str()).collect();
         (!names.is_empty()).then(|| {
             let names = names.join(" and ");
-            format!("it has one input, but u also responds to {names}: its estimates would be biased")
+            format!("the model has one input, but u also responds to {names}: the estimates would be biased")
         })
     }
 

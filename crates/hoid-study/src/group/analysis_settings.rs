@@ -101,7 +101,7 @@ impl AnalysisSettings {
         if let Some(name) = self.polynomials.iter().find(|name| !names.contains(&name.as_str())) {
             let expected = names.join(", ");
             return Err(format!(
-                "analysis.polynomials has {name:?}, expected some of {expected}"
+                "analysis.polynomials has {name:?}, expected one or more of {expected}"
             ));
         }
         let asked = |structure: &Structure| self.polynomials.iter().any(|name| name == structure.name());
@@ -137,7 +137,7 @@ impl AnalysisSettings {
         for name in &self.individual {
             let coordinate = Coordinate::of_parameter(name).ok_or_else(|| {
                 let names = Coordinate::ALL.map(Coordinate::parameter).join(", ");
-                format!("analysis.individual has {name:?}, expected parameters among {names}")
+                format!("analysis.individual has {name:?}, expected parameters from {names}")
             })?;
             estimator.individual.push(coordinate);
         }
@@ -175,7 +175,7 @@ impl AnalysisSettings {
         for (from, to) in self.windows_s.iter().flatten() {
             if !(from < to && from.is_finite() && to.is_finite()) {
                 return Err(format!(
-                    "analysis.windows_s has [{from}, {to}], expected a start before its end"
+                    "analysis.windows_s has [{from}, {to}], expected the start before the end"
                 ));
             }
         }

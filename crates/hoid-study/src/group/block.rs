@@ -41,7 +41,7 @@ pub(super) fn blocks(manifest: &Manifest) -> Vec<Block<'_>> {
         let change_s = manifest.conditions.get(cell.key().1).and_then(|facts| facts.change_s);
         cell.changes = match (change_s, cell.runs.iter().any(|run| run.then.is_some())) {
             (Some(at), _) => Some(format!("the task changes within the runs, at {at} s")),
-            (None, true) => Some("the task changes at the seam of the joined files".to_owned()),
+            (None, true) => Some("the task changes where the files are joined".to_owned()),
             (None, false) => None,
         };
     }

@@ -80,7 +80,7 @@ impl ConditionElement {
                 let own: Vec<&String> = conditions.iter().filter(|of| matches_any(name, of)).collect();
                 if own.is_empty() {
                     return Err(format!(
-                        "no condition is called {name}, expected some of {}",
+                        "no condition is called {name}, expected one of {}",
                         conditions.join(", ")
                     ));
                 }
@@ -146,7 +146,7 @@ mod tests {
             ("C1-roll,=1/s", "a name is empty"),
             (
                 "C9=1/s",
-                "no condition is called C9, expected some of C1-pitch, C1-roll, C3-roll",
+                "no condition is called C9, expected one of C1-pitch, C1-roll, C3-roll",
             ),
             ("C3-roll=1/(s>1/s@50", "controlled_element"),
             ("C3-roll=1/s>1/s", "the time of the change is missing"),

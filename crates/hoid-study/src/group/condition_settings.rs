@@ -18,11 +18,11 @@ pub struct ConditionSettings {
     /// Channel whose lines excite the loop: f_t or a disturbance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub excitation: Option<String>,
-    /// Further inputs of the person with their roles, such as `r=feedforward:0.25` for a target that is displayed 0.25 s
-    /// ahead.
+    /// Further inputs of the person with their roles, such as `r=feedforward:0.25` for a target displayed with 0.25 s
+    /// of preview.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub roles: Vec<String>,
-    /// Period of the excitation, s. Default: the longest period of which all lines are harmonics.
+    /// Period of the excitation, s. Default: the shortest period of which all lines are harmonics.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub period_s: Option<f64>,
     /// Number of samples by which u is recorded later than the e to which it responds: `e[k]` belongs to
@@ -86,7 +86,7 @@ impl ConditionSettings {
         }
         if self.changes_to.is_some() && (self.controlled_element.is_none() || self.change_s.is_none()) {
             return Err(
-                "changes_to: also give controlled_element, the element before the change, and its time, change_s"
+                "changes_to: also give controlled_element (the element before the change) and change_s (the time of the change)"
                     .to_owned(),
             );
         }
@@ -95,7 +95,7 @@ impl ConditionSettings {
                 Err("change_per_s: also give changes_to, the element after the change".to_owned())
             }
             Some(rate) if !(rate.is_finite() && rate > 0.0) => Err(format!(
-                "change_per_s is {rate}, expected a rate above 0; without it the change is sudden"
+                "change_per_s is {rate}, expected a rate above 0; leave it out for a sudden change"
             )),
             _ => Ok(()),
         }

@@ -152,7 +152,7 @@ impl Manifest {
 
     fn check(&self) -> Result<(), String> {
         if !self.runs.iter().any(|run| run.counts) {
-            return Err("no run counts, expected at least one table [[runs]] with counts = true".to_owned());
+            return Err("no run is to be analysed: expected at least one table [[runs]] with counts = true".to_owned());
         }
         let mut known = std::collections::BTreeSet::new();
         for run in &self.runs {
@@ -161,7 +161,7 @@ impl Manifest {
             }
             if !known.insert((&run.subject, &run.condition, &run.run)) {
                 return Err(format!(
-                    "run {} of {} in {:?} is duplicated, the second time as {}: give each file its own run",
+                    "run {} of {} in {:?} appears twice, the second time as {}: give each file its own run",
                     run.run,
                     run.subject,
                     run.condition,
@@ -171,7 +171,9 @@ impl Manifest {
         }
         for name in self.conditions.keys() {
             if !self.runs.iter().any(|run| run.condition == *name) {
-                return Err(format!("[conditions.{name}]: no run has this condition"));
+                return Err(format!(
+                    "[conditions.{name}]: no run has this condition; remove the table or correct its name"
+                ));
             }
         }
         for run in self.runs.iter().filter(|run| run.then.is_some()) {
@@ -180,7 +182,7 @@ impl Manifest {
             {
                 return Err(format!(
                     "run {} of {} is joined from two files, but [conditions.{}] names an excitation or change_s: leave \
-                     both out, the change is at the seam",
+                     both out, since the task changes where the files are joined",
                     run.run, run.subject, run.condition
                 ));
             }
@@ -284,7 +286,7 @@ impl Manifest {
         for run in &self.runs {
             if run.condition.is_empty() {
                 let file = run.file.display();
-                return Err(format!("{file} has no condition: name {{condition}} in --pattern"));
+                return Err(format!("{file} has no condition: include {{condition}} in --pattern"));
             }
             let facts = self.conditions.entry(run.condition.clone()).or_default();
             facts.roles = roles.to_vec();

@@ -28,10 +28,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PreparationSettings {
-    /// Scaling by channel: a factor, a factor and a unit, or two units.
+    /// Scaling of each channel: a factor, a factor and a unit, or two units.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub scale: BTreeMap<String, NumberOrText>,
-    /// Delay by channel with which it was recorded: in samples, or in s as text such as "0.0167s".
+    /// Recording delay of each channel: in samples, or in s as text such as "0.0167s".
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub offset: BTreeMap<String, NumberOrText>,
     /// Decimation factor M: every M-th sample is kept after a low-pass filter; "off" or 1 keeps the rate. Default:
@@ -41,7 +41,7 @@ pub struct PreparationSettings {
     /// New sampling frequency, Hz.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
-    /// Time at the start of the run that is dropped, s.
+    /// Time dropped at the start of each run, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub run_in_s: Option<f64>,
     /// Whether duplicated rows are dropped.
@@ -105,7 +105,7 @@ impl PreparationSettings {
         let (decimate, rate_hz) = self.rate(condition);
         let rate = match (decimation(decimate)?, rate_hz) {
             (_, Some(_)) if decimate.is_some() => {
-                return Err("decimate and rate_hz both give the rate: keep one".to_owned());
+                return Err("decimate and rate_hz both set the rate: remove one".to_owned());
             }
             (Decimation::By(factor), None) => NewRate::Decimated(factor),
             (_, Some(hz)) if hz > 0.0 && hz.is_finite() => NewRate::Hz(hz),

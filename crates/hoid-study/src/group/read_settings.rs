@@ -15,7 +15,7 @@ pub struct ReadSettings {
     pub input: String,
     /// Column of the output.
     pub output: String,
-    /// Column of the time, with its unit, such as `clock:ms`. Default: t, or another common name for time.
+    /// Time column, with its unit, such as `clock:ms`. Default: t, or another common name for time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
     /// Trial to read from each file, such as `trial=3`.

@@ -139,7 +139,7 @@ fn findings(runs: usize, failures: &[RunFailure], people: &[Person], other: usiz
         all.push(Finding::note(
             "one-input-models",
             format!(
-                "models with one input and recursions are omitted for {}: u also responds to further inputs",
+                "single-input models and recursions are omitted for {}: u also responds to other inputs",
                 of_several.join(", ")
             ),
         ));
@@ -147,7 +147,7 @@ fn findings(runs: usize, failures: &[RunFailure], people: &[Person], other: usiz
     if other > 0 {
         all.push(Finding::note(
             "fits-failed",
-            format!("{other} other fits failed; the table estimates lists their reasons"),
+            format!("other fits that failed: {other}; the table estimates gives the reasons"),
         ));
     }
     all

@@ -202,7 +202,7 @@ impl Plan {
                 return Err(PlanProblem {
                     line: None,
                     reason: format!(
-                        "no estimator uses the scenario {}: remove it or add an estimator",
+                        "no estimator uses the scenario {}: remove the scenario or add an estimator",
                         cell.scenario
                     ),
                 });
@@ -246,14 +246,14 @@ impl Plan {
         let estimates: u128 = self.cells.iter().map(estimates).sum();
         if estimates > MOST_ESTIMATES {
             return Err(format!(
-                "it asks for {estimates} estimates, expected at most {MOST_ESTIMATES}: lower replications, or split the plan"
+                "the plan has {estimates} estimates, expected at most {MOST_ESTIMATES}: reduce replications or split the plan"
             ));
         }
         let blocks = |cell: &Cell| u128::from(cell.replications.div_ceil(self.block.max(1)));
         let blocks: u128 = self.cells.iter().map(blocks).sum();
         if blocks > MOST_BLOCKS {
             return Err(format!(
-                "it has {blocks} blocks, expected at most {MOST_BLOCKS}: raise block, or split the plan"
+                "the plan has {blocks} blocks, expected at most {MOST_BLOCKS}: increase block or split the plan"
             ));
         }
         Ok(())
@@ -299,7 +299,10 @@ fn check_head(head: &Head, at: &impl Fn(&str) -> Option<usize>) -> Result<(), Pl
     if head.name.is_empty() || !head.name.chars().all(is_plain) {
         return bad(
             "name",
-            format!("{:?}, expected letters, digits, - and _: it names files", head.name),
+            format!(
+                "{:?}, expected letters, digits, - and _: the name is part of file names",
+                head.name
+            ),
         );
     }
     for (key, n) in [("replications", head.replications), ("block", head.block)] {
@@ -310,7 +313,7 @@ fn check_head(head: &Head, at: &impl Fn(&str) -> Option<usize>) -> Result<(), Pl
     if head.keep.trace_every == Some(0) {
         return bad(
             "keep.trace_every",
-            "0, expected 1 or more, or no value to keep no traces".to_owned(),
+            "0, expected 1 or more; leave it out to keep no traces".to_owned(),
         );
     }
     Ok(())

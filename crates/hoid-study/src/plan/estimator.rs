@@ -97,7 +97,7 @@ impl EstimatorCell {
             None => method.as_ref().map_or(Structure::BoxJenkins, Method::default_structure),
             Some(name) => name
                 .parse::<Structure>()
-                .map_err(|error| at("structure", format!("is wrong: {error}")))?,
+                .map_err(|error| at("structure", format!("is invalid: {error}")))?,
         };
         if asked.is_none() {
             table.check_placement(method.as_ref(), None, &at)?;
@@ -116,7 +116,7 @@ impl EstimatorCell {
             if let Some((from, to)) = span
                 && !(from < to && from.is_finite() && to.is_finite())
             {
-                return Err(at(key, format!("is [{from}, {to}], expected a start before its end")));
+                return Err(at(key, format!("is [{from}, {to}], expected the start before the end")));
             }
         }
         let (mut start, mut start_values) = (String::new(), BTreeMap::new());
@@ -296,7 +296,7 @@ impl EstimatorCell {
             {
                 return Err((
                     key,
-                    format!("the span {from} to {to} s leaves the record, which lasts from 0 to {end_s} s"),
+                    format!("the span {from} to {to} s extends beyond the record, which runs from 0 to {end_s} s"),
                 ));
             }
         }
@@ -314,7 +314,7 @@ impl EstimatorCell {
             }
             Task::GreyBox(grey) if grey.order.start() == &0 => Err((
                 "orders",
-                "orders.nd is 0, expected the order of the remnant filter, 1 or more, for the grey box".to_owned(),
+                "orders.nd is 0, expected 1 or more: for the grey box it is the order of the remnant filter".to_owned(),
             )),
             _ => Ok(()),
         }

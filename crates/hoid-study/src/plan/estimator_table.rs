@@ -33,7 +33,7 @@ pub(super) fn methods() -> Vec<MethodSpec> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(
     untagged,
-    expecting = "an order is a whole number from 0 on, \"true\" (nk, nd), \"ramp\" (nk) or a range such as \"0..8\" \
+    expecting = "an order is a whole number of 0 or more, \"true\" (nk, nd), \"ramp\" (nk) or a range such as \"0..8\" \
                  (nc, nd of operator)"
 )]
 pub(crate) enum Order {
@@ -68,7 +68,7 @@ impl TryFrom<String> for OrderRange {
 pub(crate) enum OfScenario {
     /// nk from the delay and the sample time of the scenario; nd from the order of the remnant.
     True,
-    /// nk one less than for "true", for an input that is a ramp between two samples: a decimated signal is not held.
+    /// nk one less than for "true", for an input that is linear between samples (a decimated signal is not held).
     Ramp,
 }
 
@@ -133,8 +133,8 @@ pub(crate) struct EstimatorTable {
     /// Method applied to each record.
     #[schemars(extend("enum" = method_names()))]
     pub(super) method: String,
-    /// Name of an estimator above; delta_vaf is the VAF of this estimator minus the VAF of that one with the same nk on
-    /// the same run.
+    /// Name of an estimator earlier in the plan; delta_vaf is the VAF of this estimator minus the VAF of that estimator
+    /// on the same run with the same nk.
     pub(super) versus: Option<String>,
     /// Structure of the polynomial model. Default: arx for rls, otherwise bj.
     #[schemars(extend("enum" = structure_names()))]
@@ -157,14 +157,14 @@ pub(crate) struct EstimatorTable {
     /// Start of a search or a recursion: coefficients by name; coefficients that are not given are zero. `name` is a
     /// label for the start.
     pub(super) start: Option<BTreeMap<String, StartValue>>,
-    /// Number of the method's own starts from which a search is completed. Default 2.
+    /// Number of automatic starts from which the search is completed. Default 2.
     pub(super) starts: Option<usize>,
     /// Largest number of iterations of a search. Default 100.
     pub(super) max_iterations: Option<usize>,
     /// Shortest and longest delay tau_e of an operator, s. Default: 0.02 to 0.8 for operator, otherwise 0.05 to 0.6.
     #[serde(alias = "delay_range_s")]
     pub(super) delay_s: Option<(f64, f64)>,
-    /// Kind of change of an operator's gains. Default: none.
+    /// Change of the operator's gains: none or sigmoid. Default: none.
     pub(super) change: Option<Change>,
     /// Span of the start fit of a recursion, s. Default: the first third.
     pub(super) start_span_s: Option<(f64, f64)>,
@@ -235,7 +235,6 @@ impl EstimatorTable {
                 "grey-box and operator",
             ),
             ("change", self.change.is_some(), operator, "operator"),
-            ("orders", self.orders.has_range(), operator, "operator, as a range"),
             ("start_span_s", self.start_span_s.is_some(), tracks, recursive),
             ("update_from_s", self.update_from_s.is_some(), moves, recursive),
         ];
@@ -243,6 +242,12 @@ impl EstimatorTable {
             if is_given && !has_effect {
                 return Err(at(key, format!("has no effect here: it applies to {of}")));
             }
+        }
+        if self.orders.has_range() && !operator {
+            return Err(at(
+                "orders",
+                "has a range, which only operator accepts: give single numbers".to_owned(),
+            ));
         }
         if self.settings.contains_key("memory") && self.settings.contains_key("lambda") {
             return Err(at(
@@ -256,7 +261,7 @@ impl EstimatorTable {
         if self.method == analysis::TIME_VARYING && self.change == Some(Change::None) {
             return Err(at(
                 "change",
-                "is none, and method time-varying is operator with change = \"sigmoid\": leave one of them out"
+                "is none, but method time-varying means operator with change = \"sigmoid\": leave one of them out"
                     .to_owned(),
             ));
         }
@@ -355,8 +360,8 @@ impl EstimatorTable {
             let set = asked.set(setting.name, &text);
             let known = set.map_err(|error| match error {
                 AnalysisError::Ident(error) => at(&key, in_plan(&error)),
-                AnalysisError::Option { reason, .. } => at(&key, format!("is wrong: {reason}")),
-                other => at(&key, format!("is wrong: {other}")),
+                AnalysisError::Option { reason, .. } => at(&key, format!("is invalid: {reason}")),
+                other => at(&key, format!("is invalid: {other}")),
             })?;
             if !known {
                 return Err(at(&key, misplaced(&key)));
@@ -432,7 +437,7 @@ fn text_of(value: &toml::Value, kind: Kind) -> Result<String, String> {
     let wrong = || format!("is {value}, expected {}", as_text(kind));
     Ok(match (value, kind) {
         (toml::Value::String(text), Kind::Prior) if hoid_io::is_fit_file(text) => {
-            let reason = "is a file, but a plan contains all that it needs; give the parameters, such as \
+            let reason = "is a file, but a plan must not depend on other files; give the parameters, such as \
                           \"omega_nm=9:0.2\"";
             return Err(reason.to_owned());
         }
@@ -465,7 +470,7 @@ fn as_text(kind: Kind) -> &'static str {
         Kind::Number => "a number",
         Kind::NumberOrDefault(_) => "a number, or true",
         Kind::Counts => "one or two whole numbers",
-        Kind::NumberOrSpan => "a number, or two",
+        Kind::NumberOrSpan => "one or two numbers",
         Kind::Delay => "a whole number of samples, or a text such as \"0.28s\"",
         Kind::Memory => "a number of samples, or a text such as \"2.56s\" or \"inf\"",
         Kind::NumberOrOff => "a number, or the text \"off\"",
@@ -479,7 +484,7 @@ fn as_text(kind: Kind) -> &'static str {
 fn in_plan(error: &IdentError) -> String {
     match error {
         IdentError::BadOption { found, expected, .. } => format!("is {found}, expected {expected}"),
-        other => format!("is wrong: {other}"),
+        other => format!("is invalid: {other}"),
     }
 }
 
@@ -493,7 +498,7 @@ fn methods_with(key: &str) -> Vec<&'static str> {
 /// Returns the problem with a key that the method does not have.
 fn misplaced(key: &str) -> String {
     match methods_with(key).as_slice() {
-        [] => "is unknown; the keys of an estimator are listed on the page Monte Carlo studies of the book".to_owned(),
+        [] => "is unknown; the page Monte Carlo studies of the book lists the keys of an estimator".to_owned(),
         of => format!("has no effect here: it applies to {}", of.join(", ")),
     }
 }

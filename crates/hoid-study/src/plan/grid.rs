@@ -93,7 +93,7 @@ pub fn variants(table: &Spanned<DeTable<'_>>, source: &str, whole: &[&str]) -> R
             return Err(PlanProblem {
                 line: Some(line_at(source, leaf.start)),
                 reason: format!(
-                    "the lists of this table give more than {MAX_COMBINATIONS} combinations; expected fewer: shorten a list or divide the study"
+                    "the lists of this table give more than {MAX_COMBINATIONS} combinations; expected fewer: shorten a list or split the plan"
                 ),
             });
         }
@@ -153,7 +153,7 @@ fn collect(
                     return Err(PlanProblem {
                         line: Some(line_at(source, start)),
                         reason: format!(
-                            "{} is an empty list, expected at least one entry: leave the key out for its default",
+                            "{} is an empty list, expected at least one entry: leave the key out to use the default",
                             path.join(".")
                         ),
                     });

@@ -20,8 +20,8 @@ pub(crate) struct Head {
     pub seed: u64,
     /// Number of replications of each cell.
     pub replications: u64,
-    /// Number of replications that are run and stored together. A stopped study loses at most this many per thread.
-    /// Default 50.
+    /// Number of replications that are run and stored together. A stopped study loses at most this many replications
+    /// per thread. Default 50.
     #[serde(default = "default_block")]
     pub block: u64,
     /// Data to store.
@@ -38,8 +38,8 @@ pub(crate) struct Keep {
     pub trace_points: bool,
     /// Whether standard errors are stored. Default true.
     pub standard_errors: bool,
-    /// Whether bias before and after a change, coverage of the bands and declared changes of
-    /// recursions are measured. Default false.
+    /// Whether to measure, for recursions, the bias before and after a change, the coverage of the bands and the
+    /// declared changes. Default false.
     pub changes: bool,
 }
 

@@ -132,7 +132,7 @@ impl RecursiveMethod for DualEkfOptions {
     }
 
     fn memory_as_text(&self) -> Option<String> {
-        Some("by a random walk of the parameters".to_owned())
+        Some("random walk of the parameters".to_owned())
     }
 
     fn bounds(&self) -> BTreeMap<String, Constraint> {

@@ -82,7 +82,7 @@ macro_rules! joint_filter {
             }
 
             fn memory_as_text(&self) -> Option<String> {
-                Some("by a random walk of the parameters".to_owned())
+                Some("random walk of the parameters".to_owned())
             }
 
             fn bounds(&self) -> BTreeMap<String, Constraint> {

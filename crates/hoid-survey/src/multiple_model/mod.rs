@@ -54,8 +54,7 @@ settings! {
         /// Limit on innovations, in standard deviations
         #[setting(bounds(Bounds::Positive), default("3.5"))]
         pub limit: Option<f64> = None,
-        /// Smooth a recorded run: estimate each sample from the whole run, with hypotheses run from both ends, not
-        /// from the past alone
+        /// Smooth a recorded run: use the whole run for each estimate, not only the past (hypotheses run from both ends)
         pub smooth: bool = false,
     }
     groups {
@@ -93,8 +92,8 @@ impl RecursiveMethod for MultipleModelOptions {
         if self.smooth && self.delay.track_delay_s.is_some() {
             return Err(bad_option(
                 "the range of the delay",
-                "with the two-sided estimate".to_owned(),
-                "a delay given or searched on the start span: past and future are joined for one delay",
+                "a tracked delay with the two-sided estimate".to_owned(),
+                "a delay given or searched on the start span, because past and future need the same delay",
             ));
         }
         Ok(())

@@ -41,7 +41,7 @@ pub(super) fn build(plan: &Plan<'_>) -> Result<Box<dyn Recursion>, IdentError> {
         (0..=16, Some(taps)) => Err(IdentError::BadOption {
             option: "the range of the delay".to_owned(),
             found: format!("{taps} samples"),
-            expected: "at most 1024 samples; narrow it, or sample more slowly".to_owned(),
+            expected: "at most 1024 samples; narrow the range, or sample more slowly".to_owned(),
         }),
         _ => Err(too_many(p)),
     }

@@ -160,7 +160,10 @@ impl RefinedRecursion {
             let block: Vec<f64> = (0..places.len() * places.len()).map(element).collect();
             let factors: Vec<f64> = places.iter().map(|i| lambda[*i]).collect();
             Forgetting::new(&block, &factors).ok_or_else(|| IdentError::BadStart {
-                reason: format!("its covariance is not positive, or {orders} are more than {CAPACITY} parameters"),
+                reason: format!(
+                    "its covariance is not positive, or the orders {orders} need more than {CAPACITY} \
+                     parameters"
+                ),
             })
         };
         let noise: Vec<usize> = (orders.nb..orders.nb + orders.nd).collect();

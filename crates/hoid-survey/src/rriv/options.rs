@@ -12,8 +12,8 @@ use hoid_track::{
 settings! {
     /// Options of the recursive refined instrumental variable method.
     pub struct RrivOptions {
-        /// Channel from outside the loop, from which the instruments are made
-        #[setting(default("f_t where a record has it, else the error itself"))]
+        /// Channel from outside the loop that provides the instruments
+        #[setting(default("f_t if the record has it, else e"))]
         pub instruments: Option<String> = None,
     }
     groups {
@@ -57,7 +57,7 @@ impl RecursiveMethod for RrivOptions {
     ) -> Result<Box<dyn Recursion>, IdentError> {
         if !from.from_fit {
             return Err(IdentError::BadStart {
-                reason: "rriv makes its instruments with a model; start it from the batch fit of a span".to_owned(),
+                reason: "rriv needs a model for its instruments; start it from the batch fit of a span".to_owned(),
             });
         }
         let covariance: Vec<f64> = from.spread.iter().map(|s| s * from.variance).collect();

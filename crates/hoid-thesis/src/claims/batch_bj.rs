@@ -19,7 +19,8 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "\"The remnant filter order no longer meaningfully affects the bias and accuracy in BJ estimation.\"",
         place: "V.A.1, Fig. 6; VIII; 6.1.2",
-        measure: "Median bias at m0 = 2 to 4 less that at m0 = 1, BJ(m* = m0), C1 and C2, n_k* = 29, points of %, by coefficient and noise level.",
+        measure: "Median bias at m0 = 2 to 4 less that at m0 = 1, BJ(m* = m0), C1 and C2, n_k* = 29, percentage \
+                  points, by coefficient and noise level.",
         plans: PLANS,
         source: Source::Data(all_orders),
     },
@@ -37,7 +38,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "BJ: \"results fluctuate around the bias of the remnant-free case at each model time delay\".",
         place: "V.A.1, Fig. 6; 6.1.2, Fig. C.3",
-        measure: "Median bias less that at P_n = 0, BJ(m* = m0), C1, n_k* = 25 to 30, points of %, by coefficient, m0 and noise level.",
+        measure: "Median bias less that at P_n = 0, BJ(m* = m0), C1, n_k* = 25 to 30, percentage points, by coefficient, m0 and noise level.",
         plans: PLANS,
         source: Source::Data(around_noise_free),
     },
@@ -100,7 +101,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "In C2 \"K_e and T_L associated with the HO zero present a less precise estimation, while the neuromuscular dynamics are better captured\" (BJ).",
         place: "6.1.2, Figs. C.4, C.12",
-        measure: "Median |bias| in C2 less that in C1, points of %, BJ(m* = m0), n_k* = 29, by m0 and noise level.",
+        measure: "Median |bias| in C2 less that in C1, percentage points, BJ(m* = m0), n_k* = 29, by m0 and noise level.",
         plans: PLANS,
         source: Source::Data(second_condition),
     },
@@ -108,7 +109,7 @@ pub(super) const CLAIMS: &[Claim] = &[
 
 fn all_orders(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("|difference of the median bias to that at m0 = 1| within 5 points");
+    let mut part = Part::new("|difference of the median bias from that at m0 = 1| within 5 points");
     for at in settings(&["C1", "C2"], &HIGHER, &LEVELS) {
         for name in DISCRETE {
             let first = study.median(&Setting { m0: 1, ..at }.bj(&bias_of(name), 1, TRUE_DELAY))?;

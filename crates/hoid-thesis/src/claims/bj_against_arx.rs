@@ -34,7 +34,8 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "\"BJ presents more robustness than ARX when facing high noise levels.\"",
         place: "VIII; Conclusions of Part II",
-        measure: "Change of the median bias from P_n = 0.1 to 0.3: its magnitude for BJ(m* = m0) less that for ARX, C1, n_k* = 29, points of %.",
+        measure: "Change of the median bias from P_n = 0.1 to 0.3: its magnitude for BJ(m* = m0) less that for \
+                  ARX, C1, n_k* = 29, percentage points.",
         plans: PLANS,
         source: Source::Data(more_robust),
     },

@@ -46,7 +46,7 @@ impl Theme {
             Self::BatchArx => "Batch fits of ARX models",
             Self::BatchBj => "Batch fits of Box-Jenkins models",
             Self::RemnantOrder => "Order of the noise model",
-            Self::InitialConditions => "Where searches start",
+            Self::InitialConditions => "Starts of the searches",
             Self::Recursive => "Recursive estimates",
             Self::Noise => "Noise level, remnant and sample time",
             Self::Experiment => "Experiments",

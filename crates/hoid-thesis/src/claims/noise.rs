@@ -32,7 +32,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Noise,
         statement: "The remnant time constant \"does not have much effect on the estimation accuracy\".",
         place: "VII; 6 (\"low relevance\")",
-        measure: "Median bias at T_n = 0.2 s less that at 0.06 s, C1 and C2, n_k* = 29, BJ(m* = 1) and ARX at m0 = 2 to 4, points of %.",
+        measure: "Median bias at T_n = 0.2 s less that at 0.06 s, C1 and C2, n_k* = 29, BJ(m* = 1) and ARX at m0 = 2 to 4, percentage points.",
         plans: &["remnant-time-constant"],
         source: Source::Data(time_constant),
     },

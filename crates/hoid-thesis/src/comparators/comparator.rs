@@ -92,7 +92,7 @@ impl Task<'_> {
             expected: expected.to_owned(),
         };
         if e.len() != u.len() {
-            return Err(unsuited("the input", "not there".to_owned(), "a record with e and u"));
+            return Err(unsuited("the input", "missing".to_owned(), "a record with e and u"));
         }
         if e.len() <= least {
             let expected = format!("more than {least} for this method");
@@ -106,11 +106,7 @@ impl Task<'_> {
             ));
         }
         if let Some(k) = self.at.iter().find(|k| **k >= e.len()) {
-            return Err(unsuited(
-                "a sample that is requested",
-                k.to_string(),
-                "one of the record",
-            ));
+            return Err(unsuited("a requested sample", k.to_string(), "a sample of the record"));
         }
         Ok((e, u))
     }

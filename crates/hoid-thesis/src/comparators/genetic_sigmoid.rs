@@ -63,7 +63,7 @@ settings! {
         /// Generations
         #[setting(bounds(Bounds::AtLeast(1.0)))]
         pub generations: usize = 40,
-        /// Probability that a gene is moved
+        /// Mutation probability of a gene
         #[setting(bounds(Bounds::Between(0.0, 1.0)))]
         pub mutation: f64 = 0.15,
         /// Seed of the search

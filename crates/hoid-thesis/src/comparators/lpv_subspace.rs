@@ -41,13 +41,13 @@ settings! {
         /// Every N-th sample is used
         #[setting(bounds(Bounds::AtLeast(1.0)))]
         pub decimate: usize = 4,
-        /// Window p of the past, in samples that are taken
+        /// Past window p, in samples used
         #[setting(unit("samples"), bounds(Bounds::AtLeast(2.0)))]
         pub past: usize = 12,
-        /// Window f of the future, at most that of the past
+        /// Future window f, at most the past window
         #[setting(unit("samples"), bounds(Bounds::AtLeast(2.0)))]
         pub future: usize = 6,
-        /// Order n of the model: two of the neuromuscular part, the others of the remnant
+        /// Model order n: two for the neuromuscular part, the rest for the remnant
         #[setting(bounds(Bounds::AtLeast(1.0)))]
         pub order: usize = 4,
     }
@@ -124,7 +124,7 @@ impl LpvSubspace {
             method: NAME,
             quantity: "the rank of the prediction of the future from the past".to_owned(),
             found,
-            expected: format!("at least the order {n}: lower it, or lengthen future"),
+            expected: format!("at least the order {n}; lower the order, or lengthen future"),
         };
         if n > order.len() {
             return Err(unsuited(order.len().to_string()));

@@ -21,10 +21,10 @@ settings! {
         /// Memory 1/(1 - lambda)
         #[setting(unit("samples"), bounds(Bounds::AtLeast(2.0)))]
         pub memory: f64 = 256.0,
-        /// P at the start, a multiple of the unit matrix
+        /// Initial P, as a multiple of the unit matrix
         #[setting(bounds(Bounds::PositiveFinite))]
         pub covariance: f64 = 0.1,
-        /// Time between two looks at the validation set
+        /// Time between validations
         #[setting(unit("s"), bounds(Bounds::PositiveFinite))]
         pub interval: f64 = 0.5,
         /// Length of the validation set that is examined
@@ -57,7 +57,7 @@ impl Comparator for RpemByVaf {
             found,
             expected: format!("a second run of {} samples", e.len()),
         };
-        let validation = task.validation.ok_or_else(|| unsuited("not there".to_owned()))?;
+        let validation = task.validation.ok_or_else(|| unsuited("missing".to_owned()))?;
         if validation.len() != e.len() || validation.input().len() != e.len() {
             return Err(unsuited(format!("of {} samples", validation.len())));
         }

@@ -73,15 +73,15 @@ impl ExperimentPlan {
         if let Some(key) = table.keys().find(|key| !KEYS.contains(&key.as_str())) {
             return Err(wrong("a key", key, &format!("one of {}", KEYS.join(", "))));
         }
-        let shown = |key: &str| table.get(key).map_or("not there".to_owned(), Value::to_string);
+        let shown = |key: &str| table.get(key).map_or("missing".to_owned(), Value::to_string);
         let whole = |key: &str| {
             let value = table.get(key).and_then(Value::as_integer);
             let value = value.and_then(|n| u64::try_from(n).ok());
-            value.ok_or_else(|| wrong(key, &shown(key), "a whole number from 0 on"))
+            value.ok_or_else(|| wrong(key, &shown(key), "a whole number, 0 or larger"))
         };
         let number = |key: &str| {
             let value = table.get(key).and_then(Value::as_float);
-            value.ok_or_else(|| wrong(key, &shown(key), "a number with a point"))
+            value.ok_or_else(|| wrong(key, &shown(key), "a number with a decimal point"))
         };
         let delays: Vec<usize> = table
             .get("delays")
@@ -92,7 +92,7 @@ impl ExperimentPlan {
             .collect();
         let (first, last) = match delays.as_slice() {
             [first, last] if 1 <= *first && first <= last => (*first, *last),
-            _ => return Err(wrong("delays", &shown("delays"), "[first, last], from 1 on")),
+            _ => return Err(wrong("delays", &shown("delays"), "[first, last], both 1 or larger")),
         };
         let plan = Self {
             seed: whole("seed")?,
@@ -164,7 +164,7 @@ impl Experiment for ExperimentPlan {
     fn measured(&self, key: &RunKey) -> Result<MeasuredRun, ThesisError> {
         let number = |key: &str, text: &str| {
             let number = text.parse::<u64>();
-            number.map_err(|_| wrong(key, text, "a whole number from 1 on"))
+            number.map_err(|_| wrong(key, text, "a whole number, 1 or larger"))
         };
         let record = self.record(
             number("subject", &key.subject)?,

@@ -157,7 +157,7 @@ fn best_delay(span: &Record, structure: Structure, (first, last): (usize, usize)
             method: "the search of the delay",
             quantity: "its range".to_owned(),
             found: format!("{first} to {last}"),
-            expected: "a first delay that is not beyond the last".to_owned(),
+            expected: "a first delay no longer than the last".to_owned(),
         }),
     }
 }

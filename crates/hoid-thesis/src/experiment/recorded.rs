@@ -51,7 +51,7 @@ impl RecordedPeople {
             let reasons: Vec<String> = left_out.iter().map(|(name, why)| format!("{name}: {why}")).collect();
             return Err(ThesisError::Recordings {
                 place: path.display().to_string(),
-                reason: format!("no condition is a condition of the thesis; {}", reasons.join("; ")),
+                reason: format!("no condition corresponds to one of the thesis; {}", reasons.join("; ")),
             });
         }
         let count = ExperimentPlan::parse(EXPERIMENT)?.evaluated as usize;
@@ -69,7 +69,7 @@ impl RecordedPeople {
             return Err(failed.map_or_else(
                 || ThesisError::Recordings {
                     place: path.display().to_string(),
-                    reason: "no run counts, expected runs with counts = true".to_owned(),
+                    reason: "no run counts, expected at least one run with counts = true".to_owned(),
                 },
                 ThesisError::from,
             ));
@@ -181,8 +181,8 @@ fn conditions(manifest: &Manifest) -> (Vec<ExperimentCondition>, Vec<(String, St
 fn of_text(name: &str, facts: &ConditionSettings) -> Result<Condition, String> {
     let unknown = |what: &str| {
         format!(
-            "{what}: write controlled_element into [conditions.{name}], and changes_to, change_s and change_per_s where \
-             it changes, or call the condition C1 to C6 as the text does"
+            "{what}: set controlled_element in [conditions.{name}], and changes_to, change_s and change_per_s where it \
+             changes, or name the condition C1 to C6 as in the thesis"
         )
     };
     let Some(before) = &facts.controlled_element else {
@@ -208,8 +208,8 @@ fn of_text(name: &str, facts: &ConditionSettings) -> Result<Condition, String> {
         (true, false, false) => Ok(Condition::C5),
         (true, false, true) => Ok(Condition::C6),
         (same, _, _) => Err(format!(
-            "its controlled element changes from {before} to {after}, both like a {} integrator; in the text it \
-             changes from a single to a double one, or back",
+            "its controlled element changes from {before} to {after}, both like a {} integrator; in the thesis \
+             it changes from a single to a double one, or back",
             if same { "double" } else { "single" }
         )),
     }

@@ -135,7 +135,7 @@ pub(super) fn items() -> Vec<Item> {
 
 fn item(name: &str, condition: &'static str, model: Model, parameters: Parameters) -> Item {
     let mut caption = "Relative bias by delay nk* and noise level P_n, remnant orders m0 = 1 to 4. Boxes: quartiles; whiskers: the last run within 1.5 \
-         interquartile ranges; triangles count runs beyond the panel; a cross is where no run gives a value. Without remnant all runs are the \
+         interquartile ranges; triangles count runs beyond the panel; a cross marks where no run gives a value. Without remnant all runs are the \
          same: one line. True nk = 29."
     .to_owned();
     if parameters == Parameters::Remnant {

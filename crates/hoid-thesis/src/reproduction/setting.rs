@@ -58,14 +58,14 @@ pub(super) fn items() -> Vec<Item> {
         Item::new(
             "fig-4",
             "Error gain K_e in conditions C1 to C6",
-            "Conditions with the same states coincide before and after the change, so that slow and fast ones are in separate panels.",
+            "Conditions with the same states coincide before and after the change, so slow and fast changes have separate panels.",
             None,
             |item, _| schedules(item),
         ),
         Item::of_study(
             "A.1",
             "Obtained against demanded noise level, condition C1",
-            "Mean over the runs of (var u - var u0) / var u with u0 of the run without remnant (A.4); band: one standard deviation to each side; dashed: the demand.",
+            "Mean over the runs of (var u - var u0) / var u where u0 is from the run without remnant (A.4); band: one standard deviation to each side; dashed: the demand.",
             "noise-level",
             noise_level,
         ),

@@ -34,7 +34,7 @@ impl SurveyPlan {
             .parse()
             .map_err(|error: toml::de::Error| wrong("its table", error.message().to_owned(), "TOML".to_owned()))?;
         if let Some(key) = table.keys().find(|key| *key != "comparators") {
-            return Err(wrong("another key", key.clone(), "[[comparators]] alone".to_owned()));
+            return Err(wrong("a key", key.clone(), "only [[comparators]]".to_owned()));
         }
         let each = table.get("comparators").and_then(Value::as_array).into_iter().flatten();
         let comparators = each
@@ -55,7 +55,7 @@ fn comparator(
 ) -> Result<(String, Box<dyn Comparator>), ThesisError> {
     let text = |key: &str| {
         let value = table.get(key).and_then(Value::as_str);
-        value.ok_or_else(|| wrong(key, "not there".to_owned(), "a text".to_owned()))
+        value.ok_or_else(|| wrong(key, "missing".to_owned(), "a string".to_owned()))
     };
     let (name, method) = (text("name")?, text("method")?);
     let all = comparators();
@@ -129,7 +129,7 @@ method = "rls"
             ("name = \n", "TOML"),
             (
                 "name = \"x\"\nmethod = \"wavelet\"\n[[estimators]]\nname = \"y\"\n",
-                "alone",
+                "only [[comparators]]",
             ),
         ] {
             let Err(refused) = parse(tail) else { panic!("{tail}") };

@@ -68,7 +68,7 @@ pub fn survey_tables(plan: &SurveyPlan, found: &[MethodErrors]) -> String {
             everywhere.entry(&of.name).or_default().push(row);
         }
     }
-    text += &head("ms a run");
+    text += &head("ms per run");
     for of in first {
         let rows = &everywhere[of.name.as_str()];
         let column = |i: usize| {

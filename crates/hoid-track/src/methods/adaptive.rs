@@ -45,18 +45,17 @@ use crate::{
 settings! {
     /// Options of the recursion with gains in a basis for people.
     pub struct AdaptiveOptions {
-        /// Accepted false alarms per hour: a lower number detects fewer changes, and later
+        /// Accepted false alarms per hour (a lower number detects fewer changes, and later)
         #[setting(unit("1/h"), bounds(Bounds::PositiveFinite))]
         pub false_alarms: f64 = 1.0,
         /// Limit on innovations, in standard deviations
         #[setting(bounds(Bounds::Positive), default("8"))]
         pub limit: Option<f64> = None,
-        /// Length of the record that is read repeatedly; 0 for a recursion that reads each sample once, as on a
-        /// microcontroller
+        /// Length of the record that is read repeatedly (0: each sample is read once, as on a microcontroller)
         #[setting(unit("s"), bounds(Bounds::NonNegative))]
         pub replay: f64 = defaults::REPLAYED_S,
-        /// Prior knowledge of the person: population, none, NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_I
-        /// (relative spread), or an earlier fit (file of hoid identify --json)
+        /// Prior knowledge of the person: population, none, NAME=CENTRE:SPREAD for omega_nm, zeta_nm, tau_e, T_I
+        /// (relative spread), or a file from hoid identify --json
         #[setting(default("population"))]
         pub prior: PersonPrior = PersonPrior::Population,
     }
@@ -111,7 +110,7 @@ impl RecursiveMethod for AdaptiveOptions {
                 "the start of adaptive",
                 start.to_owned(),
                 "a prior instead: adaptive starts from the defaults for people, from almost no knowledge (prior = \
-                 none) or from an earlier fit of the person; rpem, physical and rls take a start",
+                 none) or from an earlier fit of the person; rpem, physical and rls accept a start",
             ));
         }
         Ok(())
@@ -136,8 +135,7 @@ impl RecursiveMethod for AdaptiveOptions {
 
     fn memory_as_text(&self) -> Option<String> {
         Some(format!(
-            "since the last change, as long as the person does not change; a change is declared with {} expected false \
-             alarm{} per hour",
+            "all samples since the last change; changes are declared with {} expected false alarm{} per hour",
             self.false_alarms,
             if self.false_alarms == 1.0 { "" } else { "s" }
         ))
@@ -212,7 +210,7 @@ impl AdaptiveRecursion {
             Some(known) => model.and_then(|model| model.with_initial_estimate(known)),
             None => model,
         };
-        let model = model.ok_or_else(|| unusable("its delay, sample time, prior or options"))?;
+        let model = model.ok_or_else(|| unusable("this delay, sample time, prior and options"))?;
         let mut made = Self {
             model: Box::new(model),
             reported: Reported::new(from, nk, sample_time),

@@ -103,7 +103,11 @@ impl Method {
         }
         let own: Vec<&str> = self.list().iter().map(|setting| setting.name).collect();
         let expected = format!("one of {}", own.join(", "));
-        Err(bad(name, format!("with the method {}", self.name()), &expected))
+        Err(bad(
+            name,
+            format!("an option that the method {} does not have", self.name()),
+            &expected,
+        ))
     }
 
     /// Returns the method with an option set from its text.
@@ -126,7 +130,7 @@ impl Method {
             false => Err(bad(
                 "prior",
                 source,
-                "the method adaptive, the only one that starts with a fit",
+                "the method adaptive, the only one that can start from an earlier fit",
             )),
         }
     }

@@ -26,8 +26,8 @@ impl Finished<'_> {
             verdict,
         } = self.summary;
         let read = match failures.len() {
-            0 => "all of them read".to_owned(),
-            n => format!("{n} of them not read"),
+            0 => "all read".to_owned(),
+            n => format!("{n} not read"),
         };
         let mut page = format!("{verdict}\n\n{}: {runs} runs, {read}\n", self.name);
         let table = people_table(people.iter());

@@ -35,7 +35,7 @@ pub fn run(args: &GroupArgs) -> Result<(), CliError> {
         (Some(GroupCommand::Init(init)), _, _) => write_manifest(init),
         (None, Some(manifest), Some(out)) => analyse(manifest, out, &args.run),
         _ => Err(CliError::Usage(
-            "name a manifest or directory and --out, or `hoid group init DIR`".to_owned(),
+            "give a manifest or directory and --out, or use `hoid group init DIR`".to_owned(),
         )),
     }
 }
@@ -58,7 +58,7 @@ pub fn simulate(args: &SimulateGroupArgs) -> Result<(), CliError> {
     };
     bar.finish_and_clear();
     output::print(&format!(
-        "{} runs in {}, their true parameters in truth.csv; next: hoid group {} --out DIR\n",
+        "{} runs in {}, with the true parameters in truth.csv; next: hoid group {} --out DIR\n",
         manifest?.runs.len(),
         args.out.display(),
         args.out.display()
@@ -137,9 +137,9 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
     let mut said = format!("{} runs in {}\n", manifest.runs.len(), path.display());
     if !others.is_empty() {
         said.push_str(&format!(
-            "{} files do not match {:?}, the first is {}\n",
-            others.len(),
+            "Files that do not match {:?}: {}; the first is {}\n",
             args.pattern,
+            others.len(),
             others[0]
         ));
     }
@@ -232,7 +232,7 @@ fn draw(figures: &[(String, String)], place: &Path, width_mm: Option<f64>) -> Re
     if figures.is_empty() {
         output::notice(
             "",
-            "no figure: a figure would show describing functions, and no condition of the manifest names its excitation"
+            "no figure: it would show describing functions, but no condition in the manifest names its excitation"
                 .to_owned(),
         );
     }

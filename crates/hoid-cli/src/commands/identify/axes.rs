@@ -9,7 +9,7 @@ use crate::{args::IdentifyArgs, commands::reading, error::CliError, json, output
 pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let ResolvedRequest::Operator(identification) = request::asked(args)? else {
         return Err(CliError::Usage(
-            "--pair is for the structure operator, without --noise remnant or --change sigmoid".to_owned(),
+            "--pair applies only to the structure operator, without --noise remnant or --change sigmoid".to_owned(),
         ));
     };
     let others = [
@@ -20,7 +20,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     ];
     if let Some((_, option)) = others.into_iter().find(|(given, _)| *given) {
         return Err(CliError::Usage(format!(
-            "{option} applies to one axis: give --input and --output"
+            "{option} applies to one axis; drop --pair and give --input and --output"
         )));
     }
     check_axes(&identification, &args.pair).map_err(CliError::of_options)?;
@@ -72,7 +72,7 @@ fn page(args: &IdentifyArgs, identification: &Identification, all: &[Axis]) -> R
             report.page(args.show.verbose)?
         ));
     }
-    let mut rows = text::table(&["coupling", "by chance", ""]);
+    let mut rows = text::table(&["coupling", "p", ""]);
     for axis in all {
         for coupling in &axis.couplings {
             let (chance, result) = match &coupling.p_value {

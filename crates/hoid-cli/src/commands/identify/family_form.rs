@@ -119,7 +119,7 @@ impl FamilyReport<'_> {
                 }
             }
             if verbose {
-                let mut rows = text::table(&["form", "loss", "AIC minus the best"]);
+                let mut rows = text::table(&["form", "loss", "AIC minus lowest"]);
                 for form in &channel.forms {
                     rows.add_row([
                         form.form.map_or("no response", |form| form.name()).to_owned(),
@@ -220,7 +220,7 @@ impl FamilyReport<'_> {
         match all.as_slice() {
             [] => String::new(),
             all => format!(
-                "The errors apply to {runs}. For the person, whose gain varies by a further {:.0} % or so: {}.\n",
+                "These errors apply to {runs}. For the person, whose gain varies by about a further {:.0} %: {}.\n",
                 100.0 * fit.run_to_run,
                 all.join(", ")
             ),
@@ -377,7 +377,7 @@ fn with_error(value: f64, error: Option<f64>) -> String {
 
 /// Formats parameters with their intervals, the share of the prior, and whether they are determined.
 fn parameters(of: &[Parameter], gain: &GainUnit) -> String {
-    let mut rows = text::table(&["parameter", "value", "95 % from", "to", "of it prior"]);
+    let mut rows = text::table(&["parameter", "value", "95 % from", "to", "from prior"]);
     for p in of {
         let end = |v: f64| {
             if v.is_infinite() {
@@ -434,7 +434,7 @@ fn forms(all: &[FormFigures], chosen: &str) -> String {
     let least = all.iter().filter_map(|f| f.criterion).fold(f64::INFINITY, f64::min);
     for f in all {
         let number = |v: Option<f64>| v.map_or(String::new(), |v| format!("{v:.1}"));
-        let sign = if f.form.name() == chosen { "in front" } else { "" };
+        let sign = if f.form.name() == chosen { "chosen" } else { "" };
         rows.add_row([
             f.form.to_string(),
             if f.weight > 0.0 {

@@ -186,7 +186,7 @@ impl SigmoidReport<'_> {
             }
             if coloured {
                 page.push_str(
-                    "They are not white: a noise model that is too small can look like a change; try --orders nd=2 or \
+                    "The residuals are not white: too small a noise model can look like a change; try --orders nd=2 or \
                  more.\n",
                 );
             }

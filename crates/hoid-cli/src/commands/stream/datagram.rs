@@ -56,7 +56,7 @@ impl<'b> Datagram<'b> {
             return match rest.first_chunk::<{ SAMPLE - 4 }>() {
                 Some(all) if rest.len() == SAMPLE - 4 => Self::Sample(SampleDatagram::of(all)),
                 _ => Self::Unreadable(format!(
-                    "a datagram of {} bytes that starts like a sample; a sample has {SAMPLE}",
+                    "a datagram of {} bytes that starts like a sample; a sample has {SAMPLE} bytes",
                     bytes.len()
                 )),
             };

@@ -308,7 +308,7 @@ impl std::fmt::Display for Fault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Missing => f.write_str("missing"),
-            Self::Text(text) => write!(f, "{text}, no number"),
+            Self::Text(text) => write!(f, "{text}, not a number"),
         }
     }
 }
@@ -390,7 +390,7 @@ mod tests {
         assert_eq!(read.fault.unwrap(), "error is missing");
         assert_eq!(sample(&mut columns, "1,2").u, 2.0);
         let fault = sample(&mut columns, r#"{"stick": 11, "error": {}}"#).fault.unwrap();
-        assert_eq!(fault, "error is \"{}\", no number; stick is 1.1e1, beyond 10");
+        assert_eq!(fault, "error is \"{}\", not a number; stick is 1.1e1, beyond 10");
         let mut alone = Columns::new("e", "u", false, 1e6);
         assert_eq!(sample(&mut alone, r#"{"e": 4, "u": 1}"#).e, 0.0);
         for (line, reason) in [
@@ -451,7 +451,7 @@ mod tests {
             ("1,-inf", "u is -inf"),
             ("1e300,2", "e is 1e300, beyond 1000000"),
             (",", "e is missing; u is missing"),
-            ("1,abc", "u is \"abc\", no number"),
+            ("1,abc", "u is \"abc\", not a number"),
             ("1e999,2", "e is inf"),
         ] {
             let read = sample(&mut columns, line);

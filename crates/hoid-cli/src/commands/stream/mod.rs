@@ -54,8 +54,8 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     }
     if args.warm_up.is_some() && asked.method.starts_itself() {
         return Err(CliError::Usage(format!(
-            "--warm-up is for a start fit, and {} has none: it estimates from the start; drop --warm-up, or choose \
-             --method physical",
+            "--warm-up is for a start fit, but {} has none and estimates from the first sample; drop --warm-up, or \
+             choose --method physical",
             asked.method
         )));
     }

@@ -197,6 +197,7 @@ impl Session {
                             "a gap before t = {t} s, of which {LONGEST_GAP_S} s are bridged"
                         ));
                     } else if missing > 0 {
+                        let missing = text::counted(missing as u64, "sample");
                         self.fault(format!("{missing} missing before t = {t} s, bridged"));
                     }
                     for _ in 0..missing {
@@ -226,8 +227,8 @@ impl Session {
         };
         if let Some(hz) = other.filter(|_| self.rate.is_none()) {
             let words = format!(
-                "up to t = {t} s the rate of the times is {hz:.4} Hz, but --fs is {fs} Hz: delay, lead and frequency \
-                 of the estimate are scaled accordingly; give the rate of the times with --fs, or correct t"
+                "up to t = {t} s, t gives a sampling rate of {hz:.4} Hz, but --fs is {fs} Hz: delay, lead and \
+                 frequency of the estimate are scaled accordingly; give the rate of t with --fs, or correct t"
             );
             warn(&words);
             self.rate = Some(Finding::doubt("sampling-rate", words));
@@ -312,7 +313,7 @@ impl Session {
         let c = self.counts;
         if c.samples == 0 && c.dropped > 0 {
             return Err(CliError::NotDetermined(format!(
-                "no line of the stream was a sample, {} dropped; expected e,u or t,e,u with decimal points, or a JSON \
+                "no line of the stream was a sample ({} dropped); expected e,u or t,e,u with decimal points, or a JSON \
                  object; the output lines contain the errors",
                 text::counted(c.dropped, "line")
             )));

@@ -86,11 +86,11 @@ fn covariance(tracked: &Tracked) -> String {
     };
     let mut rows = text::table(&["P0", "VAF in %", ""]);
     for (p, vaf) in &choice.candidates {
-        let taken = if *p == choice.covariance { "taken" } else { "" };
+        let taken = if *p == choice.covariance { "chosen" } else { "" };
         rows.add_row(vec![format!("{p} I"), format!("{vaf:.2}"), taken.to_owned()]);
     }
     format!(
-        "\nStart covariance, chosen by how much of {file} the trace explains ({:.2} to {:.2} s):\n{rows}\n",
+        "\nStart covariance, chosen by the VAF of the trace on {file} ({:.2} to {:.2} s):\n{rows}\n",
         choice.span_s.0, choice.span_s.1
     )
 }
@@ -232,7 +232,7 @@ fn counts(tracked: &Tracked) -> String {
             tracked.trace.len()
         ));
         text.push_str(&match none.reason {
-            Some(reason) => format!("; most often {reason}.\n"),
+            Some(reason) => format!("; mostly because {reason}.\n"),
             None => ".\n".to_owned(),
         });
     }

@@ -29,7 +29,7 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
         ));
     }
     if !args.batch.is_empty() && args.report.is_none() {
-        return Err(CliError::Usage("--batch is only for --report".to_owned()));
+        return Err(CliError::Usage("--batch requires --report".to_owned()));
     }
     if let Some(path) = &args.picture.figure {
         figure::check(path)?;

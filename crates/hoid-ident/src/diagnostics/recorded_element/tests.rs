@@ -95,7 +95,7 @@ fn a_delay_of_the_machine_is_part_of_its_element() {
     assert!((found.delay_s - 0.1).abs() < 0.003 && found.is_given(), "{found:?}");
     let message = found.finding(&element(60.0, 6.0)).unwrap().message;
     assert!(
-        message.starts_with("e follows from u through 60/(s^2 + 6s), 100 ms later:"),
+        message.starts_with("the recorded element is 60/(s^2 + 6s) with an additional delay of 100 ms:"),
         "{message}"
     );
     let given = element(60.0, 6.0).with_delay(0.1).unwrap();

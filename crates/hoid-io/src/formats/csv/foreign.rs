@@ -31,12 +31,12 @@ pub(super) fn made_plain(bytes: &mut Vec<u8>) -> Vec<String> {
     };
     let above = units_above(text);
     if above.is_some() {
-        notes.push(String::from("the line below the header is taken as its units"));
+        notes.push(String::from("the line below the header is taken as the units"));
     }
     let text = above.as_deref().unwrap_or(text);
     if let Some(tabs) = between_tabs(text) {
         *bytes = tabs.into_bytes();
-        notes.push(String::from("its columns are separated by blanks"));
+        notes.push(String::from("the columns are separated by blanks"));
     } else if let Some((lines, without)) = without_preamble(text) {
         *bytes = without.into_bytes();
         notes.push(format!("lines above the header are left out: {lines}"));

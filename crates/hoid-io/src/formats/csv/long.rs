@@ -189,7 +189,7 @@ impl Text {
             if self.buffer.len() > LARGEST {
                 let megabytes = LARGEST >> 20;
                 return Err(io::Error::other(format!(
-                    "no line ends within {megabytes} MB after byte {base}, so that it is not a table"
+                    "no line ends within {megabytes} MB after byte {base}, so the file is not a table"
                 )));
             }
         }

@@ -162,7 +162,7 @@ pub(super) fn parsed(text: &str, file: &str) -> Result<Parsed, IoError> {
         return Err(IoError::NoRows { file: file.to_owned() });
     }
     if commas {
-        notes.push(String::from("the commas in its numbers are taken as decimal commas"));
+        notes.push(String::from("the commas in the numbers are taken as decimal commas"));
     }
     Ok(Parsed {
         sample_time_s: read_comments(comments(text), &mut columns),
@@ -373,10 +373,7 @@ fn with_unique_names(names: Vec<String>, notes: &mut Vec<String>) -> Vec<String>
         .map(|(new, _)| new.as_str())
         .collect();
     if !renamed.is_empty() {
-        notes.push(format!(
-            "several columns have the same name and are called {}",
-            list(&renamed)
-        ));
+        notes.push(format!("columns with the same name are renamed: {}", list(&renamed)));
     }
     found
 }
@@ -548,14 +545,17 @@ mod tests {
         );
         let found = message(&text.as_bytes()[..text.len() - 9]);
         assert!(
-            found.contains("run.csv is truncated in line 21, its last: 2 of 3 values"),
+            found.contains("run.csv is truncated in line 21, the last one: 2 of 3 values"),
             "{found}"
         );
         // A short row in the middle of a file is not reported as truncation.
         assert!(message(b"t,e,u\n0,1\n1,2,3").contains("line 2: 2 values, expected 3"));
         let table = parse(b"t,e,u\n0,1,2\n1,2,-", "run.csv").unwrap();
         let error = table.bad_value(2, 1, 0..2).to_string();
-        assert!(error.contains("line 3") && error.contains("truncated there"), "{error}");
+        assert!(
+            error.contains("line 3") && error.contains("truncated in the middle"),
+            "{error}"
+        );
     }
 
     #[test]
@@ -569,7 +569,7 @@ mod tests {
         let table = parse(text, "run.csv").unwrap();
         assert_eq!(table.names(), ["t", "e (column 2)", "u", "e (column 4)", ""]);
         assert!(
-            table.notes[0].contains("called e (column 2), e (column 4)"),
+            table.notes[0].contains("renamed: e (column 2), e (column 4)"),
             "{:?}",
             table.notes
         );

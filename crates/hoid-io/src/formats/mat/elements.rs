@@ -76,7 +76,7 @@ impl<'a> Elements<'a> {
             .ok_or_else(|| ends(self.rest.len()))? as usize;
         let data = self.rest.get(8..).unwrap_or_default();
         let Some(bytes) = data.get(..length) else {
-            return Err(format!("an element of {length} bytes ends after {}", data.len()));
+            return Err(format!("an element of {length} bytes ends after {} bytes", data.len()));
         };
         // Compressed elements are not padded, and the last element of a file may lack its padding.
         let padded = if first == data::COMPRESSED {

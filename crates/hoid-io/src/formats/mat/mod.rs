@@ -43,6 +43,6 @@ pub(super) const HDF5: Format = Format {
     reading: Reading::Arrays(|bytes, file| {
         version73::read(bytes, file, Indexing::Python).map(|entries| Contents::new(entries, Indexing::Python))
     }),
-    writing: Writing::ReadOnly("read only; .npz and .mat hold the same arrays"),
+    writing: Writing::ReadOnly("hoid only reads this format; .npz and .mat hold the same arrays"),
     record: None,
 };

@@ -45,7 +45,7 @@ fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
     let big_endian = number(0, false) > 4999;
     let kinds = number(0, big_endian);
     if kinds > 1999 || !kinds.is_multiple_of(1000) && kinds % 1000 / 100 != 0 {
-        return Err(format!("its type is {kinds}"));
+        return Err(format!("its type code {kinds} is unknown"));
     }
     let kind = match kinds % 100 / 10 {
         0 => Kind::F64,
@@ -54,11 +54,11 @@ fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
         3 => Kind::I16,
         4 => Kind::U16,
         5 => Kind::U8,
-        other => return Err(format!("its numbers are of type {other}")),
+        other => return Err(format!("its number type {other} is unknown")),
     };
     let [rows, columns, imaginary, name] = [1, 2, 3, 4].map(|at| number(at, big_endian) as usize);
     if name > LONGEST_NAME {
-        return Err(format!("its name is {name} bytes long"));
+        return Err(format!("its name has {name} bytes, expected at most {LONGEST_NAME}"));
     }
     let count = rows.checked_mul(columns);
     let length = count.and_then(|count| {
@@ -108,7 +108,7 @@ fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
             Value::Texts((0..rows.min(characters.len())).map(row).collect())
         }
         2 => Value::Unread(String::from("a sparse matrix")),
-        other => return Err(format!("it is of kind {other}")),
+        other => return Err(format!("its matrix type {other} is unknown")),
     };
     Ok((Entry::new(name, value), rest))
 }

@@ -161,7 +161,7 @@ impl Reader<'_> {
         let count = dims.iter().try_fold(1_usize, |count, side| count.checked_mul(*side));
         let count = count.ok_or_else(|| format!("an array of {}", shown(&format!("{dims:?}"))))?;
         if dims.len() > MOST_NESTED {
-            return Err(format!("an array of {} dimensions", dims.len()).into());
+            return Err(format!("an array of {} dimensions, expected at most {MOST_NESTED}", dims.len()).into());
         }
         let name = name(parts.next()?.bytes)?;
         // An element without a name is not a variable: MATLAB stores the parts of objects in such elements.
@@ -199,7 +199,7 @@ impl Reader<'_> {
                 };
                 self.push(place, place.path, Value::Array(array))
             }
-            _ => Err(format!("an array of class {class}").into()),
+            _ => Err(format!("an array of unknown class {class}").into()),
         }
     }
 
@@ -217,7 +217,7 @@ impl Reader<'_> {
             data::DOUBLE => Kind::F64,
             data::INT64 => Kind::I64,
             data::UINT64 => Kind::U64,
-            other => return Err(format!("numbers of type {other}").into()),
+            other => return Err(format!("numbers of unknown type {other}").into()),
         };
         if count.checked_mul(kind.size()) != Some(element.bytes.len()) {
             let found = element.bytes.len();
@@ -319,7 +319,10 @@ fn deeper(place: VariablePath<'_>) -> Result<usize, Stop> {
 fn name(bytes: &[u8]) -> Result<String, String> {
     let name = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
     if name.len() > LONGEST_NAME {
-        return Err(format!("a name of {} bytes", name.len()));
+        return Err(format!(
+            "a name of {} bytes, expected at most {LONGEST_NAME}",
+            name.len()
+        ));
     }
     Ok(String::from_utf8_lossy(name).into_owned())
 }
@@ -349,7 +352,7 @@ fn texts(parts: &mut Elements<'_>, dims: &[usize], count: usize) -> Result<Vec<S
             String::from_utf16_lossy(&units).chars().collect()
         }
         data::INT32 | data::UINT32 | data::UTF32 => parts.u32s(bytes).into_iter().map(of).collect(),
-        other => return Err(format!("characters of type {other}")),
+        other => return Err(format!("characters of unknown type {other}")),
     };
     match dims {
         [1, ..] | [] => Ok(vec![characters.into_iter().collect()]),

@@ -178,23 +178,25 @@ fn header_of(bytes: &[u8]) -> Result<(Header, usize), NpyError> {
         [1, _, a, b, ..] => (usize::from(u16::from_le_bytes([*a, *b])), BEFORE_SHORT),
         [2 | 3, _, a, b, c, d, ..] => (u32::from_le_bytes([*a, *b, *c, *d]) as usize, BEFORE_LONG),
         [version, ..] if !(1..=3).contains(version) => {
-            return Err(NpyError::Damaged(format!("the array is of version {version}")));
+            return Err(NpyError::Damaged(format!(
+                "the array has version {version}, expected 1 to 3"
+            )));
         }
-        _ => return Err(damaged("the array ends in its header")),
+        _ => return Err(damaged("the array ends within its header")),
     };
     if length > LONGEST_HEADER {
         return Err(NpyError::Damaged(format!(
-            "the header of an array is {length} bytes long"
+            "the header of an array has {length} bytes, expected at most {LONGEST_HEADER}"
         )));
     }
     let end = before.saturating_add(length);
     let text = bytes
         .get(before..end)
-        .ok_or_else(|| damaged("the array ends in its header"))?;
+        .ok_or_else(|| damaged("the array ends within its header"))?;
     // The text is Latin 1 before version 3, UTF-8 in version 3; everything that hoid needs, except names, is ASCII.
     let text = String::from_utf8_lossy(text);
     let header = header::parse(&text)
-        .ok_or_else(|| NpyError::Damaged(format!("the header of an array reads {}", shown(&text))))?;
+        .ok_or_else(|| NpyError::Damaged(format!("the header of an array cannot be parsed: {}", shown(&text))))?;
     Ok((header, end))
 }
 

@@ -14,7 +14,7 @@ pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Contents, IoError> {
             file: file.to_owned(),
             format: "NPY",
             found,
-            expected: "\\x93NUMPY at its start",
+            expected: "\\x93NUMPY at the start",
         },
         NpyError::Damaged(found) => IoError::Damaged {
             file: file.to_owned(),

@@ -53,7 +53,7 @@ fn check_ends(bytes: &[u8], file: &str) -> Result<(), IoError> {
     } else if bytes.starts_with(b"PARE") {
         return Err(IoError::Unsupported {
             file: file(),
-            found: String::from("is encrypted"),
+            found: String::from("it is encrypted"),
             remedy: "write it without encryption",
         });
     } else if !bytes.starts_with(MAGIC) {
@@ -79,12 +79,12 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
     };
     let reader = SerializedFileReader::new(bytes.clone()).map_err(|error| damaged(short_error(&error.to_string())))?;
     let footer = reader.metadata().file_metadata();
-    let count = |rows: i64| usize::try_from(rows).map_err(|_| damaged(format!("{rows} rows")));
+    let count = |rows: i64| usize::try_from(rows).map_err(|_| damaged(format!("it states {rows} rows")));
     let rows = count(footer.num_rows())?;
     if rows > MOST_ROWS {
         return Err(IoError::Unsupported {
             file: file.to_owned(),
-            found: format!("holds {rows} rows, expected at most {MOST_ROWS}"),
+            found: format!("it holds {rows} rows, more than {MOST_ROWS}"),
             remedy: "write it in parts",
         });
     }
@@ -121,7 +121,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
             let values = u64::try_from(chunk.num_values()).unwrap_or(0);
             let Some(stated) = pages::decompressed_size(pages, chunk.compression(), values) else {
                 return Err(damaged(format!(
-                    "{}: a page is longer than it states, or does not state its length",
+                    "{}: a page is longer than stated, or its length is not stated",
                     place()
                 )));
             };
@@ -205,7 +205,7 @@ impl ColumnPath<'_> {
             (Type::FIXED_LEN_BYTE_ARRAY, C::DECIMAL) if column.type_length() <= 16 => {
                 Data::Real(self.values::<FixedLenByteArrayType, _>(|value| signed(value.data()) as f64 / unit)?)
             }
-            (_, C::DECIMAL) => Data::Unread("decimal numbers of any length"),
+            (_, C::DECIMAL) => Data::Unread("decimal numbers of variable length or more than 16 bytes"),
             (Type::FIXED_LEN_BYTE_ARRAY, _) if logical == Some(&LogicalType::Float16) => {
                 Data::Real(self.values::<FixedLenByteArrayType, _>(|value| half(value.data()))?)
             }

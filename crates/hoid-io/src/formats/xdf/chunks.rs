@@ -94,10 +94,10 @@ pub(super) fn streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), Stri
         let damaged = |what: String| format!("stream {id}, the chunk at byte {at}: {what}");
         if tag == STREAM_HEADER {
             let header = header::parse(content.rest).map_err(damaged)?;
-            let samples =
-                empty(&header.format).ok_or_else(|| damaged(format!("its format is \"{}\"", shown(&header.format))))?;
+            let samples = empty(&header.format)
+                .ok_or_else(|| damaged(format!("the channel format \"{}\" is unknown", shown(&header.format))))?;
             if known.insert(id, streams.len()).is_some() {
-                return Err(damaged(String::from("its header is duplicated")));
+                return Err(damaged(String::from("the stream has two headers")));
             }
             streams.push(Stream {
                 id,
@@ -111,7 +111,7 @@ pub(super) fn streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), Stri
             continue;
         }
         let stream = known.get(&id).and_then(|at| streams.get_mut(*at));
-        let stream = stream.ok_or_else(|| damaged(String::from("its header is missing")))?;
+        let stream = stream.ok_or_else(|| damaged(String::from("the stream has no header")))?;
         if tag == STREAM_FOOTER {
             // The footer is not needed to read the samples; it is only compared with them.
             match header::footer(content.rest) {

@@ -43,7 +43,9 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
     let parts = synchronise(&mut times, &stream.offsets);
     let name = shown(&stream.header.name);
     let resets = match parts {
-        0 => String::from("no clock offsets were recorded: its time stamps are taken as those of the recorder"),
+        0 => String::from(
+            "no clock offsets were recorded: the time stamps are taken as times on the clock of the recorder",
+        ),
         1 => format!("clock aligned by a line fitted to {} offsets", stream.offsets.len()),
         parts => format!(
             "clock aligned by {parts} lines fitted to {} offsets, because the clock was reset",
@@ -61,7 +63,7 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
     let (parts, effective_hz) = straighten(&mut times, longest, stream.nominal_step_s());
     if let Some(hz) = effective_hz.filter(|hz| (hz / nominal_hz - 1.0).abs() > OFF) {
         notes.push(format!(
-            "stream {name}: its time stamps run at {hz:.4} Hz, but {nominal_hz} Hz is stated: samples are lost at \
+            "stream {name}: the time stamps give {hz:.4} Hz, but the stated rate is {nominal_hz} Hz: samples are lost at \
              regular intervals, or the stated rate is wrong"
         ));
     }

@@ -34,10 +34,10 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, String> {
             .and_then(|node| node.text())
             .map(|text| text.trim().to_owned())
     };
-    let needed = |name: &str| text(name).ok_or_else(|| format!("its header holds no {name}"));
+    let needed = |name: &str| text(name).ok_or_else(|| format!("its header has no {name}"));
     let number = |name: &str, text: String| {
         text.parse::<f64>()
-            .map_err(|_| format!("its {name} is \"{}\"", short_error(&text)))
+            .map_err(|_| format!("its {name} is \"{}\", expected a number", short_error(&text)))
     };
     let count = number("channel_count", needed("channel_count")?)?;
     if !(0.0..=MOST_CHANNELS as f64).contains(&count) {
@@ -45,7 +45,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, String> {
     }
     let nominal_hz = number("nominal_srate", needed("nominal_srate")?)?;
     if !(nominal_hz >= 0.0 && nominal_hz.is_finite()) {
-        return Err(format!("its nominal_srate is {nominal_hz} Hz"));
+        return Err(format!("its nominal_srate is {nominal_hz} Hz, expected zero or more"));
     }
     let desc = child(info, "desc");
     let channels = desc.and_then(|desc| child(desc, "channels"));

@@ -23,6 +23,6 @@ pub(super) const XDF: Format = Format {
     name: "XDF",
     extensions: &["xdf"],
     reading: Reading::Arrays(|bytes, file| streams::read(&bytes, file)),
-    writing: Writing::ReadOnly("the format of a recorder"),
+    writing: Writing::ReadOnly("hoid only reads this format of recorders"),
     record: None,
 };

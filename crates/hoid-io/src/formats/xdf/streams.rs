@@ -20,7 +20,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
             file: file.to_owned(),
             format: "XDF",
             found: start_of(bytes),
-            expected: "XDF: at its start",
+            expected: "\"XDF:\" at the start",
         });
     }
     let mut budget = Budget::of(bytes.len());

@@ -63,7 +63,7 @@ impl Reader {
         let all = self.sum()?;
         match self.next() {
             None => Ok(all),
-            Some(')') => self.refuse("no ')' without a '('"),
+            Some(')') => self.refuse("a '(' before this ')'"),
             Some('=' | 'z' | 'p' | 'x') => self.refuse("an expression in s only"),
             Some(_) => self.refuse("a number, s, a parenthesis, or one of + - * / ^"),
         }
@@ -82,7 +82,7 @@ impl Reader {
             let term = self.product()?;
             let Some(total) = sum.plus(&term, sign) else {
                 self.at = begin;
-                return self.refuse("one delay, as a factor of the whole: 5exp(-0.1s)/(s+1)");
+                return self.refuse("one delay, as a factor of the whole function: 5exp(-0.1s)/(s+1)");
             };
             sum = self.checked(total, begin)?;
         }
@@ -111,13 +111,13 @@ impl Reader {
                     product = product.times(&by.inverse());
                 }
                 Some(sign) if is_of_number(sign) => {
-                    return self.refuse("a sign before a number: s^2 or s*2");
+                    return self.refuse("'^' or '*' before a number: s^2 or s*2");
                 }
                 Some('s' | '(' | 'e') => {
                     if divided {
                         return self.refuse(
-                            "a sign: it is not clear whether this is also part of the divisor; 1/(s(s+6)) divides by \
-                             both, 1/s*(s+6) by s only",
+                            "'*' or parentheses, because this may or may not be part of the divisor: 1/(s(s+6)) \
+                             divides by both factors, 1/s*(s+6) by s only",
                         );
                     }
                     product = product.times(&self.power()?);

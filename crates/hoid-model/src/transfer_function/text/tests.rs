@@ -102,7 +102,7 @@ fn what_is_wrong_is_named_with_its_place() {
         ("1,0,0/1", "higher degree"),
         (
             "s2/(s+1)^3",
-            "at character 2 there is '2', expected a sign before a number",
+            "at character 2 there is '2', expected '^' or '*' before a number",
         ),
         ("1/0", "divides by zero at character 3"),
         ("1/(s-s)", "divides by zero at character 3"),

@@ -42,7 +42,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
         "[read]",
         "",
         if units.is_empty() {
-            "the files state no units: gains are in units of output by input".to_owned()
+            "the files state no units: gains are in units of output per unit of input".to_owned()
         } else {
             format!("units in the file: {}", units.join(", "))
         },
@@ -172,7 +172,7 @@ fn key_of(name: &str) -> String {
 #[must_use]
 pub fn commented(text: &str, evidence: &[Evidence]) -> String {
     let mut written = String::from(
-        "# Made by `hoid group init` from names and contents of the files: review it, then\n\
+        "# Made by `hoid group init` from the names and contents of the files: review it, then run\n\
          #   hoid group . --out results\n",
     );
     let comment = |written: &mut String, table: &str, key: &str| {

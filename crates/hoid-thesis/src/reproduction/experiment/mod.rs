@@ -118,7 +118,7 @@ pub(super) fn items() -> Vec<Item> {
 /// Items for recorded people.
 pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
     const DELAYS: &str = "Mean of the values of the best fits of the first and the last three eighths of a run; \
-                          those of each alongside.";
+                          the value of each alongside.";
     let name = people.name().to_owned();
     let runs = Runs::new(people);
     let shared = runs.shared("The experiment with recorded people");
@@ -156,9 +156,10 @@ pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
     all.extend(figures_of(
         &runs,
         &name,
-        "Recorded people, mean (dark) and median (light) over the last five runs of each at each time; the text shows \
-         the mean. Thick dots: batch fits of the first and the last three eighths of a run, the mean; vertical dots: \
-         the change of the controlled element. Outliers beyond the range of an ordinate are cut; the data contain all.",
+        "Recorded people, mean (dark) and median (light) over the last five runs of each person at each time; the \
+         text shows the mean. Thick dots: batch fits of the first and the last three eighths of a run, the mean; \
+         vertical dots: the change of the controlled element. Outliers beyond the range of an ordinate are cut; the \
+         data contain them.",
     ));
     all.into_iter().map(|item| item.sharing(&shared)).collect()
 }

@@ -27,7 +27,7 @@ pub(super) fn items() -> Vec<Item> {
         Item::of_study(
             "memory-settling",
             "Settling of recursive estimates by memory, condition C4, P_n = 0.1",
-            "Time after the change at which the median trace has covered 90 % of the step of K_e_dot. A point that is missing has not settled within the run.",
+            "Time after the change at which the median trace has covered 90 % of the step of K_e_dot. A missing point did not settle within the run.",
             "memory",
             settling,
         ),

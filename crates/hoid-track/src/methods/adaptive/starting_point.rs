@@ -128,8 +128,8 @@ pub(super) fn initial_estimate(
         return Err(no_place(
             fit,
             &format!(
-                "the form {} is {:.0} % away from the nearest operator of the basis; identify with a form that has a \
-                 lag, such as --form lead-lag",
+                "the response of the form {} is {:.0} % off the nearest operator of the basis; identify with a form \
+                 that has a lag, such as --form lead-lag",
                 fit.operator.form(),
                 100.0 * misfit
             ),
