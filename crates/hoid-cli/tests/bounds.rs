@@ -27,8 +27,8 @@ fn limits_are_named_at_once() {
         (&identify, vec!["--nk", HUGE], "at most 1000000;"),
         (&identify, vec!["--nk", "0..1000000"], "at most 100000"),
         (&identify, vec!["--orders", "nd=0..65"], "at most 64;"),
-        (&identify, vec!["--nk", "29", "--horizon", HUGE], "write 1 to 1000000"),
-        (&identify, vec!["--nk", "29", "--horizon", "0"], "write 1 to 1000000"),
+        (&identify, vec!["--nk", "29", "--horizon", HUGE], "from 1 to 1000000"),
+        (&identify, vec!["--nk", "29", "--horizon", "0"], "from 1 to 1000000"),
         (
             &[
                 "identify",

@@ -389,7 +389,7 @@ fn late_lines_are_bridged_and_lines_behind_are_dropped() {
         assert!(stream.ask(&row(k)).get("fault").is_none());
     }
     let line = stream.ask(&row(53));
-    assert!(line["fault"].as_str().unwrap().contains("3 missing"), "{line}");
+    assert!(line["fault"].as_str().unwrap().contains("3 samples missing"), "{line}");
     assert_eq!((&line["skipped"], &line["dropped"]), (&3.into(), &0.into()));
     assert!(line["innovation"].is_f64());
     let line = stream.ask(&row(53));

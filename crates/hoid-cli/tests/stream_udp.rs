@@ -167,7 +167,7 @@ fn places_that_cannot_be_are_refused() {
     let port = taken.local_addr().unwrap().port();
     for (places, reason) in [
         ("5005", "5005:5006"),
-        ("5005:5005", "another port"),
+        ("5005:5005", "give another output port"),
         (&format!("{port}:9"), "cannot listen on"),
     ] {
         let (code, message) = bad(directory.path(), &["stream", "--fs", "100", "--udp", places]);

@@ -544,7 +544,7 @@ fn what_does_not_fit_together_ends_with_two() {
         (&["--batch", "0..20"], "--report"),
         (&["--update-from", "100"], "81.92"),
         (&["--moving-average", "-1"], "--moving-average"),
-        (&["--nk", "5..2"], "empty"),
+        (&["--nk", "5..2"], "LO <= HI"),
         (&["--method", "rpem", "--orders", "nx=2"], "nx"),
     ] {
         let mut all = vec!["track", "c.csv", "--out", "trace.csv"];

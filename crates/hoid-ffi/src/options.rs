@@ -275,7 +275,7 @@ mod tests {
             ("rpem", "{\"structure\": \"curve\"}", "curve"),
             ("rpem", "{\"prior\": \"none\"}", "adaptive"),
             ("rpem", "{\"start\": {\"b0\": 1}, \"nk\": 29, \"nd\": 1}", "it lacks"),
-            ("rpem", "{\"warm_up\": 0}", "one sample"),
+            ("rpem", "{\"warm_up\": 0}", "expected 1 to 10 million samples"),
             ("rpem", "{\"controlled_element\": \"9/\"}", "coefficients"),
             ("multiple-model", "{\"smooth\": true}", "no future samples"),
             ("adaptive", "{\"prior\": \"nowhere.json\"}", "nowhere.json"),

@@ -292,14 +292,14 @@ fn a_bad_file_is_a_row_and_a_bad_manifest_an_error() {
         Err(error @ StudyError::NoRuns { .. }) => error.to_string(),
         other => panic!("{other:?}"),
     };
-    assert!(said(&pattern).contains("matches {run}.csv; it has no files"));
+    assert!(said(&pattern).contains("matches {run}.csv; found no files"));
     for n in 1..=4 {
         std::fs::write(empty.path().join(format!("anna-{n}.csv")), "").unwrap();
     }
     let pattern = Pattern::new("{subject}_{run}*.csv").unwrap();
     let message = said(&pattern);
     assert!(
-        message.contains("{subject}_{run}*.csv; it has anna-1.csv, anna-2.csv, anna-3.csv and 1 more"),
+        message.contains("{subject}_{run}*.csv; found anna-1.csv, anna-2.csv, anna-3.csv and 1 more"),
         "{message}"
     );
 }
@@ -401,7 +401,7 @@ run = "2"
         "[conditions.\"A then B\"]\nchange_s = 5.0\n\n[[runs]]\nfile = \"A_C1_1.csv\"\nsubject",
     );
     let refused = Manifest::parse(&both, "group.toml").unwrap_err().to_string();
-    assert!(refused.contains("seam"), "{refused}");
+    assert!(refused.contains("where the files are joined"), "{refused}");
 }
 
 /// One more sample of delay in every file is one more sample of nk, by the operator of the person

@@ -194,7 +194,7 @@ fn options_of_an_operator_are_checked() {
         (
             "method = \"fit\"\nstructure = \"bj\"\norders.nd = \"1..2\"",
             19,
-            "applies to operator",
+            "which only operator accepts: give single numbers",
         ),
     ] {
         let message = of(text).expect_err(text).to_string();

@@ -150,7 +150,7 @@ fn a_record_is_cut_where_it_is_masked() {
         )
     };
     // Without a mask the gaps are an error as before.
-    assert!(cut(&[], 2.0).unwrap_err().to_string().contains("samples missing"));
+    assert!(cut(&[], 2.0).unwrap_err().to_string().contains("missing samples: "));
     let segments = cut(&[QualityIssueKind::Gap, QualityIssueKind::Stalled], 1.0).unwrap();
     assert!(segments.len() > 10);
     let mut end = f64::NEG_INFINITY;

@@ -65,15 +65,15 @@ class MethodSettings(TypedDict, total=False):
     # adaptive, fused.
     limit: float | None
 
-    # How far each variance in P may grow where nothing excites its parameter, as a multiple of
-    # its initial value; off: no limit. For rls, rpem, physical.
+    # Limit on the growth of each variance in P while its parameter is not excited, relative to
+    # the initial value; off: no limit. For rls, rpem, physical.
     windup_guard: float | Literal["off"] | None
 
     # Memory of individual parameters, or of all parameters with one letter, such as
     # b0=256,f=inf,K_e=5s. For rls, rpem, physical, rriv, fused.
     memory_of: Mapping[str, float | str] | None
 
-    # Memory of all parameters, in which the weight of a sample falls to 1/e: samples (256),
+    # Memory of all parameters, after which the weight of a sample is 1/e: samples (256),
     # seconds (2.56s) or inf. For rls, rpem, physical, rriv, fused.
     memory: float | str | None
 
@@ -95,15 +95,15 @@ class MethodSettings(TypedDict, total=False):
         | None
     )
 
-    # For forgetting by a random walk: drift of a parameter in one second (standard deviation),
-    # such as K_e=.01,K_e_dot=.01. For rls, rpem, physical.
+    # For random-walk: drift of a parameter in one second (standard deviation), such as
+    # K_e=.01,K_e_dot=.01. For rls, rpem, physical.
     drift: Mapping[str, float] | None
 
     # For gradient: step size. For rls, rpem, physical.
     rate: float | None
 
-    # Guard: outliers of e and u are held back, spans that no tracking produces are excluded,
-    # and the estimate restarts after them. For rls, rpem, physical, multiple-model, adaptive.
+    # Guard: hold back outliers of e and u, exclude spans that no tracking produces, and restart
+    # the estimate after them. For rls, rpem, physical, multiple-model, adaptive.
     guard: Literal["yes", "no"] | None
 
     # Signals of psi: gradient (D/(C F) as one filter), cascade (1/F before D/C; for
@@ -113,8 +113,8 @@ class MethodSettings(TypedDict, total=False):
     # Polynomials kept stable: predictor (C and F), or noise (D too). For rpem, physical, fused.
     stable: Literal["predictor", "noise"] | None
 
-    # Also track the delay tau_e within this range: as a parameter (physical) or in whole
-    # samples (rpem, multiple-model). For rpem, physical, multiple-model.
+    # Range in which tau_e is also tracked (physical: as a parameter; rpem, multiple-model: in
+    # whole samples). For rpem, physical, multiple-model.
     track_delay: tuple[float, float] | None
 
     # Bounds of physical parameters, such as omega_nm=5..30,zeta_nm=0.1..2; either end may be
@@ -127,27 +127,26 @@ class MethodSettings(TypedDict, total=False):
     # Samples between fits. For window.
     refit: int | None
 
-    # Channel from outside the loop, from which the instruments are made. For rriv.
+    # Channel from outside the loop that provides the instruments. For rriv.
     instruments: str | None
 
     # Log odds at which a change is declared. For multiple-model.
     alarm: float | None
 
-    # Smooth a recorded run: estimate each sample from the whole run, with hypotheses run from
-    # both ends, not from the past alone. For multiple-model.
+    # Smooth a recorded run: use the whole run for each estimate, not only the past (hypotheses
+    # run from both ends). For multiple-model.
     smooth: bool | None
 
-    # Accepted false alarms per hour: a lower number detects fewer changes, and later. For
+    # Accepted false alarms per hour (a lower number detects fewer changes, and later). For
     # adaptive.
     false_alarms: float | None
 
-    # Length of the record that is read repeatedly; 0 for a recursion that reads each sample
-    # once, as on a microcontroller. For adaptive.
+    # Length of the record that is read repeatedly (0: each sample is read once, as on a
+    # microcontroller). For adaptive.
     replay: float | None
 
-    # Prior knowledge of the person: population, none, NAME=CENTRE:SPREAD of omega_nm, zeta_nm,
-    # tau_e, T_I (relative spread), or an earlier fit (file of hoid identify --json). For
-    # adaptive.
+    # Prior knowledge of the person: population, none, NAME=CENTRE:SPREAD for omega_nm, zeta_nm,
+    # tau_e, T_I (relative spread), or a file from hoid identify --json. For adaptive.
     prior: str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit | None
 
     # Drift of K_e and K_e_dot per root second, relative to their start. For dual-ekf.
@@ -181,11 +180,11 @@ class BatchSettings(TypedDict, total=False):
     # remnant of order m (remnant). For operators.
     noise: Literal["ar", "arma", "remnant"] | None
 
-    # Change of the operator: none, or one change of its gains along a sigmoid, for which hoid
-    # identify refuses --figure, --validate, --horizon and --report. For operators.
+    # Change of the operator: none, or one sigmoid change of its gains (hoid identify then
+    # rejects --figure, --validate, --horizon and --report). For operators.
     change: Literal["none", "sigmoid"] | None
 
-    # Form of the operator; auto: average over the forms that the data allow, lead for --change
+    # Form of operator; auto: average over the forms that the data allow; lead with --change
     # sigmoid. For operator, change="sigmoid".
     form: (
         Literal[
@@ -207,21 +206,21 @@ class BatchSettings(TypedDict, total=False):
     # Include neuromuscular dynamics (omega_nm, zeta_nm). For operator, change="sigmoid".
     neuromuscular: Literal["yes", "no"] | None
 
-    # Prior knowledge of the person: population (published people), none, a JSON result of
-    # another fit, or NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_L, T_I, such as
+    # Prior knowledge of the person: population (published data), none, a JSON result of another
+    # fit, or NAME=CENTRE:SPREAD for omega_nm, zeta_nm, tau_e, T_L, T_I, such as
     # omega_nm=10.5:0.3 (relative spread). For operator, change="sigmoid".
     prior: str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit | None
 
-    # Delay tau_e, or a range to search; for polynomials it replaces nk = tau_e/Ts + 1.
+    # Delay tau_e (for polynomials instead of nk = tau_e/Ts + 1) or a range to search.
     delay: float | tuple[float, float] | None
 
     # Behaviour of e between samples: held (zoh), linear (foh: e was logged from a faster or
-    # continuous signal; tau_e is half a sample longer), or smooth with the delay for a held e,
-    # unless noise-free data show zoh or foh (auto). For operator.
+    # continuous signal; tau_e is half a sample longer), or (auto) zoh or foh if noise-free data
+    # show it, else smooth with the delay for a held e. For operator.
     intersample: Literal["auto", "zoh", "foh"] | None
 
-    # Run-to-run variation of a person's gain, relative to the gain; included in the error bars
-    # for fewer than five records. For operator.
+    # Relative run-to-run variation of a person's gain; added to the error bars if there are
+    # fewer than five records. For operator.
     run_to_run: float | None
 
     # Role of each input other than the error: r=feedforward (displayed target;
@@ -246,23 +245,21 @@ class BatchSettings(TypedDict, total=False):
     # Relative decrease of the loss for convergence.
     tolerance: float | None
 
-    # Column of the recorded disturbance or target, for the fit at its lines; none: no such fit.
-    # For operator.
+    # Column of the recorded disturbance or target for the fit at its lines; none: no fit at
+    # lines. For operator.
     excitation: str | None
 
     # Period of the excitation. For operator.
     period: float | None
 
-    # Controlled element in s, such as 90/(s(s+6)), or NUM/DEN in descending powers of s, such
-    # as 90/1,6,0: adds crossover frequency and margins. For polynomials, operator,
-    # noise="remnant".
+    # Controlled element, such as 90/(s(s+6)) or 90/1,6,0 (NUM/DEN in descending powers of s):
+    # adds crossover frequency and margins. For polynomials, operator, noise="remnant".
     controlled_element: str | tuple[Sequence[float], Sequence[float]] | None
 
-    # Quantities that the verdict covers: response, crossover, phase_margin or parameters, such
-    # as crossover,tau_e.
+    # Quantities in the verdict: response,crossover,phase_margin or parameters, such as tau_e.
     answers: Sequence[str] | None
 
-    # Order m of the remnant, a number or a range to search. For noise="remnant".
+    # Order m of the remnant, or a range to search. For noise="remnant".
     remnant_order: int | tuple[int, int] | range | None
 
     # Parameters fixed at a value, such as d1=-0.85,f1=-1.9. For noise="remnant",
@@ -283,11 +280,11 @@ class BatchSettings(TypedDict, total=False):
     # Purpose of the model: one-step prediction, or simulation from the input alone. For pem.
     focus: Literal["prediction", "simulation"] | None
 
-    # Start of the search, all coefficients, such as f1=-1.9,f2=.92,b0=.04,.... For pem.
+    # Start of the search: all coefficients, such as f1=-1.9,f2=.92,b0=.04,.... For pem.
     start: Mapping[str, float] | None
 
-    # Prior values of coefficients with a weight W, such as f1=-1.9:0.5, which adds W (f1 +
-    # 1.9)^2 to the loss. For pem.
+    # Prior values and weights of coefficients: f1=-1.9:0.5 adds 0.5 (f1 + 1.9)^2 to the loss.
+    # For pem.
     coefficient_prior: Mapping[str, tuple[float, float]] | None
 
     # Huber loss instead of squares: linear beyond X standard deviations; 1.345 if X is not
@@ -328,14 +325,14 @@ SETTINGS = """covariance : float
             Limit on innovations, in standard deviations. For rls, rpem, physical,
             multiple-model, adaptive, fused.
         windup_guard : float | Literal['off']
-            How far each variance in P may grow where nothing excites its parameter, as a
-            multiple of its initial value; off: no limit. For rls, rpem, physical.
+            Limit on the growth of each variance in P while its parameter is not excited,
+            relative to the initial value; off: no limit. For rls, rpem, physical.
         memory_of : Mapping[str, float | str]
             Memory of individual parameters, or of all parameters with one letter, such as
             b0=256,f=inf,K_e=5s. For rls, rpem, physical, rriv, fused.
         memory : float | str
-            Memory of all parameters, in which the weight of a sample falls to 1/e: samples
-            (256), seconds (2.56s) or inf. For rls, rpem, physical, rriv, fused.
+            Memory of all parameters, after which the weight of a sample is 1/e: samples (256),
+            seconds (2.56s) or inf. For rls, rpem, physical, rriv, fused.
         forgetting_factor : float
             Forgetting factor instead of a memory: lambda = 1 - 1/N for a memory of N samples.
             For rls, rpem, physical, rriv, fused.
@@ -343,14 +340,13 @@ SETTINGS = """covariance : float
             Type of forgetting; window, variable and directional use the shortest memory. For
             rls, rpem, physical.
         drift : Mapping[str, float]
-            For forgetting by a random walk: drift of a parameter in one second (standard
-            deviation), such as K_e=.01,K_e_dot=.01. For rls, rpem, physical.
+            For random-walk: drift of a parameter in one second (standard deviation), such as
+            K_e=.01,K_e_dot=.01. For rls, rpem, physical.
         rate : float
             For gradient: step size. For rls, rpem, physical.
         guard : Literal['yes', 'no']
-            Guard: outliers of e and u are held back, spans that no tracking produces are
-            excluded, and the estimate restarts after them. For rls, rpem, physical,
-            multiple-model, adaptive.
+            Guard: hold back outliers of e and u, exclude spans that no tracking produces, and
+            restart the estimate after them. For rls, rpem, physical, multiple-model, adaptive.
         regressor : Literal['gradient', 'cascade', 'pseudo-linear']
             Signals of psi: gradient (D/(C F) as one filter), cascade (1/F before D/C; for
             comparison), or pseudo-linear (without filters: extended least squares). For rpem.
@@ -358,8 +354,8 @@ SETTINGS = """covariance : float
             Polynomials kept stable: predictor (C and F), or noise (D too). For rpem, physical,
             fused.
         track_delay : tuple[float, float]
-            Also track the delay tau_e within this range: as a parameter (physical) or in whole
-            samples (rpem, multiple-model). For rpem, physical, multiple-model.
+            Range in which tau_e is also tracked (physical: as a parameter; rpem,
+            multiple-model: in whole samples). For rpem, physical, multiple-model.
         bound : Mapping[str, tuple[float | None, float | None]]
             Bounds of physical parameters, such as omega_nm=5..30,zeta_nm=0.1..2; either end may
             be omitted. For physical, multiple-model, ekf, ukf, dual-ekf.
@@ -368,22 +364,22 @@ SETTINGS = """covariance : float
         refit : int
             Samples between fits. For window.
         instruments : str
-            Channel from outside the loop, from which the instruments are made. For rriv.
+            Channel from outside the loop that provides the instruments. For rriv.
         alarm : float
             Log odds at which a change is declared. For multiple-model.
         smooth : bool
-            Smooth a recorded run: estimate each sample from the whole run, with hypotheses run
-            from both ends, not from the past alone. For multiple-model.
+            Smooth a recorded run: use the whole run for each estimate, not only the past
+            (hypotheses run from both ends). For multiple-model.
         false_alarms : float
-            Accepted false alarms per hour: a lower number detects fewer changes, and later. For
-            adaptive.
+            Accepted false alarms per hour (a lower number detects fewer changes, and later).
+            For adaptive.
         replay : float
-            Length of the record that is read repeatedly; 0 for a recursion that reads each
-            sample once, as on a microcontroller. For adaptive.
+            Length of the record that is read repeatedly (0: each sample is read once, as on a
+            microcontroller). For adaptive.
         prior : str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit
-            Prior knowledge of the person: population, none, NAME=CENTRE:SPREAD of omega_nm,
-            zeta_nm, tau_e, T_I (relative spread), or an earlier fit (file of hoid identify
-            --json). For adaptive.
+            Prior knowledge of the person: population, none, NAME=CENTRE:SPREAD for omega_nm,
+            zeta_nm, tau_e, T_I (relative spread), or a file from hoid identify --json. For
+            adaptive.
         gain_drift : float
             Drift of K_e and K_e_dot per root second, relative to their start. For dual-ekf.
         nms_drift : float
@@ -408,26 +404,26 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
             Noise model: autoregression (ar), autoregression and moving average of order nc
             (arma), or remnant of order m (remnant). For operators.
         change : Literal['none', 'sigmoid']
-            Change of the operator: none, or one change of its gains along a sigmoid, for which
-            hoid identify refuses --figure, --validate, --horizon and --report. For operators.
+            Change of the operator: none, or one sigmoid change of its gains (hoid identify then
+            rejects --figure, --validate, --horizon and --report). For operators.
         form : Literal['auto', 'gain', 'lead', 'lead2', 'lag', 'lead-lag', 'lead2-lag', 'quadratic-integral', 'lead-droop', 'derivative', 'derivative-lead']
-            Form of the operator; auto: average over the forms that the data allow, lead for
+            Form of operator; auto: average over the forms that the data allow; lead with
             --change sigmoid. For operator, change="sigmoid".
         neuromuscular : Literal['yes', 'no']
             Include neuromuscular dynamics (omega_nm, zeta_nm). For operator, change="sigmoid".
         prior : str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit
-            Prior knowledge of the person: population (published people), none, a JSON result of
-            another fit, or NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_L, T_I, such as
+            Prior knowledge of the person: population (published data), none, a JSON result of
+            another fit, or NAME=CENTRE:SPREAD for omega_nm, zeta_nm, tau_e, T_L, T_I, such as
             omega_nm=10.5:0.3 (relative spread). For operator, change="sigmoid".
         delay : float | tuple[float, float]
-            Delay tau_e, or a range to search; for polynomials it replaces nk = tau_e/Ts + 1.
+            Delay tau_e (for polynomials instead of nk = tau_e/Ts + 1) or a range to search.
         intersample : Literal['auto', 'zoh', 'foh']
             Behaviour of e between samples: held (zoh), linear (foh: e was logged from a faster
-            or continuous signal; tau_e is half a sample longer), or smooth with the delay for a
-            held e, unless noise-free data show zoh or foh (auto). For operator.
+            or continuous signal; tau_e is half a sample longer), or (auto) zoh or foh if
+            noise-free data show it, else smooth with the delay for a held e. For operator.
         run_to_run : float
-            Run-to-run variation of a person's gain, relative to the gain; included in the error
-            bars for fewer than five records. For operator.
+            Relative run-to-run variation of a person's gain; added to the error bars if there
+            are fewer than five records. For operator.
         role : Sequence[str]
             Role of each input other than the error: r=feedforward (displayed target;
             r=feedforward:0.5 with 0.5 s of preview), motion, output; /FORM restricts the
@@ -446,19 +442,19 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
         tolerance : float
             Relative decrease of the loss for convergence.
         excitation : str
-            Column of the recorded disturbance or target, for the fit at its lines; none: no
-            such fit. For operator.
+            Column of the recorded disturbance or target for the fit at its lines; none: no fit
+            at lines. For operator.
         period : float
             Period of the excitation. For operator.
         controlled_element : str | tuple[Sequence[float], Sequence[float]]
-            Controlled element in s, such as 90/(s(s+6)), or NUM/DEN in descending powers of s,
-            such as 90/1,6,0: adds crossover frequency and margins. For polynomials, operator,
+            Controlled element, such as 90/(s(s+6)) or 90/1,6,0 (NUM/DEN in descending powers of
+            s): adds crossover frequency and margins. For polynomials, operator,
             noise="remnant".
         answers : Sequence[str]
-            Quantities that the verdict covers: response, crossover, phase_margin or parameters,
-            such as crossover,tau_e.
+            Quantities in the verdict: response,crossover,phase_margin or parameters, such as
+            tau_e.
         remnant_order : int | tuple[int, int] | range
-            Order m of the remnant, a number or a range to search. For noise="remnant".
+            Order m of the remnant, or a range to search. For noise="remnant".
         fix : Mapping[str, float]
             Parameters fixed at a value, such as d1=-0.85,f1=-1.9. For noise="remnant",
             change="sigmoid", pem.
@@ -474,10 +470,10 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
             Purpose of the model: one-step prediction, or simulation from the input alone. For
             pem.
         start : Mapping[str, float]
-            Start of the search, all coefficients, such as f1=-1.9,f2=.92,b0=.04,.... For pem.
+            Start of the search: all coefficients, such as f1=-1.9,f2=.92,b0=.04,.... For pem.
         coefficient_prior : Mapping[str, tuple[float, float]]
-            Prior values of coefficients with a weight W, such as f1=-1.9:0.5, which adds W (f1
-            + 1.9)^2 to the loss. For pem.
+            Prior values and weights of coefficients: f1=-1.9:0.5 adds 0.5 (f1 + 1.9)^2 to the
+            loss. For pem.
         robust : float | bool
             Huber loss instead of squares: linear beyond X standard deviations; 1.345 if X is
             not given. For pem.
