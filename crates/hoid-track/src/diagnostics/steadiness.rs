@@ -1,23 +1,31 @@
 //! Tests whether the response is constant where the trace reports no change, and whether e responds to u.
 //!
 //! The gains of the basis and the delay are fitted to each stretch between two declared changes and are tested for
-//! steps, drifts and slow oscillations ([`hoid_ident::diagnostics::unsteady`]).
+//! steps, drifts and slow oscillations, and all stretches together for a drift that they share: the method may declare
+//! a change somewhere within a long drift ([`hoid_ident::diagnostics::unsteady`]).
 
 use std::ops::Range;
 
-use hoid_ident::diagnostics::{Course, LoopResponse, Unsteady, answer, unsteady};
+use hoid_core::adaptive::{GAINS, STATES};
+use hoid_ident::diagnostics::{Course, LoopResponse, ResponseBasis, Unsteady, answer, unsteady};
 use hoid_model::{Finding, Record};
 
 use super::structure::columns;
 use crate::trace::Trace;
 
 /// p-values below which the response is considered to vary within a stretch: by a step, a drift or an oscillation. The
-/// p-values count all instants of a step, and all frequencies and phases of an oscillation, as independent although
-/// neighbouring ones are correlated; among people who do not change, fewer than one in a hundred are below these
-/// limits.
-const UNLIKELY_STEP: f64 = 0.02;
-const UNLIKELY_DRIFT: f64 = 0.01;
-const UNLIKELY_SWAY: f64 = 0.05;
+/// p-values count all frequencies and phases of an oscillation as independent, and take the larger of two variances for
+/// a step: of people who do not change, 1 to 3 % are below the limit for a step or an oscillation, and 1 to 2 % below
+/// that for a drift.
+const UNLIKELY_STEP: f64 = 0.1;
+const UNLIKELY_DRIFT: f64 = 0.015;
+const UNLIKELY_SWAY: f64 = 0.08;
+/// Lag of a second basis, s, for people with a long lag, whose response is that of an integrator. The basis that
+/// explains u better is used.
+const LONG_LAG_S: f64 = 10.0;
+/// Time excluded at the start of the record and after a faulty span, s: the fast modes of the basis start at rest. The
+/// transient of its lag is estimated.
+const SETTLING_S: f64 = 3.0;
 /// Smallest share of the innovations of e (the part of e that older e and u do not explain) that the latest u explains
 /// if e responds to u. The share is above one half in closed loops, and below 0.03 if e and u are from two runs with
 /// the same forcing function.
@@ -25,12 +33,29 @@ const NO_ANSWER: f64 = 0.05;
 /// Time before and after a declared change that is excluded from the stretches, s.
 const EXCLUDED_S: f64 = 5.0;
 
+/// Signals and terms of a basis.
+struct Spanned {
+    columns: Vec<Vec<f64>>,
+    terms: Vec<Vec<f64>>,
+    lag_s: f64,
+}
+
+impl Spanned {
+    fn basis(&self) -> ResponseBasis<'_> {
+        ResponseBasis {
+            columns: &self.columns,
+            terms: &self.terms,
+            lag_s: self.lag_s,
+        }
+    }
+}
+
 impl Trace {
     /// Returns the stretches without a declared change, as ranges of samples of the record.
     fn stretches(&self, record: &Record) -> Vec<Range<usize>> {
         let ts = self.sample_time().s();
         let sample = |t: f64| ((t - record.time_s(0)) / ts).round().clamp(0.0, record.len() as f64) as usize;
-        let mut from = sample(self.settled_s(record));
+        let mut from = sample(self.settled_s(record, SETTLING_S));
         let mut all = Vec::new();
         let mut times: Vec<f64> = self
             .changes()
@@ -50,22 +75,28 @@ impl Trace {
     /// Returns the test results of all stretches, the most significant first; the p-values account for the number of
     /// stretches.
     pub(super) fn unsteady(&self, record: &Record) -> Vec<Unsteady> {
-        let Some((_, signals)) = self.signals(record) else {
-            return Vec::new();
-        };
-        let signals = columns(&signals);
-        let stretches = self.stretches(record);
-        let ts = self.sample_time().s();
-        let mut all: Vec<Unsteady> = stretches
-            .iter()
-            .flat_map(|stretch| unsteady(&signals, record.output(), stretch.clone(), ts))
-            .map(|found| Unsteady {
-                p_value: (found.p_value * stretches.len() as f64).min(1.0),
-                ..found
-            })
+        let spanned: Vec<Spanned> = [self.lag_s(), LONG_LAG_S]
+            .into_iter()
+            .filter_map(|lag_s| self.spanned(record, lag_s))
             .collect();
+        let bases: Vec<ResponseBasis<'_>> = spanned.iter().map(Spanned::basis).collect();
+        let mut all = unsteady(&bases, record.output(), &self.stretches(record), self.sample_time().s());
         all.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
         all
+    }
+
+    fn spanned(&self, record: &Record, lag_s: f64) -> Option<Spanned> {
+        let (basis, signals) = self.signals(record, lag_s)?;
+        let term = |i: usize| {
+            let mut gains = [0.0; STATES];
+            gains[i] = 1.0;
+            basis.weights(&gains).to_vec()
+        };
+        Some(Spanned {
+            columns: columns(&signals),
+            terms: (0..GAINS).map(term).collect(),
+            lag_s,
+        })
     }
 
     /// Finding that the response varies in a way that the trace does not report. The test is limited to methods with a

@@ -45,11 +45,12 @@ impl Trace {
         let ts = self.sample_time().s();
         let end = self.times_s().last()? + ts;
         let changed = self.changes().last().map(|(t, change)| t - change.seconds_ago);
-        let from = (self.settled_s(record))
+        let from = self
+            .settled_s(record, SETTLING_S)
             .max(changed.unwrap_or(f64::MIN))
             .max(end - LONGEST_S);
         let first = ((from - record.time_s(0)) / ts).round().max(0.0) as usize;
-        let (basis, signals) = self.signals(record)?;
+        let (basis, signals) = self.signals(record, self.lag_s())?;
         let mut columns = columns(&signals);
         columns.push(slower(&columns[0], basis.point().lag, ts));
         let of = |columns: &[Vec<f64>]| residual_response(columns, record.input(), record.output(), first, ts);
@@ -63,21 +64,27 @@ impl Trace {
 
     /// Returns the time from which the filters of the basis have settled, s: a settling time after the start of the
     /// record or after the last faulty span that is neither an outlier nor a step.
-    pub(super) fn settled_s(&self, record: &Record) -> f64 {
+    pub(super) fn settled_s(&self, record: &Record, settling_s: f64) -> f64 {
         let outliers = [GuardKind::Outlier, GuardKind::Step];
         let hostile = self.faults().iter().filter(|fault| !outliers.contains(&fault.kind));
-        hostile.fold(record.time_s(0), |last, fault| last.max(fault.to_s)) + SETTLING_S
+        hostile.fold(record.time_s(0), |last, fault| last.max(fault.to_s)) + settling_s
     }
 
-    /// Returns the basis of the operator of the last row, and the signals of the basis at each sample of the record.
-    pub(super) fn signals(&self, record: &Record) -> Option<(Basis, Vec<Signals>)> {
+    /// Returns the lag of the basis of the method, s.
+    pub(super) fn lag_s(&self) -> f64 {
+        self.options().method.lag_of_basis_s().unwrap_or(LAG_S)
+    }
+
+    /// Returns the basis of the operator of the last row with this lag, and the signals of the basis at each sample of
+    /// the record.
+    pub(super) fn signals(&self, record: &Record, lag_s: f64) -> Option<(Basis, Vec<Signals>)> {
         let operator = self.operator(self.len().checked_sub(1)?).ok()?;
         let ts = record.sample_time().s();
         let point = Point {
             tau: operator.tau_e_s.value + 0.5 * ts,
             omega: operator.omega_nm_rad_s.value,
             zeta: operator.zeta_nm.value,
-            lag: self.options().method.lag_of_basis_s().unwrap_or(LAG_S),
+            lag: lag_s,
         };
         let mut basis = Basis::new(point, ts)?;
         let (e, delay) = (record.input(), basis.delay());

@@ -142,11 +142,11 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
         let typical = upper_median(&mut ratios).unwrap_or(1.0);
         let smallest = all.iter().map(|t| t.share.min(1.0 - t.share)).fold(0.5, f64::min);
         for t in &all {
-            // A drift or a periodic change affects all blocks; the variance for such a change uses the median scatter
-            // over all candidates.
+            // A periodic change affects all blocks alike; the variance for such a change uses the median scatter over all
+            // candidates.
             let (scatter, freedom) = match sets[t.set].course {
-                Course::Step => (t.by_blocks, n - 2),
-                _ => (0.0, 4 * (n - 2)),
+                Course::Step | Course::Drift => (t.by_blocks, n - 2),
+                Course::Sway(_) => (0.0, 4 * (n - 2)),
             };
             let variance = scatter.max(t.by_model * typical.max(1.0)) + t.between_runs;
             let p_one = of_student(t.u / variance.sqrt(), freedom as f64);

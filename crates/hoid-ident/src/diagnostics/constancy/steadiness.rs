@@ -10,11 +10,14 @@
 
 use std::ops::Range;
 
+use nalgebra::DMatrix;
+
 use super::{
     blocks::{BLOCK_S, ScoreBlock},
+    critical::of_student,
     search::{Change, Constancy, Course, Direction, drifts, periodic_changes, sets, strongest_among},
 };
-use crate::diagnostics::whitened::{LIMIT, NOISE, Whitened, thinning};
+use crate::diagnostics::whitened::{LIMIT, NOISE, Whitened, solution, thinning};
 
 /// Minimum number of 2 s blocks for the test.
 const FEWEST: usize = 8;
@@ -36,70 +39,191 @@ pub struct Unsteady {
     pub p_value: f64,
 }
 
-/// Returns the most significant jump, drift and periodic change of a response over `samples`. The `columns` span the
-/// response; each column is the derivative of the previous column. Empty if there are too few data or a value is not a
-/// number.
-pub fn unsteady(columns: &[Vec<f64>], u: &[f64], samples: Range<usize>, sample_time_s: f64) -> Vec<Unsteady> {
-    found(columns, u, samples, sample_time_s).unwrap_or_default()
+/// A response to the error, as signals and as the terms of its numerator.
+#[derive(Debug, Clone, Copy)]
+pub struct ResponseBasis<'a> {
+    /// Signals z_1, z_2, .. that span the response and its corrections; each is the derivative of the one before.
+    pub columns: &'a [Vec<f64>],
+    /// Terms of the numerator, each as its coefficients at the signals. The last signal is in no term: it is the
+    /// derivative of one.
+    pub terms: &'a [Vec<f64>],
+    /// Time constant of the slowest mode, s. Its response to what was before a stretch is estimated with the stretch.
+    pub lag_s: f64,
 }
 
-fn found(columns: &[Vec<f64>], u: &[f64], samples: Range<usize>, sample_time_s: f64) -> Option<Vec<Unsteady>> {
-    let thin = thinning(sample_time_s);
-    let rows: Vec<usize> = samples.step_by(thin).collect();
-    let block = (BLOCK_S / (thin as f64 * sample_time_s)).round().max(1.0) as usize;
-    let count = rows.len().saturating_sub(NOISE) / block;
-    if count < FEWEST || rows.last()? >= &u.len() || columns.iter().any(|c| c.len() != u.len()) {
-        return None;
-    }
-    let fit = Whitened::of(columns, u, &rows, LIMIT)?;
-    let (p, last) = (columns.len() + 1, columns.len() - 1);
-    let blocks: Vec<ScoreBlock> = (0..count)
-        .map(|k| {
-            let (from, length) = (k * block, block);
-            let x = fit.x.rows(from, length);
-            let eps = fit.eps.rows(from, length);
-            ScoreBlock {
-                record: 0,
-                from: rows[from + NOISE],
-                score: (x.transpose() * eps).iter().copied().collect(),
-                information: (x.transpose() * x).iter().copied().collect(),
+/// Returns the most significant jump, drift and periodic change of a response in each of these stretches, and the most
+/// significant drift that all stretches have in common. Among several bases, the one that explains u best is used in
+/// each stretch. Stretches with too few data, or in which a value is not a number, are left out.
+pub fn unsteady(
+    bases: &[ResponseBasis<'_>],
+    u: &[f64],
+    stretches: &[Range<usize>],
+    sample_time_s: f64,
+) -> Vec<Unsteady> {
+    let all: Vec<TestedStretch> = stretches
+        .iter()
+        .filter_map(|stretch| {
+            let fits = bases
+                .iter()
+                .filter_map(|basis| ScoredStretch::of(basis, u, stretch, sample_time_s));
+            let best = fits.min_by(|a, b| a.residual.total_cmp(&b.residual))?;
+            Some(best.tested(sample_time_s))
+        })
+        .collect();
+    let several = if all.len() > 1 { all.len() as f64 } else { 1.0 };
+    let common = common_drift(&all);
+    let each = all.iter().flat_map(|stretch| &stretch.strongest);
+    each.map(|found| Unsteady {
+        p_value: (found.p_value * several).min(1.0),
+        ..*found
+    })
+    .chain(common)
+    .collect()
+}
+
+/// The whitened fit of a stretch, by blocks.
+struct ScoredStretch {
+    blocks: Vec<ScoreBlock>,
+    directions: [Direction; 2],
+    variance: f64,
+    /// Sum of squared residuals.
+    residual: f64,
+}
+
+/// What the tests found in a stretch.
+struct TestedStretch {
+    strongest: Vec<Unsteady>,
+    /// Drift of the gain and of the delay over the stretch, and the length of the stretch in blocks.
+    drifts: [Option<Change>; 2],
+    blocks: usize,
+}
+
+impl ScoredStretch {
+    fn of(basis: &ResponseBasis<'_>, u: &[f64], stretch: &Range<usize>, sample_time_s: f64) -> Option<Self> {
+        let thin = thinning(sample_time_s);
+        let rows: Vec<usize> = stretch.clone().step_by(thin).collect();
+        let block = (BLOCK_S / (thin as f64 * sample_time_s)).round().max(1.0) as usize;
+        let count = rows.len().saturating_sub(NOISE) / block;
+        if count < FEWEST || rows.last()? >= &u.len() || basis.columns.iter().any(|c| c.len() != u.len()) {
+            return None;
+        }
+        let start = *rows.first()?;
+        let ago = |k: usize| k.saturating_sub(start) as f64 * sample_time_s;
+        let transient: Vec<f64> = (0..u.len()).map(|k| (-ago(k) / basis.lag_s).exp()).collect();
+        let mut columns = basis.columns.to_vec();
+        columns.push(transient);
+        let fit = Whitened::of(&columns, u, &rows, LIMIT)?;
+        let p = columns.len() + 1;
+        // Gains of the numerator: the estimates of the coefficients of all signals would be too uncertain for a
+        // direction.
+        let terms = DMatrix::from_fn(columns.len() + 1, basis.terms.len() + 2, |i, j| {
+            match basis.terms.get(j) {
+                Some(term) => term.get(i).copied().unwrap_or(0.0),
+                None => f64::from(u8::from(i == basis.columns.len() + j - basis.terms.len())),
             }
+        });
+        let whitened_u = &fit.x * &fit.b + &fit.eps;
+        let gains = solution(&(&fit.x * &terms), &whitened_u)?;
+        let kept = terms.columns(0, basis.terms.len()) * gains.rows(0, basis.terms.len());
+        let gain: Vec<f64> = kept.iter().copied().collect();
+        let delay = (0..p)
+            .map(|j| {
+                if j > 0 && j < basis.columns.len() {
+                    -gain[j - 1]
+                } else {
+                    0.0
+                }
+            })
+            .collect();
+        let direction = |name: &str, vector: Vec<f64>| Direction {
+            name: name.to_owned(),
+            unit: "",
+            vector,
+            delay: name == NAMES[1],
+            size: 0.0,
+        };
+        let blocks = (0..count)
+            .map(|k| {
+                let (from, length) = (k * block, block);
+                let x = fit.x.rows(from, length);
+                let eps = fit.eps.rows(from, length);
+                ScoreBlock {
+                    record: 0,
+                    from: rows[from + NOISE],
+                    score: (x.transpose() * eps).iter().copied().collect(),
+                    information: (x.transpose() * x).iter().copied().collect(),
+                }
+            })
+            .collect();
+        Some(Self {
+            blocks,
+            directions: [direction(NAMES[0], gain), direction(NAMES[1], delay)],
+            variance: fit.eps.norm_squared() / (fit.eps.len() - p - NOISE) as f64,
+            residual: fit.eps.norm_squared(),
         })
-        .collect();
-    // The level is not part of the response, and the derivative of the last column is not available.
-    let gain = (0..p).map(|j| if j <= last { fit.b[j] } else { 0.0 }).collect();
-    let delay = (0..p)
-        .map(|j| if j > 0 && j <= last { -fit.b[j - 1] } else { 0.0 })
-        .collect();
-    let direction = |name: &str, vector: Vec<f64>| Direction {
-        name: name.to_owned(),
-        unit: "",
-        vector,
-        delay: name == NAMES[1],
-        size: 0.0,
-    };
-    let directions = [direction(NAMES[0], gain), direction(NAMES[1], delay)];
-    let of = Constancy {
-        blocks: &blocks,
-        directions: &directions,
-        variance: fit.eps.norm_squared() / (fit.eps.len() - p - NOISE) as f64,
-        run_to_run: 0.0,
-        sample_time_s,
-    };
-    let all: Vec<&Direction> = directions.iter().collect();
-    let courses = [sets(&blocks), drifts(&blocks), periodic_changes(&blocks, BLOCK_S)];
-    let told = |change: Change| {
-        let name = NAMES.into_iter().find(|name| *name == change.name)?;
-        Some(Unsteady {
-            course: change.course,
-            name,
-            at: change.at,
-            by: [change.by, change.error],
-            p_value: change.p_value,
+    }
+
+    fn tested(&self, sample_time_s: f64) -> TestedStretch {
+        let of = Constancy {
+            blocks: &self.blocks,
+            directions: &self.directions,
+            variance: self.variance,
+            run_to_run: 0.0,
+            sample_time_s,
+        };
+        let all: Vec<&Direction> = self.directions.iter().collect();
+        let courses = [
+            sets(&self.blocks),
+            drifts(&self.blocks),
+            periodic_changes(&self.blocks, BLOCK_S),
+        ];
+        let drift = |direction: &Direction| strongest_among(&of, &[direction], &courses[1]);
+        TestedStretch {
+            strongest: courses
+                .iter()
+                .filter_map(|sets| strongest_among(&of, &all, sets))
+                .filter_map(|change| {
+                    Some(Unsteady {
+                        course: change.course,
+                        name: NAMES.into_iter().find(|name| *name == change.name)?,
+                        at: change.at,
+                        by: [change.by, change.error],
+                        p_value: change.p_value,
+                    })
+                })
+                .collect(),
+            drifts: self.directions.each_ref().map(drift),
+            blocks: self.blocks.len(),
+        }
+    }
+}
+
+/// Returns the more significant drift of the two that several stretches have in common: the mean rate of the stretches,
+/// weighted by their precision, as a change over all of them. Each stretch has its own response, so that what changes
+/// between two stretches is not part of it.
+fn common_drift(all: &[TestedStretch]) -> Option<Unsteady> {
+    let blocks: usize = all.iter().map(|stretch| stretch.blocks).sum();
+    let of = |i: usize| {
+        let (mut information, mut weighted) = (0.0, 0.0);
+        for stretch in all {
+            let Some(drift) = &stretch.drifts[i] else { continue };
+            let (rate, error) = (drift.by / stretch.blocks as f64, drift.error / stretch.blocks as f64);
+            information += error.powi(-2);
+            weighted += rate * error.powi(-2);
+        }
+        let z = weighted / information.sqrt();
+        (information > 0.0).then(|| Unsteady {
+            course: Course::Drift,
+            name: NAMES[i],
+            at: 0,
+            by: [weighted / information, information.sqrt().recip()].map(|rate| rate * blocks as f64),
+            p_value: (of_student(z, (blocks - 2 * all.len()) as f64) * NAMES.len() as f64).min(1.0),
         })
     };
-    let strongest = courses.iter().filter_map(|sets| strongest_among(&of, &all, sets));
-    Some(strongest.filter_map(told).collect())
+    let several = all.len() > 1;
+    (0..NAMES.len())
+        .filter_map(|i| of(i).filter(|_| several))
+        .min_by(|a, b| a.p_value.total_cmp(&b.p_value))
 }
 
 const NAMES: [&str; 2] = ["gain", "delay"];
@@ -112,6 +236,16 @@ mod tests {
     use crate::diagnostics::whitened::stream;
 
     const TS: f64 = 0.02;
+
+    /// Tests with a response in which each signal is a term of the numerator but the last.
+    fn tested(columns: &[Vec<f64>], u: &[f64], samples: Range<usize>) -> Vec<Unsteady> {
+        let basis = ResponseBasis {
+            columns,
+            terms: &[vec![1.0, 0.0], vec![0.0, 1.0]],
+            lag_s: 1.0,
+        };
+        unsteady(&[basis], u, &[samples], TS)
+    }
 
     /// Faults found for this course of the gain of u, in 80 s.
     fn of(seed: u64, gain: impl Fn(f64) -> f64) -> Vec<Unsteady> {
@@ -126,7 +260,7 @@ mod tests {
             z[1][t] = w;
             u[t] = gain(t as f64 * TS) * (3.0 * z[0][t] + z[1][t]) + 0.5 * v;
         }
-        unsteady(&z, &u, 0..n, TS)
+        tested(&z, &u, 0..n)
     }
 
     fn p_value(found: &[Unsteady], is: impl Fn(Course) -> bool) -> f64 {
@@ -168,7 +302,7 @@ mod tests {
     #[test]
     fn too_little_says_nothing() {
         let columns = [vec![0.0; 4000], vec![0.0; 4000]];
-        assert!(unsteady(&columns, &vec![1.0; 4000], 0..4000, TS).is_empty());
-        assert!(unsteady(&columns, &vec![1.0; 4000], 0..500, TS).is_empty());
+        assert!(tested(&columns, &vec![1.0; 4000], 0..4000).is_empty());
+        assert!(tested(&columns, &vec![1.0; 4000], 0..500).is_empty());
     }
 }
