@@ -232,7 +232,11 @@ fn what_cannot_be_described_is_said() {
         (&["good.csv", "--excitation", "r"], 1, "r"),
         (&["flat.csv"], 1, "u"),
         (&["long.csv"], 1, "whole periods"),
-        (&["long.csv", "--period", "20"], 1, "use 40 s, the longest span of whole periods: 2 periods from 0 s to 40 s"),
+        (
+            &["long.csv", "--period", "20"],
+            1,
+            "use 40 s, the longest span of whole periods: 2 periods from 0 s to 40 s",
+        ),
         (&["good.csv", "--lines", "1.0"], 2, "--period"),
         (
             &["good.csv", "--lines", "1.0", "--period", "20"],

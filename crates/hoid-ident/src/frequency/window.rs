@@ -132,7 +132,10 @@ mod tests {
         // 10/3 s are 333.3 samples: three periods are the whole record.
         assert_eq!(Window::of_span(&r, None, None, 10.0 / 3.0).unwrap().periods, 3);
         let message = Window::of_span(&r, None, None, 3.0).unwrap_err().to_string();
-        assert!(message.contains("use 9 s, the longest span of whole periods: 3 periods from -1 s to 8 s"), "{message}");
+        assert!(
+            message.contains("use 9 s, the longest span of whole periods: 3 periods from -1 s to 8 s"),
+            "{message}"
+        );
         let message = Window::of_span(&r, None, None, 20.0).unwrap_err().to_string();
         assert!(message.contains("at least 20 s"), "{message}");
         assert!(Window::of_span(&r, Some(50.0), None, 2.0).is_err());

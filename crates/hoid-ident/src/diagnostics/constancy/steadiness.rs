@@ -2,7 +2,8 @@
 //!
 //! The response is `u = sum b_i z_i + v` with columns `z_{i+1} = dz_i/dt`. A change of the gain has the direction b; a
 //! change of the delay has the direction `-db/dt`, i.e. `-b_i` at `z_{i+1}`. To first order, an increase of the lead is
-//! equivalent to a decrease of the delay by the same amount.
+//! equivalent to a decrease of the delay by the same amount. The columns are nearly collinear, so that the b_i are too
+//! uncertain for a direction: for the directions, b is a combination of a few terms of a numerator.
 //!
 //! The scores come from least squares with known columns ([`crate::diagnostics::whitened`]); the test is the same as
 //! for fits. For a drift the regressor is multiplied by `t/T - 1/2`, for a periodic change by a sine with one of
@@ -44,10 +45,10 @@ pub struct Unsteady {
 pub struct ResponseBasis<'a> {
     /// Signals z_1, z_2, .. that span the response and its corrections; each is the derivative of the one before.
     pub columns: &'a [Vec<f64>],
-    /// Terms of the numerator, each as its coefficients at the signals. The last signal is in no term: it is the
-    /// derivative of one.
+    /// Terms of the numerator, each as its coefficients of the signals. A change of the delay has the derivative of the
+    /// response as its direction, without that of the last signal, which is not available.
     pub terms: &'a [Vec<f64>],
-    /// Time constant of the slowest mode, s. Its response to what was before a stretch is estimated with the stretch.
+    /// Time constant of the slowest mode, s. The transient of this mode at the start of a stretch is estimated.
     pub lag_s: f64,
 }
 
@@ -230,37 +231,43 @@ const NAMES: [&str; 2] = ["gain", "delay"];
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::TAU;
+    use std::{f64::consts::TAU, sync::LazyLock};
 
     use super::*;
     use crate::diagnostics::whitened::stream;
 
     const TS: f64 = 0.02;
+    const N: usize = 4000;
+    static TERMS: LazyLock<Vec<Vec<f64>>> = LazyLock::new(|| vec![vec![1.0, 0.0], vec![0.0, 1.0]]);
 
-    /// Tests with a response in which each signal is a term of the numerator but the last.
-    fn tested(columns: &[Vec<f64>], u: &[f64], samples: Range<usize>) -> Vec<Unsteady> {
-        let basis = ResponseBasis {
+    /// The basis of a response `b_1 z_1 + b_2 z_2`.
+    fn basis(columns: &[Vec<f64>]) -> ResponseBasis<'_> {
+        ResponseBasis {
             columns,
-            terms: &[vec![1.0, 0.0], vec![0.0, 1.0]],
+            terms: &TERMS,
             lag_s: 1.0,
-        };
-        unsteady(&[basis], u, &[samples], TS)
+        }
     }
 
-    /// Faults found for this course of the gain of u, in 80 s.
-    fn of(seed: u64, gain: impl Fn(f64) -> f64) -> Vec<Unsteady> {
+    /// Signals z_1 and z_2, and u for this course of its gain, in 80 s.
+    fn run(seed: u64, gain: impl Fn(f64) -> f64) -> ([Vec<f64>; 2], Vec<f64>) {
         let mut seed = seed;
-        let n = 4000;
-        let (mut z, mut u) = ([vec![0.0; n], vec![0.0; n]], vec![0.0; n]);
+        let (mut z, mut u) = ([vec![0.0; N], vec![0.0; N]], vec![0.0; N]);
         let (mut w, mut v) = (0.0, 0.0);
-        for t in 1..n {
+        for t in 1..N {
             w = 0.9 * w + stream(&mut seed);
             v = 0.9 * v + stream(&mut seed);
             z[0][t] = z[0][t - 1] + TS * w;
             z[1][t] = w;
             u[t] = gain(t as f64 * TS) * (3.0 * z[0][t] + z[1][t]) + 0.5 * v;
         }
-        tested(&z, &u, 0..n)
+        (z, u)
+    }
+
+    /// Changes found for this course of the gain of u.
+    fn of(seed: u64, gain: impl Fn(f64) -> f64) -> Vec<Unsteady> {
+        let (z, u) = run(seed, gain);
+        unsteady(&[basis(&z)], &u, &[0..N], TS)
     }
 
     fn p_value(found: &[Unsteady], is: impl Fn(Course) -> bool) -> f64 {
@@ -300,9 +307,49 @@ mod tests {
     }
 
     #[test]
+    fn a_drift_that_stretches_share_is_found_and_a_jump_between_them_is_not() {
+        let halves = [0..N / 2, N / 2..N];
+        let drift = |gain: &dyn Fn(f64) -> f64, seed| {
+            let (z, u) = run(seed, gain);
+            p_value(&unsteady(&[basis(&z)], &u, &halves, TS), |course| {
+                course == Course::Drift
+            })
+        };
+        let (mut shared, mut one) = (0, 0);
+        for seed in 1..21 {
+            // It falls by 15 % in each half, and returns between them.
+            let falls = |t: f64| 1.0 - 0.15 * (t / 40.0).fract();
+            shared += usize::from(drift(&falls, seed) < 1e-3);
+            let (z, u) = run(seed, falls);
+            let first = unsteady(&[basis(&z)], &u, &halves[..1], TS);
+            one += usize::from(p_value(&first, |course| course == Course::Drift) < 1e-3);
+            assert!(drift(&|t| if t < 40.0 { 1.0 } else { 0.6 }, seed) > 1e-3);
+        }
+        assert!(shared >= 15 && one < shared, "{shared} {one}");
+    }
+
+    #[test]
+    fn the_basis_that_explains_u_better_is_used() {
+        let (z, u) = run(7, |t| 1.0 - 0.3 * t / 80.0);
+        let (other, _) = run(8, |_| 1.0);
+        let alone = unsteady(&[basis(&z)], &u, &[0..N], TS);
+        assert_eq!(unsteady(&[basis(&other), basis(&z)], &u, &[0..N], TS), alone);
+        // A transient of the lag from before the stretch changes nothing.
+        let early = |t: usize| 5.0 * (-(t as f64) * TS).exp();
+        let decaying: Vec<f64> = u.iter().enumerate().map(|(t, u)| u + early(t)).collect();
+        let with = unsteady(&[basis(&z)], &decaying, &[0..N], TS);
+        for (with, alone) in with.iter().zip(&alone) {
+            assert!(
+                (with.by[0] - alone.by[0]).abs() < 1e-3 * alone.by[1],
+                "{with:?} {alone:?}"
+            );
+        }
+    }
+
+    #[test]
     fn too_little_says_nothing() {
-        let columns = [vec![0.0; 4000], vec![0.0; 4000]];
-        assert!(tested(&columns, &vec![1.0; 4000], 0..4000).is_empty());
-        assert!(tested(&columns, &vec![1.0; 4000], 0..500).is_empty());
+        let columns = [vec![0.0; N], vec![0.0; N]];
+        assert!(unsteady(&[basis(&columns)], &vec![1.0; N], &[0..N], TS).is_empty());
+        assert!(unsteady(&[basis(&columns)], &vec![1.0; N], &[0..500], TS).is_empty());
     }
 }
