@@ -144,7 +144,7 @@ pub fn roles(further: &[String], text: &str) -> Result<Vec<ChannelRole>, Analysi
     for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
         let named: SeenChannel = part
             .parse()
-            .map_err(|why| options(format!("role: found {part:?}: {why}")))?;
+            .map_err(|why| options(format!("role: found {part:?}; expected {why}")))?;
         let Some(place) = further.iter().position(|name| *name == named.name) else {
             return Err(options(format!(
                 "role: {} is not one of the further inputs {}; name it as an input first",

@@ -28,10 +28,13 @@ fn main() -> ExitCode {
     let bench = Bench::new(beside_this(), directory.path());
     let mut failed = false;
     let only = std::env::args().nth(3);
-    for work in [STUDY, GROUP, TRACK] {
-        if only.as_ref().is_some_and(|name| name != work.name) {
-            continue;
-        }
+    let mut works = vec![STUDY, GROUP, TRACK];
+    works.retain(|work| only.as_ref().is_none_or(|name| name == work.name));
+    if works.is_empty() {
+        println!("no work of this name, expected study, group or track");
+        return ExitCode::FAILURE;
+    }
+    for work in works {
         let Some(outcome) = rounds(&bench, &work, count, &mut draw) else {
             println!("skipped: no disk of its own can be mounted here");
             return ExitCode::SUCCESS;

@@ -25,7 +25,7 @@ use hoid_model::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::{LabError, plant::MOST_STATES};
+use crate::{LabError, course::TaskDefinition, plant::MOST_STATES};
 
 /// Configuration of an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -341,14 +341,19 @@ impl Condition {
     /// # Errors
     /// As [`Condition::course`].
     pub(crate) fn role_of_target(&self) -> Result<Option<String>, LabError> {
-        let [has_target, _] = self.course()?.has_lines();
+        Ok(self.role_of_target_in(&self.course()?))
+    }
+
+    /// Returns [`Self::role_of_target`] for the course of this condition.
+    pub(crate) fn role_of_target_in(&self, course: &TaskDefinition) -> Option<String> {
+        let [has_target, _] = course.has_lines();
         let feedforward = ChannelRole::Feedforward;
         let role = match self.display {
             Display::Compensatory => None,
             Display::Pursuit => Some(feedforward.to_string()),
             Display::Preview => Some(format!("{feedforward}:{}", self.preview_s)),
         };
-        Ok(role.filter(|_| has_target))
+        role.filter(|_| has_target)
     }
 
     /// Checks that the numbers of the condition are valid and that it can be run.

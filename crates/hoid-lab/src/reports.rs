@@ -74,7 +74,10 @@ fn one(program: &Path, config: &Config, stem: &Stem, name: &str) {
     let mut command = hoid(program);
     command.arg(name).arg(stem.file("beh.parquet")).args(["--from", "0"]);
     let begun = crate::session::RunStart::read(stem).ok();
-    let course = begun.as_ref().and_then(|begun| begun.condition.course().ok());
+    let condition = begun.as_ref().map(|begun| &begun.condition);
+    let course = condition.and_then(|condition| condition.course().ok());
+    let role_of_target =
+        (condition.zip(course.as_ref())).and_then(|(condition, course)| condition.role_of_target_in(course));
     // Margins are defined only for a constant controlled element.
     let element = course
         .filter(|course| course.change_s().is_none())
@@ -89,7 +92,7 @@ fn one(program: &Path, config: &Config, stem: &Stem, name: &str) {
                 .arg(&place);
         }
         "identify" => {
-            if let Some(Ok(Some(role))) = begun.as_ref().map(|begun| begun.condition.role_of_target()) {
+            if let Some(role) = role_of_target {
                 command.args(["--input", "e", "--input", TARGET]);
                 command.arg(format!("--role={TARGET}={role}"));
             }

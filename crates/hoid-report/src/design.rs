@@ -1,7 +1,7 @@
 //! Figures of a designed experiment: the forcing function with the response of the person, and the expected errors as
 //! functions of the number of runs.
 
-use hoid_design::experiment::{DesignedLine, Enters, Expected, ExpectedResponse, ExperimentDesign};
+use hoid_design::experiment::{DesignedLine, Enters, Expected, ExpectedResponse, ExperimentDesign, has_absolute_error};
 use hoid_model::uncertainty::Estimate;
 
 use crate::{
@@ -112,7 +112,7 @@ pub fn runs_figure(design: &ExperimentDesign) -> String {
     for (who, expected, kind) in people {
         let one = of_one(expected);
         for (k, (name, scale)) in shown(design).iter().enumerate() {
-            let Some(error) = one.relative_error(name).filter(|e| e.is_finite()) else {
+            let Some(error) = one.error(name).filter(|e| e.is_finite()) else {
                 continue;
             };
             let label = match who {
@@ -162,18 +162,16 @@ pub fn runs_figure(design: &ExperimentDesign) -> String {
     curves("runs", "expected errors by number of runs", &grid)
 }
 
-/// The quantities of the figure, each with the factor that scales its relative error.
+/// The quantities of the figure, each with the factor that scales its error.
 fn shown(design: &ExperimentDesign) -> Vec<(String, f64)> {
     if !design.wanted.is_empty() {
         return design.wanted.iter().map(|w| (w.name.clone(), 1.0 / w.error)).collect();
     }
-    // A relative error of the phase margin, or of a delay that may be zero, has no meaning.
-    let names = design
-        .expected
-        .names()
-        .into_iter()
-        .filter(|name| !["phase_margin", "tau_f"].contains(name));
-    names.map(|name| (name.to_owned(), 100.0)).collect()
+    let names = design.expected.names().into_iter();
+    names
+        .filter(|name| !has_absolute_error(name))
+        .map(|name| (name.to_owned(), 100.0))
+        .collect()
 }
 
 fn counted(runs: usize) -> String {

@@ -235,7 +235,7 @@ mod tests {
             }
             .run(&task, &[Enters::Target])
             .unwrap();
-            let error = |name: &str| designed.expected.relative_error(name).unwrap();
+            let error = |name: &str| designed.expected.error(name).unwrap();
             assert_eq!(designed.periods, (error(name) / 0.02).powi(2).ceil().max(1.0) as usize);
             [error("crossover"), error("omega_nm")]
         };

@@ -17,6 +17,12 @@ pub struct ExpectedParameter {
     pub estimate: Estimate,
 }
 
+/// Returns true if errors of a quantity are given in its unit: a relative error of the phase margin (deg), or of the
+/// delay to a target, which may be zero (s), has no meaning.
+pub fn has_absolute_error(name: &str) -> bool {
+    matches!(name, "phase_margin" | "tau_f")
+}
+
 /// Expected standard errors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Expected {
@@ -61,14 +67,14 @@ impl Expected {
         }
     }
 
-    /// Returns the standard error of a quantity as accepted errors are given: in deg for `phase_margin`, in s for `tau_f`
-    /// (which may be zero), otherwise relative to its value.
-    pub fn relative_error(&self, name: &str) -> Option<f64> {
+    /// Returns the standard error of a quantity as accepted errors are given: relative to its value, or in its unit if
+    /// [`has_absolute_error`] is true.
+    pub fn error(&self, name: &str) -> Option<f64> {
         let found = self.estimate(name)?;
-        match name {
-            "phase_margin" | "tau_f" => found.standard_error,
-            _ => Some(found.standard_error? / found.value.abs()),
+        if has_absolute_error(name) {
+            return found.standard_error;
         }
+        Some(found.standard_error? / found.value.abs())
     }
 
     /// Returns the names of all quantities.

@@ -43,7 +43,7 @@ pub use difference::{
     ALPHA, BETWEEN_PEOPLE, DifferencePlan, DifferenceRequest, POWER, RUN_TO_RUN, RunsAndPeople, TargetDifference,
 };
 pub use error::DesignError;
-pub use expected::{Expected, ExpectedParameter};
+pub use expected::{Expected, ExpectedParameter, has_absolute_error};
 pub use information::expected;
 pub use lines::crest_factor;
 pub use people::People;

@@ -10,7 +10,7 @@ use super::{
     Against, BETWEEN_PEOPLE, Between, DesignError, DesignedLine, Designing, DifferenceRequest, Enters, Expected,
     ExperimentDesign, Forcing, NamedExpected, People, Remnant, RequestedQuantity, Task,
     chosen::{Chosen, Given, NamedState, left_out},
-    expected, feedforward,
+    expected, feedforward, has_absolute_error,
     information::Loop,
     periods,
 };
@@ -258,10 +258,13 @@ fn worst<'a>(people: &'a [NamedExpected], wanted: &[RequestedQuantity]) -> Optio
     let of = |person: &NamedExpected| -> f64 {
         let e = &person.expected;
         if wanted.is_empty() {
-            let relative = e.parameters.iter().filter_map(|p| e.relative_error(p.name));
+            let names = e.parameters.iter().map(|p| p.name);
+            let relative = names
+                .filter(|name| !has_absolute_error(name))
+                .filter_map(|name| e.error(name));
             return relative.filter(|r| r.is_finite()).map(|r| r * r).sum();
         }
-        let ratios = wanted.iter().filter_map(|w| Some(e.relative_error(&w.name)? / w.error));
+        let ratios = wanted.iter().filter_map(|w| Some(e.error(&w.name)? / w.error));
         ratios.fold(0.0, f64::max)
     };
     people.iter().max_by(|a, b| of(a).total_cmp(&of(b)))
@@ -305,7 +308,7 @@ mod tests {
         assert!(design.people.iter().all(|p| p.runs_needed <= worst.runs_needed));
         assert!(design.runs == design.runs_needed && worst.runs_needed > design.runs);
         // With the accepted errors in so many runs.
-        let error = |name: &str| design.expected.relative_error(name).unwrap();
+        let error = |name: &str| design.expected.error(name).unwrap();
         assert!(error("tau_e") <= 0.03 && error("crossover") <= 0.01);
     }
 

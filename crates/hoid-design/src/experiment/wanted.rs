@@ -59,6 +59,6 @@ impl FromStr for RequestedQuantity {
 pub fn periods(of_one: &Expected, wanted: &[RequestedQuantity]) -> usize {
     let needed = wanted
         .iter()
-        .filter_map(|w| Some((of_one.relative_error(&w.name)? / w.error).powi(2)));
+        .filter_map(|w| Some((of_one.error(&w.name)? / w.error).powi(2)));
     needed.fold(1.0, f64::max).ceil() as usize
 }

@@ -2,7 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
-use hoid_model::{Complex64, FamilyOperator, Form, SampleTime, uncertainty::Estimate};
+use hoid_model::{Complex64, FamilyOperator, Form, SampleTime, UnknownName, uncertainty::Estimate};
 
 use super::{intersample::Intersample, layout::ChannelInLayout, parameter::Parameter};
 use crate::ResponsePoint;
@@ -83,7 +83,8 @@ impl FromStr for SeenChannel {
         if name.trim().is_empty() {
             return Err(expected());
         }
-        let role = role.trim().parse::<ChannelRole>().map_err(|error| error.to_string())?;
+        let one_of = |unknown: UnknownName| format!("a {}: {}", unknown.what, unknown.expected);
+        let role = role.trim().parse::<ChannelRole>().map_err(one_of)?;
         let mut channel = Self::new(name.trim(), role);
         if let Some(shown) = shown {
             let seconds = shown.trim().trim_end_matches('s').parse::<f64>();
@@ -93,7 +94,7 @@ impl FromStr for SeenChannel {
                 .ok_or_else(expected)?;
         }
         if let Some(form) = form {
-            channel.forms = vec![form.trim().parse::<Form>().map_err(|error| error.to_string())?];
+            channel.forms = vec![form.trim().parse::<Form>().map_err(one_of)?];
         }
         Ok(channel)
     }

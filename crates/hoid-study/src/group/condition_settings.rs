@@ -59,7 +59,9 @@ impl ConditionSettings {
     pub(super) fn channels(&self) -> Result<Vec<SeenChannel>, String> {
         let mut all: Vec<SeenChannel> = Vec::with_capacity(self.roles.len());
         for text in &self.roles {
-            let channel: SeenChannel = text.parse().map_err(|why| format!("roles: found {text:?}: {why}"))?;
+            let channel: SeenChannel = text
+                .parse()
+                .map_err(|why| format!("roles: found {text:?}; expected {why}"))?;
             if all.iter().any(|other| other.name == channel.name) {
                 return Err(format!("roles: {} has two roles, expected one", channel.name));
             }
