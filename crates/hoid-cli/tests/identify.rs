@@ -563,3 +563,24 @@ fn the_course_between_samples_moves_the_delay_by_half_a_sample() {
     let (code, words) = bad(d, &[&arguments[..], &["--intersample", "cubic"]].concat());
     assert!(code == 2 && words.contains("zoh"), "{words}");
 }
+
+/// Without the excitation, other forms may be as likely as the one that has K_e: its interval then has a condition.
+#[test]
+fn a_parameter_of_a_form_that_is_not_settled_has_a_condition() {
+    let directory = tempfile::tempdir().unwrap();
+    let d = directory.path();
+    good(d, &["simulate", "--condition", "C1", "--seed", "5", "--out", "c1.csv"]);
+    let out = good(d, &["identify", "c1.csv", "--excitation", "none"]);
+    let note = "not determined, because other forms are as likely: K_e, K_e_dot; the intervals apply only if the form \
+                is lead (weight 0.49): use --form lead to report them";
+    assert!(out.contains(note), "{out}");
+    assert!(
+        !out.contains("K_e is not determined, but") && !out.contains("not determined by the data"),
+        "{out}"
+    );
+    let out = good(d, &["identify", "c1.csv", "--excitation", "none", "--form", "lead"]);
+    assert!(
+        out.contains("K_e (deg/deg)") && !out.contains("not determined"),
+        "{out}"
+    );
+}

@@ -95,8 +95,8 @@ fn bad_input_is_told_in_the_users_words() {
         (&["jitter.csv"], &["--resample"]),
         (&["short.csv"], &["33 samples"]),
         (&["one.csv", "--nk", "500"], &["nk = 500", "400 samples"]),
-        (&["zero.csv"], &["u", "0 in every sample"]),
-        (&["constant.csv"], &["e", "2.5 in every sample"]),
+        (&["zero.csv"], &["u of record zero is constant"]),
+        (&["constant.csv"], &["e of record constant is constant"]),
         (&["one.csv", "slow.csv"], &["0.02", "0.01", "--new-fs 50"]),
         (&["one.csv", "--from", "90", "--to", "95"], &["90", "95"]),
         (&["one.csv", "--input", "q"], &["q", "t, e, u"]),
@@ -202,4 +202,26 @@ fn what_cannot_be_simulated_ends_with_one_and_writes_nothing() {
     }
     let (code, _) = bad(d, &["simulate", "--condition", "C1", "--out", "no/such/place.csv"]);
     assert_eq!(code, 1);
+}
+
+#[test]
+fn lines_of_json_and_a_header_of_matlab() {
+    let directory = tempfile::tempdir().unwrap();
+    let d = directory.path();
+    let row = |k: usize| {
+        let t = k as f64 / 100.0;
+        (t, (3.0 * t).sin() + (7.0 * t).cos(), (3.0 * t - 0.9).sin())
+    };
+    let lines = |of: &dyn Fn((f64, f64, f64)) -> String| (0..1000).map(|k| of(row(k)) + "\n").collect::<String>();
+    let json = lines(&|(t, e, u)| format!("{{\"t\": {t}, \"e\": {e}, \"u\": {u}}}"));
+    std::fs::write(d.join("lines.txt"), json).unwrap();
+    let (code, message) = bad(d, &["identify", "lines.txt"]);
+    assert!(
+        code > 0 && message.contains("lines.txt holds JSON, expected a table"),
+        "{message}"
+    );
+    let matlab = lines(&|(t, e, u)| format!("  {t:.2}  {e:.6}  {u:.6}"));
+    std::fs::write(d.join("saved.txt"), format!("% t e u\n{matlab}")).unwrap();
+    let shown = good(d, &["info", "saved.txt"]);
+    assert!(shown.contains("t: 1000 rows from 0 to 9.99 s"), "{shown}");
 }

@@ -564,7 +564,7 @@ fn what_gives_no_result_ends_with_one() {
     fs::write(d.join("hole.csv"), text.replacen(",0.0", ",nan", 3000)).unwrap();
     for (arguments, expected) in [
         (&["absent.csv"][..], "cannot be read"),
-        (&["silent.csv", "--fs", "100"], "0 in every sample"),
+        (&["silent.csv", "--fs", "100"], "is constant"),
         (&["hole.csv"], "--fill"),
         (&["c.csv", "--to", "0.5"], "samples"),
         (&["c.csv", "--start-span", "500..600"], "500"),

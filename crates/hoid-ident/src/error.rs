@@ -63,16 +63,12 @@ pub enum IdentError {
         samples: usize,
     },
     /// A signal is constant.
-    #[error(
-        "{channel} of record {label} is {value} in every sample: there is nothing to identify; check the column and the span"
-    )]
+    #[error("{channel} of record {label} is constant: there is nothing to identify; check the column and the span")]
     NoExcitation {
         /// Name of the channel.
         channel: String,
         /// Label of the record.
         label: String,
-        /// Constant value of the channel.
-        value: f64,
     },
     /// The regressors are linearly dependent.
     #[error(

@@ -49,7 +49,6 @@ pub(crate) fn check_record(
             return Err(IdentError::NoExcitation {
                 channel: channel.name.clone(),
                 label: label(),
-                value,
             });
         }
     }

@@ -131,6 +131,15 @@ pub enum IoError {
         /// The first cells of the line.
         found: String,
     },
+    /// A text of JSON.
+    #[error(
+        "{file} holds JSON, expected a table with a header such as t,e,u; save the samples as CSV (hoid stream reads \
+         lines of JSON, but no other command does)"
+    )]
+    Json {
+        /// Name of the file.
+        file: String,
+    },
     /// Cells that are separated by blanks.
     #[error(
         "{file}: a line has {found} numbers separated by blanks, expected commas, semicolons or tabs; save the table \

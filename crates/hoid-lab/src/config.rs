@@ -18,14 +18,13 @@
 
 use std::path::Path;
 
-use hoid_ident::family::ChannelRole;
 use hoid_model::{
     family_scenario::{Display, Interleaved, MultiSine},
     scenario::Condition as Reference,
 };
 use serde::{Deserialize, Serialize};
 
-use crate::{LabError, course::TaskDefinition, plant::MOST_STATES};
+use crate::{LabError, plant::MOST_STATES};
 
 /// Configuration of an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -333,27 +332,6 @@ impl Condition {
             Err(_) => hoid_io::read_settings(&directory.join(name))?,
         });
         Ok(())
-    }
-
-    /// Returns the role of the target for the person, as a role of `hoid identify`; `None` if there is no target or the
-    /// display shows the error only.
-    ///
-    /// # Errors
-    /// As [`Condition::course`].
-    pub(crate) fn role_of_target(&self) -> Result<Option<String>, LabError> {
-        Ok(self.role_of_target_in(&self.course()?))
-    }
-
-    /// Returns [`Self::role_of_target`] for the course of this condition.
-    pub(crate) fn role_of_target_in(&self, course: &TaskDefinition) -> Option<String> {
-        let [has_target, _] = course.has_lines();
-        let feedforward = ChannelRole::Feedforward;
-        let role = match self.display {
-            Display::Compensatory => None,
-            Display::Pursuit => Some(feedforward.to_string()),
-            Display::Preview => Some(format!("{feedforward}:{}", self.preview_s)),
-        };
-        role.filter(|_| has_target)
     }
 
     /// Checks that the numbers of the condition are valid and that it can be run.

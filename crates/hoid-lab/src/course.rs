@@ -1,8 +1,9 @@
 //! The task of a condition: the controlled element as a function of time, and the excitation of the loop.
 
+use hoid_ident::family::ChannelRole;
 use hoid_model::{
     ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, ModelError, SampleTime,
-    family_scenario::{Excitation, MultiSine},
+    family_scenario::{Display, Excitation, MultiSine},
     forcing::ForcingFunction,
     schedule::Schedule,
 };
@@ -74,6 +75,27 @@ impl Condition {
         scenario.target = excitation(&self.target)?;
         scenario.disturbance = excitation(&self.disturbance)?;
         Ok(TaskDefinition::Family(Box::new(scenario.resolve()?)))
+    }
+
+    /// Returns the role of the target for the person, as a role of `hoid identify`; `None` if there is no target or the
+    /// display shows the error only.
+    ///
+    /// # Errors
+    /// As [`Condition::course`].
+    pub(crate) fn role_of_target(&self) -> Result<Option<String>, LabError> {
+        Ok(self.role_of_target_in(&self.course()?))
+    }
+
+    /// Returns [`Self::role_of_target`] for the course of this condition.
+    pub(crate) fn role_of_target_in(&self, course: &TaskDefinition) -> Option<String> {
+        let [has_target, _] = course.has_lines();
+        let feedforward = ChannelRole::Feedforward;
+        let role = match self.display {
+            Display::Compensatory => None,
+            Display::Pursuit => Some(feedforward.to_string()),
+            Display::Preview => Some(format!("{feedforward}:{}", self.preview_s)),
+        };
+        role.filter(|_| has_target)
     }
 }
 

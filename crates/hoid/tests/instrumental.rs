@@ -387,10 +387,7 @@ fn a_missing_or_useless_channel_is_told() {
         .clone()
         .with_channel(Channel::new("still", "", vec![0.0; record.len()]))
         .unwrap();
-    assert!(matches!(
-        fit("still", &still),
-        Err(IdentError::NoExcitation { value: 0.0, .. })
-    ));
+    assert!(matches!(fit("still", &still), Err(IdentError::NoExcitation { .. })));
     for inside in ["e", "u"] {
         assert!(matches!(fit(inside, &record), Err(IdentError::BadOption { .. })));
     }

@@ -10,7 +10,7 @@ use super::{
     clusters::ClusterKind,
     instrumental::InstrumentalFit,
     line_fit::LineFit,
-    parameter::Parameter,
+    parameter::{LEAST_WEIGHT, Parameter},
     prior::OperatorPrior,
     result::{FreeModel, WeighedForm},
 };
@@ -170,7 +170,58 @@ fn pulled(parameter: &Parameter, prior: &OperatorPrior) -> Option<String> {
     })
 }
 
+/// A parameter that would be determined, if the forms that have it were more likely than those that do not; with these
+/// forms and their total weight.
+struct OfSomeForms<'a> {
+    parameter: &'a Parameter,
+    forms: Vec<&'a WeighedForm>,
+    weight: f64,
+}
+
+impl<'a> OfSomeForms<'a> {
+    fn of(parameter: &'a Parameter, weighed: &'a [WeighedForm]) -> Option<Self> {
+        let known =
+            parameter.standard_error.is_some() && parameter.interval.is_some_and(|(low, high)| low * high > 0.0);
+        let has = |(i, form): (usize, &WeighedForm)| match parameter.averaged_over.as_slice() {
+            [] => i == 0,
+            over => over.contains(&form.form),
+        };
+        let forms: Vec<&WeighedForm> = (weighed.iter().enumerate())
+            .filter(|(i, form)| has((*i, form)))
+            .map(|(_, form)| form)
+            .collect();
+        let weight = forms.iter().map(|form| form.weight).sum();
+        let is_one = !parameter.determined && known && weight <= LEAST_WEIGHT && !forms.is_empty();
+        is_one.then_some(Self {
+            parameter,
+            forms,
+            weight,
+        })
+    }
+
+    fn message(all: &[Self]) -> Option<String> {
+        let first = all.first()?;
+        let names: Vec<&str> = all.iter().map(|of| of.parameter.name.as_str()).collect();
+        let forms: Vec<String> = first.forms.iter().map(|form| form.form.to_string()).collect();
+        Some(format!(
+            "not determined, because other forms are as likely: {}; the intervals apply only if the form is {} (weight \
+             {:.2}): use --form {} to report them",
+            names.join(", "),
+            forms.join(" or "),
+            first.weight,
+            first.forms[0].form
+        ))
+    }
+}
+
 fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
+    let of_some_forms: Vec<OfSomeForms<'_>> = (judged.parameters.iter())
+        .filter_map(|parameter| OfSomeForms::of(parameter, judged.weighed))
+        .collect();
+    let is_explained = |parameter: &Parameter| of_some_forms.iter().any(|of| of.parameter.name == parameter.name);
+    if let Some(message) = OfSomeForms::message(&of_some_forms) {
+        all.push(Finding::note("undetermined-parameter", message));
+    }
     let find = |name: &str| {
         judged
             .parameters
@@ -188,13 +239,14 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
         ));
     }
     let gain = ["K_over_T_I", "K_I", "K_e", "K"].iter().find_map(|name| find(name));
-    if let Some(gain) = gain.filter(|g| !g.determined) {
+    if let Some(gain) = gain.filter(|g| !g.determined && !is_explained(g)) {
+        let response = match judged.response_error.is_some_and(|e| e > LARGEST_RESPONSE_ERROR) {
+            true => "",
+            false => ", but the response in the middle of the band is",
+        };
         all.push(Finding::note(
             "gain",
-            format!(
-                "{} is not determined, but the response in the middle of the band is",
-                gain.name
-            ),
+            format!("{} is not determined{response}", gain.name),
         ));
     }
     if let Some(tau) = find("tau_e").filter(|t| !t.determined) {
@@ -207,6 +259,7 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
     }
     if let Some((t_i, (low, high))) = find("T_I").and_then(|t| Some((t, t.interval?)))
         && !t_i.determined
+        && !is_explained(t_i)
     {
         let words = if high.is_infinite() {
             format!("only K/T_I is determined, not T_I or K: T_I is longer than {low:.2} s (95 %)")
@@ -227,7 +280,7 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
     }
     let mut prior_alone: Vec<&str> = Vec::new();
     let mut open: Vec<&str> = Vec::new();
-    for parameter in judged.parameters.iter().filter(|p| !p.determined) {
+    for parameter in judged.parameters.iter().filter(|p| !p.determined && !is_explained(p)) {
         let name = parameter.name.as_str();
         if matches!(name, "omega_nm" | "zeta_nm") && parameter.value > 0.0 && at_bound(parameter) {
             open.push(name);

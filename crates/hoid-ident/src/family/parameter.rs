@@ -18,7 +18,7 @@ use hoid_model::{
 use super::mixture::{Component, Mixture, widened};
 
 /// Total weight of the forms with a parameter up to which the parameter counts as undetermined.
-const LEAST_WEIGHT: f64 = 0.5;
+pub(super) const LEAST_WEIGHT: f64 = 0.5;
 /// Largest ratio of the posterior to the prior variance of a determined parameter.
 const LARGEST_PRIOR_SHARE: f64 = 0.5;
 /// Largest standard error of the logarithm of a determined parameter.

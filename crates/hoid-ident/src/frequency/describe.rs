@@ -222,7 +222,6 @@ fn runs_of(record: &Record, excitation: &Excitation, options: &DescribingOptions
             return Err(IdentError::NoExcitation {
                 channel: channel.name.clone(),
                 label: record.label().to_owned(),
-                value: part[0],
             });
         }
     }

@@ -149,7 +149,6 @@ impl Excitation {
             return Err(IdentError::NoExcitation {
                 channel: channel.to_owned(),
                 label: record.label().to_owned(),
-                value: values[0],
             });
         }
         let threshold = largest * search.least_amplitude * search.least_amplitude;

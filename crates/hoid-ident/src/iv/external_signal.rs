@@ -72,7 +72,6 @@ pub(super) fn signals<'a>(records: &'a [Record], name: &str) -> Result<Vec<&'a [
             return Err(IdentError::NoExcitation {
                 channel: name.to_owned(),
                 label: record.label().to_owned(),
-                value: signal[0],
             });
         }
         let of_loop = [record.input_channel(), Some(record.output_channel())];

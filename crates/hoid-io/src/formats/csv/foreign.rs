@@ -71,10 +71,11 @@ fn is_number(cell: &str) -> bool {
 }
 
 /// Replaces blanks by tabs in a table separated by blanks; `None` unless the header has as many words as each line
-/// below it has numbers.
+/// below it has numbers. A percent sign before the header, the comment sign of MATLAB, is left out.
 fn between_tabs(text: &str) -> Option<String> {
     let mut lines = text.lines().filter(|line| !is_aside(line));
-    let header = lines.next()?;
+    let marked = lines.next()?;
+    let header = marked.trim_start().trim_start_matches('%');
     let count = header.split_whitespace().count();
     let is_row = |line: &str| line.split_whitespace().count() == count;
     let numbers = |line: &str| {
@@ -88,6 +89,7 @@ fn between_tabs(text: &str) -> Option<String> {
     (rows.peek().is_some() && rows.all(|line| is_row(line) && numbers(line))).then(|| {
         let line = |line: &str| match is_aside(line) {
             true => line.to_owned(),
+            false if std::ptr::eq(line, marked) => header.split_whitespace().collect::<Vec<_>>().join("\t"),
             false => line.split_whitespace().collect::<Vec<_>>().join("\t"),
         };
         text.lines().map(|text| line(text) + "\n").collect()
@@ -240,6 +242,10 @@ mod tests {
         assert_eq!(notes, 1);
         assert_eq!(
             plain(b"  t   e\n 0.0  1\n 0.1 -2\n"),
+            (String::from("t\te\n0.0\t1\n0.1\t-2\n"), 1)
+        );
+        assert_eq!(
+            plain(b"% t e\n0.0 1\n0.1 -2\n"),
             (String::from("t\te\n0.0\t1\n0.1\t-2\n"), 1)
         );
         for same in [

@@ -125,6 +125,9 @@ pub(super) fn parsed(text: &str, file: &str) -> Result<Parsed, IoError> {
     let Some(header_line) = lines.next() else {
         return Err(IoError::Empty { file: file.to_owned() });
     };
+    if header_line.trim_start().starts_with('{') {
+        return Err(IoError::Json { file: file.to_owned() });
+    }
     refuse_blanks(header_line, lines.next(), file)?;
     let separator = separator(header_line);
     let commas = has_decimal_commas(text, separator);
