@@ -19,7 +19,7 @@ use crate::trace::Trace;
 /// that for a drift.
 const UNLIKELY_STEP: f64 = 0.1;
 const UNLIKELY_DRIFT: f64 = 0.015;
-const UNLIKELY_SWAY: f64 = 0.08;
+const UNLIKELY_SWAY: f64 = 0.06;
 /// Lag of a second basis, s, for people with a long lag, whose response is that of an integrator. The basis that
 /// explains u better is used.
 const LONG_LAG_S: f64 = 10.0;
