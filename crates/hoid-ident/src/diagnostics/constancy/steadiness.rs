@@ -231,13 +231,14 @@ const NAMES: [&str; 2] = ["gain", "delay"];
 
 #[cfg(test)]
 mod tests {
-    use std::{f64::consts::TAU, sync::LazyLock};
+    use std::{f64::consts::TAU, slice, sync::LazyLock};
 
     use super::*;
     use crate::diagnostics::whitened::stream;
 
     const TS: f64 = 0.02;
     const N: usize = 4000;
+    const WHOLE: Range<usize> = 0..N;
     static TERMS: LazyLock<Vec<Vec<f64>>> = LazyLock::new(|| vec![vec![1.0, 0.0], vec![0.0, 1.0]]);
 
     /// The basis of a response `b_1 z_1 + b_2 z_2`.
@@ -267,7 +268,7 @@ mod tests {
     /// Changes found for this course of the gain of u.
     fn of(seed: u64, gain: impl Fn(f64) -> f64) -> Vec<Unsteady> {
         let (z, u) = run(seed, gain);
-        unsteady(&[basis(&z)], &u, &[0..N], TS)
+        unsteady(&[basis(&z)], &u, slice::from_ref(&WHOLE), TS)
     }
 
     fn p_value(found: &[Unsteady], is: impl Fn(Course) -> bool) -> f64 {
@@ -332,12 +333,15 @@ mod tests {
     fn the_basis_that_explains_u_better_is_used() {
         let (z, u) = run(7, |t| 1.0 - 0.3 * t / 80.0);
         let (other, _) = run(8, |_| 1.0);
-        let alone = unsteady(&[basis(&z)], &u, &[0..N], TS);
-        assert_eq!(unsteady(&[basis(&other), basis(&z)], &u, &[0..N], TS), alone);
+        let alone = unsteady(&[basis(&z)], &u, slice::from_ref(&WHOLE), TS);
+        assert_eq!(
+            unsteady(&[basis(&other), basis(&z)], &u, slice::from_ref(&WHOLE), TS),
+            alone
+        );
         // A transient of the lag from before the stretch changes nothing.
         let early = |t: usize| 5.0 * (-(t as f64) * TS).exp();
         let decaying: Vec<f64> = u.iter().enumerate().map(|(t, u)| u + early(t)).collect();
-        let with = unsteady(&[basis(&z)], &decaying, &[0..N], TS);
+        let with = unsteady(&[basis(&z)], &decaying, slice::from_ref(&WHOLE), TS);
         for (with, alone) in with.iter().zip(&alone) {
             assert!(
                 (with.by[0] - alone.by[0]).abs() < 1e-3 * alone.by[1],
@@ -349,7 +353,7 @@ mod tests {
     #[test]
     fn too_little_says_nothing() {
         let columns = [vec![0.0; N], vec![0.0; N]];
-        assert!(unsteady(&[basis(&columns)], &vec![1.0; N], &[0..N], TS).is_empty());
-        assert!(unsteady(&[basis(&columns)], &vec![1.0; N], &[0..500], TS).is_empty());
+        assert!(unsteady(&[basis(&columns)], &vec![1.0; N], slice::from_ref(&WHOLE), TS).is_empty());
+        assert!(unsteady(&[basis(&columns)], &vec![1.0; N], slice::from_ref(&(0..500)), TS).is_empty());
     }
 }
