@@ -15,11 +15,10 @@ use crate::trace::Trace;
 
 /// p-values below which the response is considered to vary within a stretch: by a step, a drift or an oscillation. The
 /// p-values count all frequencies and phases of an oscillation as independent, and take the larger of two variances for
-/// a step: of people who do not change, 1 to 3 % are below the limit for a step or an oscillation, and 1 to 2 % below
-/// that for a drift.
-const UNLIKELY_STEP: f64 = 0.1;
-const UNLIKELY_DRIFT: f64 = 0.015;
-const UNLIKELY_SWAY: f64 = 0.06;
+/// a step: of simulated people who do not change, about 1 % are below each of these limits.
+const UNLIKELY_STEP: f64 = 0.03;
+const UNLIKELY_DRIFT: f64 = 0.01;
+const UNLIKELY_SWAY: f64 = 0.05;
 /// Lag of a second basis, s, for people with a long lag, whose response is that of an integrator. The basis that
 /// explains u better is used.
 const LONG_LAG_S: f64 = 10.0;
