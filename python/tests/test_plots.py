@@ -73,7 +73,7 @@ def test_an_operator_is_drawn_as_a_fit_is(fit: pyhoid.Fit, c1: pyhoid.Record) ->
     response = person.fit.frequency_response(None).magnitude_db
     assert np.array_equal(alone.lines[0].get_ydata(), response)
     bare = pyhoid.Record(e=c1.e, u=c1.u, sample_time=0.01, d=c1["f_t"])
-    with pytest.raises(pyhoid.OptionError, match="channel is f_t, and the records have d"):
+    with pytest.raises(pyhoid.OptionError, match="channel is f_t, but the records have d"):
         pyhoid.describing_function(bare)
 
 
