@@ -3,7 +3,7 @@
 //! Each rule yields one finding of a separate kind ([`hoid_model::Finding`]). The limits are defined next to the rules;
 //! the limits for residuals are common to all fits.
 
-use hoid_model::Finding;
+use hoid_model::{Finding, Form};
 
 use super::{
     agreement::Agreement,
@@ -170,58 +170,66 @@ fn pulled(parameter: &Parameter, prior: &OperatorPrior) -> Option<String> {
     })
 }
 
-/// A parameter that would be determined, if the forms that have it were more likely than those that do not; with these
-/// forms and their total weight.
+/// Parameters that would be determined if the forms that have them were more likely than the others.
 struct OfSomeForms<'a> {
-    parameter: &'a Parameter,
-    forms: Vec<&'a WeighedForm>,
+    names: Vec<&'a str>,
+    forms: Vec<Form>,
+    /// Total weight of these forms.
     weight: f64,
 }
 
 impl<'a> OfSomeForms<'a> {
-    fn of(parameter: &'a Parameter, weighed: &'a [WeighedForm]) -> Option<Self> {
-        let known =
-            parameter.standard_error.is_some() && parameter.interval.is_some_and(|(low, high)| low * high > 0.0);
-        let has = |(i, form): (usize, &WeighedForm)| match parameter.averaged_over.as_slice() {
-            [] => i == 0,
-            over => over.contains(&form.form),
-        };
-        let forms: Vec<&WeighedForm> = (weighed.iter().enumerate())
-            .filter(|(i, form)| has((*i, form)))
-            .map(|(_, form)| form)
-            .collect();
-        let weight = forms.iter().map(|form| form.weight).sum();
-        let is_one = !parameter.determined && known && weight <= LEAST_WEIGHT && !forms.is_empty();
-        is_one.then_some(Self {
-            parameter,
-            forms,
-            weight,
-        })
+    /// Returns such parameters, those of the same forms together.
+    fn all(parameters: &'a [Parameter], weighed: &[WeighedForm]) -> Vec<Self> {
+        let mut all: Vec<Self> = Vec::new();
+        let is_open = |p: &&Parameter| !p.determined && p.interval.is_some_and(|(low, high)| low * high > 0.0);
+        for parameter in parameters.iter().filter(is_open).filter(|p| !at_bound(p)) {
+            let forms = match parameter.averaged_over.as_slice() {
+                [] => weighed.first().map(|front| front.form).into_iter().collect(),
+                several => several.to_vec(),
+            };
+            let weight = (weighed.iter().filter(|of| forms.contains(&of.form)))
+                .map(|of| of.weight)
+                .sum();
+            if forms.is_empty() || weight > LEAST_WEIGHT {
+                continue;
+            }
+            match all.iter_mut().find(|of| of.forms == forms) {
+                Some(of) => of.names.push(&parameter.name),
+                None => all.push(Self {
+                    names: vec![&parameter.name],
+                    forms,
+                    weight,
+                }),
+            }
+        }
+        all
     }
 
-    fn message(all: &[Self]) -> Option<String> {
-        let first = all.first()?;
-        let names: Vec<&str> = all.iter().map(|of| of.parameter.name.as_str()).collect();
-        let forms: Vec<String> = first.forms.iter().map(|form| form.form.to_string()).collect();
-        Some(format!(
-            "not determined, because other forms are as likely: {}; the intervals apply only if the form is {} (weight \
-             {:.2}): use --form {} to report them",
-            names.join(", "),
-            forms.join(" or "),
-            first.weight,
-            first.forms[0].form
-        ))
+    fn finding(&self) -> Finding {
+        let forms: Vec<String> = self.forms.iter().map(Form::to_string).collect();
+        Finding::note(
+            "undetermined-parameter",
+            format!(
+                "not determined, because other forms are as likely: {}; the intervals apply only if the form is {} \
+                 (weight {:.2}): use --form {} to report them",
+                self.names.join(", "),
+                forms.join(" or "),
+                self.weight,
+                forms[0]
+            ),
+        )
     }
 }
 
 fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
-    let of_some_forms: Vec<OfSomeForms<'_>> = (judged.parameters.iter())
-        .filter_map(|parameter| OfSomeForms::of(parameter, judged.weighed))
-        .collect();
-    let is_explained = |parameter: &Parameter| of_some_forms.iter().any(|of| of.parameter.name == parameter.name);
-    if let Some(message) = OfSomeForms::message(&of_some_forms) {
-        all.push(Finding::note("undetermined-parameter", message));
-    }
+    let of_some_forms = OfSomeForms::all(judged.parameters, judged.weighed);
+    let is_explained = |parameter: &Parameter| {
+        of_some_forms
+            .iter()
+            .any(|of| of.names.contains(&parameter.name.as_str()))
+    };
+    all.extend(of_some_forms.iter().map(OfSomeForms::finding));
     let find = |name: &str| {
         judged
             .parameters
@@ -371,5 +379,45 @@ fn methods(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
             "no-lines",
             format!("no fit at the lines of the excitation: {why}"),
         ));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_of_forms_that_are_not_settled_are_named_with_their_own_forms() {
+        let weighed =
+            [(Form::Lead, 0.45), (Form::LeadLag, 0.04), (Form::Lag, 0.51)].map(|(form, weight)| WeighedForm {
+                form,
+                weight,
+                operators: Vec::new(),
+            });
+        let parameter = |name: &str, averaged_over: &[Form]| Parameter {
+            name: name.to_owned(),
+            unit: "s",
+            value: 0.4,
+            standard_error: Some(0.1),
+            standard_error_person: None,
+            interval: Some((0.2, 0.6)),
+            prior_share: 0.0,
+            determined: false,
+            averaged_over: averaged_over.to_vec(),
+        };
+        let all = [
+            parameter("K_e", &[]),
+            parameter("T_L", &[Form::Lead, Form::LeadLag]),
+            parameter("K_e_dot", &[]),
+            // It is open for another reason: more likely than not, the person has it.
+            parameter("tau_e", &[Form::Lead, Form::Lag]),
+        ];
+        let messages: Vec<String> = OfSomeForms::all(&all, &weighed)
+            .iter()
+            .map(|of| of.finding().message)
+            .collect();
+        assert_eq!(messages.len(), 2);
+        assert!(messages[0].contains("K_e, K_e_dot; the intervals apply only if the form is lead (weight 0.45)"));
+        assert!(messages[1].contains("T_L; the intervals apply only if the form is lead or lead-lag (weight 0.49)"));
     }
 }

@@ -71,11 +71,10 @@ pub fn unsteady(
             Some(best.tested(sample_time_s))
         })
         .collect();
-    let several = if all.len() > 1 { all.len() as f64 } else { 1.0 };
-    let common = common_drift(&all);
+    let common = if all.len() > 1 { common_drift(&all) } else { None };
     let each = all.iter().flat_map(|stretch| &stretch.strongest);
     each.map(|found| Unsteady {
-        p_value: (found.p_value * several).min(1.0),
+        p_value: (found.p_value * all.len() as f64).min(1.0),
         ..*found
     })
     .chain(common)
@@ -221,9 +220,8 @@ fn common_drift(all: &[TestedStretch]) -> Option<Unsteady> {
             p_value: (of_student(z, (blocks - 2 * all.len()) as f64) * NAMES.len() as f64).min(1.0),
         })
     };
-    let several = all.len() > 1;
     (0..NAMES.len())
-        .filter_map(|i| of(i).filter(|_| several))
+        .filter_map(of)
         .min_by(|a, b| a.p_value.total_cmp(&b.p_value))
 }
 
