@@ -93,6 +93,7 @@ pub mod delay;
 pub mod divided_differences;
 pub mod error_bars;
 pub mod filter;
+pub mod further_input;
 pub mod guard;
 pub mod held_operator;
 pub mod innovation_variance;

@@ -25,6 +25,8 @@
 //! ([`Predictor::correct`]). With these a-posteriori residuals the recursion converges faster (L. Ljung and T.
 //! Söderström, *Theory and Practice of Recursive Identification*, 1983, section 3.7.3 and eq. 3.151).
 //!
+//! Further inputs I add their responses to w and their coefficients to the end of theta ([`crate::further_input`]).
+//!
 //! The last L samples of the input are stored, so that B can start at any `offset` within them, and a delay can be
 //! changed without a transient. N is the capacity for parameters.
 
@@ -33,6 +35,7 @@ use core::hint::black_box;
 use hoid_numerics::products::dot;
 
 use crate::{
+    further_input::{FurtherInputs, NoFurtherInputs, NoiseFilters},
     sensitivities::{ErrorLayout, LinearForm, Sensitivities},
     shape::Shape,
 };
@@ -54,8 +57,9 @@ pub enum Regressor {
 
 /// State of the filters. The histories contain the newest value first.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Predictor<S, const N: usize, const L: usize> {
+pub struct Predictor<S, const N: usize, const L: usize, I = NoFurtherInputs> {
     shape: S,
+    further: I,
     regressor: Regressor,
     offset: usize,
     x: [f64; L],
@@ -77,18 +81,27 @@ pub struct Predictor<S, const N: usize, const L: usize> {
     pending: [f64; 2],
 }
 
-crate::state!([S, const N: usize, const L: usize] Predictor<S, N, L> {
-    x, filtered_x, x_over_f, u, w, v, eps, filtered_u, filtered_eps, filtered_v, w_over_f, filtered_w, pending,
+crate::state!([S, const N: usize, const L: usize, I: crate::state::State] Predictor<S, N, L, I> {
+    x, filtered_x, x_over_f, u, w, v, eps, filtered_u, filtered_eps, filtered_v, w_over_f, filtered_w, pending, further,
 });
 
 impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
-    /// Builds the predictor with all filters at rest. Returns `None` if the shape exceeds the capacities N or L, or has
-    /// no parameter.
+    /// Builds the predictor of a model with one input, with all filters at rest. Returns `None` if the shape exceeds the
+    /// capacities N or L, or has no parameter.
     pub fn new(shape: S, regressor: Regressor) -> Option<Self> {
+        Self::with_further(shape, regressor, NoFurtherInputs)
+    }
+}
+
+impl<S: Shape, const N: usize, const L: usize, I: FurtherInputs<N>> Predictor<S, N, L, I> {
+    /// As [`Predictor::new`], with further inputs.
+    pub fn with_further(shape: S, regressor: Regressor, further: I) -> Option<Self> {
         let inputs = shape.nb().max(shape.nd() + 1).max(shape.nc() + shape.nf());
-        let fits = (1..=N).contains(&shape.parameters()) && (shape.nb() == 0 || inputs <= L);
+        let parameters = shape.parameters() + further.parameters();
+        let fits = (1..=N).contains(&parameters) && (shape.nb() == 0 || inputs <= L);
         fits.then_some(Self {
             shape,
+            further,
             regressor,
             offset: 0,
             x: [0.0; L],
@@ -107,7 +120,17 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         })
     }
 
-    /// Returns the orders of the model.
+    /// Returns the further inputs.
+    pub fn further(&self) -> &I {
+        &self.further
+    }
+
+    /// Returns the further inputs, for the values of the next sample.
+    pub fn further_mut(&mut self) -> &mut I {
+        &mut self.further
+    }
+
+    /// Returns the orders of the model in the first input.
     pub fn shape(&self) -> S {
         self.shape
     }
@@ -122,11 +145,23 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
     #[cold]
     #[inline(never)]
     pub fn reset(&mut self) {
-        let offset = self.offset;
-        if let Some(at_rest) = Self::new(self.shape, self.regressor) {
-            *self = at_rest;
-            self.offset = offset;
-        }
+        self.further.reset();
+        let histories = [&mut self.x, &mut self.filtered_x];
+        histories.into_iter().for_each(|history| *history = [0.0; L]);
+        let histories = [
+            &mut self.x_over_f,
+            &mut self.u,
+            &mut self.w,
+            &mut self.v,
+            &mut self.eps,
+            &mut self.filtered_u,
+            &mut self.filtered_eps,
+            &mut self.filtered_v,
+            &mut self.w_over_f,
+            &mut self.filtered_w,
+        ];
+        histories.into_iter().for_each(|history| *history = [0.0; N]);
+        self.pending = [0.0; 2];
     }
 
     /// Offset of B. If B cannot shift, the offset is the constant zero at compile time.
@@ -166,14 +201,23 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
             }
         }
         push(&mut self.x, input, x);
-        let psi = if self.regressor != Regressor::PseudoLinear {
+        let mut psi = if self.regressor != Regressor::PseudoLinear {
             let of = [&self.filtered_u, &self.filtered_eps, &self.filtered_v, &self.filtered_w];
             gather(&shape, &self.filtered_x[offset..], of)
         } else {
             let of = [&self.u, &self.eps, &self.v, &self.w];
             gather(&shape, &self.x[offset..], of)
         };
+        let first = shape.parameters();
+        let noise = self.noise(c, d);
+        self.further.predict(&theta[first..], noise, &mut psi[first..]);
         (psi, self.residual(theta)[2])
+    }
+
+    #[inline(always)]
+    fn noise<'a>(&self, c: &'a [f64], d: &'a [f64]) -> NoiseFilters<'a> {
+        let filtered = self.regressor != Regressor::PseudoLinear;
+        NoiseFilters { c, d, filtered }
     }
 
     /// Returns `[w, v, eps]` of the pending sample at theta.
@@ -181,7 +225,8 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
     fn residual(&self, theta: &[f64; N]) -> [f64; 3] {
         let [a, b, c, d, f] = self.shape.split(theta);
         let w = dot(b, &self.x[self.offset()..]) - dot(f, &self.w);
-        let v = self.pending[0] + dot(a, &self.u) - w;
+        let all = self.further.add_responses(&theta[self.shape.parameters()..], w);
+        let v = self.pending[0] + dot(a, &self.u) - all;
         [w, v, v + dot(d, &self.v) - dot(c, &self.eps)]
     }
 
@@ -223,6 +268,8 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
                 push(&mut self.filtered_w, shape.nf() + shape.nc(), filtered);
             }
         }
+        let noise = self.noise(c, d);
+        self.further.correct(&theta[shape.parameters()..], noise);
         if shape.na() > 0 {
             push(&mut self.u, shape.na().max(shape.nd()), u);
         }
@@ -300,7 +347,7 @@ fn dot_of_fresh(coefficients: &[f64], history: &[f64]) -> f64 {
 
 /// Returns the coefficients `g_1 ... g_(nc+nf)` of `G = C F`, where C and F have a leading 1.
 #[inline(always)]
-fn product<const N: usize>(c: &[f64], f: &[f64]) -> [f64; N] {
+pub(crate) fn product<const N: usize>(c: &[f64], f: &[f64]) -> [f64; N] {
     let mut g = [0.0; N];
     g[..f.len()].copy_from_slice(f);
     for (i, c) in c.iter().enumerate() {

@@ -9,19 +9,20 @@
 use crate::{
     adaptation::Adaptation,
     error_bars::{ErrorBars, ErrorPropagation},
+    further_input::{FurtherInputs, NoFurtherInputs},
     predictor::{Predictor, Regressor},
     recursion::{Stable, Step, backtrack, ratio},
     sensitivities::{ErrorLayout, Sensitivities},
     shape::Shape,
 };
 
-/// Recursive prediction-error method. N is the capacity for parameters and K the capacity for filter errors
+/// Recursive prediction-error method, with further inputs I. N is the capacity for parameters and K the capacity for filter errors
 /// ([`ErrorLayout::filter_errors`]). K is 0 for the default error bars and for B =
 /// [`NoErrorBars`](crate::error_bars::NoErrorBars).
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
-pub struct Rpem<S, const N: usize, const K: usize, A, B = ErrorBars<N, K>> {
-    predictor: Predictor<S, N, N>,
+pub struct Rpem<S, const N: usize, const K: usize, A, B = ErrorBars<N, K>, I = NoFurtherInputs> {
+    predictor: Predictor<S, N, N, I>,
     theta: [f64; N],
     psi: [f64; N],
     adaptation: A,
@@ -30,7 +31,7 @@ pub struct Rpem<S, const N: usize, const K: usize, A, B = ErrorBars<N, K>> {
     restarts: u64,
 }
 
-crate::state!([S, const N: usize, const K: usize, A: crate::state::State, B: crate::state::State] Rpem<S, N, K, A, B> {
+crate::state!([S, const N: usize, const K: usize, A: crate::state::State, B: crate::state::State, I: crate::state::State] Rpem<S, N, K, A, B, I> {
     predictor, theta, psi, adaptation, bars, restarts,
 });
 
@@ -45,7 +46,28 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         adaptation: A,
         bars: B,
     ) -> Option<Self> {
-        let predictor = Predictor::new(shape, regressor)?;
+        Self::with_further(shape, NoFurtherInputs, regressor, stable, theta, adaptation, bars)
+    }
+}
+
+impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropagation<N, K>, I: FurtherInputs<N>>
+    Rpem<S, N, K, A, B, I>
+{
+    /// As [`Rpem::new`], with further inputs, whose coefficients follow those of `[a.. b.. c.. d.. f..]`. The error bars
+    /// of a model with further inputs have no filter errors: also `None` if K is not zero.
+    pub fn with_further(
+        shape: S,
+        further: I,
+        regressor: Regressor,
+        stable: Stable,
+        theta: [f64; N],
+        adaptation: A,
+        bars: B,
+    ) -> Option<Self> {
+        let (first, of_further) = (shape.parameters(), further.parameters());
+        let fits = first + of_further <= N && (K == 0 || of_further == 0);
+        let sound = fits && further.are_stable(&theta[first..]);
+        let predictor = Predictor::with_further(shape, regressor, further).filter(|_| sound)?;
         let known = bars.variance().is_some() || !adaptation.needs_innovation_variance();
         let usable =
             known && stable.holds(&shape, &theta) && ErrorLayout::for_capacity::<S, K>(&shape).filter_errors() <= K;
@@ -76,7 +98,10 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         let stable = self.stable;
         // eps and psi are outputs of filters with the poles of C and F. If these poles are unstable, eps and psi
         // diverge, and with them the estimate (Ljung and Söderström 1983, section 3.7.3).
-        let (allowed, theta) = backtrack(&theta, &moved.step, |theta| stable.holds(&shape, theta));
+        let further = self.predictor.further();
+        let (allowed, theta) = backtrack(&theta, &moved.step, |theta| {
+            stable.holds(&shape, theta) && further.are_stable(&theta[shape.parameters()..])
+        });
         // The filters continue with the a-posteriori residuals of the new theta (Ljung and Söderström 1983, eq. 3.151).
         self.correct(&theta);
         (self.theta, self.psi) = (theta, psi);
@@ -137,6 +162,11 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         }
     }
 
+    /// Returns the further inputs, for the values of the next sample.
+    pub fn further_mut(&mut self) -> &mut I {
+        self.predictor.further_mut()
+    }
+
     /// Returns the estimate theta.
     pub fn theta(&self) -> &[f64; N] {
         &self.theta
@@ -163,7 +193,9 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
     }
 }
 
-impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>> Rpem<S, N, K, A> {
+impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, I: FurtherInputs<N>>
+    Rpem<S, N, K, A, ErrorBars<N, K>, I>
+{
     /// Returns the covariance of theta divided by sigma^2.
     pub fn normalised_covariance(&self) -> [[f64; N]; N] {
         self.adaptation.normalised_covariance(&self.bars)
