@@ -89,4 +89,4 @@ pub use recordings::{Account, Recordings};
 pub use request::{Request, ResolvedRequest};
 pub use settings::Setting;
 pub use several_inputs::{SeveralInputsResult, roles, several_inputs};
-pub use tracking::{Tracked, Tracking, options_of_recursion, relative_errors, settings_of_recursion};
+pub use tracking::{Tracked, Tracking, options_of_recursion, relative_errors, settings_of_recursion, two_inputs};

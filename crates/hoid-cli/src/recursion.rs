@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use hoid::analysis::Tracking;
-use hoid::ident::{Choice, IdentError, settings::DelayRange};
+use hoid::analysis::{Tracking, two_inputs};
+use hoid::ident::{Choice, IdentError, NamedOrders, settings::DelayRange};
 use hoid::io::{is_fit_file, read_fit};
 use hoid::model::Record;
 use hoid::survey;
@@ -23,12 +23,57 @@ const PRIOR: &str = "prior";
 /// # Errors
 /// [`CliError::Usage`] if an option is invalid.
 pub fn request(args: &RecursionArgs) -> Result<TrackRequest, CliError> {
-    let delay = DelayRange::given(args.nk.as_ref(), args.delay);
+    let nk = match args.nk.as_slice() {
+        [] => None,
+        [one] => Some(one),
+        _ => {
+            return Err(CliError::Usage(
+                "--nk has several numbers, and there is one input".to_owned(),
+            ));
+        }
+    };
+    let delay = DelayRange::given(nk, args.delay);
+    let orders = orders::named_orders(args.orders.as_deref(), delay.as_ref())?;
+    of_orders(args, orders, delay)
+}
+
+/// Returns the requested recursion of a model with two inputs.
+fn request_of_two(args: &TrackArgs) -> Result<TrackRequest, CliError> {
+    let typed = &args.recursion;
+    let samples = |delay: &DelayRange| match delay {
+        DelayRange::Samples(range) if range.start() == range.end() => Ok(range.start().to_string()),
+        other => Err(CliError::Usage(format!(
+            "--nk: found {other}; a model with two inputs takes one number of samples for each"
+        ))),
+    };
+    if typed.delay.is_some() {
+        return Err(CliError::Usage(
+            "--delay applies to one input; use --nk, such as 29,12".to_owned(),
+        ));
+    }
+    let nk = typed.nk.iter().map(samples).collect::<Result<Vec<_>, _>>()?.join(",");
+    let (orders, further) = two_inputs(
+        &method(typed)?,
+        typed.structure,
+        typed.orders.as_deref().unwrap_or_default(),
+        Some(nk.as_str()).filter(|nk| !nk.is_empty()),
+        &args.read.inputs,
+        args.role.as_deref().unwrap_or_default(),
+    )
+    .map_err(CliError::of_options)?;
+    Ok(TrackRequest {
+        further: Some(further),
+        ..of_orders(typed, orders, None)?
+    })
+}
+
+fn of_orders(args: &RecursionArgs, orders: NamedOrders, delay: Option<DelayRange>) -> Result<TrackRequest, CliError> {
     Ok(TrackRequest {
         method: method(args)?,
         structure: args.structure,
-        orders: orders::named_orders(args.orders.as_deref(), delay.as_ref())?,
+        orders,
         delay,
+        further: None,
         start: match args.start.as_deref().map(str::trim) {
             None => RequestedStart::Default,
             Some("nothing") => RequestedStart::Nothing,
@@ -46,8 +91,17 @@ pub fn request(args: &RecursionArgs) -> Result<TrackRequest, CliError> {
 /// # Errors
 /// As [`request`].
 pub fn tracking(args: &TrackArgs) -> Result<Tracking, CliError> {
+    let recursion = match (args.read.inputs.len(), &args.role) {
+        (2.., _) => request_of_two(args)?,
+        (_, None) => request(&args.recursion)?,
+        (_, Some(role)) => {
+            return Err(CliError::Usage(format!(
+                "--role {role} names a second input; add it with --input"
+            )));
+        }
+    };
     Ok(Tracking {
-        recursion: request(&args.recursion)?,
+        recursion,
         start_span_s: args.start_span,
         update_from_s: args.update_from,
         moving_average_s: args.moving_average,

@@ -313,3 +313,43 @@ fn a_displayed_target_is_never_left_out_without_a_word() {
         .collect();
     assert!(!kinds(&json(at.path(), &two)).contains(&"displayed".to_owned()));
 }
+
+#[test]
+fn a_recursion_tracks_both_responses() {
+    let at = TempDir::new().unwrap();
+    let run = runs(at.path(), PURSUIT, 1).remove(0);
+    let two = ["track", &run, "--input", "e", "--input", "f_t", "--role", "f_t=feedforward", "--at", "2,4"];
+    let model = ["--method", "rpem", "--orders", "nb=2,2,nf=2,nd=1", "--nk", "14,1"];
+    let out = ["--out", "trace.csv", "--every", "60", "--json"];
+    let found = json(at.path(), &[&two[..], &model, &out].concat());
+    let channels = found["channels"].as_array().unwrap();
+    let names: Vec<&str> = channels.iter().map(|c| c["input"].as_str().unwrap()).collect();
+    let roles: Vec<&str> = channels.iter().map(|c| c["role"].as_str().unwrap()).collect();
+    assert_eq!((names, roles), (vec!["e", "f_t"], vec!["feedback", "feedforward"]));
+    assert!(of(&channels[1]["parameters"], "b0[f_t]")["standard_error"].as_f64().unwrap() > 0.0);
+    // The person responds to the target by K_d s: 6 dB an octave and 90 deg.
+    let response = channels[1]["response"].as_array().unwrap();
+    let gain = |k: usize| &response[k]["gain_db"];
+    let truth = 20.0 * (K_D * 4.0_f64).log10();
+    assert!(off(gain(1), truth).abs() < 3.0, "{} {truth}", gain(1));
+    assert!((gain(1)["value"].as_f64().unwrap() - gain(0)["value"].as_f64().unwrap() - 6.0).abs() < 1.5);
+    let table = fs::read_to_string(at.path().join("trace.csv")).unwrap();
+    let header = table.lines().find(|line| !line.starts_with('#')).unwrap();
+    for name in ["b0[f_t]", "b0[f_t]_se", "f2[f_t]", "gain_db[f_t]@2", "phase_deg[f_t]@4_se", "gain_db@2"] {
+        assert!(header.split(',').any(|column| column == name), "{name}: {header}");
+    }
+    assert!(!kinds(&found).contains(&"displayed".to_owned()));
+
+    for (options, words) in [
+        (&["--method", "rpem"][..], "give nk of each in samples"),
+        (&["--method", "adaptive", "--nk", "14,1"], "rls or rpem"),
+        (&["--method", "rpem", "--nk", "14,1,3"], "3 numbers for 2 inputs"),
+        (&["--method", "rpem", "--nk", "0.2s,0.1s"], "one number of samples"),
+        (&["--method", "rpem", "--nk", "14,1", "--validate", &run], "--validate"),
+    ] {
+        let told = bad(at.path(), &[&two[..], options].concat());
+        assert!(told.contains(words), "{options:?}: {told}");
+    }
+    let told = bad(at.path(), &["track", &run, "--role", "f_t=feedforward"]);
+    assert!(told.contains("add it with --input"), "{told}");
+}

@@ -27,7 +27,9 @@ pub trait FurtherInputs<const N: usize>: State {
     fn parameters(&self) -> usize;
     /// True if all roots of every F_i are inside the unit circle.
     fn are_stable(&self, own: &[f64]) -> bool;
-    /// Takes the values set for this sample and writes their part of psi.
+    /// Sets the values `x_i(t) = r_i(t - nk_i)` of this sample, in the order of the inputs. They must be finite.
+    fn set(&mut self, values: &[f64]);
+    /// Takes the values of this sample and writes their part of psi.
     fn predict(&mut self, own: &[f64], noise: NoiseFilters<'_>, psi: &mut [f64]);
     /// Returns the response `w` of the first input plus the responses to the further inputs.
     fn add_responses(&self, own: &[f64], w: f64) -> f64;
@@ -55,6 +57,9 @@ impl<const N: usize> FurtherInputs<N> for NoFurtherInputs {
     fn are_stable(&self, _own: &[f64]) -> bool {
         true
     }
+
+    #[inline(always)]
+    fn set(&mut self, _values: &[f64]) {}
 
     #[inline(always)]
     fn predict(&mut self, _own: &[f64], _noise: NoiseFilters<'_>, _psi: &mut [f64]) {}
@@ -104,11 +109,6 @@ impl<const N: usize> FurtherInput<N> {
         }
     }
 
-    /// Sets the value `x(t) = r(t - nk)` that the next prediction takes. It must be finite.
-    pub fn set(&mut self, value: f64) {
-        self.value = value;
-    }
-
     /// Splits the input's part of theta or psi from the rest.
     fn split<'t>(&self, own: &'t [f64]) -> (&'t [f64], &'t [f64], &'t [f64]) {
         let (b, rest) = own.split_at(self.nb);
@@ -132,6 +132,12 @@ impl<const N: usize, const M: usize> FurtherInputs<N> for [FurtherInput<N>; M] {
             own = rest;
             roots_inside(f, 1.0)
         })
+    }
+
+    fn set(&mut self, values: &[f64]) {
+        for (input, value) in self.iter_mut().zip(values) {
+            input.value = *value;
+        }
     }
 
     fn predict(&mut self, mut own: &[f64], noise: NoiseFilters<'_>, mut psi: &mut [f64]) {

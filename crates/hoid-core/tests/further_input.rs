@@ -73,7 +73,7 @@ fn a_further_input_alone_is_the_first_input() {
         .unwrap();
         let mut far: f64 = 0.0;
         for (k, (x, u)) in box_jenkins(4000, 5, 0.02).into_iter().enumerate() {
-            further.further_mut()[0].set(x);
+            further.further_mut().set(&[x]);
             // Some samples only advance the filters, and some lack the output.
             let (a, b) = match k % 50 {
                 48 => (alone.step_without_update(x, u), further.step_without_update(0.0, u)),
@@ -116,8 +116,7 @@ fn psi_is_the_negative_derivative_of_the_innovation() {
         let mut predictor = Predictor::<_, 9, 9, _>::with_further(shape, Regressor::Gradient, inputs).unwrap();
         let mut last = ([0.0; 9], 0.0);
         for [e, r, u] in &data {
-            predictor.further_mut()[0].set(*r);
-            predictor.further_mut()[1].set(r * r);
+            predictor.further_mut().set(&[*r, r * r]);
             last = predictor.predict(&theta, *e, *u);
             predictor.correct(&theta);
         }
@@ -163,7 +162,7 @@ fn without_forgetting_the_estimate_is_that_of_least_squares() {
     .unwrap();
     let (mut gram, mut right, mut past) = ([[0.0; 5]; 5], [0.0; 5], [0.0; 3]);
     for &[e, r, u] in &data {
-        recursion.further_mut()[0].set(r);
+        recursion.further_mut().set(&[r]);
         recursion.step(e, u);
         let [before_e, before_r, before_u] = past;
         let row = [-before_u, e, before_e, r, before_r];
@@ -218,11 +217,11 @@ fn after_an_overflow_the_filters_of_all_inputs_are_at_rest() {
     let theta = [1.0, 1.0, -0.5];
     let first = predictor.predict(&theta, 1.0, 2.0);
     predictor.correct(&theta);
-    predictor.further_mut()[0].set(1e300);
+    predictor.further_mut().set(&[1e300]);
     predictor.predict(&theta, 0.0, 0.0);
     predictor.correct(&theta);
     predictor.reset();
-    predictor.further_mut()[0].set(0.0);
+    predictor.further_mut().set(&[0.0]);
     assert_eq!(predictor.predict(&theta, 1.0, 2.0), first);
     assert_eq!(predictor.further().parameters(), 2);
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use hoid_analysis::two_inputs;
 use hoid_ident::{
     IdentError,
     settings::{DelayRange, MethodSpec},
@@ -42,9 +43,21 @@ pub fn request(options: &Bound<'_, PyDict>) -> Outcome<TrackRequest> {
     let start: Option<BTreeMap<String, f64>> = get(options, "start")?;
     let from_nothing = get(options, "from_nothing")?.unwrap_or(false);
     let default = TrackRequest::of(method(options)?);
+    let structure = text("structure")?.map(|name| names::structure(&name)).transpose()?;
+    let inputs: Vec<String> = get(options, "inputs")?.unwrap_or_default();
+    let (orders, further) = match inputs.is_empty() {
+        true => (names::named_orders(&orders)?, None),
+        false => {
+            let orders = text("orders_of_inputs")?.unwrap_or_default();
+            let role = text("role")?.unwrap_or_default();
+            let (orders, further) = two_inputs(&default.method, structure, &orders, None, &inputs, &role)?;
+            (orders, Some(further))
+        }
+    };
     Ok(TrackRequest {
-        structure: text("structure")?.map(|name| names::structure(&name)).transpose()?,
-        orders: names::named_orders(&orders)?,
+        structure,
+        orders,
+        further,
         delay: delay.map(|(low, high)| DelayRange::Seconds(low, high)),
         start: match start {
             Some(start) => RequestedStart::Coefficients(start),

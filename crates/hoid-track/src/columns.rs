@@ -27,7 +27,8 @@ impl Trace {
     }
 
     /// Returns `t`, each coefficient, each parameter of the operator, gain in dB and phase in degrees at the
-    /// frequencies of the options (`gain_db@2.5`, `phase_deg@2.5`), and with a controlled element `crossover_rad_s` and
+    /// frequencies of the options (`gain_db@2.5`, `phase_deg@2.5`; for a further input r also `gain_db[r]@2.5`,
+    /// `phase_deg[r]@2.5`), and with a controlled element `crossover_rad_s` and
     /// `phase_margin_deg`. Each of these columns except `t` is followed by its standard error (`_se`). NaN marks a
     /// missing operator, crossover or standard error. `operators` is the result of [`Trace::operators`].
     pub fn estimate_columns(&self, operators: &[Result<OperatorEstimate, NotConvertible>]) -> Columns {
@@ -54,6 +55,15 @@ impl Trace {
             };
             add(&format!("gain_db@{omega}"), &each(Response::gain_db));
             add(&format!("phase_deg@{omega}"), &each(Response::phase_deg));
+            if let Some(further) = &self.options().further {
+                let channel = &further.channel;
+                let responses: Vec<_> = (0..self.len()).map(|row| self.further_response(row, *omega)).collect();
+                let each = |of: fn(&Response) -> Estimate| -> Vec<Option<Estimate>> {
+                    responses.iter().map(|response| response.as_ref().map(of)).collect()
+                };
+                add(&format!("gain_db[{channel}]@{omega}"), &each(Response::gain_db));
+                add(&format!("phase_deg[{channel}]@{omega}"), &each(Response::phase_deg));
+            }
         }
         if self.options().controlled_element.is_some() {
             let loops: Vec<Option<OpenLoop>> = (0..self.len()).map(|row| self.open_loop(row)?.ok()).collect();

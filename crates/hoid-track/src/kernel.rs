@@ -1,21 +1,28 @@
 //! The recursions of the real-time kernel with the interface of all recursions, which adds capacity for the parameters,
-//! the delay line, and the covariance in units of the parameters.
+//! the delay lines, and the covariance in units of the parameters.
+//!
+//! Least squares with a further input is the prediction-error method of a model without C, D and F: without them the two
+//! are the same recursion. At a sample at which the further input is not known, its last value enters the filters and
+//! the estimate stays constant.
 
 use hoid_core::{
     adaptation::Adaptation,
     delay::DelayLine,
     error_bars::ErrorBars,
+    further_input::{FurtherInput, FurtherInputs, NoFurtherInputs},
     predictor::Regressor,
     rls::Rls,
     rpem::Rpem,
     shape::{AnyShape, FixedShape, Shape},
-    state::State,
+    state::{State, visit_all},
 };
 use hoid_ident::IdentError;
 use hoid_model::SampleTime;
 
 use crate::{
+    further_input::TrackedInput,
     gain::{self, Gain, Scaled},
+    method::bad,
     recursion::{Recursion, Sample, StepOutcome},
     setup::Setup,
     start::StartState,
@@ -74,6 +81,14 @@ impl<'a> Plan<'a> {
             nd: o.nd,
             nf: o.nf,
         };
+        if let Some(further) = &self.setup.further {
+            return match p {
+                0..=8 => self.two_inputs::<8>(any, further, kernel),
+                9..=16 => self.two_inputs::<16>(any, further, kernel),
+                17..=64 => self.two_inputs::<64>(any, further, kernel),
+                _ => Err(too_many(p)),
+            };
+        }
         let of_operator = (o.na, o.nb, o.nc, o.nd, o.nf) == (0, 2, 0, 1, 2);
         match kernel {
             Kernel::LeastSquares => match p {
@@ -150,14 +165,58 @@ impl<'a> Plan<'a> {
             self.gain::<N>(true)?,
             self.bars::<N, K>()?,
         )
-        .ok_or_else(|| IdentError::BadStart {
-            reason: "it is not stable; give another start, or a structure with fewer poles".to_owned(),
-        })?;
+        .ok_or_else(unstable_start)?;
         Ok(Box::new(Polynomials {
             rpem,
             delay: delay(self.setup.orders.nk),
+            further: Vec::new(),
             parameters: self.parameters(),
         }))
+    }
+
+    fn two_inputs<const N: usize>(
+        &self,
+        shape: AnyShape,
+        further: &TrackedInput,
+        kernel: Kernel,
+    ) -> Result<Box<dyn Recursion>, IdentError> {
+        let (regressor, growing) = match kernel {
+            Kernel::LeastSquares => (Regressor::Gradient, false),
+            Kernel::PredictionError(regressor) => (regressor, true),
+        };
+        if regressor == Regressor::Cascade {
+            return Err(bad(
+                "regressor",
+                "cascade with a further input".to_owned(),
+                "gradient or pseudo-linear",
+            ));
+        }
+        let orders = further.orders;
+        let rpem = Rpem::with_further(
+            shape,
+            [FurtherInput::new(orders.nb, orders.nf)],
+            regressor,
+            self.setup.stable,
+            self.values(),
+            self.gain::<N>(growing)?,
+            self.bars::<N, 0>()?,
+        )
+        .ok_or_else(unstable_start)?;
+        Ok(Box::new(Polynomials {
+            rpem,
+            delay: delay(self.setup.orders.nk),
+            further: vec![FurtherLine {
+                delay: delay(orders.nk),
+                last: 0.0,
+            }],
+            parameters: self.parameters(),
+        }))
+    }
+}
+
+fn unstable_start() -> IdentError {
+    IdentError::BadStart {
+        reason: "it is not stable; give another start, or a structure with fewer poles".to_owned(),
     }
 }
 
@@ -175,7 +234,15 @@ pub fn scaled<const N: usize>(spread: &[[f64; N]; N], variance: f64, parameters:
 }
 
 hoid_core::state!([S, const N: usize, A: State] Linear<S, N, A> { rls, delay });
-hoid_core::state!([S, const N: usize, const K: usize, A: State] Polynomials<S, N, K, A> { rpem, delay });
+impl<S, const N: usize, const K: usize, A: State, I: State> State for Polynomials<S, N, K, A, I> {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        let further = self.further.as_mut_slice();
+        visit_all(&mut [&mut self.rpem, &mut self.delay], each);
+        further.visit(each);
+    }
+}
+
+hoid_core::state!([] FurtherLine { delay, last });
 
 struct Linear<S, const N: usize, A> {
     rls: Rls<S, N, A>,
@@ -224,27 +291,55 @@ impl<S: Shape + Send + Sync, const N: usize, A: Adaptation<N> + Scaled + State +
     }
 }
 
-struct Polynomials<S, const N: usize, const K: usize, A> {
-    rpem: Rpem<S, N, K, A>,
+/// Delay line of a further input, and its last known value.
+struct FurtherLine {
     delay: DelayLine<Vec<f64>>,
+    last: f64,
+}
+
+struct Polynomials<S, const N: usize, const K: usize, A, I = NoFurtherInputs> {
+    rpem: Rpem<S, N, K, A, ErrorBars<N, K>, I>,
+    delay: DelayLine<Vec<f64>>,
+    further: Vec<FurtherLine>,
     parameters: usize,
 }
 
-impl<S: Shape + Send + Sync, const N: usize, const K: usize, A: Adaptation<N> + Scaled + State + Send + Sync> Recursion
-    for Polynomials<S, N, K, A>
+impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, I: FurtherInputs<N>> Polynomials<S, N, K, A, I> {
+    /// Passes the inputs of a sample through the delay lines. Returns the input of the first response, and whether the
+    /// further input is known.
+    fn enter(&mut self, sample: &Sample) -> (f64, bool) {
+        let mut known = true;
+        if let [line] = self.further.as_mut_slice() {
+            known = sample.reference.is_some();
+            line.last = sample.reference.unwrap_or(line.last);
+            self.rpem.further_mut().set(&[line.delay.step(line.last)]);
+        }
+        (self.delay.step(sample.e), known)
+    }
+}
+
+impl<
+    S: Shape + Send + Sync,
+    const N: usize,
+    const K: usize,
+    A: Adaptation<N> + Scaled + State + Send + Sync,
+    I: FurtherInputs<N> + Send + Sync,
+> Recursion for Polynomials<S, N, K, A, I>
 {
     fn step(&mut self, sample: Sample) -> StepOutcome {
-        let x = self.delay.step(sample.e);
-        self.rpem.step(x, sample.u).into()
+        match self.enter(&sample) {
+            (x, true) => self.rpem.step(x, sample.u).into(),
+            (x, false) => self.rpem.step_without_update(x, sample.u).into(),
+        }
     }
 
     fn follow(&mut self, sample: Sample) -> StepOutcome {
-        let x = self.delay.step(sample.e);
+        let (x, _) = self.enter(&sample);
         self.rpem.step_without_update(x, sample.u).into()
     }
 
     fn bridge(&mut self, sample: Sample) {
-        let x = self.delay.step(sample.e);
+        let (x, _) = self.enter(&sample);
         self.rpem.bridge(x);
     }
 

@@ -28,6 +28,7 @@
 //! | `methods`, `method` | [`Method`]: the recursive methods, and their self-description |
 //! | [`building`] | components of a method, for methods in other crates |
 //! | `options`, `shared_options`, `memory`, `forgetting` | [`TrackOptions`]: the options of a recursion |
+//! | `further_input` | [`TrackedInput`]: a second input of the person, with its response |
 //! | `person_prior` | [`PersonPrior`]: prior knowledge of a person before the first sample |
 //! | `request`, `plan` | [`TrackRequest`]: the request; [`TrackPlan`]: orders that are still open, searched on the start span |
 //! | `setup`, `start`, `start_noise`, `gain` | components of a recursion: structure, start, forgetting |
@@ -66,6 +67,7 @@ mod determined;
 mod diagnostics;
 mod display;
 mod forgetting;
+mod further_input;
 mod gain;
 mod guard;
 mod history;
@@ -108,6 +110,7 @@ pub use change::{Change, ErrorThreshold};
 pub use columns::{Columns, value_of};
 pub use determined::Determined;
 pub use forgetting::ForgettingRule;
+pub use further_input::TrackedInput;
 pub use guard::{GuardAction, GuardChannel, GuardChoice, GuardEvent, GuardKind, GuardOptions, TrackFault};
 pub use idle::{default_start_span, idle_head};
 pub use live::{ChooseOrders, DEFAULT_WARM_UP_S, Live};

@@ -211,6 +211,11 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         false
     }
 
+    /// True for a method that tracks the responses to two inputs ([`crate::TrackedInput`]).
+    fn takes_further_input(&self) -> bool {
+        false
+    }
+
     /// Returns the name of the channel of the external signal that the method uses.
     fn reference_channel(&self) -> Option<&str> {
         None

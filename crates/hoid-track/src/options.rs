@@ -1,10 +1,13 @@
 //! Options of a recursive estimate.
 
+use std::borrow::Cow;
+
 use hoid_ident::{Estimator, IdentError, SearchOptions};
 use hoid_model::{ContinuousTransferFunction, Orders, Record, SampleTime, Structure};
 
 use crate::{
     forgetting::ForgettingRule,
+    further_input::{TrackedInput, block},
     idle::default_start_span,
     memory::Memory,
     method::bad,
@@ -22,6 +25,8 @@ pub struct TrackOptions {
     pub structure: Structure,
     /// The orders.
     pub orders: Orders,
+    /// A further input of the model, for the methods `rls` and `rpem`. Default none.
+    pub further: Option<TrackedInput>,
     /// Start of the recursion. Default: a batch fit of the first third of the record.
     pub start: StartAt,
     /// Time from which the estimate is updated, s; before it, only the filters are updated. Default: the end of the
@@ -47,6 +52,7 @@ impl TrackOptions {
             method,
             structure,
             orders,
+            further: None,
             start: StartAt::Span(None),
             update_from_s: None,
             search: SearchOptions::default(),
@@ -101,7 +107,36 @@ impl TrackOptions {
     /// Returns the names of the estimated parameters: coefficients of theta, or physical parameters.
     pub fn parameter_names(&self) -> Vec<String> {
         let with_delay = self.delay_parameter_s().is_some();
-        parameter_names(&self.orders, self.method.is_physical(), with_delay)
+        let mut names = parameter_names(&self.orders, self.method.is_physical(), with_delay);
+        names.extend(self.further.iter().flat_map(TrackedInput::names));
+        names
+    }
+
+    /// Returns the names of the reported coefficients, in the order of theta.
+    pub fn coefficient_names(&self) -> Vec<String> {
+        let mut names = self.polynomial_orders().parameter_names();
+        names.extend(self.further.iter().flat_map(TrackedInput::names));
+        names
+    }
+
+    /// Returns the coefficients of the model of the first input and their covariance, by rows.
+    pub(crate) fn of_first_input<'t>(
+        &self,
+        theta: &'t [f64],
+        covariance: Option<&'t [f64]>,
+    ) -> (&'t [f64], Option<Cow<'t, [f64]>>) {
+        if self.further.is_none() {
+            return (theta, covariance.map(Cow::Borrowed));
+        }
+        let first = self.polynomial_orders().parameters();
+        let places: Vec<usize> = (0..first).collect();
+        let own = covariance.map(|c| Cow::Owned(block(c, theta.len(), &places)));
+        (&theta[..first], own)
+    }
+
+    /// Returns the number of reported coefficients.
+    pub(crate) fn coefficients(&self) -> usize {
+        self.polynomial_orders().parameters() + self.further.as_ref().map_or(0, TrackedInput::parameters)
     }
 
     /// Returns the orders of the reported polynomials.
@@ -138,6 +173,7 @@ impl TrackOptions {
         Ok(Setup {
             structure: self.structure,
             orders: self.orders,
+            further: self.further.clone(),
             start: self.start.clone(),
             search: self.search,
             memories: self.parameter_names().into_iter().zip(self.memories()?).collect(),
@@ -168,6 +204,34 @@ impl TrackOptions {
         }
     }
 
+    /// Checks a further input against method and options.
+    fn check_further(&self, setup: &Setup) -> Result<(), IdentError> {
+        let Some(further) = &self.further else {
+            return Ok(());
+        };
+        let refused = |found: String, expected: &str| Err(bad("a further input", found, expected));
+        let name = self.method.name();
+        if !self.method.takes_further_input() {
+            return refused(
+                format!("{} with the method {name}", further.channel),
+                "the method rls or rpem; the other methods track the response to one input",
+            );
+        }
+        if setup.track_delay_s.is_some() {
+            return refused(
+                format!("{} and track_delay", further.channel),
+                "one of them: with a further input the delays are fixed",
+            );
+        }
+        if self.method.is_guarded() {
+            return refused(
+                format!("{} and guard = yes", further.channel),
+                "guard = no: the guard predicts u from one input",
+            );
+        }
+        further.batch_model(self.structure, &self.orders, self.search).check()
+    }
+
     /// Checks method, structure, orders and options against each other.
     ///
     /// # Errors
@@ -175,6 +239,7 @@ impl TrackOptions {
     pub fn check(&self) -> Result<(), IdentError> {
         self.orders.check(self.structure)?;
         let (setup, method) = (self.setup()?, &self.method);
+        self.check_further(&setup)?;
         method.check(&setup)?;
         setup.forgetting.check()?;
         if let Some((low, high)) = setup.track_delay_s

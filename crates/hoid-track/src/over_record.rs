@@ -76,7 +76,7 @@ pub(crate) fn track_with(
     trace.start = tracker.start.fit.clone();
     trace.updated_from_s = from_s;
     let (input, output) = (record.input(), record.output());
-    let p = options.polynomial_orders().parameters();
+    let p = options.coefficients();
     let mut covariance = vec![0.0; p * p];
     // The limit is half a sample earlier, so that rounding of the times has no effect.
     let first_update = from_s - sample_time.s() / 2.0;
@@ -151,9 +151,10 @@ fn kept_rows(samples: usize, every: usize) -> Vec<usize> {
     (0..samples).filter(kept).collect()
 }
 
-/// Returns the external signal, for methods that use one.
+/// Returns the further input, or the external signal for methods that use one.
 fn reference<'r>(record: &'r Record, options: &TrackOptions) -> Result<Option<&'r [f64]>, IdentError> {
-    let Some(name) = options.method.reference_channel() else {
+    let further = options.further.as_ref().map(|further| further.channel.as_str());
+    let Some(name) = further.or_else(|| options.method.reference_channel()) else {
         return Ok(None);
     };
     let names = || {

@@ -12,7 +12,8 @@ pub struct Sample {
     pub e: f64,
     /// Control output.
     pub u: f64,
-    /// External signal f_t, if known.
+    /// Value of the further input ([`crate::TrackedInput`]) or, for methods that use one, of the external signal f_t;
+    /// `None` if it is not known.
     pub reference: Option<f64>,
 }
 

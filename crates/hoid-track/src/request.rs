@@ -4,9 +4,10 @@
 use std::collections::BTreeMap;
 
 use hoid_ident::{IdentError, NamedOrders, order_selection::Criterion, settings::DelayRange};
-use hoid_model::{ContinuousTransferFunction, SampleTime, Structure, theta_of};
+use hoid_model::{ContinuousTransferFunction, Orders, SampleTime, Structure, theta_of};
 
 use crate::{
+    further_input::TrackedInput,
     methods::Method,
     options::TrackOptions,
     plan::{TrackPlan, of_one_model, ranges_of},
@@ -36,6 +37,8 @@ pub struct TrackRequest {
     pub orders: NamedOrders,
     /// The delay, in samples or in s.
     pub delay: Option<DelayRange>,
+    /// A further input, for the methods `rls` and `rpem`.
+    pub further: Option<TrackedInput>,
     /// The start.
     pub start: RequestedStart,
     /// Criterion that chooses between the searched orders.
@@ -62,6 +65,7 @@ impl TrackRequest {
             structure: None,
             orders: NamedOrders::new(),
             delay: None,
+            further: None,
             start: RequestedStart::Default,
             criterion: Criterion::Bic,
             largest: TrackOptions::LARGEST,
@@ -78,7 +82,14 @@ impl TrackRequest {
     /// True for a recursion of polynomials, or if the delay is in samples: the sampling rate is then kept.
     pub fn counts_samples(&self) -> bool {
         let in_samples = matches!(self.delay, Some(DelayRange::Samples(_))) || self.orders.contains_key("nk");
-        in_samples || self.method.counts_samples()
+        in_samples || self.further.is_some() || self.method.counts_samples()
+    }
+
+    /// Returns the names of the coefficients of a model with these orders of the first input.
+    fn coefficient_names(&self, orders: &Orders) -> Vec<String> {
+        let mut names = orders.parameter_names();
+        names.extend(self.further.iter().flat_map(TrackedInput::names));
+        names
     }
 
     /// Returns the plan for a sample time, after a check of everything that does not depend on data.
@@ -107,7 +118,8 @@ impl TrackRequest {
             orders.insert("nk".to_owned(), delay.samples(sample_time));
         }
         let names: Vec<String> = match &self.start {
-            RequestedStart::Coefficients(named) => named.keys().cloned().collect(),
+            // The coefficients of a further input do not count for the orders of the first.
+            RequestedStart::Coefficients(named) => named.keys().filter(|name| !name.contains('[')).cloned().collect(),
             _ => Vec::new(),
         };
         let structure = self.structure();
@@ -115,21 +127,37 @@ impl TrackRequest {
         let combinations = ranges.combinations()?;
         // These are the largest values of each order: a name that is unknown for them is unknown for all orders.
         let largest = combinations[combinations.len() - 1];
+        if let Some(further) = &self.further
+            && combinations.len() > 1
+        {
+            return Err(IdentError::BadOption {
+                option: "the orders of a model with two inputs".to_owned(),
+                found: format!("{} combinations of orders", combinations.len()),
+                expected: format!(
+                    "one number for each order and the delay of each input in samples: the search for orders fits \
+                     models with one input, without {}",
+                    further.channel
+                ),
+            });
+        }
         let start = match &self.start {
             RequestedStart::Default => StartAt::Span(None),
             RequestedStart::Nothing => StartAt::Nothing,
             RequestedStart::Coefficients(_) if combinations.len() > 1 => return Err(of_one_model()),
-            RequestedStart::Coefficients(named) => StartAt::Theta(
-                theta_of(&largest.parameter_names(), named).map_err(|reason| IdentError::BadStart {
-                    reason: format!("it {reason}"),
-                })?,
-            ),
+            RequestedStart::Coefficients(named) => {
+                StartAt::Theta(theta_of(&self.coefficient_names(&largest), named).map_err(|reason| {
+                    IdentError::BadStart {
+                        reason: format!("it {reason}"),
+                    }
+                })?)
+            }
         };
         let options = TrackOptions {
             start,
             largest: self.largest,
             at_rad_s: self.at_rad_s.clone(),
             controlled_element: self.controlled_element.clone(),
+            further: self.further.clone(),
             ..TrackOptions::new(self.method.clone(), structure, largest)
         };
         TrackPlan::new(options, ranges, self.criterion, sample_time)

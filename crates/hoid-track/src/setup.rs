@@ -6,7 +6,7 @@ use hoid_core::recursion::Stable;
 use hoid_ident::{Constraint, Estimator, SearchOptions};
 use hoid_model::{Orders, Structure};
 
-use crate::{forgetting::ForgettingRule, memory::Memory, shared_options::WindupGuard};
+use crate::{forgetting::ForgettingRule, further_input::TrackedInput, memory::Memory, shared_options::WindupGuard};
 
 /// Default delay of people who track, s.
 pub(crate) const DEFAULT_DELAY_S: f64 = 0.2;
@@ -32,6 +32,8 @@ pub struct Setup {
     pub structure: Structure,
     /// The orders.
     pub orders: Orders,
+    /// The further input, if the model has one.
+    pub further: Option<TrackedInput>,
     /// Start of the recursion.
     pub start: StartAt,
     /// Limits of the search in start fits and in fits of windows.

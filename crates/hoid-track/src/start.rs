@@ -13,6 +13,7 @@ use hoid_model::{Record, SampleTime, operator::retrieval_jacobian};
 use hoid_ident::{Constraint, Fit, GreyBox, IdentError};
 
 use crate::{
+    further_input::TrackedInput,
     setup::{PHYSICAL_NAMES, Setup, StartAt},
     start_noise::StartNoise,
 };
@@ -94,7 +95,8 @@ impl StartState {
 
     /// Computes the start from a given theta.
     fn given(setup: &Setup, theta: &[f64], sample_time: SampleTime) -> Result<Self, IdentError> {
-        let names = setup.orders.parameter_names();
+        let mut names = setup.orders.parameter_names();
+        names.extend(setup.further.iter().flat_map(TrackedInput::names));
         if theta.len() != names.len() || theta.iter().any(|t| !t.is_finite()) {
             return Err(IdentError::BadStart {
                 reason: format!("found {theta:?}; expected finite values of {}", names.join(", ")),
@@ -149,15 +151,15 @@ impl StartState {
             covariance,
             fit,
             variance,
-        } = if setup.is_physical {
-            fit_physical(setup, record, known)?
-        } else {
-            let fit = polynomial_fit(setup, record, known)?;
-            FittedStart {
-                values: fit.model().theta().to_vec(),
-                covariance: fit.covariance().map(<[f64]>::to_vec),
-                variance: fit.innovation_variance(),
-                fit,
+            residuals,
+        } = match &setup.further {
+            Some(further) => FittedStart::of_several_inputs(setup, further, record)?,
+            None if setup.is_physical => fit_physical(setup, record, known)?,
+            None => {
+                let fit = polynomial_fit(setup, record, known)?;
+                let (values, covariance) = (fit.model().theta().to_vec(), fit.covariance().map(<[f64]>::to_vec));
+                let variance = fit.innovation_variance();
+                FittedStart::of(fit, values, covariance, variance)
             }
         };
         let values = stabilised(setup, values);
@@ -175,9 +177,9 @@ impl StartState {
             covariance,
             spread,
             variance,
-            residuals: (fit.residual_count() - fit.free_count() - fit.state_count()) as f64,
+            residuals: residuals as f64,
             from_fit: true,
-            fit: Some(fit),
+            fit,
         })
     }
 }
@@ -286,8 +288,41 @@ fn physical_values(setup: &Setup, theta: &[f64], sample_time: SampleTime) -> Res
 struct FittedStart {
     values: Vec<f64>,
     covariance: Option<Vec<f64>>,
-    fit: Fit,
+    fit: Option<Fit>,
     variance: f64,
+    /// Number of residuals without the number of estimated values.
+    residuals: usize,
+}
+
+impl FittedStart {
+    /// Returns the start from a fit, with values and covariance in the coordinates of the recursion.
+    fn of(fit: Fit, values: Vec<f64>, covariance: Option<Vec<f64>>, variance: f64) -> Self {
+        Self {
+            values,
+            covariance,
+            variance,
+            residuals: fit.residual_count() - fit.free_count() - fit.state_count(),
+            fit: Some(fit),
+        }
+    }
+
+    /// Computes the start of a model with a further input from the batch fit of that model.
+    fn of_several_inputs(setup: &Setup, further: &TrackedInput, record: &Record) -> Result<Self, IdentError> {
+        let model = further.batch_model(setup.structure, &setup.orders, setup.search);
+        let fit = model.fit(std::slice::from_ref(record))?;
+        let values: Vec<f64> = fit
+            .parameters()
+            .into_iter()
+            .map(|(_, estimate)| estimate.value)
+            .collect();
+        Ok(Self {
+            covariance: fit.covariance().map(<[f64]>::to_vec),
+            fit: None,
+            variance: fit.innovation_variance,
+            residuals: fit.residuals.saturating_sub(values.len()),
+            values,
+        })
+    }
 }
 
 /// Returns the fit of the start span; computes it if it is not known.
@@ -338,12 +373,8 @@ fn from_box_jenkins(setup: &Setup, record: &Record, known: Option<&Fit>) -> Resu
         debug_assert_eq!(noise, setup.orders.nc + setup.orders.nd);
         congruence(&(0..p).map(row).collect::<Vec<_>>(), c, p)
     });
-    Ok(Some(FittedStart {
-        values: eta,
-        covariance,
-        variance: fit.innovation_variance(),
-        fit,
-    }))
+    let variance = fit.innovation_variance();
+    Ok(Some(FittedStart::of(fit, eta, covariance, variance)))
 }
 
 /// Returns `T C T'` for a matrix T with sparse rows.
@@ -449,10 +480,5 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<FittedStart, IdentErr
             }
         }
     }
-    Ok(FittedStart {
-        values: eta,
-        covariance,
-        fit,
-        variance,
-    })
+    Ok(FittedStart::of(fit, eta, covariance, variance))
 }

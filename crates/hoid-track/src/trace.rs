@@ -76,7 +76,7 @@ pub const OPERATOR_COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "z
 impl Trace {
     /// Returns an empty trace, with capacity for `rows` rows.
     pub(crate) fn empty(options: TrackOptions, sample_time: SampleTime, rows: usize, every: usize) -> Self {
-        let p = options.polynomial_orders().parameters();
+        let p = options.coefficients();
         Self {
             options,
             sample_time,
@@ -111,7 +111,7 @@ impl Trace {
 
     /// Replaces the estimate of each row by a two-sided estimate.
     pub(crate) fn replace(&mut self, rows: Vec<TwoSided>) {
-        let p = self.options.polynomial_orders().parameters();
+        let p = self.options.coefficients();
         self.theta.clear();
         self.covariance.clear();
         self.covariance.reserve(rows.len() * packed_len(p));
@@ -153,11 +153,11 @@ impl Trace {
     /// Returns the names of the coefficients. If the delay is a parameter, B has three coefficients, the first at the
     /// smallest tracked delay.
     pub fn parameter_names(&self) -> Vec<String> {
-        self.options.polynomial_orders().parameter_names()
+        self.options.coefficient_names()
     }
 
     fn width(&self) -> usize {
-        self.options.polynomial_orders().parameters()
+        self.options.coefficients()
     }
 
     /// Returns theta of a row.
@@ -219,13 +219,14 @@ impl Trace {
         row: usize,
         covariance: Option<&[f64]>,
     ) -> Result<OperatorEstimate, NotConvertible> {
+        let (theta, covariance) = self.options.of_first_input(self.theta(row), covariance);
         operator_of(
             self.options.structure,
             self.options.orders,
             self.delays.get(row),
             self.sample_time,
-            self.theta(row),
-            covariance,
+            theta,
+            covariance.as_deref(),
         )
     }
 
@@ -256,18 +257,31 @@ impl Trace {
         let count = self.options.at_rad_s.len();
         let omega_rad_s = *self.options.at_rad_s.get(place)?;
         if self.responses.is_empty() {
-            let (orders, covariance) = (self.orders_of(row), self.covariance(row));
-            let (theta, whole) = (self.theta(row), covariance.as_deref());
-            return Some(Response::of_polynomials(
-                &orders,
-                theta,
-                whole,
-                omega_rad_s,
-                self.sample_time,
-            ));
+            return Some(self.response_at(row, omega_rad_s));
         }
         let from = (row * count + place) * Response::NUMBERS;
         Response::unpacked(&self.responses[from..from + Response::NUMBERS])
+    }
+
+    /// Returns the response of the polynomials of a row at a frequency in rad/s, for methods that have no other response.
+    pub fn response_at(&self, row: usize, omega_rad_s: f64) -> Response {
+        let covariance = self.covariance(row);
+        let (theta, whole) = self.options.of_first_input(self.theta(row), covariance.as_deref());
+        Response::of_polynomials(
+            &self.orders_of(row),
+            theta,
+            whole.as_deref(),
+            omega_rad_s,
+            self.sample_time,
+        )
+    }
+
+    /// Returns the response to the further input in a row, at a frequency in rad/s; `None` without a further input.
+    pub fn further_response(&self, row: usize, omega_rad_s: f64) -> Option<Response> {
+        let further = self.options.further.as_ref()?;
+        let (orders, covariance) = (self.orders_of(row), self.covariance(row));
+        let (theta, ts) = (self.theta(row), self.sample_time);
+        Some(further.response(&orders, theta, covariance.as_deref(), omega_rad_s, ts))
     }
 
     /// Returns every crossing of the open loop of the last row with the controlled element of the options, and the
@@ -285,13 +299,9 @@ impl Trace {
             let found = OpenLoop::unpacked(&self.open_loops[from..from + OpenLoop::NUMBERS]);
             return Some(found.ok_or(self.no_crossover[row].unwrap_or(NoCrossover::NotDetermined)));
         }
-        let (orders, theta, ts) = (self.orders_of(row), self.theta(row), self.sample_time);
-        let value = |omega: f64| Some(Response::value_of_polynomials(&orders, theta, omega, ts));
-        let whole = |omega: f64| {
-            let covariance = self.covariance(row);
-            let found = Response::of_polynomials(&orders, theta, covariance.as_deref(), omega, ts);
-            Some(found)
-        };
+        let (orders, ts) = (self.orders_of(row), self.sample_time);
+        let value = |omega: f64| Some(Response::value_of_polynomials(&orders, self.theta(row), omega, ts));
+        let whole = |omega: f64| Some(self.response_at(row, omega));
         Some(OpenLoop::of(value, whole, element, ts))
     }
 

@@ -197,7 +197,7 @@ impl Tracker {
 
     /// Returns the names of the coefficients.
     pub fn parameter_names(&self) -> Vec<String> {
-        self.options.polynomial_orders().parameter_names()
+        self.options.coefficient_names()
     }
 
     /// Returns the covariance of theta by rows; `None` while there is none.
@@ -226,14 +226,18 @@ impl Tracker {
         match self.recursion.operator() {
             Some(operator) if operator.t_l_s.value.is_finite() => Ok(operator),
             Some(_) => Err(NotConvertible::ZeroGain),
-            None => operator_of(
-                self.options.structure,
-                self.options.orders,
-                self.recursion.delay().as_ref(),
-                self.sample_time,
-                self.theta(),
-                self.covariance().as_deref(),
-            ),
+            None => {
+                let covariance = self.covariance();
+                let (theta, covariance) = self.options.of_first_input(self.theta(), covariance.as_deref());
+                operator_of(
+                    self.options.structure,
+                    self.options.orders,
+                    self.recursion.delay().as_ref(),
+                    self.sample_time,
+                    theta,
+                    covariance.as_deref(),
+                )
+            }
         }
     }
 
@@ -251,8 +255,9 @@ impl Tracker {
         }
         let orders = self.orders();
         let covariance = self.covariance();
-        let (theta, ts) = (self.theta(), self.sample_time);
-        let whole = covariance.as_deref();
+        let ts = self.sample_time;
+        let (theta, whole) = self.options.of_first_input(self.theta(), covariance.as_deref());
+        let whole = whole.as_deref();
         Some(Response::of_polynomials(&orders, theta, whole, omega_rad_s, ts))
     }
 

@@ -51,6 +51,30 @@ def order(name: str, value: Any) -> tuple[int, int]:
     return low, high
 
 
+def roles(
+    record: Record, inputs: Sequence[str] | None, roles: Mapping[str, str] | None
+) -> list[str]:
+    """Return the inputs other than the error with their roles, in the form that the library reads.
+
+    >>> roles(record, ["e", "r"], {"r": "feedforward:0.5"})
+    ['r=feedforward:0.5']
+    """
+    named = dict(roles or {})
+    error = record.input_name
+    names = list(inputs) if inputs is not None else [error, *(name for name in named if name != error)]
+    if isinstance(inputs, str) or not names or names[0] not in (error, "e"):
+        raise OptionError(
+            f"inputs: the first is the error, found {inputs!r}, expected [{error!r}, ...]"
+            " (name another column when the record is read)"
+        )
+    if named.pop(names[0], "feedback") != "feedback":
+        raise OptionError(f"roles: {names[0]} is the feedback")
+    unknown = sorted(set(named) - set(names[1:]))
+    if unknown:
+        raise OptionError(f"roles: {unknown[0]} is not one of the inputs {names}")
+    return [f"{name}={named.get(name, 'feedforward')}" for name in names[1:]]
+
+
 def controlled_element(
     element: str | Sequence[float] | tuple[Sequence[float], Sequence[float]],
     den: Sequence[float] | None = None,

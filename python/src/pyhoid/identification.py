@@ -172,7 +172,7 @@ def identify(
     several = tuple(_options.as_records(records))
     given: dict[str, Any] = dict(settings)
     if inputs is not None or roles is not None:
-        given["role"] = [*given.get("role", ()), *_roles(several[0], inputs, roles)]
+        given["role"] = [*given.get("role", ()), *_options.roles(several[0], inputs, roles)]
     found, notes = _pyhoid.identify(
         several,
         structure=structure,
@@ -243,28 +243,6 @@ def identify_operator(
     """
     found: OperatorFit = identify(records, "operator", **options)
     return found
-
-
-def _roles(record: Record, inputs: Sequence[str] | None, roles: Mapping[str, str] | None) -> list[str]:
-    """Return the inputs other than the error with their roles, in the form that the library reads.
-
-    >>> _roles(record, ["e", "r"], {"r": "feedforward:0.5"})
-    ['r=feedforward:0.5']
-    """
-    named = dict(roles or {})
-    error = record.input_name
-    names = list(inputs) if inputs is not None else [error, *(name for name in named if name != error)]
-    if isinstance(inputs, str) or not names or names[0] not in (error, "e"):
-        raise OptionError(
-            f"inputs: the first is the error, found {inputs!r}, expected [{error!r}, ...]"
-            " (name another column when the record is read)"
-        )
-    if named.pop(names[0], "feedback") != "feedback":
-        raise OptionError(f"roles: {names[0]} is the feedback")
-    unknown = sorted(set(named) - set(names[1:]))
-    if unknown:
-        raise OptionError(f"roles: {unknown[0]} is not one of the inputs {names}")
-    return [f"{name}={named.get(name, 'feedforward')}" for name in names[1:]]
 
 
 def _texts(settings: Mapping[str, Any]) -> dict[str, str]:

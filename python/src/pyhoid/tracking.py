@@ -21,11 +21,20 @@ if TYPE_CHECKING:
 
 __all__ = ["track"]
 
+_ORDERS = ("na", "nb", "nc", "nd", "nf", "nk")
+
+
+def _numbers(order: Order) -> list[int]:
+    """Return an order of a model with two inputs as a list: one number for both, or one for each."""
+    return list(order) if isinstance(order, (tuple, list)) else [order]
+
 
 def track(
     record: Record,
     method: RecursiveMethod = "adaptive",
     *,
+    inputs: Sequence[str] | None = None,
+    roles: Mapping[str, str] | None = None,
     structure: Structure | None = None,
     na: Order | None = None,
     nb: Order | None = None,
@@ -60,10 +69,17 @@ def track(
     record : Record
     method : str
         {methods}
+    inputs : sequence of str, optional
+        For ``"rls"`` and ``"rpem"``: the error and one further channel to which the person responds, such as
+        ``["e", "r"]``. Each order is then one number for both inputs or a pair with one for each, and `nk`
+        must be given. The trace has the coefficients ``b0[r]``, ... and with `at` the columns
+        ``gain_db[r]@2.5`` and ``phase_deg[r]@2.5``.
+    roles : mapping of str to str, optional
+        Role of the further input: ``{"r": "feedforward"}`` (the default), ``"motion"`` or ``"output"``.
     structure : str, optional
         By default ``"arx"`` for ``"rls"``, otherwise ``"bj"``.
     na, nb, nc, nd, nf, nk : int or (int, int) or range, optional
-        Orders; pairs are ranges that are searched on the start span.
+        Orders; pairs are ranges that are searched on the start span (with two inputs: one number for each).
     delay : float or (float, float), optional
         Delay tau_e in s in place of `nk`, or the shortest and the longest delay of a search.
     criterion : str
@@ -122,12 +138,17 @@ def track(
     >>> fit = pyhoid.identify(earlier)
     >>> trace = pyhoid.track(record, at=(1, 2.5), controlled_element="90/(s(s+6))", prior=fit)
     >>> trace["phase_margin_deg"], trace["phase_margin_deg_se"]
+
+    A person who sees the target:
+
+    >>> trace = pyhoid.track(record, "rpem", inputs=["e", "f_t"], nb=(2, 1), nd=1, nk=(14, 1), at=[2])
+    >>> trace["gain_db[f_t]@2"]
     """
     method = _recursion.name_of_now(method)
     shared = {
         name: value
         for name, value in locals().items()
-        if name not in ("record", "progress", "settings", "validate", "update_covariance")
+        if name not in ("record", "progress", "settings", "validate", "update_covariance", "inputs", "roles")
     }
     if not isinstance(record, Record):
         raise DataError(f"expected a pyhoid.Record, found {type(record).__name__}")
@@ -135,7 +156,20 @@ def track(
         raise DataError(f"validate: expected a pyhoid.Record, found {type(validate).__name__}")
     if update_covariance and validate is None:
         raise OptionError("update_covariance applies only with validate, a second run")
-    options = _recursion.plain(shared, settings)
+    further = _options.roles(record, inputs, roles) if inputs is not None or roles is not None else []
+    if further:
+        options = _recursion.plain(shared | dict.fromkeys(_ORDERS), settings)
+        options |= {
+            "inputs": [record.input_name, *(role.partition("=")[0] for role in further)],
+            "role": ",".join(further),
+            "orders_of_inputs": ",".join(
+                f"{name}={','.join(map(str, _numbers(shared[name])))}"
+                for name in _ORDERS
+                if shared[name] is not None
+            ),
+        }
+    else:
+        options = _recursion.plain(shared, settings)
     if every < 1:
         raise OptionError(f"every is {every}, expected 1 or more")
     native = _pyhoid.track(
@@ -150,7 +184,12 @@ def track(
         update_covariance=bool(update_covariance),
         progress=_options.reporter(progress, "candidates"),
     )
-    by_run = {"validate": validate, "update_covariance": update_covariance}
+    by_run = {
+        "validate": validate,
+        "update_covariance": update_covariance,
+        "inputs": inputs,
+        "roles": roles,
+    }
     call = Call("track", (record,), shared | settings | by_run)
     return Trace(native, record, shared | settings, call)
 

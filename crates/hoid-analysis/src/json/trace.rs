@@ -63,6 +63,9 @@ impl Tracked {
         }
         set("updated_from", number(trace.updated_from_s()));
         set("last", self.last_json());
+        if let Some(channels) = self.channels_json() {
+            set("channels", channels);
+        }
         set("samples", json!(counts.samples));
         set("skipped", json!(counts.skipped));
         set("held", json!(counts.held));
@@ -118,6 +121,42 @@ impl Tracked {
             settings: &[Setting::new("span in s", words)],
         };
         Ok(Value::Object(answer.object()))
+    }
+
+    /// Returns the two inputs of a model with a further input: their coefficients and responses in the last row.
+    fn channels_json(&self) -> Option<Value> {
+        let trace = &self.trace;
+        let further = trace.options().further.as_ref()?;
+        let row = trace.len().checked_sub(1)?;
+        let own = further.names();
+        let at = &trace.options().at_rad_s;
+        let channel = |input: &str, role: &str, first: bool| {
+            let all = trace.parameter_names().into_iter().zip(trace.parameters(row));
+            let of_input = all.filter(|(name, _)| match first {
+                true => name.starts_with(['b', 'f']) && !own.contains(name),
+                false => own.contains(name),
+            });
+            let parameters = of_input.map(|(name, e)| {
+                json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)})
+            });
+            let response = |_, omega: f64| match first {
+                true => Some(trace.response_at(row, omega)),
+                false => trace.further_response(row, omega),
+            };
+            json!({
+                "input": input,
+                "role": role,
+                "form": null,
+                "parameters": parameters.collect::<Vec<_>>(),
+                "response": responses(at, response),
+            })
+        };
+        let record = &self.data.records[0];
+        let error = record.input_channel().map_or("e", |channel| channel.name.as_str());
+        Some(json!([
+            channel(error, "feedback", true),
+            channel(&further.channel, further.role.name(), false),
+        ]))
     }
 
     fn last_json(&self) -> Value {

@@ -10,11 +10,13 @@
 //! that a recording is not repaired beforehand.
 
 mod errors;
+mod inputs;
 mod run;
 mod settings;
 mod tracked;
 
 pub use errors::relative_errors;
+pub use inputs::two_inputs;
 pub use run::{Tracking, options_of_recursion};
 pub use settings::settings_of_recursion;
 pub use tracked::Tracked;

@@ -101,7 +101,7 @@ impl Tracking {
         }
         .max(1);
         let plan = plan_of(&self.recursion, record.sample_time())?;
-        self.check(&plan, record)?;
+        self.check(&plan, record, validation.is_some())?;
         let span_s = self.start_span_s.unwrap_or_else(|| default_start_span(record));
         let span = record.span(span_s.0, span_s.1);
         let (planned, choice) = if plan.is_settled() {
@@ -140,7 +140,8 @@ impl Tracking {
         let verdict = trace.verdict(record, choice.as_ref())?;
         let verdict = verdict.prepend(findings_of_quality(account, record, Of::Person));
         let verdict = verdict.append(data.element_finding(used.controlled_element.as_ref(), None));
-        let verdict = verdict.append(data.display_finding(&[]));
+        let inputs: Vec<&str> = used.further.iter().map(|further| further.channel.as_str()).collect();
+        let verdict = verdict.append(data.display_finding(&inputs));
         let mut settings = settings_of_recursion(&self.recursion, &plan, &used, choice.as_ref());
         let own = OwnSettings {
             trace: &trace,
@@ -166,8 +167,13 @@ impl Tracking {
     }
 
     /// Checks the plan and the record for contradictions.
-    fn check(&self, plan: &TrackPlan, record: &Record) -> Result<(), AnalysisError> {
+    fn check(&self, plan: &TrackPlan, record: &Record, validated: bool) -> Result<(), AnalysisError> {
         let method = &plan.options().method;
+        if validated && plan.options().further.is_some() {
+            return Err(options(
+                "--validate predicts the second run from one input; drop it, or track with one input".to_owned(),
+            ));
+        }
         if self.start_span_s.is_some() && matches!(self.recursion.start, RequestedStart::Coefficients(_)) {
             return Err(options(
                 "--start-span is the span of the start fit, and --start gives the start itself; drop one of the \

@@ -32,6 +32,9 @@ pub fn settings_of_recursion(
         Setting::new("structure", options.structure.name()).given(asked.structure.is_some()),
         Setting::new("orders", orders).given(!asked.orders.is_empty() || asked.delay.is_some()),
     ];
+    if let Some(further) = &options.further {
+        list.push(Setting::new("further input", further.to_string()).given(true));
+    }
     if let Some(delay @ DelayRange::Seconds(..)) = &asked.delay {
         list.push(Setting::new("delay", delay.to_string()).given(true));
     }

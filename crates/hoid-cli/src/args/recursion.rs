@@ -35,9 +35,10 @@ pub struct RecursionArgs {
     #[arg(long, value_name = "LIST")]
     pub orders: Option<String>,
     /// Delay of b0 in samples (29) or dead time in s (0.28s), or a range (20..40, 0.1s..0.4s) to search on the start
-    /// span [default: 0.05 to 0.6 s; adaptive starts at 0.2 s and tracks the delay]
-    #[arg(long, value_name = "N|Ss|LO..HI")]
-    pub nk: Option<DelayRange>,
+    /// span; with two inputs one number each (29,12) [default: 0.05 to 0.6 s; adaptive starts at 0.2 s and tracks the
+    /// delay]
+    #[arg(long, value_name = "N|Ss|LO..HI", value_delimiter = ',')]
+    pub nk: Vec<DelayRange>,
     /// Delay tau_e in s, instead of --nk: .28, or a range (0.1..0.4) to search on the start span
     #[arg(long, value_name = "S|LO..HI", conflicts_with = "nk")]
     pub delay: Option<OneOrSpan>,
@@ -74,6 +75,10 @@ pub struct TrackArgs {
     pub methods: bool,
     #[command(flatten)]
     pub recursion: RecursionArgs,
+    /// Role of a second --input: feedforward, motion or output, such as r=motion [default: feedforward]. A model with
+    /// two inputs requires --method rls or rpem, and --nk
+    #[arg(long, value_name = "COLUMN=ROLE")]
+    pub role: Option<String>,
     /// Span of the start fit, s, for methods that have one [default: the first third of the record]
     #[arg(long, value_name = "S..S", value_parser = parse_span, allow_hyphen_values = true)]
     pub start_span: Option<(f64, f64)>,

@@ -32,14 +32,16 @@
 //! | `sign` | without a given controlled element: the response at 0.5 rad/s would increase the error |
 //! | `unstable-loop`, `no-crossover` | with the controlled element, a person could not have kept the loop of the last row stable |
 //! | `undeclared-change`, `drifting`, `swaying` | the response varies between declared changes |
+//! | `changed-input` | for a model with two inputs, the input whose response changed (a note) |
 //! | `no-answer` | e does not respond to u |
 //! | `not-finite` | an estimate is not a finite number |
 //!
 //! `operators` examines the operators of the rows, `recording` the actions of the guard and the start and end of the
 //! record, `structure` the form of the operator, `steadiness` its constancy, and `moment` a single sample. If the
 //! response is known at the end, an undetermined gain or lead, or a negative lead, gives only a note: gain and lead are
-//! only one description of the response, which may have another form.
+//! only one description of the response, which may have another form. `inputs` examines the responses to two inputs.
 
+mod inputs;
 mod moment;
 mod operators;
 mod recording;
@@ -90,6 +92,7 @@ impl Trace {
         all.extend(self.idle_finding(record));
         all.extend(self.supposed_finding());
         all.extend(self.not_followed(record));
+        all.extend(self.changed_input(&rows));
         if !all.iter().any(|finding| finding.kind == "gain") {
             all.extend(self.last_row_finding());
         }

@@ -103,6 +103,10 @@ impl Trace {
         let operator = self.operator(row).ok()?;
         // If gain and lead approximate another form, their response differs from that of the estimate, so that they are
         // not compared.
+        // The batch fits of the last seconds have one input.
+        if self.options().further.is_some() {
+            return None;
+        }
         if self.response_is_known && (is_open(&operator.k_e) || leads_backwards(&operator)) {
             return None;
         }

@@ -72,6 +72,10 @@ impl RecursiveMethod for RlsOptions {
         Plan::new(setup, from, sample_time).build(Kernel::LeastSquares)
     }
 
+    fn takes_further_input(&self) -> bool {
+        true
+    }
+
     fn gain(&self) -> Option<&GainOptions> {
         Some(&self.gain)
     }

@@ -86,6 +86,10 @@ impl RecursiveMethod for RpemOptions {
         }
     }
 
+    fn takes_further_input(&self) -> bool {
+        true
+    }
+
     fn gain(&self) -> Option<&GainOptions> {
         Some(&self.gain)
     }

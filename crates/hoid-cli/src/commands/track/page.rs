@@ -3,7 +3,7 @@
 use hoid::analysis::Tracked;
 use hoid::model::{GainUnit, uncertainty::Estimate};
 use hoid::report::numbers;
-use hoid::track::value_of;
+use hoid::track::{Response, value_of};
 
 use crate::{error::CliError, text};
 
@@ -20,6 +20,7 @@ const COEFFICIENTS_SHOWN: usize = 6;
 pub fn page(tracked: &Tracked, out: Option<&str>, verbose: bool) -> Result<String, CliError> {
     let mut page = text::verdict(&tracked.verdict);
     page.push_str(&rows_shown(tracked));
+    page.push_str(&further_response(tracked));
     let errors = tracked.relative_errors();
     if !errors.is_empty() {
         let each: Vec<String> = errors
@@ -95,18 +96,26 @@ fn covariance(tracked: &Tracked) -> String {
     )
 }
 
+/// Returns the rows that are printed, evenly spaced over those in which the estimate moves.
+fn picked_rows(tracked: &Tracked) -> Vec<usize> {
+    let Some(last) = tracked.trace.len().checked_sub(1) else {
+        return Vec::new();
+    };
+    let first = tracked.first_moved_row();
+    let shown = ROWS_SHOWN.min(last - first + 1);
+    let mut picked: Vec<usize> = (0..shown)
+        .map(|i| first + (last - first) * i / (shown - 1).max(1))
+        .collect();
+    picked.dedup();
+    picked
+}
+
 /// Returns a table of the estimate at a few times.
 fn rows_shown(tracked: &Tracked) -> String {
     let trace = &tracked.trace;
     if trace.is_empty() {
         return String::new();
     }
-    let (first, last) = (tracked.first_moved_row(), trace.len() - 1);
-    let shown = ROWS_SHOWN.min(last - first + 1);
-    let mut picked: Vec<usize> = (0..shown)
-        .map(|i| first + (last - first) * i / (shown - 1).max(1))
-        .collect();
-    picked.dedup();
     let with_operator = tracked.has_operator();
     let gain = GainUnit::of(tracked.record());
     let units = ["", "s", "s", "rad/s", "", "s"];
@@ -123,7 +132,7 @@ fn rows_shown(tracked: &Tracked) -> String {
         header.extend(trace.parameter_names().into_iter().take(COEFFICIENTS_SHOWN));
     }
     let mut rows = text::table(&header.iter().map(String::as_str).collect::<Vec<_>>()).into_time_series();
-    for row in picked {
+    for row in picked_rows(tracked) {
         let mut cells = vec![format!("{:.2}", trace.times_s()[row])];
         if with_operator {
             let of = |name| value_of(&tracked.operators[row], name);
@@ -152,6 +161,37 @@ fn rows_shown(tracked: &Tracked) -> String {
         trace.options().method.name(),
         trace.len()
     )
+}
+
+/// Frequencies in rad/s at which the response to a further input is printed if the user gives none.
+const FURTHER_AT_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
+
+/// Returns the response to the further input at a few times; empty for a model with one input.
+fn further_response(tracked: &Tracked) -> String {
+    let trace = &tracked.trace;
+    let Some(further) = &trace.options().further else {
+        return String::new();
+    };
+    let at = match trace.options().at_rad_s.as_slice() {
+        [] => &FURTHER_AT_RAD_S,
+        given => given,
+    };
+    let mut header = vec!["t in s".to_owned()];
+    header.extend(
+        at.iter()
+            .flat_map(|omega| [format!("dB at {omega} rad/s"), format!("deg at {omega} rad/s")]),
+    );
+    let mut rows = text::table(&header.iter().map(String::as_str).collect::<Vec<_>>()).into_time_series();
+    for row in picked_rows(tracked) {
+        let mut cells = vec![format!("{:.2}", trace.times_s()[row])];
+        for omega in at {
+            let found = trace.further_response(row, *omega);
+            cells.push(plus_minus(found.as_ref().map(Response::gain_db)));
+            cells.push(plus_minus(found.as_ref().map(Response::phase_deg)));
+        }
+        rows.add_row(cells);
+    }
+    format!("Response to {}.\n{rows}\n", further.channel)
 }
 
 /// Returns crossover and phase margin at the end of the trace; empty without a controlled element.

@@ -53,7 +53,11 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
         &[args.report.as_deref()],
     )?;
     let tracking = recursion::tracking(args)?;
-    let reading = reading::of(&args.read, None, tracking.recursion.structure().has_input())?;
+    let reading = reading::of(
+        &args.read.with_one_input(),
+        None,
+        tracking.recursion.structure().has_input(),
+    )?;
     let read = reading.file(record, reading::report_problems)?;
     reading::report_kept_rate(read.kept_rate(tracking.rate, tracking.recursion.counts_samples()));
     let other = args.validate.as_deref();

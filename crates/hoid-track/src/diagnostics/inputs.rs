@@ -1,0 +1,150 @@
+//! Names the input whose response changed, for a model with two inputs.
+//!
+//! Rows at distances of at least [`APART_S`] are compared in pairs. With the difference d of a response at a frequency
+//! and the sum C of the covariances of its real and imaginary parts, `T = d' C^-1 d` (A. Wald, 1943) exceeds x with
+//! probability `exp(-x/2)` if nothing changes and the errors of the rows are independent. Rows within the memory of the
+//! recursion have similar errors, so that the test then finds less than it could. The largest T of an input, over pairs
+//! and frequencies, has at most the probability of one comparison times their number (Bonferroni). While the recursion
+//! follows a change of one response, the other may deviate for a few seconds. T of a pair is therefore the smallest of
+//! the pair and of those with the neighbouring rows: a change must last.
+
+use hoid_model::Finding;
+
+use crate::{response::Response, trace::Trace};
+
+/// Frequencies at which responses are compared, rad/s.
+const AT_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
+/// Least time between compared rows, s.
+const APART_S: f64 = 10.0;
+/// Largest number of rows that are compared.
+const ROWS: usize = 16;
+/// Probability, over all comparisons of an input, below which a change is named.
+const UNLIKELY: f64 = 0.01;
+
+/// The largest change of a response.
+#[derive(Debug, Clone, Copy)]
+struct ChangeOfResponse {
+    /// Times of the two rows, s.
+    between_s: [f64; 2],
+    omega_rad_s: f64,
+    responses: [Response; 2],
+    /// Probability of a change that large if nothing changes.
+    p_value: f64,
+}
+
+impl Trace {
+    /// Returns a note that names the input whose response changed; `None` for a model with one input and if neither
+    /// changed. `rows` are the examined rows.
+    pub(super) fn changed_input(&self, rows: &[usize]) -> Option<Finding> {
+        let further = self.options().further.as_ref()?;
+        let own = self.largest_change(rows, |row, omega| Some(self.response_at(row, omega)));
+        let of_further = self.largest_change(rows, |row, omega| self.further_response(row, omega));
+        let channel = further.channel.as_str();
+        let named = |found: Option<ChangeOfResponse>| found.filter(|f| f.p_value < UNLIKELY).map(|f| f.in_words());
+        let message = match (named(own), named(of_further)) {
+            (Some(own), Some(further)) => {
+                format!("both responses changed: that to e {own}; that to {channel} {further}")
+            }
+            (Some(own), None) => format!("the response to e changed {own}; no change of that to {channel} is found"),
+            (None, Some(further)) => {
+                format!("the response to {channel} changed {further}; no change of that to e is found")
+            }
+            (None, None) => return None,
+        };
+        Some(Finding::note("changed-input", message))
+    }
+
+    /// Returns the largest change of a response between two of the rows; `None` if no two rows can be compared.
+    fn largest_change(
+        &self,
+        rows: &[usize],
+        response: impl Fn(usize, f64) -> Option<Response>,
+    ) -> Option<ChangeOfResponse> {
+        let step = rows.len().div_ceil(ROWS).max(1);
+        let rows: Vec<usize> = rows.iter().rev().step_by(step).rev().copied().collect();
+        let at = |row: usize| self.times_s()[row];
+        let last = rows.len().checked_sub(1)?;
+        let pairs: Vec<[usize; 2]> = (0..=last)
+            .flat_map(|from| (from + 1..=last).map(move |to| [from, to]))
+            .filter(|[from, to]| at(rows[*to]) - at(rows[*from]) >= APART_S)
+            .collect();
+        let comparisons = (AT_RAD_S.len() * pairs.len()) as f64;
+        let mut largest: Option<ChangeOfResponse> = None;
+        for omega_rad_s in AT_RAD_S {
+            let all: Vec<Response> = rows.iter().filter_map(|row| response(*row, omega_rad_s)).collect();
+            if all.len() <= last {
+                continue;
+            }
+            for &[from, to] in &pairs {
+                // The neighbours away from the pair, or within it at the ends of the record.
+                let before = from.checked_sub(1).unwrap_or(from + 1);
+                let after = if to < last { to + 1 } else { to - 1 };
+                let lasting = [[from, to], [before, to], [from, after]]
+                    .map(|[from, to]| wald(&[all[from], all[to]]))
+                    .into_iter()
+                    .fold(f64::INFINITY, f64::min);
+                let p_value = (comparisons * (-0.5 * lasting).exp()).min(1.0);
+                if largest.is_none_or(|known| p_value < known.p_value) {
+                    largest = Some(ChangeOfResponse {
+                        between_s: [at(rows[from]), at(rows[to])],
+                        omega_rad_s,
+                        responses: [all[from], all[to]],
+                        p_value,
+                    });
+                }
+            }
+        }
+        largest
+    }
+}
+
+impl ChangeOfResponse {
+    fn in_words(&self) -> String {
+        let [before, after] = &self.responses;
+        let turned = (after.phase_deg().value - before.phase_deg().value + 180.0).rem_euclid(360.0) - 180.0;
+        format!(
+            "between {:.0} and {:.0} s, at {} rad/s from {:.1} to {:.1} dB and by {turned:+.0} deg (p = {:.1e})",
+            self.between_s[0],
+            self.between_s[1],
+            self.omega_rad_s,
+            before.gain_db().value,
+            after.gain_db().value,
+            self.p_value
+        )
+    }
+}
+
+/// Returns `d' C^-1 d` for the difference d of two responses; zero without a positive covariance.
+fn wald([before, after]: &[Response; 2]) -> f64 {
+    let d = [0, 1].map(|part| after.value[part] - before.value[part]);
+    let c = |i: usize, j: usize| before.covariance[i][j] + after.covariance[i][j];
+    let determinant = c(0, 0) * c(1, 1) - c(0, 1) * c(1, 0);
+    let squares = d[0] * d[0] * c(1, 1) - 2.0 * d[0] * d[1] * c(0, 1) + d[1] * d[1] * c(0, 0);
+    let found = squares / determinant;
+    if determinant > 0.0 && found.is_finite() {
+        found
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_statistic_is_the_distance_in_errors() {
+        let response = |re: f64, c: [[f64; 2]; 2]| Response {
+            value: [re, 1.0],
+            covariance: c,
+        };
+        let unit = [[0.5, 0.0], [0.0, 0.5]];
+        assert!((wald(&[response(0.0, unit), response(3.0, unit)]) - 9.0).abs() < 1e-12);
+        // d = [1, 0], C = [[2, 1], [1, 2]]: d' C^-1 d = 2/3.
+        let oblique = [[1.0, 0.5], [0.5, 1.0]];
+        assert!((wald(&[response(0.0, oblique), response(1.0, oblique)]) - 2.0 / 3.0).abs() < 1e-12);
+        for useless in [[[0.0; 2]; 2], [[f64::NAN; 2]; 2]] {
+            assert_eq!(wald(&[response(0.0, useless), response(1.0, useless)]), 0.0);
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! A further input of a tracked model: `A u = (B/F) q^-nk e + (B_r/F_r) q^-nk_r r + (C/D) eps` (L. Ljung, *System
+//! Identification*, 1999, section 4.2, eq. 4.35).
+//!
+//! A person who sees the target r responds to the error and to r. With one input, a recursion attributes both responses
+//! to the error. In theta the coefficients of B_r and F_r follow those of the model of e. The response to r is
+//! `B_r z^-nk_r/(A F_r)`; its covariance is a part of that of theta.
+
+use std::fmt;
+
+use hoid_ident::{
+    SearchOptions,
+    family::ChannelRole,
+    several_inputs::{InputOrders, SeveralInputs},
+};
+use hoid_model::{Orders, SampleTime, Structure};
+
+use crate::response::Response;
+
+/// A further input of a tracked model.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TrackedInput {
+    /// Name of the channel in the record.
+    pub channel: String,
+    /// Its role in the task of the person.
+    pub role: ChannelRole,
+    /// Numbers of coefficients of B and F, and the delay in samples.
+    pub orders: InputOrders,
+}
+
+impl fmt::Display for TrackedInput {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let InputOrders { nb, nf, nk } = self.orders;
+        write!(f, "{} ({}), nb={nb}, nf={nf}, nk={nk}", self.channel, self.role)
+    }
+}
+
+impl TrackedInput {
+    /// Returns the number of coefficients.
+    pub fn parameters(&self) -> usize {
+        self.orders.nb + self.orders.nf
+    }
+
+    /// Returns the names of the coefficients, such as `b0[r]`.
+    pub fn names(&self) -> Vec<String> {
+        let of_b = (0..self.orders.nb).map(|i| format!("b{i}[{}]", self.channel));
+        let of_f = (1..=self.orders.nf).map(|i| format!("f{i}[{}]", self.channel));
+        of_b.chain(of_f).collect()
+    }
+
+    /// Returns the batch model whose fit starts the recursion, with the coefficients in the same order.
+    pub(crate) fn batch_model(&self, structure: Structure, orders: &Orders, search: SearchOptions) -> SeveralInputs {
+        let first = InputOrders {
+            nb: orders.nb,
+            nf: orders.nf,
+            nk: orders.nk,
+        };
+        SeveralInputs {
+            na: orders.na,
+            nc: orders.nc,
+            nd: orders.nd,
+            // The first input of a batch model is that of the record; its name only labels coefficients.
+            inputs: vec![(String::new(), first), (self.channel.clone(), self.orders)],
+            search,
+            ..SeveralInputs::new(structure)
+        }
+    }
+
+    /// Returns the response to this input at a frequency in rad/s; `orders` are those of the model of e, and
+    /// `covariance` is that of the whole theta, by rows.
+    pub(crate) fn response(
+        &self,
+        orders: &Orders,
+        theta: &[f64],
+        covariance: Option<&[f64]>,
+        omega_rad_s: f64,
+        sample_time: SampleTime,
+    ) -> Response {
+        let own = Orders {
+            na: orders.na,
+            nb: self.orders.nb,
+            nc: 0,
+            nd: 0,
+            nf: self.orders.nf,
+            nk: self.orders.nk,
+        };
+        let first = orders.parameters();
+        let places: Vec<usize> = (0..orders.na).chain(first..first + self.parameters()).collect();
+        let theta_of_input: Vec<f64> = places.iter().map(|&i| theta[i]).collect();
+        let block = covariance.map(|c| block(c, theta.len(), &places));
+        Response::of_polynomials(&own, &theta_of_input, block.as_deref(), omega_rad_s, sample_time)
+    }
+}
+
+/// Returns the rows and columns at `places` of a matrix of `width` rows.
+pub(crate) fn block(matrix: &[f64], width: usize, places: &[usize]) -> Vec<f64> {
+    let rows = places.iter().flat_map(|i| places.iter().map(move |j| i * width + j));
+    rows.map(|place| matrix[place]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_response_to_a_further_input_is_that_of_a_model_of_its_own() {
+        let orders = Orders {
+            na: 1,
+            nb: 2,
+            nc: 1,
+            nd: 1,
+            nf: 1,
+            nk: 3,
+        };
+        let input = TrackedInput {
+            channel: "r".to_owned(),
+            role: ChannelRole::Feedforward,
+            orders: InputOrders { nb: 2, nf: 1, nk: 5 },
+        };
+        assert_eq!(input.names(), ["b0[r]", "b1[r]", "f1[r]"]);
+        // [a1, b0, b1, c1, d1, f1], [b0, b1, f1].
+        let theta = [-0.4, 0.3, 0.1, 0.2, -0.6, -0.5, 0.7, -0.2, -0.3];
+        let p = theta.len();
+        let covariance: Vec<f64> = (0..p * p)
+            .map(|k| {
+                if k / p == k % p {
+                    1e-3 * (1 + k / p) as f64
+                } else {
+                    1e-5
+                }
+            })
+            .collect();
+        let found = input.response(&orders, &theta, Some(&covariance), 3.0, SampleTime::HUNDREDTH);
+        let alone = Orders {
+            na: 1,
+            nb: 2,
+            nc: 0,
+            nd: 0,
+            nf: 1,
+            nk: 5,
+        };
+        let places = [0, 6, 7, 8];
+        let own = places.map(|i| theta[i]);
+        let of_own: Vec<f64> = places
+            .iter()
+            .flat_map(|i| places.map(|j| covariance[i * p + j]))
+            .collect();
+        let expected = Response::of_polynomials(&alone, &own, Some(&of_own), 3.0, SampleTime::HUNDREDTH);
+        assert_eq!(found, expected);
+        let e = Response::of_polynomials(&orders, &theta[..6], None, 3.0, SampleTime::HUNDREDTH);
+        assert_ne!(found.value, e.value);
+    }
+}

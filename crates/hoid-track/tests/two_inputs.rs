@@ -1,0 +1,301 @@
+//! Recursions with a further input: against the batch fit, through a change of one response, and refused options.
+#![allow(clippy::unwrap_used)]
+
+use hoid_ident::{
+    InitialState,
+    family::ChannelRole,
+    several_inputs::{InputOrders, SeveralInputs},
+};
+use hoid_model::{Channel, Orders, Record, SampleTime, Structure};
+use hoid_track::{Method, Sample, StartAt, Trace, TrackOptions, TrackedInput, Tracker, track};
+
+/// Standard normal numbers.
+struct Noise(u64);
+
+impl Noise {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+    }
+
+    fn next(&mut self) -> f64 {
+        (-2.0 * self.uniform().ln()).sqrt() * (std::f64::consts::TAU * self.uniform()).cos()
+    }
+}
+
+const TS: f64 = 0.02;
+const F: [f64; 2] = [-1.6, 0.68];
+const D: f64 = -0.8;
+const NK: usize = 10;
+const NK_R: usize = 5;
+const SAMPLES: usize = 4000;
+
+/// Coefficient b0 of the response to r at a sample: it doubles in the middle of the record.
+fn gain(k: usize, changes: bool) -> f64 {
+    if changes && k >= SAMPLES / 2 { 0.06 } else { 0.03 }
+}
+
+/// A record of `u = (B/F) q^-10 e + (B_r/F) q^-5 r + n`, `n = eps/D`; e and r are sums of sines with random phases.
+fn record(seed: u64, level: f64, changes: bool) -> Record {
+    let mut noise = Noise(seed);
+    let mut sines = |lines: &[f64]| -> Vec<f64> {
+        let phases: Vec<f64> = lines.iter().map(|_| 6.3 * noise.uniform()).collect();
+        let at = |k: usize| {
+            let each = lines.iter().zip(&phases);
+            each.map(|(w, p)| (w * k as f64 * TS + p).sin() / w.sqrt()).sum()
+        };
+        (0..SAMPLES).map(at).collect()
+    };
+    let e = sines(&[0.4, 0.9, 1.6, 2.9, 4.7, 7.3, 11.0, 17.0]);
+    let r = sines(&[0.6, 1.2, 2.1, 3.8, 6.1, 9.2, 14.0, 21.0]);
+    let (mut of_e, mut of_r, mut n) = ([0.0; 2], [0.0; 2], 0.0);
+    let past = |x: &[f64], k: usize, by: usize| k.checked_sub(by).map_or(0.0, |k| x[k]);
+    let u = (0..SAMPLES)
+        .map(|k| {
+            let w = 0.05 * past(&e, k, NK) - 0.03 * past(&e, k, NK + 1) - F[0] * of_e[0] - F[1] * of_e[1];
+            let w_r = gain(k, changes) * past(&r, k, NK_R) - F[0] * of_r[0] - F[1] * of_r[1];
+            (of_e, of_r) = ([w, of_e[0]], [w_r, of_r[0]]);
+            n = level * noise.next() - D * n;
+            w + w_r + n
+        })
+        .collect();
+    Record::new(
+        SampleTime::new(TS).unwrap(),
+        Channel::new("e", "", e),
+        Channel::new("u", "", u),
+    )
+    .unwrap()
+    .with_channel(Channel::new("r", "", r))
+    .unwrap()
+}
+
+fn input(nb: usize, nf: usize, nk: usize) -> Option<TrackedInput> {
+    Some(TrackedInput {
+        channel: "r".to_owned(),
+        role: ChannelRole::Feedforward,
+        orders: InputOrders { nb, nf, nk },
+    })
+}
+
+fn orders(na: usize, nd: usize, nf: usize) -> Orders {
+    Orders {
+        na,
+        nb: 2,
+        nc: 0,
+        nd,
+        nf,
+        nk: NK,
+    }
+}
+
+/// Options of a Box-Jenkins model by the prediction-error method.
+fn box_jenkins() -> TrackOptions {
+    TrackOptions {
+        further: input(1, 2, NK_R),
+        ..TrackOptions::new(Method::rpem(), Structure::BoxJenkins, orders(0, 1, 2))
+    }
+}
+
+fn value(trace: &Trace, row: usize, name: &str) -> (f64, f64) {
+    let place = trace.parameter_names().iter().position(|known| known == name).unwrap();
+    let estimate = trace.parameters(row)[place];
+    (estimate.value, estimate.standard_error.unwrap())
+}
+
+#[test]
+fn without_forgetting_rls_ends_at_the_batch_fit() {
+    let record = record(1, 0.01, false);
+    let method = Method::rls();
+    let options = TrackOptions {
+        further: input(2, 0, NK_R),
+        start: StartAt::Nothing,
+        ..TrackOptions::new(method, Structure::Arx, orders(2, 0, 0))
+    }
+    .with(&[("memory", "inf"), ("covariance", "1e10")])
+    .unwrap();
+    let trace = track(&record, &options, 500).unwrap();
+    let batch = SeveralInputs {
+        na: 2,
+        inputs: vec![
+            ("e".to_owned(), InputOrders { nb: 2, nf: 0, nk: NK }),
+            ("r".to_owned(), InputOrders { nb: 2, nf: 0, nk: NK_R }),
+        ],
+        initial_state: InitialState::Zero,
+        ..SeveralInputs::new(Structure::Arx)
+    };
+    let fit = batch.fit(&[record]).unwrap();
+    assert_eq!(trace.parameter_names(), ["a1", "a2", "b0", "b1", "b0[r]", "b1[r]"]);
+    let last = trace.len() - 1;
+    for ((name, expected), found) in fit.parameters().iter().zip(trace.parameters(last)) {
+        let difference = (found.value - expected.value).abs();
+        assert!(difference < 1e-7, "{name}: {} {}", found.value, expected.value);
+        let [found, expected] = [found, *expected].map(|e| e.standard_error.unwrap());
+        assert!((found / expected - 1.0).abs() < 0.01, "{name}: {found} {expected}");
+    }
+    // The response to r is B/A of its own coefficients.
+    let response = trace.further_response(last, 2.0).unwrap();
+    let of_fit = &fit.frequency_response(1, &[2.0])[0];
+    assert!((response.gain_db().value - of_fit.magnitude_db.value).abs() < 1e-4);
+    assert!((response.phase_deg().value - of_fit.phase_deg.value).abs() < 1e-3);
+}
+
+#[test]
+fn a_change_of_one_response_is_followed_in_that_response_alone() {
+    let (mut before, mut after) = (Vec::new(), Vec::new());
+    let (mut changed, mut false_alarms) = (0, 0);
+    let note = |trace: &Trace, record: &Record| {
+        let verdict = trace.verdict(record, None).unwrap();
+        let finding = verdict
+            .findings()
+            .iter()
+            .find(|finding| finding.kind == "changed-input");
+        finding.map_or_else(String::new, |finding| finding.message.clone())
+    };
+    for seed in 0..24 {
+        let trace = track(&record(seed, 0.02, true), &box_jenkins(), 20).unwrap();
+        let row = |t: f64| trace.times_s().partition_point(|time| *time < t);
+        for (t, truth, into) in [(38.0, 0.03, &mut before), (78.0, 0.06, &mut after)] {
+            let response = |t: f64| trace.further_response(row(t), 2.0).unwrap().gain_db();
+            let gain = response(t);
+            let expected = 20.0 * (truth / 0.03_f64).log10() + level_db();
+            into.push((gain.value - expected) / gain.standard_error.unwrap());
+            // The response to e does not change.
+            let own = trace.response_at(row(t), 2.0).gain_db();
+            let expected = own_db();
+            into.push((own.value - expected) / own.standard_error.unwrap());
+        }
+        assert_eq!(value(&trace, row(20.0), "b0[r]").0, value(&trace, row(10.0), "b0[r]").0);
+        let record = record(seed, 0.02, true);
+        let named = note(&trace, &record);
+        changed += usize::from(named.contains("response to r changed") && named.contains("that to e is found"));
+        // Without a change no input is named.
+        let steady = self::record(seed + 100, 0.02, false);
+        let trace = track(&steady, &box_jenkins(), 20).unwrap();
+        false_alarms += usize::from(!note(&trace, &steady).is_empty());
+    }
+    assert!(changed >= 22 && false_alarms <= 1, "{changed}, {false_alarms}");
+    for (name, z) in [("before", before), ("after", after)] {
+        let rms = (z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64).sqrt();
+        let inside = z.iter().filter(|z| z.abs() < 1.96).count() as f64 / z.len() as f64;
+        // 48 numbers: the standard error of the rms is .1, that of the share .03.
+        assert!(
+            (0.6..1.35).contains(&rms) && inside > 0.85,
+            "{name}: {rms:.2}, {inside:.2}"
+        );
+    }
+}
+
+fn db(b: &[f64], nk: usize) -> f64 {
+    let at = |k: f64| {
+        let (sin, cos) = (-2.0 * TS * k).sin_cos();
+        [cos, sin]
+    };
+    let sum = |of: &[f64], from: f64| {
+        of.iter().enumerate().fold([0.0; 2], |[re, im], (j, c)| {
+            let [cos, sin] = at(from + j as f64);
+            [re + c * cos, im + c * sin]
+        })
+    };
+    let ([b_re, b_im], [f_re, f_im]) = (sum(b, nk as f64), sum(&F, 1.0));
+    20.0 * (b_re.hypot(b_im) / (1.0 + f_re).hypot(f_im)).log10()
+}
+
+/// Gain of the response to r before the change, and of the response to e, at 2 rad/s.
+fn level_db() -> f64 {
+    db(&[0.03], NK_R)
+}
+
+fn own_db() -> f64 {
+    db(&[0.05, -0.03], NK)
+}
+
+#[test]
+fn with_one_input_the_response_to_the_error_is_wrong() {
+    // A target that e follows: without it as an input the response to e takes over the response to r.
+    let plain = record(3, 0.01, false);
+    let r = plain.channel("r").unwrap().to_vec();
+    let e: Vec<f64> = plain.input().iter().zip(&r).map(|(e, r)| 0.3 * e + r).collect();
+    let u: Vec<f64> = plain.output().to_vec();
+    let ts = SampleTime::new(TS).unwrap();
+    let joined = Record::new(ts, Channel::new("e", "", e), Channel::new("u", "", u))
+        .unwrap()
+        .with_channel(Channel::new("r", "", r))
+        .unwrap();
+    // u = (B q^-10/.3) e + (F q^-5 - (B/.3) q^-10) r: B of r has seven coefficients.
+    let gain = |further: Option<TrackedInput>| {
+        let options = TrackOptions {
+            further,
+            ..box_jenkins()
+        };
+        let trace = track(&joined, &options, 100).unwrap();
+        trace.response_at(trace.len() - 1, 2.0).gain_db().value
+    };
+    let expected = own_db() - 20.0 * 0.3_f64.log10();
+    assert!((gain(input(7, 2, NK_R)) - expected).abs() < 0.5);
+    assert!((gain(None) - expected).abs() > 3.0);
+}
+
+#[test]
+fn samples_without_the_further_input_change_nothing() {
+    let record = record(5, 0.01, false);
+    let span = record.span(0.0, 26.0).unwrap();
+    let mut tracker = Tracker::new(&box_jenkins(), Some(&span), record.sample_time()).unwrap();
+    let r = record.channel("r").unwrap();
+    let mut before = Vec::new();
+    for k in 0..SAMPLES {
+        let known = !(3000..3100).contains(&k);
+        let (e, u) = (record.input()[k], record.output()[k]);
+        let sample = Sample {
+            e,
+            u,
+            reference: known.then_some(r[k]),
+        };
+        tracker.update(sample, true);
+        match k {
+            2999 => before = tracker.theta().to_vec(),
+            3000 | 3099 => assert_eq!(tracker.theta(), before),
+            3100 => assert_ne!(tracker.theta(), before),
+            _ => {}
+        }
+    }
+    // Without the samples the estimate stays as good.
+    let found = (tracker.parameter_names().into_iter().zip(tracker.parameters())).find(|(name, _)| name == "b0[r]");
+    let found = found.unwrap().1;
+    let away = (found.value - 0.03).abs() / found.standard_error.unwrap();
+    assert!(away < 3.5, "{found:?}");
+}
+
+#[test]
+fn options_that_a_further_input_excludes_are_refused() {
+    let record = record(7, 0.01, false);
+    let refused = |options: TrackOptions| track(&record, &options, 10).unwrap_err().to_string();
+    let words = refused(TrackOptions {
+        further: input(1, 0, 1),
+        ..TrackOptions::default_for(Method::adaptive(), NK)
+    });
+    assert!(words.contains("rls or rpem"), "{words}");
+    for (option, text) in [("track_delay", "0.1..0.3"), ("guard", "yes"), ("regressor", "cascade")] {
+        let words = refused(box_jenkins().with(&[(option, text)]).unwrap());
+        assert!(
+            words.contains(&option.replace("_delay", "")) || words.contains("further"),
+            "{words}"
+        );
+    }
+    let words = refused(TrackOptions {
+        further: Some(TrackedInput {
+            channel: "nowhere".to_owned(),
+            ..input(1, 0, 1).unwrap()
+        }),
+        ..box_jenkins()
+    });
+    assert!(words.contains("nowhere"), "{words}");
+    // ARX has no F.
+    let words = refused(TrackOptions {
+        further: input(2, 2, 1),
+        ..TrackOptions::new(Method::rls(), Structure::Arx, orders(2, 0, 0))
+    });
+    assert!(words.contains("nf"), "{words}");
+}
