@@ -140,16 +140,35 @@ pub enum IoError {
         /// Name of the file.
         file: String,
     },
-    /// Cells that are separated by blanks.
+    /// A text in which a line has no end.
     #[error(
-        "{file}: a line has {found} numbers separated by blanks, expected commas, semicolons or tabs; save the table \
-         with one of these separators, and with a header such as t,e,u"
+        "{file}: no line ends within {most_mb} MB after byte {byte}, expected one line per sample; copy or record the \
+         file again, or remove what follows this byte"
     )]
-    Blanks {
+    LongLine {
         /// Name of the file.
         file: String,
-        /// Count of the numbers in the first line.
-        found: usize,
+        /// Start of the line, counted from 0.
+        byte: usize,
+        /// Maximum length of a line in MB.
+        most_mb: usize,
+    },
+    /// A header separated by blanks whose words cannot be assigned to the cells below it.
+    #[error(
+        "{file}, {place}: the header has {}, expected {} as in the rows below it; write each name as one word \
+         (Roll_error) or in quotation marks, or separate the columns by commas, semicolons or tabs",
+        counted(*words, "word"),
+        counted(*cells, "name")
+    )]
+    Words {
+        /// Name of the file.
+        file: String,
+        /// Place of the header in the file.
+        place: String,
+        /// Number of words in the header.
+        words: usize,
+        /// Number of cells in the rows below the header.
+        cells: usize,
     },
     /// A table with too many columns.
     #[error(

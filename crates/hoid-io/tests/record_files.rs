@@ -135,8 +135,8 @@ fn channels_that_could_not_be_read_back_are_not_written() {
 #[test]
 fn other_extensions_and_places() {
     let desk = Desk::new();
-    for name in ["run.xlsx", "run", "run.npz.gz"] {
-        fs::write(desk.path(name), "t,e,u\n0,1,2\n").unwrap();
+    for name in ["run.xlsx", "run", "run.npz.gz", "run.dat"] {
+        fs::write(desk.path(name), "PK\u{3}\u{4}\0\0 words only").unwrap();
         let message = read_record(&desk.path(name), &defaults()).unwrap_err().to_string();
         assert!(
             message.contains("extension") && message.contains("; expected .csv"),
@@ -154,6 +154,29 @@ fn other_extensions_and_places() {
         read_record(&desk.path("no.csv"), &defaults()),
         Err(IoError::Unreadable { .. })
     ));
+}
+
+/// A text table is known by its content, whatever the program called the file.
+#[test]
+fn text_tables_under_other_names() {
+    let desk = Desk::new();
+    let rows = |mark: &str| format!("t{mark}e{mark}u\n0.00{mark}1{mark}2\n0.01{mark}3{mark}4\n0.02{mark}5{mark}6\n");
+    for name in ["run.dat", "run.asc", "run.log", "run.PRN", "run", "run.lvm", "run 3.5 deg"] {
+        for mark in [",", ";", "\t", " ", " | ", "|"] {
+            fs::write(desk.path(name), rows(mark)).unwrap();
+            let read = read_record(&desk.path(name), &defaults()).unwrap().record;
+            assert_eq!(read.input(), [1.0, 3.0, 5.0], "{name} {mark}");
+            assert_eq!(read.output(), [2.0, 4.0, 6.0], "{name} {mark}");
+            assert_eq!(read.sample_time().s(), 0.01, "{name} {mark}");
+        }
+    }
+    for words in ["", "\n", "one, two\nthree, four\n", "{\"t\": [0, 1]}\n", "[table]\nx = [1, 2]\n"] {
+        fs::write(desk.path("run.dat"), words).unwrap();
+        let message = read_record(&desk.path("run.dat"), &defaults()).unwrap_err().to_string();
+        assert!(message.contains(".dat is not the extension of a record format"), "{message}");
+    }
+    let message = read_record(&desk.path("missing.dat"), &defaults()).unwrap_err().to_string();
+    assert!(message.contains(".dat is not the extension"), "{message}");
 }
 
 #[test]
@@ -244,7 +267,18 @@ fn errors_name_line_column_and_remedy() {
     );
     says(
         "t e\n0.00 1.5 2\n0.01 1.6 2\n",
-        &["3 numbers separated by blanks", "expected commas, semicolons or tabs"],
+        &[
+            "line 1: the header has 2 words, expected 3 names as in the rows below it",
+            "in quotation marks",
+        ],
+    );
+    says(
+        "Run 3\n\nTime s Roll error\n0.00 1.5 2\n0.01 1.6 2\n",
+        &["line 3: the header has 4 words, expected 3 names"],
+    );
+    says(
+        "0.00 1.5 2\n0.01 1.6 2\n",
+        &["line 1: the first line holds numbers (0.00 1.5 2)", "insert a header"],
     );
     says(
         "t,e,u\n0,1,2\n#\n1,NaN,2\n2,,2\n",

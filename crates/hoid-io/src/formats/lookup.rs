@@ -1,7 +1,10 @@
 //! Choice of the file format by extension, and the known extensions.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::io::{self, Read};
+use std::path::Path;
+
+use flate2::read::MultiGzDecoder;
 
 use super::format::{Format, Writing, with_time_and_selection};
 use super::{ALL, csv, packed};
@@ -108,13 +111,44 @@ fn unknown(path: &Path, expected: String, remedy: Option<&str>) -> IoError {
     }
 }
 
-/// Returns the format of a file that will be read.
+/// Returns the error for a file that will be read and whose extension belongs to no format.
+fn not_readable(path: &Path) -> IoError {
+    let ending = ending_of(path).unwrap_or_default();
+    let elsewhere = ELSEWHERE.iter().find(|(endings, _)| endings.contains(&ending.as_str()));
+    unknown(path, readable_endings(), elsewhere.map(|(_, remedy)| *remedy))
+}
+
+/// Returns the format of a file that will be read: that of its extension, or text if the extension belongs to no format
+/// and the file starts with a table, as many programs name their text `.dat`, `.log` or without an extension.
 fn format_to_read(path: &Path) -> Result<&'static Format, IoError> {
-    format_of(path).ok_or_else(|| {
-        let ending = ending_of(path).unwrap_or_default();
-        let elsewhere = ELSEWHERE.iter().find(|(endings, _)| endings.contains(&ending.as_str()));
-        unknown(path, readable_endings(), elsewhere.map(|(_, remedy)| *remedy))
-    })
+    let inner = packed::inner(path);
+    match format_of(inner.as_deref().unwrap_or(path)) {
+        // Binary formats compress their columns themselves.
+        Some(format) if inner.is_none() || format.name == csv::CSV.name => Ok(format),
+        None if starts_with_table(path, inner.is_some()) => Ok(&csv::CSV),
+        _ => Err(not_readable(path)),
+    }
+}
+
+/// Number of bytes at the start of a file from which a table is recognised.
+const START: u64 = 64 << 10;
+
+/// True if a file, which may be packed, starts with a table of text. Pipes are not read, since what is read is lost.
+fn starts_with_table(path: &Path, is_packed: bool) -> bool {
+    let read = || -> io::Result<Vec<u8>> {
+        let mut start = Vec::new();
+        let file = fs::File::open(path)?;
+        if !file.metadata()?.is_file() {
+            return Ok(start);
+        }
+        if is_packed {
+            MultiGzDecoder::new(file).take(START).read_to_end(&mut start)?;
+        } else {
+            file.take(START).read_to_end(&mut start)?;
+        }
+        Ok(start)
+    };
+    read().is_ok_and(|start| csv::is_table(&start))
 }
 
 /// Returns the format of a file that will be written; the path must not be a directory. A pipe or a device without a
@@ -139,28 +173,32 @@ pub(crate) fn format_to_write(path: &Path) -> Result<&'static Format, IoError> {
     })
 }
 
-/// Returns the name of a compressed text file without `.gz`; `None` for other files. Binary formats compress their
-/// columns themselves.
-fn packed_text(path: &Path) -> Option<PathBuf> {
-    packed::inner(path).filter(|inner| format_of(inner).is_some_and(|format| format.name == csv::CSV.name))
-}
-
 /// Returns the format of a file and its bytes. A text compressed by gzip is decompressed, and a BIDS table gets a
 /// header.
 pub(crate) fn bytes_of(path: &Path) -> Result<(&'static Format, Vec<u8>), IoError> {
-    let file = || path.display().to_string();
+    let file = path.display().to_string();
     if path.is_dir() {
-        return Err(IoError::Directory { file: file() });
+        return Err(IoError::Directory { file });
     }
-    let inner = packed_text(path);
-    let plain = inner.as_deref().unwrap_or(path);
-    let format = format_to_read(plain)?;
-    let mut bytes = fs::read(path).map_err(|source| IoError::Unreadable { file: file(), source })?;
-    if inner.is_some() {
-        bytes = packed::decompressed(&bytes, &file())?;
-    }
+    let format = format_to_read(path)?;
+    let inner = packed::inner(path);
+    let read = |path| {
+        fs::read(path).map_err(|source| IoError::Unreadable {
+            file: file.clone(),
+            source,
+        })
+    };
+    let mut bytes = match (&inner, format.name == csv::CSV.name) {
+        (Some(_), _) => {
+            let bytes = packed::decompressed(&read(path)?, &file)?;
+            csv::LineLimit::default().add(&bytes, &file)?;
+            bytes
+        }
+        (None, true) => csv::whole_text(path, &file)?,
+        (None, false) => read(path)?,
+    };
     if format.extensions == csv::TSV.extensions {
-        bytes = packed::with_sidecar(bytes, plain);
+        bytes = packed::with_sidecar(bytes, inner.as_deref().unwrap_or(path));
     }
     Ok((format, bytes))
 }
@@ -169,19 +207,17 @@ pub(crate) fn bytes_of(path: &Path) -> Result<(&'static Format, Vec<u8>), IoErro
 /// other file.
 ///
 /// # Errors
-/// [`IoError::Unreadable`].
+/// [`IoError::Unreadable`]; [`IoError::LongLine`].
 pub(crate) fn long_text<'a>(
     path: &Path,
     file: &'a str,
     options: &ReadOptions,
 ) -> Result<Option<(&'static Format, Table<'a>)>, IoError> {
-    let text = format_of(path).filter(|format| format.name == csv::CSV.name);
-    let table = text.map(|_| csv::long_table(path, file, options)).transpose();
-    let unreadable = |source| IoError::Unreadable {
-        file: file.to_owned(),
-        source,
+    let is_text = |format: &&Format| packed::inner(path).is_none() && format.name == csv::CSV.name;
+    let Some(format) = format_to_read(path).ok().filter(is_text) else {
+        return Ok(None);
     };
-    Ok(text.zip(table.map_err(unreadable)?.flatten()))
+    Ok(csv::long_table(path, file, options)?.map(|table| (format, table)))
 }
 
 /// Returns the requested columns of a file of any format; the table may borrow from `bytes`.

@@ -58,7 +58,7 @@ pub(crate) fn with_decimal_point(cell: &str, commas: bool) -> Cow<'_, str> {
 }
 
 /// True if a cell looks like a date or a clock time, such as `2024-03-01 10:00:00.5` or `10:00:00,5`.
-pub(super) fn is_moment(cell: &str) -> bool {
+pub(crate) fn is_moment(cell: &str) -> bool {
     let parts = |marks: &[char]| {
         cell.split(marks)
             .filter(|part| part.starts_with(|c: char| c.is_ascii_digit()))

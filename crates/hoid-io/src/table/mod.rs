@@ -16,7 +16,7 @@ mod common_names;
 mod precision;
 mod selection;
 
-pub(crate) use cell::{Cell, DECIMAL_COMMA, has_decimal_comma, with_decimal_point};
+pub(crate) use cell::{Cell, DECIMAL_COMMA, has_decimal_comma, is_moment, with_decimal_point};
 pub use column_expression::ColumnExpression;
 pub(crate) use column_expression::Signal;
 pub(crate) use columns::{Column, Source, Table, UNITS_ROW, check_names, check_number, kept, read_comments};

@@ -87,10 +87,11 @@ impl CsvColumns {
 /// Reads the columns from the bytes of a CSV file.
 pub(super) fn read(bytes: &[u8], file: &str) -> Result<OutputTable, IoError> {
     let text = text(bytes, file)?;
-    let Some(header_line) = text.lines().find(|line| !is_aside(line)) else {
+    let mut lines = text.lines().filter(|line| !is_aside(line));
+    let Some(header_line) = lines.next() else {
         return Err(IoError::Empty { file: file.to_owned() });
     };
-    let separator = separator(header_line);
+    let separator = separator(header_line, lines.next());
     let (names, kinds, rows) = survey(text, file, separator)?;
     let mut values: Vec<ColumnValues> = kinds
         .iter()

@@ -12,9 +12,11 @@ use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use super::foreign::made_plain;
+use super::line_limit::{LONGEST, LineLimit};
 use super::plain::{Layout, RowStarts, plain_rows};
 use super::span_end::SpanEnd;
 use super::table::{Parsed, nth_row, parsed};
+use crate::IoError;
 use crate::record::ReadOptions;
 use crate::table::{Cell, Source, Table, check_selected, selected};
 use crate::time::{is_time, may_be_time};
@@ -24,9 +26,8 @@ use crate::wording::shown;
 const LONG: u64 = 16 << 20;
 /// Number of bytes read to obtain the header and the first rows.
 const HEAD: usize = 256 << 10;
-/// Size of the first block in bytes; each further block is twice as long as the previous block, up to [`LARGEST`].
+/// Size of the first block in bytes; each further block is twice as long as the previous block, up to [`LONGEST`].
 const BLOCK: usize = 1 << 20;
-const LARGEST: usize = 32 << 20;
 /// Number of positions in the unread part of a file at which the time is probed.
 const PROBES: u32 = 64;
 /// Number of bytes read at a probed position; it exceeds the length of a line.
@@ -35,13 +36,22 @@ const PROBE: usize = 64 << 10;
 /// Reads the table of a long text; `None` if the text is short, or if it contains anything other than plain numbers.
 ///
 /// # Errors
-/// An error of the operating system if the file cannot be read.
-pub(crate) fn table<'a>(path: &Path, file: &'a str, options: &ReadOptions) -> io::Result<Option<Table<'a>>> {
+/// [`IoError::Unreadable`]; [`IoError::LongLine`].
+pub(crate) fn table<'a>(path: &Path, file: &'a str, options: &ReadOptions) -> Result<Option<Table<'a>>, IoError> {
     of_length(path, file, options, LONG)
 }
 
 /// Reads the table of a text of at least `long` bytes.
-fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -> io::Result<Option<Table<'a>>> {
+fn of_length<'a>(
+    path: &Path,
+    file: &'a str,
+    options: &ReadOptions,
+    long: u64,
+) -> Result<Option<Table<'a>>, IoError> {
+    let unreadable = |source| IoError::Unreadable {
+        file: file.to_owned(),
+        source,
+    };
     let Ok(about) = std::fs::metadata(path) else {
         return Ok(None);
     };
@@ -49,14 +59,14 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
         return Ok(None);
     }
     let mut text = Text {
-        file: File::open(path)?,
+        file: File::open(path).map_err(unreadable)?,
         at: 0,
         buffer: Vec::new(),
         lines: 0,
         length: about.len() as usize,
         next: BLOCK,
     };
-    let Some(mut parsed) = text.head(file)? else {
+    let Some(mut parsed) = text.head(file).map_err(unreadable)? else {
         return Ok(None);
     };
     let separator = parsed.separator;
@@ -86,7 +96,8 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
         let _ = column.values.try_reserve((rows as usize).saturating_sub(parsed.rows));
     }
     let mut may_end = end.is_some();
-    while let Some(base) = text.advance()? {
+    let mut limit = LineLimit::starting_at(text.at);
+    while let Some(base) = text.advance(&mut limit, file)? {
         let read = plain_rows(text.lines(), 0, layout, |run| {
             run.starts
                 .iter()
@@ -103,7 +114,8 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
         if let Some(end) = end.as_ref().filter(|end| may_end && end.is_reached(&parsed)) {
             may_end = false;
             let probed = end.time_column().map(|column| text.probed(column, separator));
-            if end.is_last(&parsed, &probed.transpose()?.unwrap_or_default()) {
+            let probed = probed.transpose().map_err(unreadable)?;
+            if end.is_last(&parsed, &probed.unwrap_or_default()) {
                 break;
             }
         }
@@ -150,7 +162,12 @@ impl Text {
         self.at = bytes.len();
         let last = self.bytes(self.length.saturating_sub(1), 1)?;
         let is_marked = bytes.starts_with(b"\xef\xbb\xbf");
-        if last != b"\n" || is_marked || bytes.contains(&0) || !made_plain(&mut bytes).is_empty() {
+        if last != b"\n" || is_marked || bytes.contains(&0) {
+            return Ok(None);
+        }
+        // If the head is rewritten, the rest of the text may need the same changes.
+        let found = bytes.clone();
+        if !made_plain(&mut bytes).is_empty() || bytes != found {
             return Ok(None);
         }
         self.file.seek(SeekFrom::Start(self.at as u64))?;
@@ -170,27 +187,26 @@ impl Text {
     }
 
     /// Reads the next lines and returns the position of the first of them; `None` at the end of the file. An error if a
-    /// line is longer than [`LARGEST`]: all of it would have to be kept in memory.
-    fn advance(&mut self) -> io::Result<Option<usize>> {
+    /// line is too long to be kept in memory.
+    fn advance(&mut self, limit: &mut LineLimit, file: &str) -> Result<Option<usize>, IoError> {
         // The same buffer is used for all blocks.
         self.buffer.drain(..self.lines);
         let base = self.at.saturating_sub(self.buffer.len());
         loop {
             let from = self.buffer.len();
-            let read = (&mut self.file).take(self.next as u64).read_to_end(&mut self.buffer)?;
+            let read = (&mut self.file).take(self.next as u64).read_to_end(&mut self.buffer);
+            let read = read.map_err(|source| IoError::Unreadable {
+                file: file.to_owned(),
+                source,
+            })?;
             self.at = self.at.saturating_add(read);
-            self.next = self.next.saturating_mul(2).min(LARGEST);
+            self.next = self.next.saturating_mul(2).min(LONGEST);
+            limit.add(self.buffer.get(from..).unwrap_or_default(), file)?;
             let mut new = self.buffer.iter().enumerate().skip(from);
-            let line = new.rfind(|(_, byte)| **byte == b'\n');
+            let line = new.rfind(|(_, byte)| matches!(byte, b'\n' | b'\r'));
             self.lines = line.map_or(self.buffer.len(), |(at, _)| at.saturating_add(1));
             if line.is_some() || read == 0 {
                 return Ok((self.lines > 0).then_some(base));
-            }
-            if self.buffer.len() > LARGEST {
-                let megabytes = LARGEST >> 20;
-                return Err(io::Error::other(format!(
-                    "no line ends within {megabytes} MB after byte {base}, so the file is not a table"
-                )));
             }
         }
     }
@@ -377,7 +393,7 @@ mod tests {
             length: 1000,
             next: BLOCK,
         };
-        growing.advance().unwrap();
+        growing.advance(&mut LineLimit::default(), "run.csv").unwrap();
         assert!(growing.lines > growing.length);
         assert_eq!(growing.probed(0, b',').unwrap().len(), PROBES as usize);
     }
@@ -394,7 +410,7 @@ mod tests {
         let error = of_length(file.path(), "run.csv", &ReadOptions::default(), 0)
             .err()
             .unwrap();
-        let words = "no line ends within 32 MB after byte 400004";
+        let words = "run.csv: no line ends within 32 MB after byte 400004";
         assert!(error.to_string().starts_with(words), "{error}");
     }
 

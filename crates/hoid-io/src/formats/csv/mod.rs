@@ -5,6 +5,7 @@
 //! | `foreign` | conversion of files from other programs to plain CSV |
 //! | `text` | encoding, comments, separator, lines |
 //! | `table`, `plain` | the columns of a record; fast reading of rows of plain numbers |
+//! | `line_limit` | the length of a line |
 //! | `long` | reading of a long text of plain numbers, block by block |
 //! | `span_end` | the row at which reading stops if only a span is requested |
 //! | `record` | writing of a record |
@@ -12,6 +13,7 @@
 
 mod columns;
 mod foreign;
+mod line_limit;
 mod long;
 mod plain;
 mod record;
@@ -19,6 +21,8 @@ mod span_end;
 mod table;
 mod text;
 
+pub(super) use foreign::is_table;
+pub(super) use line_limit::{LineLimit, whole_text};
 pub(super) use long::table as long_table;
 pub(crate) use record::write_with_commas as write_record;
 

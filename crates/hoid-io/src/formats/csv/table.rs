@@ -16,10 +16,11 @@
 use std::collections::HashSet;
 use std::ops::Range;
 
+use super::foreign::mismatch;
 use super::plain::{Layout, RowStarts, plain_rows};
 use super::text::{
-    comments, has_decimal_commas, is_aside, is_unit, open_line, place, reader, refuse_blanks, row_start, separator,
-    text, unescape_formula,
+    comments, has_decimal_commas, is_aside, is_unit, open_line, place, reader, row_start, separator, text,
+    unescape_formula,
 };
 use crate::IoError;
 use crate::table::{Cell, Column, Source, Table, check_names, check_number, read_comments, with_decimal_point};
@@ -128,8 +129,23 @@ pub(super) fn parsed(text: &str, file: &str) -> Result<Parsed, IoError> {
     if header_line.trim_start().starts_with('{') {
         return Err(IoError::Json { file: file.to_owned() });
     }
-    refuse_blanks(header_line, lines.next(), file)?;
-    let separator = separator(header_line);
+    if let Some(found) = mismatch(text) {
+        let (file, place) = (file.to_owned(), format!("line {}", found.line));
+        return Err(match found.words {
+            0 => IoError::NoHeader {
+                file,
+                place,
+                found: found.first_row,
+            },
+            words => IoError::Words {
+                file,
+                place,
+                words,
+                cells: found.cells,
+            },
+        });
+    }
+    let separator = separator(header_line, lines.next());
     let commas = has_decimal_commas(text, separator);
     let bytes = text.as_bytes();
     let first = first_record(bytes, separator);

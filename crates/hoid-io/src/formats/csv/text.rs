@@ -73,32 +73,25 @@ pub(super) fn is_unit(text: &str) -> bool {
         && !text.starts_with(|c: char| c.is_ascii_digit() || c == ':')
 }
 
-/// Returns the most frequent separator in the header; the comma if the header contains no separator.
-pub(crate) fn separator(header: &str) -> u8 {
-    let mut quoted = false;
-    let is_plain = |byte: &u8| {
-        quoted ^= *byte == b'"';
-        !quoted
+/// Returns the most frequent separator in the header, of those that are as frequent in the `row` below if there are
+/// any: names such as `e, deg` may contain commas. Returns the comma if the header contains no separator.
+pub(crate) fn separator(header: &str, row: Option<&str>) -> u8 {
+    let count = |line: &str, separator: u8| {
+        let mut quoted = false;
+        let is_separator = |byte: &u8| {
+            quoted ^= *byte == b'"';
+            !quoted && *byte == separator
+        };
+        line.bytes().filter(is_separator).count()
     };
-    let plain: Vec<u8> = header.bytes().filter(is_plain).collect();
-    let count = |separator: &u8| plain.iter().filter(|byte| *byte == separator).count();
+    let suits = |separator: u8| {
+        let found = count(header, separator);
+        let in_row = row.is_some_and(|row| count(row, separator) == found);
+        (found > 0 && in_row, found)
+    };
     // If several separators are equally frequent, the comma precedes the semicolon, and the semicolon the tab.
-    [b'\t', b';', b','].into_iter().max_by_key(count).unwrap_or(b',')
-}
-
-/// Refuses a table separated by blanks, which would be read as one column: a header without separator above a line of
-/// several numbers between blanks.
-pub(crate) fn refuse_blanks(header: &str, first: Option<&str>, file: &str) -> Result<(), IoError> {
-    let is_number = |word: &str| matches!(Cell::parse(word), Cell::Number(_));
-    let cells = first.map_or(0, |line| line.split_whitespace().count());
-    let all_numbers = first.is_some_and(|line| line.split_whitespace().all(is_number));
-    if header.contains([',', ';', '\t']) || cells < 2 || !all_numbers {
-        return Ok(());
-    }
-    Err(IoError::Blanks {
-        file: file.to_owned(),
-        found: cells,
-    })
+    let all = [b'\t', b';', b','].into_iter();
+    all.max_by_key(|separator| suits(*separator)).unwrap_or(b',')
 }
 
 /// True if the numbers of a table have decimal commas: some cell is a number with a comma, and no number has a point

@@ -1,0 +1,260 @@
+//! Where the header and the first row of a table are, and what separates its cells.
+//!
+//! The first rows are the first lines of which more than half of the cells are numbers or clock times, in equal number
+//! in [`ROWS`] lines. The header is the line of words above them, or a comment directly above them. It must name the
+//! cells without doubt ([`super::names`]).
+
+use std::borrow::Cow;
+
+use super::lines::{Mark, filled, is_missing, is_number, is_row, is_value, unquoted};
+use super::names::{Extra, Names, names_of, unmarked};
+use super::units;
+use crate::formats::csv::text::is_aside;
+use crate::wording::shown;
+
+/// Number of lines of equally many numbers with which a table starts, if it has so many lines.
+const ROWS: usize = 3;
+
+/// Comments that hoid writes itself above a table, and that are not headers.
+const OWN: [&str; 3] = ["units:", "roles:", "sample_time:"];
+
+/// Structure of the start of a table. Lines are counted from 0.
+#[derive(Debug)]
+pub(super) struct Layout<'a> {
+    pub(super) mark: Mark,
+    pub(super) names: Names<'a>,
+    /// Line of the header, which may be a comment.
+    header: usize,
+    is_comment: bool,
+    /// Line of the units, and the comment that states them.
+    units: Option<(usize, String)>,
+    /// Line of the first row.
+    row: usize,
+    /// Lines above the header that are neither blank nor comments.
+    above: Vec<usize>,
+}
+
+/// A header separated by blanks that does not name the cells below it with certainty.
+#[derive(Debug, PartialEq, Eq)]
+pub(in crate::formats::csv) struct Mismatch {
+    /// Line of the header, counted from 1.
+    pub(in crate::formats::csv) line: usize,
+    /// Number of words of the header; 0 if the first line holds numbers.
+    pub(in crate::formats::csv) words: usize,
+    pub(in crate::formats::csv) cells: usize,
+    /// Text of the first row, shortened.
+    pub(in crate::formats::csv) first_row: String,
+}
+
+/// Returns the position in `filled` of the first row and the cells of the first rows, from position `from` on.
+fn first_rows<'a>(filled: &[(usize, &'a str)], from: usize, mark: Mark) -> Option<(usize, Vec<Vec<&'a str>>)> {
+    (from..filled.len()).find_map(|at| {
+        let lines = filled.iter().skip(at).take(ROWS);
+        let rows: Vec<Vec<&str>> = lines.map(|(_, line)| mark.cells(line)).collect();
+        let count = rows.first()?.len();
+        let are_rows = rows.iter().all(|row| row.len() == count && is_row(row));
+        are_rows.then_some((at, rows))
+    })
+}
+
+impl<'a> Layout<'a> {
+    /// Finds the structure of a text; `None` if no header is certain.
+    pub(super) fn of(text: &'a str) -> Option<Self> {
+        let filled = filled(text);
+        let found = Mark::ALL.iter().filter_map(|mark| Self::with(text, &filled, *mark));
+        // The first table counts; among marks that suit the same lines, the one that leaves numbers and nothing else.
+        found
+            .min_by_key(|(layout, are_values)| (layout.row, !*are_values))
+            .map(|(layout, _)| layout)
+    }
+
+    /// Finds the structure for a given mark; the second value is true if the first rows hold values only.
+    fn with(text: &'a str, filled: &[(usize, &'a str)], mark: Mark) -> Option<(Self, bool)> {
+        let mut from = 0;
+        while let Some((at, rows)) = first_rows(filled, from, mark) {
+            let row = filled.get(at)?.0;
+            let values = |cell: &&str| is_value(cell) || is_missing(cell);
+            let are_values = rows.iter().flatten().all(values);
+            let (before, _) = filled.split_at_checked(at)?;
+            let found = Self::below(before, mark, &rows, row).or_else(|| Self::commented(text, before, mark, &rows, row));
+            // A line of numbers above the header is a sample, which must not be left out.
+            let is_sample = |(at, line): &(usize, &str)| {
+                let cells = mark.cells(line);
+                found.as_ref().is_some_and(|layout| layout.above.contains(at))
+                    && cells.len() > 1
+                    && cells.iter().all(|cell| is_value(cell))
+            };
+            if before.iter().any(is_sample) {
+                return None;
+            }
+            if let Some(layout) = found {
+                return Some((layout, are_values));
+            }
+            from = at.saturating_add(1);
+        }
+        None
+    }
+
+    /// Returns the structure with a header among the lines `before` the first row.
+    fn below(before: &[(usize, &'a str)], mark: Mark, rows: &[Vec<&str>], row: usize) -> Option<Self> {
+        let ((at, line), above) = before.split_last()?;
+        let of_units = || -> Option<Self> {
+            let ((header, names_line), above) = above.split_last()?;
+            let names = names_of(names_line, mark, rows)?;
+            let mut cells = mark.cells(unmarked(line, mark));
+            if names.extra == Extra::NameInHeader {
+                cells.truncate(names.names.len());
+            }
+            let comment = units::comment(&names.names, &cells)?;
+            Some(Self {
+                mark,
+                names,
+                header: *header,
+                is_comment: false,
+                units: Some((*at, comment)),
+                row,
+                above: above.iter().map(|(at, _)| *at).collect(),
+            })
+        };
+        if let Some(layout) = of_units() {
+            return Some(layout);
+        }
+        let names = names_of(line, mark, rows)?;
+        let filled = |names: &[&str]| names.iter().filter(|name| !unquoted(name).is_empty()).count();
+        // If another line above may be the header, the line found may be its units or damaged.
+        let is_rival = |(_, line): &(usize, &str)| {
+            let cells = mark.cells(line);
+            let same = cells.len() == names.names.len() && filled(&cells) >= filled(&names.names);
+            mark != Mark::Blanks && same && !cells.iter().any(|cell| is_value(cell))
+        };
+        (!above.iter().any(is_rival)).then(|| Self {
+            mark,
+            header: *at,
+            is_comment: false,
+            units: None,
+            row,
+            above: above.iter().map(|(at, _)| *at).collect(),
+            names,
+        })
+    }
+
+    /// Returns the structure with a header in the comment directly above the first row, as NumPy writes it.
+    fn commented(
+        text: &'a str,
+        before: &[(usize, &'a str)],
+        mark: Mark,
+        rows: &[Vec<&str>],
+        row: usize,
+    ) -> Option<Self> {
+        let lines = text.lines().enumerate().take(row);
+        let (header, line) = lines.filter(|(_, line)| !line.trim().is_empty()).last()?;
+        let words = line.strip_prefix('#')?.trim_start_matches('#').trim();
+        if OWN.iter().any(|own| words.starts_with(own)) {
+            return None;
+        }
+        let marks = [mark].into_iter().chain(Mark::ALL);
+        let names = marks.filter_map(|mark| names_of(words, mark, rows)).next()?;
+        Some(Self {
+            mark,
+            names,
+            header,
+            is_comment: true,
+            units: None,
+            row,
+            above: before.iter().map(|(at, _)| *at).collect(),
+        })
+    }
+
+    /// Returns the text as plain CSV with a header in one line above the rows, and notes about what was changed; `None`
+    /// if the text is already plain.
+    pub(super) fn rewritten(&self, text: &str) -> Option<(String, Vec<String>)> {
+        let mut notes = Vec::new();
+        if self.units.is_some() {
+            notes.push(String::from("the line below the header is taken as the units"));
+        }
+        if self.mark == Mark::Blanks {
+            notes.push(String::from("the columns are separated by blanks"));
+        }
+        if !self.above.is_empty() {
+            notes.push(format!("lines above the header are left out: {}", self.above.len()));
+        }
+        if self.is_comment {
+            notes.push(String::from("the comment above the first row is taken as the header"));
+        }
+        if self.names.extra == Extra::RowNumbers {
+            notes.push(String::from("the rows start with their numbers, which are left out"));
+        }
+        let header = self.header();
+        let as_found = text.lines().nth(self.header).is_some_and(|line| line == header);
+        if notes.is_empty() && self.names.extra == Extra::None && as_found {
+            return None;
+        }
+        let line = |(at, line): (usize, &str)| -> String {
+            let (line, end) = line.strip_suffix('\n').map_or((line, ""), |line| (line, "\n"));
+            let (line, end) = line.strip_suffix('\r').map_or((line, end), |line| (line, "\r\n"));
+            let line: Cow<'_, str> = match &self.units {
+                Some((below, comment)) if at == self.header && at < *below => Cow::Owned(format!("# {comment}")),
+                Some((below, _)) if at == *below => Cow::Borrowed(&*header),
+                None if at == self.header => Cow::Borrowed(&*header),
+                _ if self.above.contains(&at) => Cow::Owned(format!("#{line}")),
+                _ if at < self.row || is_aside(line) => Cow::Borrowed(line),
+                _ => self.row_of(line),
+            };
+            line.into_owned() + end
+        };
+        Some((text.split_inclusive('\n').enumerate().map(line).collect(), notes))
+    }
+
+    /// Returns the separator in the rewritten text.
+    fn separator(&self) -> char {
+        match self.mark {
+            Mark::Char(mark) => mark,
+            Mark::Blanks => '\t',
+        }
+    }
+
+    /// Returns the header of the rewritten text.
+    fn header(&self) -> String {
+        let separator = self.separator();
+        let name = |name: &&str| match name.contains(separator) && !name.contains('"') {
+            true => format!("\"{name}\""),
+            false => (*name).to_owned(),
+        };
+        let names: Vec<String> = self.names.names.iter().map(name).collect();
+        let names = names.join(&separator.to_string());
+        match self.names.extra {
+            Extra::RowNumbers => format!("{separator}{names}"),
+            _ => names,
+        }
+    }
+
+    /// Returns a row of the rewritten text.
+    fn row_of<'b>(&self, line: &'b str) -> Cow<'b, str> {
+        let line = match self.mark {
+            Mark::Blanks => return Cow::Owned(self.mark.cells(line).join("\t")),
+            Mark::Char(_) => line,
+        };
+        match self.names.extra {
+            Extra::SeparatorInRows => Cow::Borrowed(line.strip_suffix(self.separator()).unwrap_or(line)),
+            _ => Cow::Borrowed(line),
+        }
+    }
+}
+
+/// Returns the header and the cells of a table separated by blanks whose names are not certain; `None` for other text.
+pub(in crate::formats::csv) fn mismatch(text: &str) -> Option<Mismatch> {
+    let filled = filled(text);
+    let (at, rows) = first_rows(&filled, 0, Mark::Blanks)?;
+    let (row, numbers) = filled.get(at)?;
+    let header = at.checked_sub(1).and_then(|above| filled.get(above));
+    let (line, header) = header.copied().unwrap_or((*row, ""));
+    let words = Mark::Blanks.cells(header);
+    let is_separated = |line: &str| line.contains(['\t', ';']) || line.contains(", ") || line.ends_with(',');
+    let is_certain = words.iter().any(|word| is_number(word)) || header.contains(',');
+    (!is_certain && !is_separated(header) && !is_separated(numbers)).then(|| Mismatch {
+        line: line.saturating_add(1),
+        words: words.len(),
+        cells: rows.first().map_or(0, Vec::len),
+        first_row: shown(numbers),
+    })
+}

@@ -1,0 +1,161 @@
+//! Assignment of the words of a header to the cells below it.
+
+use super::lines::{Mark, is_number, unquoted};
+
+/// Names of the columns of a table, and how many cells a line has beside the named ones.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Names<'a> {
+    pub(super) names: Vec<&'a str>,
+    pub(super) extra: Extra,
+}
+
+/// Difference between the cells of the header and those of the rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Extra {
+    None,
+    /// Each row ends with a separator that the header lacks.
+    SeparatorInRows,
+    /// The rows start with their numbers, which have no name, as R writes them.
+    RowNumbers,
+    /// The header ends with a name, empty or of comments, for which the rows have no cell.
+    NameInHeader,
+}
+
+/// Signs before a header that is a comment in MATLAB, Fortran, C or a shell; they do not belong to the first name.
+const SIGNS: [char; 6] = ['%', '#', '!', '*', '/', ';'];
+
+/// Returns a header without comment signs before its first name. A sign directly before a name, as in `%time`, may
+/// belong to it, unless blanks separate the names.
+pub(super) fn unmarked(header: &str, mark: Mark) -> &str {
+    let inside = header.trim_start().trim_start_matches(SIGNS);
+    match mark {
+        Mark::Char(_) if !inside.starts_with(' ') => header,
+        _ => inside.trim_start_matches(' '),
+    }
+}
+
+/// Returns the names that `header` gives to the cells of `rows`, which are the first rows and have equally many cells;
+/// `None` if the assignment is not certain.
+pub(super) fn names_of<'a>(header: &'a str, mark: Mark, rows: &[Vec<&str>]) -> Option<Names<'a>> {
+    let header = unmarked(header, mark);
+    let count = rows.first()?.len();
+    let words = mark.cells(header);
+    let named = |names: Vec<&'a str>, extra: Extra| {
+        let is_name = |name: &&str| !is_number(name);
+        let any = names.iter().any(|name| !unquoted(name).is_empty());
+        (any && names.iter().all(is_name)).then_some(Names { names, extra })
+    };
+    if words.len() == count {
+        return named(words, Extra::None);
+    }
+    if mark == Mark::Blanks
+        && let Some(names) = in_groups(header, count)
+    {
+        return named(names, Extra::None);
+    }
+    if words.len().saturating_add(1) == count {
+        let ends_empty = |row: &Vec<&str>| row.last().is_some_and(|cell| cell.trim().is_empty());
+        if mark != Mark::Blanks && rows.iter().all(ends_empty) {
+            return named(words, Extra::SeparatorInRows);
+        }
+        return counts_up(rows).then(|| named(words, Extra::RowNumbers)).flatten();
+    }
+    let (last, names) = words.split_last()?;
+    let is_idle = matches!(unquoted(last).to_lowercase().as_str(), "" | "comment" | "comments");
+    (mark != Mark::Blanks && names.len() == count && is_idle)
+        .then(|| named(names.to_vec(), Extra::NameInHeader))
+        .flatten()
+}
+
+/// True if the first cells of the rows are consecutive whole numbers from 0 or 1.
+fn counts_up(rows: &[Vec<&str>]) -> bool {
+    let numbers = rows.iter().map(|row| unquoted(row.first()?).parse::<usize>().ok());
+    let from = |first: usize| numbers.clone().eq((first..).map(Some).take(rows.len()));
+    rows.len() > 1 && (from(0) || from(1))
+}
+
+/// Divides a header of several words per name, separated by blanks, into `count` names: at tabs or gaps of several
+/// blanks, or behind brackets, as in `Time (s) Roll error (deg)`; `None` if that gives another number of names.
+fn in_groups(header: &str, count: usize) -> Option<Vec<&str>> {
+    if header.contains('"') {
+        return None;
+    }
+    let by_gaps = header.split('\t').flat_map(|part| part.split("  "));
+    let by_gaps: Vec<&str> = by_gaps.map(str::trim).filter(|part| !part.is_empty()).collect();
+    let mut depth = 0_usize;
+    let behind_bracket = |character: char| {
+        match character {
+            '(' | '[' => depth = depth.saturating_add(1),
+            ')' | ']' => {
+                depth = depth.saturating_sub(1);
+                return depth == 0;
+            }
+            _ => {}
+        }
+        false
+    };
+    let by_brackets = header.split_inclusive(behind_bracket).map(str::trim);
+    let by_brackets: Vec<&str> = by_brackets.filter(|part| !part.is_empty()).collect();
+    let is_closed = |name: &&str| name.ends_with([')', ']']) && !name.starts_with(['(', '[']);
+    // Without any bracket all words would be one name.
+    let brackets = by_brackets.first().is_some_and(is_closed) && !by_brackets.iter().any(|n| n.starts_with(['(', '[']));
+    [(by_gaps, true), (by_brackets, brackets)]
+        .into_iter()
+        .find(|(names, possible)| *possible && names.len() == count)
+        .map(|(names, _)| names)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(header: &str, mark: Mark, rows: &[&str]) -> Option<(Vec<String>, Extra)> {
+        let rows: Vec<Vec<&str>> = rows.iter().map(|row| mark.cells(row)).collect();
+        let names = names_of(header, mark, &rows)?;
+        Some((names.names.iter().map(|name| (*name).to_owned()).collect(), names.extra))
+    }
+
+    #[test]
+    fn words_between_blanks() {
+        let rows = ["0.0 1 2", "0.1 3 4"];
+        for (header, names) in [
+            ("t e u", ["t", "e", "u"]),
+            ("# t e u", ["t", "e", "u"]),
+            ("%t e u", ["t", "e", "u"]),
+            ("\"t\" \"roll e\" u", ["\"t\"", "\"roll e\"", "u"]),
+            ("Time (s) Roll error (deg) Stick (-)", ["Time (s)", "Roll error (deg)", "Stick (-)"]),
+            ("Time [s] Error [left hand] Stick cmd", ["Time [s]", "Error [left hand]", "Stick cmd"]),
+            ("Time   Roll error\tStick  ", ["Time", "Roll error", "Stick"]),
+        ] {
+            let names = names.map(str::to_owned).to_vec();
+            assert_eq!(found(header, Mark::Blanks, &rows), Some((names, Extra::None)), "{header}");
+        }
+        for header in [
+            "", "t", "t e", "Time s Roll error Stick", "t e u x y", "t 1 2", "(s) (deg) (V) x", "t (s) e u x", "\"t e",
+        ] {
+            assert_eq!(found(header, Mark::Blanks, &rows), None, "{header}");
+        }
+    }
+
+    #[test]
+    fn cells_beside_the_names() {
+        let comma = Mark::Char(',');
+        let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+        let rows = ["0,5,", "1,6,"];
+        assert_eq!(found("t,e", comma, &rows), Some((names(&["t", "e"]), Extra::SeparatorInRows)));
+        for rows in [["0,5.1,7", "1,5.2,7"], ["1,5.1,7", "2,5.2,7"], ["\"1\",5.1,7", "\"2\",5.2,7"]] {
+            assert_eq!(found("t,e", comma, &rows), Some((names(&["t", "e"]), Extra::RowNumbers)));
+        }
+        for rows in [["0,5,7", "0.1,6,7"], ["3,5,7", "4,6,7"], ["0,5,", "0.1,6,7"]] {
+            assert_eq!(found("t,e", comma, &rows), None, "{rows:?}");
+        }
+        for header in ["t,e,", "t,e,Comment"] {
+            assert_eq!(found(header, comma, &["0,5", "1,6"]), Some((names(&["t", "e"]), Extra::NameInHeader)));
+        }
+        assert_eq!(found("t,e,u", comma, &["0,5", "1,6"]), None);
+        assert_eq!(found("%time,e", comma, &["0,5", "1,6"]), Some((names(&["%time", "e"]), Extra::None)));
+        assert_eq!(found("% t,e", comma, &["0,5", "1,6"]), Some((names(&["t", "e"]), Extra::None)));
+        assert_eq!(found("t,e", comma, &[]), None);
+        assert_eq!(found(",", comma, &["0,5"]), None);
+    }
+}

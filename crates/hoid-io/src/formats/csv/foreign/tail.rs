@@ -1,0 +1,83 @@
+//! Lines of words below a table, such as `End of recording` or `Mean,0.1,0.2`.
+
+use super::super::text::{is_aside, open_line};
+use super::lines::{Mark, is_missing, is_value, unquoted};
+use crate::wording::shown;
+
+/// Largest number of lines of words below a table.
+const MOST: usize = 60;
+/// Number of rows above the words with which their first cells are compared.
+const COMPARED: usize = 3;
+
+/// Returns the position at which words below a table begin, and a note; `None` if the table ends with a row.
+///
+/// A line belongs to the words if its first cell is a text, whereas the first cells of the rows above are numbers or
+/// clock times. A last line without a line end may be truncated, and is not left out.
+pub(super) fn words_below(text: &str, mark: Mark) -> Option<(usize, String)> {
+    let mut end = text.len();
+    let mut found: Vec<&str> = Vec::new();
+    let starts_with_value = |line: &str| mark.cells(line).first().is_some_and(|cell| is_value(cell));
+    let starts_with_text = |line: &str| {
+        let cells = mark.cells(line);
+        let first = cells.first().copied().unwrap_or_default();
+        !is_value(first) && !is_missing(first) && unquoted(first).chars().any(char::is_alphabetic)
+    };
+    let mut lines = text.split_inclusive('\n').rev().peekable();
+    while let Some(line) = lines.next_if(|line| is_aside(line) || starts_with_text(line)) {
+        end = end.saturating_sub(line.len());
+        if !is_aside(line) {
+            found.push(line);
+        }
+        if found.len() > MOST {
+            return None;
+        }
+    }
+    let rows: Vec<&str> = lines.filter(|line| !is_aside(line)).take(COMPARED).collect();
+    let first = found.last()?;
+    let is_open = open_line(text).is_some() && found.len() == 1 && mark.cells(first).len() > 1;
+    (rows.len() == COMPARED && rows.iter().all(|row| starts_with_value(row)) && !is_open).then(|| {
+        let note = format!(
+            "lines of words below the table are left out: {}, the first of which is \"{}\"",
+            found.len(),
+            shown(first)
+        );
+        (end, note)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_below_a_table() {
+        let rows = "t,e\n0,1\n1,2\n2,3\n";
+        for words in ["Mean,2\n", "End of recording\n", "\n\nMean,2\nMax,3\n\n", "End", "# aside\nMean,2\n"] {
+            let text = format!("{rows}{words}");
+            let (at, note) = words_below(&text, Mark::Char(',')).unwrap();
+            assert_eq!(text[..at].trim_end(), rows.trim_end(), "{words:?}");
+            let first = words.lines().find(|line| !line.is_empty() && !line.starts_with('#'));
+            assert!(note.contains(first.unwrap()), "{note}");
+        }
+    }
+
+    #[test]
+    fn rows_are_kept() {
+        for text in [
+            "",
+            "t,e\n",
+            "t,e\n0,1\n",
+            "t,e\nMean,2\n",
+            "t,e\n0,1\n1,2\n2,3\n",
+            "t,e\n0,1\n1,2\n2,3\n,4\n",
+            "t,e\n0,1\n1,2\n2,3\n-,4\n",
+            "t,e\n0,1\n1,2\n2,3\nNaN,4\n",
+            "word,e\na,1\nb,2\nc,3\nd,4\n",
+            "t,e\n0,1\n1,2\n2,3\nx,4",
+        ] {
+            assert_eq!(words_below(text, Mark::Char(',')), None, "{text:?}");
+        }
+        let many = format!("t,e\n0,1\n1,2\n2,3\n{}", "word\n".repeat(MOST + 1));
+        assert_eq!(words_below(&many, Mark::Char(',')), None);
+    }
+}
