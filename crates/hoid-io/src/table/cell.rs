@@ -14,9 +14,10 @@ pub(crate) enum Cell {
 }
 
 /// Words for missing values in R, pandas, databases, spreadsheets, statistics packages and the C library of Windows.
-const MISSING: [&str; 16] = [
-    "", "na", "n/a", "null", "none", "<na>", "#n/a", "#na", "-", "--", ".", "?", "1.#ind", "-1.#ind", "1.#qnan",
-    "-1.#qnan",
+const MISSING: [&str; 30] = [
+    "", "na", "n/a", "n.a.", "null", "none", "nil", "missing", "<na>", "#n/a", "#na", "#nv", "#div/0!", "#value!",
+    "#wert!", "#num!", "#zahl!", "#ref!", "#bezug!", "#name?", "-", "--", ".", "?", "1.#ind", "-1.#ind", "1.#qnan",
+    "-1.#qnan", "nan(ind)", "-nan(ind)",
 ];
 
 /// Typographic minus sign, U+2212.
@@ -30,11 +31,13 @@ impl Cell {
             Ok(value) if value.is_nan() => Self::Missing,
             Ok(value) => Self::Number(value),
             Err(_) if MISSING.iter().any(|word| text.eq_ignore_ascii_case(word)) => Self::Missing,
-            // Spreadsheets in some languages write the typographic minus sign.
-            Err(_) if text.contains(MINUS) => match text.replace(MINUS, "-").parse::<f64>() {
-                Ok(value) if !value.is_nan() => Self::Number(value),
-                _ => Self::Text,
-            },
+            // Spreadsheets in some languages write the typographic minus sign, and Fortran the exponent D.
+            Err(_) if text.contains(MINUS) || is_fortran(text) => {
+                match text.replace(MINUS, "-").replace(['d', 'D'], "e").parse::<f64>() {
+                    Ok(value) if !value.is_nan() => Self::Number(value),
+                    _ => Self::Text,
+                }
+            }
             Err(_) => Self::Text,
         }
     }
@@ -48,13 +51,58 @@ pub(crate) fn has_decimal_comma(cell: &str) -> bool {
     cell.contains(',') && matches!(Cell::parse(&cell.replacen(',', ".", 1)), Cell::Number(_))
 }
 
-/// Replaces the decimal comma of a number by a point; other cells are returned unchanged.
+/// Replaces the decimal comma of a number by a point, and removes separators of thousands that cannot be decimal signs;
+/// other cells are returned unchanged.
 pub(crate) fn with_decimal_point(cell: &str, commas: bool) -> Cow<'_, str> {
     if commas && has_decimal_comma(cell) {
         Cow::Owned(cell.replacen(',', ".", 1))
     } else {
-        Cow::Borrowed(cell)
+        without_thousands(cell).map_or(Cow::Borrowed(cell), Cow::Owned)
     }
+}
+
+/// Signs that separate thousands and never decimals: apostrophes, and blanks of several widths.
+const THOUSANDS: [char; 6] = ['\'', '\u{2019}', ' ', '\u{a0}', '\u{2009}', '\u{202f}'];
+
+/// Returns a number such as `-1.234,50`, `1,234.50`, `1'234.5` or `1 234,5` with a decimal point and without the signs
+/// between its thousands; `None` for any other cell. In `1,234` the comma may be a decimal sign.
+fn without_thousands(cell: &str) -> Option<String> {
+    let text = cell.trim();
+    let number = text.trim_start_matches(['+', '-', MINUS]);
+    if number.len() < 5 || !number.starts_with(|c: char| c.is_ascii_digit()) {
+        return None;
+    }
+    // The last point or comma is the decimal sign, unless it occurs again.
+    let last = number.rfind(['.', ',']);
+    let (whole, decimals) = match last {
+        Some(at) => (number.get(..at)?, number.get(at..)?.get(1..)?),
+        None => (number, ""),
+    };
+    let mark = whole.chars().find(|c| !c.is_ascii_digit())?;
+    let decimal_sign = last.and_then(|at| number.get(at..)?.chars().next());
+    // Without decimals, a blank may stand between two numbers.
+    let is_mark = match mark {
+        '.' | ',' => decimal_sign.is_some_and(|sign| sign != mark),
+        ' ' => decimal_sign.is_some(),
+        mark => THOUSANDS.contains(&mark),
+    };
+    let mut groups = whole.split(mark);
+    let first = groups.next()?;
+    let digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
+    let in_threes = (1..4).contains(&first.len()) && digits(first) && groups.all(|group| group.len() == 3 && digits(group));
+    (is_mark && in_threes && digits(decimals)).then(|| {
+        let sign = text.strip_suffix(number).unwrap_or_default();
+        format!("{sign}{}.{decimals}", whole.replace(mark, ""))
+    })
+}
+
+/// True for a number such as `1.5D+03`.
+fn is_fortran(text: &str) -> bool {
+    let digits = text.trim_start_matches(['+', '-']);
+    let rest = digits.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
+    let exponent = rest.strip_prefix(['d', 'D']).map(|rest| rest.trim_start_matches(['+', '-']));
+    rest.len() < digits.len()
+        && exponent.is_some_and(|digits| !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit()))
 }
 
 /// True if a cell looks like a date or a clock time, such as `2024-03-01 10:00:00.5` or `10:00:00,5`.
@@ -74,7 +122,7 @@ mod tests {
     #[test]
     fn cells() {
         for missing in [
-            "", "  ", "NaN", "nan", "NA", "n/a", "NULL", "-NaN", "None", "<NA>", "#N/A", "-", "-1.#IND",
+            "", "  ", "NaN", "nan", "NA", "n/a", "NULL", "-NaN", "None", "<NA>", "#N/A", "-", "-1.#IND", "#DIV/0!", "n.a.",
         ] {
             assert_eq!(Cell::parse(missing), Cell::Missing, "{missing:?}");
         }
@@ -96,6 +144,36 @@ mod tests {
         assert_eq!(Cell::parse("+.5"), Cell::Number(0.5));
         assert_eq!(Cell::parse("\u{2212}1.5e\u{2212}3"), Cell::Number(-1.5e-3));
         assert_eq!(Cell::parse("1e999"), Cell::Number(f64::INFINITY));
+        assert_eq!(Cell::parse("-1.5D+03"), Cell::Number(-1500.0));
+        for text in ["1.5D", "D3", "1D2D3", "d", "1.5d+", ".D"] {
+            assert_eq!(Cell::parse(text), Cell::Text, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn thousands() {
+        for (cell, number) in [
+            ("4.000,25", "4000.25"),
+            ("-1.234.567,5", "-1234567.5"),
+            ("4,000.25", "4000.25"),
+            ("+1,234,567.", "+1234567."),
+            ("4'000.25", "4000.25"),
+            ("4\u{202f}000,25", "4000.25"),
+            (" 1\u{a0}234\u{a0}567 ", "1234567."),
+            ("1 234,5", "1234.5"),
+            ("\u{2212}4.000,5", "\u{2212}4000.5"),
+        ] {
+            for commas in [true, false] {
+                assert_eq!(with_decimal_point(cell, commas), number, "{cell}");
+            }
+            assert!(matches!(Cell::parse(number), Cell::Number(_)), "{number}");
+        }
+        for cell in [
+            "4,000", "4.000", "1,234,567", "40,00.5", "1.2345,6", "1,23.4", "1.234,5,6", "1.234.5", "12 34", "1 234", "1234 567,5",
+            "1.234,5e3", "", "'", "10:11:12,5", "05.03.2024", "1 é34", "1.234,é",
+        ] {
+            assert_eq!(with_decimal_point(cell, false), cell);
+        }
     }
 
     #[test]

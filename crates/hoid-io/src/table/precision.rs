@@ -47,7 +47,7 @@ impl Precision {
 
     /// Updates the precision with another printed number, which must have no surrounding blanks.
     pub(crate) fn add_bytes(&mut self, text: &[u8]) {
-        let mut parts = text.splitn(2, |byte| matches!(byte, b'e' | b'E'));
+        let mut parts = text.splitn(2, |byte| matches!(byte, b'e' | b'E' | b'd' | b'D'));
         let digits = parts.next().unwrap_or_default();
         let written = parts
             .next()
@@ -81,6 +81,14 @@ impl Precision {
     pub(crate) fn shifted(self, power: i32) -> Self {
         Self {
             decimals: self.decimals.map(|decimals| decimals.saturating_sub(power)),
+            ..self
+        }
+    }
+
+    /// Returns the precision limited to a number of decimals, as of binary numbers far from zero.
+    pub(crate) fn limited(self, decimals: i32) -> Self {
+        Self {
+            decimals: Some(self.decimals.map_or(decimals, |own| own.min(decimals))),
             ..self
         }
     }

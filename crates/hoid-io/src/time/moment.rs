@@ -5,16 +5,23 @@
 //! this way, the number of days is `365 y + y/4 - y/100 + y/400 + (153 m + 2)/5 + d` (H. Hinnant, *chrono-compatible
 //! low-level date algorithms*).
 
+use super::time_choice::Unit;
 use crate::table::{Column, Precision};
 
 /// Number of ns in a second.
 const NS_PER_S: i64 = 1_000_000_000;
 
-/// A clock time, and the number of decimals of its seconds.
+/// Number of ns after which the hands of a clock without a date, and of one without hours, return.
+const DAY: i64 = 86_400 * NS_PER_S;
+const HOUR: i64 = 3600 * NS_PER_S;
+
+/// A clock time, and the precision of its seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Moment {
     ns: i64,
-    decimals: usize,
+    precision: Precision,
+    /// Time after which the clock starts again at zero, ns; `None` if there is a date.
+    cycle: Option<i64>,
 }
 
 /// Parses a cell as a clock time; `None` if the cell is not a clock time. A date without a time means midnight.
@@ -23,17 +30,67 @@ fn parse(cell: &str) -> Option<Moment> {
     if !cell.starts_with(|c: char| c.is_ascii_digit()) || cell.len() > 40 {
         return None;
     }
-    let (date, time) = match cell.split_once(['T', ' ']) {
+    if let Some(moment) = duration(cell) {
+        return Some(moment);
+    }
+    let (date, time) = match cell.split_once(['T', ' ', '_']) {
         Some((date, time)) => (Some(date), Some(time.trim())),
         None if cell.contains(':') => (None, Some(cell)),
         None => (Some(cell), None),
     };
+    // In a file with columns for date and clock, a cell such as `10:11:12 PM` has no date.
+    let (date, time) = match (date, time) {
+        (Some(clock), Some(half)) if clock.contains(':') && is_half(half) => (None, Some(cell)),
+        other => other,
+    };
     let days = date.map_or(Some(0), days_of)?;
-    let (ns, decimals) = time.map_or(Some((0, 0)), time_of_day)?;
-    let day = days.checked_mul(86_400 * NS_PER_S)?;
+    let (ns, decimals, cycle) = time.map_or(Some((0, 0, DAY)), time_of_day)?;
+    let day = days.checked_mul(DAY)?;
     Some(Moment {
         ns: day.checked_add(ns)?,
-        decimals,
+        precision: of_decimals(decimals),
+        cycle: date.is_none().then_some(cycle),
+    })
+}
+
+fn is_half(text: &str) -> bool {
+    ["am", "pm"].iter().any(|half| text.eq_ignore_ascii_case(half))
+}
+
+fn of_decimals(decimals: usize) -> Precision {
+    // The number of decimals does not depend on the size of the value.
+    let mut precision = Precision::default();
+    precision.add_decimals(decimals);
+    precision
+}
+
+/// Parses a duration of MATLAB such as `0.01 sec`, or of pandas such as `0 days 00:00:00.01`.
+fn duration(cell: &str) -> Option<Moment> {
+    let (number, rest) = cell.split_once(' ')?;
+    let rest = rest.trim();
+    if let Some(clock) = rest.strip_prefix("day") {
+        let days = number.parse::<u16>().ok().map(i64::from)?;
+        let clock = clock.trim_start_matches(['s', ',', ' ']);
+        let (ns, decimals, _) = match clock {
+            "" => (0, 0, DAY),
+            clock => time_of_day(clock).filter(|(_, _, cycle)| *cycle == DAY)?,
+        };
+        return Some(Moment {
+            ns: days.checked_mul(DAY)?.checked_add(ns)?,
+            precision: of_decimals(decimals),
+            cycle: None,
+        });
+    }
+    let (unit_s, power) = Unit::of(rest)?.seconds()?;
+    let value: f64 = number.parse().ok()?;
+    let ns = (value * unit_s * NS_PER_S as f64).round();
+    let mut precision = Precision::default();
+    precision.add(number);
+    // Larger numbers of ns are not exact, and beyond those of 64 bits.
+    (ns.abs() < 9e15).then(|| Moment {
+        ns: ns as i64,
+        precision: precision.shifted(power),
+        cycle: None,
     })
 }
 
@@ -43,8 +100,9 @@ pub(crate) enum Moments {
     /// All values so far are missing.
     #[default]
     Unknown,
-    /// Clock times; the first one, from which the others are counted, is stored here in ns.
-    From(i64),
+    /// Clock times in ns: the first one, from which the others are counted, the last one, and what was added to it
+    /// because the clock returned to zero.
+    From { first: i64, last: i64, added: i64 },
     /// The column contains numbers or other texts.
     No,
 }
@@ -54,26 +112,38 @@ impl Moments {
     pub(crate) fn push(&mut self, column: &mut Column, cell: &str) {
         let moment = parse(cell).filter(|_| *self != Self::No);
         let row = column.values.len();
-        let Some(Moment { ns, decimals }) = moment else {
+        let Some(Moment { ns, precision, cycle }) = moment else {
             self.refuse(column);
             column.texts.push(row);
             column.values.push(f64::NAN);
             return;
         };
-        let first = match *self {
-            Self::From(first) => first,
-            Self::Unknown | Self::No => ns,
+        let (first, last, mut added) = match *self {
+            Self::From { first, last, added } => (first, last, added),
+            Self::Unknown | Self::No => (ns, ns, 0),
         };
-        *self = Self::From(first);
+        let mut now = ns.saturating_add(added);
+        // The clock passed its end shortly before: at midnight, or at the full hour.
+        if let Some(cycle) = cycle {
+            let step = now.saturating_add(cycle).saturating_sub(last);
+            if now < last && (0..cycle / 60).contains(&step) {
+                added = added.saturating_add(cycle);
+                now = now.saturating_add(cycle);
+            }
+        }
+        *self = Self::From {
+            first,
+            last: now,
+            added,
+        };
         column.moments = true;
-        // The number of decimals does not depend on the size of the value.
-        column.precision.add_decimals(decimals);
-        column.values.push(seconds(ns, first));
+        column.precision.join(precision);
+        column.values.push(seconds(now, first));
     }
 
     /// Called if a number was found in the column: its apparent clock times are then treated as text.
     pub(crate) fn refuse(&mut self, column: &mut Column) {
-        if let Self::From(_) = std::mem::replace(self, Self::No) {
+        if let Self::From { .. } = std::mem::replace(self, Self::No) {
             column.moments = false;
             column.precision = Precision::default();
             let of_text = |(row, value): (usize, &mut f64)| {
@@ -102,9 +172,10 @@ fn days_of(date: &str) -> Option<i64> {
     let mark = date.chars().find(|c| ['-', '/', '.'].contains(c))?;
     let parts: Vec<&str> = date.split(mark).collect();
     let &[a, b, c] = parts.as_slice() else { return None };
-    let number = |text: &str| text.parse::<u16>().ok().map(i64::from);
+    let number = |text: &str| text.parse::<u16>().ok().map(i64::from).or_else(|| month_of(text));
     let (year, month, day) = match mark {
         '.' => (c, b, a),
+        _ if a.len() != 4 && month_of(b).is_some() => (c, b, a),
         _ if a.len() == 4 => (a, b, c),
         // Otherwise the month or the day comes first. It is unknown which of them, but this does not matter within one
         // day.
@@ -130,13 +201,24 @@ fn days_of(date: &str) -> Option<i64> {
     Some(of_years + (153 * month + 2) / 5 + day - 1 - 719_468)
 }
 
-/// Parses a time of day such as `10:11:12.5`, optionally followed by `Z`, `+02:00`, AM or PM; returns the number of ns
-/// since midnight UTC and the number of decimals of the seconds.
+/// Returns the number of a month from the start of its English name, as MATLAB writes it.
+fn month_of(text: &str) -> Option<i64> {
+    const MONTHS: [&str; 12] = [
+        "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec",
+    ];
+    let months = (1..).zip(MONTHS);
+    let named = months.filter(|(_, month)| text.len() == 3 && text.eq_ignore_ascii_case(month));
+    named.map(|(number, _)| number).next()
+}
+
+/// Parses a time of day such as `10:11:12.5` or `10:11:12:500`, optionally followed by `Z`, `+02:00`, AM or PM, or
+/// minutes and seconds such as `11:12.5`; returns the number of ns since midnight UTC or the full hour, the number of
+/// decimals of the seconds, and the number of ns after which the clock returns to zero.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "numbers of at most three digits and a fraction of 1e9 ns, in 64 bits"
 )]
-fn time_of_day(text: &str) -> Option<(i64, usize)> {
+fn time_of_day(text: &str) -> Option<(i64, usize, i64)> {
     let (text, half_day) = match text.rsplit_once(' ') {
         Some((text, half)) if half.eq_ignore_ascii_case("pm") => (text, Some(12)),
         Some((text, half)) if half.eq_ignore_ascii_case("am") => (text, Some(0)),
@@ -147,24 +229,32 @@ fn time_of_day(text: &str) -> Option<(i64, usize)> {
         Some(at) => (text[..at].trim_end(), zone(&text[at..])?),
     };
     let parts: Vec<&str> = clock.split(':').collect();
-    let (hour, minute, seconds) = match parts.as_slice() {
-        [hour, minute] => (*hour, *minute, "0"),
-        [hour, minute, seconds] => (*hour, *minute, *seconds),
+    let has_fraction = |seconds: &str| seconds.contains(['.', ',']);
+    let (hour, minute, seconds, ms) = match parts.as_slice() {
+        // Spreadsheets show a short time as minutes and seconds.
+        [minute, seconds] if has_fraction(seconds) => ("0", *minute, *seconds, ""),
+        [hour, minute] => (*hour, *minute, "0", ""),
+        [hour, minute, seconds] => (*hour, *minute, *seconds, ""),
+        [hour, minute, seconds, ms] if ms.len() == 3 && !has_fraction(seconds) => (*hour, *minute, *seconds, *ms),
         _ => return None,
+    };
+    let cycle = match parts.as_slice() {
+        [_, seconds] if has_fraction(seconds) => HOUR,
+        _ => DAY,
     };
     let whole = |text: &str, below: i64| text.parse::<u8>().ok().map(i64::from).filter(|n| *n < below);
     let hour = match half_day {
         Some(half) => whole(hour, 13)? % 12 + half,
         None => whole(hour, 24)?,
     };
-    let (second, fraction) = seconds.split_once(['.', ',']).unwrap_or((seconds, ""));
+    let (second, fraction) = seconds.split_once(['.', ',']).unwrap_or((seconds, ms));
     if fraction.len() > 18 || !fraction.bytes().all(|digit| digit.is_ascii_digit()) {
         return None;
     }
     let ns = format!("{fraction:0<9}")[..9].parse::<i64>().ok()?;
     // A leap second counts as the first second of the next minute.
     let s = (hour * 60 + whole(minute, 60)? - zone_min) * 60 + whole(second, 61)?;
-    Some((s * NS_PER_S + ns, fraction.len()))
+    Some((s * NS_PER_S + ns, fraction.len(), cycle))
 }
 
 /// Returns the offset in minutes east of UTC from `Z`, `+02:00`, `-0530` or `+02`.
@@ -208,10 +298,22 @@ mod tests {
             ("2000-02-29T00:00:00", 951_782_400 * NS_PER_S),
             ("10:11:12.000000001", 36_672 * NS_PER_S + 1),
             ("00:00", 0),
+            ("05-Mar-2024 10:11:12.5", s + NS_PER_S / 2),
+            ("2024-03-05_10:11:12", s),
+            ("10:11:12:500", 36_672 * NS_PER_S + NS_PER_S / 2),
+            ("10:11:12 PM", 79_872 * NS_PER_S),
+            ("11:12.5", 672 * NS_PER_S + NS_PER_S / 2),
+            ("0.01 sec", 10_000_000),
+            ("1.5 min", 90 * NS_PER_S),
+            ("20 ms", 20_000_000),
+            ("1 days 00:00:00.010000", DAY + 10_000_000),
+            ("2 days", 2 * DAY),
+            ("1 day, 0:00:01", DAY + NS_PER_S),
         ] {
             assert_eq!(parse(cell).map(|moment| moment.ns), Some(ns), "{cell}");
         }
-        assert_eq!(parse("10:11:12.020").map(|moment| moment.decimals), Some(3));
+        assert_eq!(parse("10:11:12.020").map(|moment| moment.precision.unit(0.0)), Some(1e-3));
+        assert_eq!(parse("20 ms").map(|moment| moment.precision.unit(0.0)), Some(1e-3));
     }
 
     #[test]
@@ -227,6 +329,12 @@ mod tests {
             "24:00:00",
             "10:61",
             "1:2:3:4",
+            "1:2:3.5:400",
+            "05-Mai-2024",
+            "5 deg",
+            "1e300 s",
+            "5 days 11:12.5",
+            "x days",
             "10:11:1é",
             "2024-03-05T",
             "2024-03-05Tx",
@@ -238,5 +346,24 @@ mod tests {
         ] {
             assert_eq!(parse(cell), None, "{cell}");
         }
+    }
+
+    /// Pushes cells to a column and returns its values.
+    fn column(cells: &[&str]) -> Vec<f64> {
+        let mut column = Column::default();
+        let mut moments = Moments::default();
+        cells.iter().for_each(|cell| moments.push(&mut column, cell));
+        column.values
+    }
+
+    #[test]
+    fn a_clock_without_a_date_passes_midnight() {
+        assert_eq!(column(&["23:59:59.5", "00:00:00.0", "00:00:00.5"]), [0.0, 0.5, 1.0]);
+        assert_eq!(column(&["11:59:59 PM", "12:00:00 AM"]), [0.0, 1.0]);
+        assert_eq!(column(&["59:59.5", "00:00.0", "59:59.5", "00:00.0"]), [0.0, 0.5, 3600.0, 3600.5]);
+        // A time that starts again with each trial, a clock that is set back, and a date.
+        assert_eq!(column(&["00:00:30", "00:00:00", "00:00:01"]), [0.0, -30.0, -29.0]);
+        assert_eq!(column(&["12:00:00", "11:59:59"]), [0.0, -1.0]);
+        assert_eq!(column(&["2024-03-05 23:59:59", "2024-03-05 00:00:00"]), [0.0, -86_399.0]);
     }
 }

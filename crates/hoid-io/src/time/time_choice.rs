@@ -12,6 +12,8 @@ pub(super) enum Unit {
     Power(i32),
     Minutes,
     Hours,
+    /// Days, such as the serial dates of spreadsheets and the date numbers of MATLAB.
+    Days,
     /// Dates and clock times.
     Iso,
     /// Whole seconds in this column and nanoseconds in another column.
@@ -22,14 +24,26 @@ impl Unit {
     pub(super) fn of(text: &str) -> Option<Self> {
         Some(match text {
             "s" | "sec" | "secs" | "second" | "seconds" | "sek" | "sekunden" => Self::Power(0),
-            "ms" | "msec" | "millis" | "millisecond" | "milliseconds" => Self::Power(-3),
-            "us" | "µs" | "μs" | "usec" | "micros" | "microsecond" | "microseconds" => Self::Power(-6),
-            "ns" | "nsec" | "nanos" | "nanosec" | "nanosecond" | "nanoseconds" => Self::Power(-9),
+            "ms" | "msec" | "msecs" | "millis" | "millisecond" | "milliseconds" => Self::Power(-3),
+            "us" | "µs" | "μs" | "usec" | "usecs" | "micros" | "microsecond" | "microseconds" => Self::Power(-6),
+            "ns" | "nsec" | "nsecs" | "nanos" | "nanosec" | "nanosecond" | "nanoseconds" => Self::Power(-9),
             "min" | "mins" | "minute" | "minutes" | "minuten" => Self::Minutes,
             "h" | "hr" | "hour" | "hours" => Self::Hours,
+            "d" | "day" | "days" | "tag" | "tage" => Self::Days,
             "iso" => Self::Iso,
             "sec+nanosec" => Self::SecondsAndNanoseconds,
             _ => return None,
+        })
+    }
+
+    /// Returns the length of the unit in s, and the power of ten at or above it; `None` for dates and pairs of columns.
+    pub(super) fn seconds(self) -> Option<(f64, i32)> {
+        Some(match self {
+            Self::Power(power) => (10_f64.powi(power), power),
+            Self::Minutes => (60.0, 2),
+            Self::Hours => (3600.0, 4),
+            Self::Days => (86_400.0, 5),
+            Self::Iso | Self::SecondsAndNanoseconds => return None,
         })
     }
 }
@@ -43,6 +57,7 @@ impl fmt::Display for Unit {
             Self::Power(_) => "s",
             Self::Minutes => "min",
             Self::Hours => "h",
+            Self::Days => "days",
             Self::Iso => "iso",
             Self::SecondsAndNanoseconds => "sec+nanosec",
         })
@@ -80,7 +95,7 @@ impl FromStr for TimeChoice {
                 None if unit.starts_with([')', ',', ']']) => (text, None),
                 None => {
                     return Err(refuse(
-                        "expected the time column, and after a colon its unit: s, ms, us, ns, min, h, iso or sec+nanosec",
+                        "expected the time column, and after a colon its unit: s, ms, us, ns, min, h, days, iso or sec+nanosec",
                     ));
                 }
             },

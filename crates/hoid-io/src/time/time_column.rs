@@ -4,15 +4,20 @@
 //! 1. the only column whose name denotes a time, with or without a unit: `Time (s)`, `Zeit [s]`, `time_ns`, `elapsed`,
 //!    `%time`;
 //! 2. the only column with time stamps: dates and clock times as text or as a data type, or numbers counted from 1970
-//!    in a column such as `timestamp` or `header.stamp`;
+//!    in a column such as `timestamp` or `header.stamp`, or serial days, or numbers with steps of fractions of a second;
 //! 3. whole seconds in one column and nanoseconds in another with the same prefix: `stamp.sec`, `stamp.nanosec`;
-//! 4. the first column if it has no name, or the first row or column of a matrix, if its values increase from row to
+//! 4. the only increasing column with a unit of time, such as `xAxis [s]`;
+//! 5. the first column if it has no name, or the first row or column of a matrix, if its values increase from row to
 //!    row and are not row numbers.
 //!
 //! A column selected by `--time COLUMN[:unit]` takes precedence. The unit is taken from the name. Without a unit in the
 //! name, it follows from the size of numbers counted from 1970 (1e11 s would be the year 5138), or else from the steps:
 //! integers at least 5 apart are taken to be in the unit that gives a sampling frequency from 2 to 2000 Hz, and not in
-//! s. The choice is reported.
+//! s. Numbers from 20 000 to 80 000 or from 700 000 to 800 000 with steps of 0.5 ms to 10 s in days are the serial days of
+//! spreadsheets (from 1900) or the date numbers of MATLAB (from the year 0): in s, the sampling frequency would be above
+//! 8 kHz. The choice is reported.
+
+use std::ops::Range;
 
 use super::sampling::{pairs, steps};
 use super::time_choice::{TimeChoice, Unit};
@@ -27,8 +32,13 @@ const STEP_OF_NO_SECONDS: f64 = 5.0;
 /// Largest sampling frequency that is assumed when the unit is inferred from the steps, Hz.
 const MOST_HZ: f64 = 2000.0;
 
+/// Serial days of spreadsheets from 1954 to 2119, and of MATLAB from 1916 to 2190.
+const SERIAL_DAYS: [Range<f64>; 2] = [20_000.0..80_000.0, 700_000.0..800_000.0];
+/// Steps of serial days, in s.
+const SERIAL_STEPS_S: Range<f64> = 1.0 / MOST_HZ..10.0;
+
 /// Column names that denote a time.
-const WORDS: [&str; 9] = [
+const WORDS: [&str; 11] = [
     "t",
     "time",
     "zeit",
@@ -38,9 +48,26 @@ const WORDS: [&str; 9] = [
     "elapsed",
     "elapsed time",
     "elapsedtime",
+    "real time",
+    "x value",
 ];
 /// Column names that denote a time stamp; a column with such a name may also hold the time of day or a count.
-const STAMPS: [&str; 5] = ["timestamp", "stamp", "datetime", "date time", "date"];
+const STAMPS: [&str; 14] = [
+    "timestamp",
+    "timestamps",
+    "time stamp",
+    "time stamps",
+    "stamp",
+    "datetime",
+    "date time",
+    "date",
+    "datum",
+    "uhrzeit",
+    "zeitstempel",
+    "datenum",
+    "date number",
+    "serial date",
+];
 
 /// Role of a column, as its name suggests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -165,16 +192,20 @@ fn found(table: &Table<'_>) -> Option<(usize, Option<Unit>)> {
     let by_type = || only(table, |_, column| column.moments && !is_constant(&column.values));
     let by_stamp = || {
         only(table, |_, column| {
+            let values = &column.values;
+            let is_stamp = || values.iter().all(|value| *value >= STAMP || value.is_nan());
             column_role(&column.name) == ColumnRole::Stamp
-                && column.values.iter().all(|value| *value >= STAMP || value.is_nan())
+                && (is_stamp() || is_serial_days(values) || runs_in_seconds(values))
         })
     };
+    let by_unit = || only(table, |_, column| Unit::of(&column.unit).is_some() && rises(&column.values));
     let pair = || only(table, |at, _| nanoseconds_of(table, at).is_some());
     by_name()
         .or_else(by_type)
         .or_else(by_stamp)
         .map(|at| (at, unit(at)))
         .or_else(|| pair().map(|at| (at, Some(Unit::SecondsAndNanoseconds))))
+        .or_else(|| by_unit().map(|at| (at, None)))
         .or_else(|| first_line(table).map(|at| (at, None)))
 }
 
@@ -206,9 +237,35 @@ fn first_line(table: &Table<'_>) -> Option<usize> {
     };
     let first = only(table, is_first)?;
     let values = &table.columns.get(first)?.values;
-    let rises = pairs(values).all(|(value, next)| next > value);
     let counts = steps(values).all(|step| step == 1.0);
-    (values.len() > 2 && rises && !counts && values.iter().all(|value| value.is_finite())).then_some(first)
+    (rises(values) && !counts).then_some(first)
+}
+
+/// True if the values increase from row to row.
+fn rises(values: &[f64]) -> bool {
+    let rises = pairs(values).all(|(value, next)| next > value);
+    values.len() > 2 && rises && values.iter().all(|value| value.is_finite())
+}
+
+/// Returns the median of the steps forward; `None` if there are fewer than two.
+fn median_step(values: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> = steps(values).filter(|step| *step > 0.0).collect();
+    let middle = steps.len() / 2;
+    (steps.len() > 1).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// True if the values can be serial days.
+fn is_serial_days(values: &[f64]) -> bool {
+    let first = values.iter().copied().find(|value| value.is_finite()).unwrap_or(0.0);
+    let range = SERIAL_DAYS.into_iter().find(|range| range.contains(&first));
+    range.is_some_and(|range| values.iter().all(|value| range.contains(value) || value.is_nan()))
+        && median_step(values).is_some_and(|step| SERIAL_STEPS_S.contains(&(step * 86_400.0)))
+}
+
+/// True if the values increase in fractions of a second; whole numbers may be a count.
+fn runs_in_seconds(values: &[f64]) -> bool {
+    let in_fractions = values.iter().any(|value| value.fract() != 0.0);
+    rises(values) && in_fractions && median_step(values).is_some_and(|step| (1.0 / MOST_HZ..=1.0).contains(&step))
 }
 
 /// Infers the unit of times whose unit is not stated.
@@ -218,20 +275,15 @@ fn unit_of(values: &[f64]) -> Unit {
         stamp if stamp >= 1e17 => return Unit::Power(-9),
         stamp if stamp >= 1e14 => return Unit::Power(-6),
         stamp if stamp >= 1e11 => return Unit::Power(-3),
+        _ if is_serial_days(values) => return Unit::Days,
         _ => {}
     }
     if !values.iter().all(|value| value.fract() == 0.0) {
         return Unit::Power(0);
     }
-    let mut steps: Vec<f64> = steps(values).filter(|step| *step > 0.0).collect();
-    if steps.len() < 2 {
+    let Some(step) = median_step(values).filter(|step| *step >= STEP_OF_NO_SECONDS) else {
         return Unit::Power(0);
-    }
-    let middle = steps.len() / 2;
-    let step = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
-    if step < STEP_OF_NO_SECONDS {
-        return Unit::Power(0);
-    }
+    };
     // Sample times from 0.5 ms to 0.5 s are assumed; each unit then covers its own three decades of steps.
     let power = [-3, -6, -9].into_iter().find(|power| {
         let seconds = step * 10_f64.powi(*power);
@@ -256,8 +308,7 @@ fn make_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
     let unit = match unit {
         _ if time.moments => Unit::Iso,
         Some(unit) => unit,
-        None if time.unit == "s" => Unit::Power(0),
-        None => unit_of(&time.values),
+        None => Unit::of(&time.unit).unwrap_or_else(|| unit_of(&time.values)),
     };
     if was_t && unit == Unit::Power(0) {
         return;
@@ -302,10 +353,22 @@ fn make_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
                 named(&other)
             )
         }
-        Unit::Minutes | Unit::Hours => {
-            scale(time, if unit == Unit::Minutes { 60.0 } else { 3600.0 }, 0.0, false);
-            time.precision = Precision::default();
-            format!("{name} is taken as t, from {unit}")
+        Unit::Minutes | Unit::Hours | Unit::Days => {
+            let (unit_s, power) = unit.seconds().unwrap_or((1.0, 0));
+            // Days are counted from a date long ago; the last binary digit of such a number is an appreciable time.
+            let is_date = unit == Unit::Days && is_serial_days(&time.values);
+            scale(time, unit_s, if is_date { first } else { 0.0 }, false);
+            time.precision = time.precision.shifted(power);
+            if is_date {
+                let digit_s = first.abs() * f64::EPSILON * unit_s;
+                time.precision = time.precision.limited((-digit_s.log10()).floor() as i32);
+            }
+            let taken = match (was_t, is_date) {
+                (true, _) => "is in s from its first time",
+                (false, true) => "is taken as t, in s from its first time",
+                (false, false) => "is taken as t",
+            };
+            format!("{name} {taken}, from {unit}")
         }
         Unit::Power(0) => format!("{name} is taken as t, in s"),
         Unit::Power(power) => {
@@ -349,6 +412,10 @@ mod tests {
             ("Elapsed Time (ms)", power(-3)),
             ("%time", Time(None)),
             ("timestamp", Stamp),
+            ("time_stamps", Stamp),
+            ("Date Time", Stamp),
+            ("__real,_time", Time(None)),
+            ("Time (days)", Time(Some(Unit::Days))),
             ("header.stamp", Stamp),
             ("times", Other),
             ("target", Other),
@@ -381,6 +448,19 @@ mod tests {
         ] {
             assert_eq!(unit(first, step), Unit::Power(power), "{first} {step}");
         }
+        // Serial days at 100 Hz, and seconds of the day.
+        for (first, step, unit_found) in [
+            (45_321.5, 0.01 / 86_400.0, Unit::Days),
+            (739_000.5, 0.01 / 86_400.0, Unit::Days),
+            (45_321.5, 0.01, Unit::Power(0)),
+            (45_321.5, 1.0, Unit::Power(0)),
+            (15_321.5, 0.01 / 86_400.0, Unit::Power(0)),
+            (45_321.5, 1e-12, Unit::Power(0)),
+        ] {
+            assert_eq!(unit(first, step), unit_found, "{first} {step}");
+        }
+        assert!(!is_serial_days(&[]) && !is_serial_days(&[f64::NAN]) && !is_serial_days(&[45_321.5]));
+        assert!(!is_serial_days(&[45_321.5, 45_321.500_000_1, 12.0]));
         assert_eq!(unit_of(&[f64::NAN]), Unit::Power(0));
         assert_eq!(unit_of(&[]), Unit::Power(0));
     }
@@ -392,6 +472,7 @@ mod tests {
             "clock:ms",
             "a:b:iso",
             "stamp:sec+nanosec",
+            "clock:days",
             "ans(1,:)",
             "ans(1,:):ms",
         ] {

@@ -185,24 +185,48 @@ impl<'a> Layout<'a> {
             notes.push(String::from("the rows start with their numbers, which are left out"));
         }
         let header = self.header();
-        let as_found = text.lines().nth(self.header).is_some_and(|line| line == header);
-        if notes.is_empty() && self.names.extra == Extra::None && as_found {
+        let found = text.lines().nth(self.header).map(str::trim_end);
+        let as_found = found == Some(header.trim_end());
+        let repeated = self.repeated(text, found.unwrap_or_default());
+        notes.extend(repeated);
+        // Blank lines of separators above the header would be read as a header without names.
+        let is_blank = |line: &str| !line.is_empty() && line.trim().is_empty();
+        let mut start = text.lines().take(self.row);
+        if notes.is_empty() && self.names.extra == Extra::None && as_found && !start.any(is_blank) {
             return None;
         }
         let line = |(at, line): (usize, &str)| -> String {
             let (line, end) = line.strip_suffix('\n').map_or((line, ""), |line| (line, "\n"));
             let (line, end) = line.strip_suffix('\r').map_or((line, end), |line| (line, "\r\n"));
+            let is_repeated = |line: &str| !self.is_comment && Some(line.trim_end()) == found;
             let line: Cow<'_, str> = match &self.units {
                 Some((below, comment)) if at == self.header && at < *below => Cow::Owned(format!("# {comment}")),
                 Some((below, _)) if at == *below => Cow::Borrowed(&*header),
                 None if at == self.header => Cow::Borrowed(&*header),
                 _ if self.above.contains(&at) => Cow::Owned(format!("#{line}")),
+                _ if at < self.row && is_blank(line) => Cow::Borrowed(""),
                 _ if at < self.row || is_aside(line) => Cow::Borrowed(line),
+                _ if is_repeated(line) => Cow::Owned(format!("#{line}")),
                 _ => self.row_of(line),
             };
             line.into_owned() + end
         };
         Some((text.split_inclusive('\n').enumerate().map(line).collect(), notes))
+    }
+
+    /// Returns a note if the header is repeated between the rows, as in recordings that were appended to each other.
+    fn repeated(&self, text: &str, header: &str) -> Option<String> {
+        if self.is_comment || header.is_empty() {
+            return None;
+        }
+        let lines = text.match_indices(header).skip(1);
+        let is_line = |(at, found): &(usize, &str)| {
+            let before = text.get(..*at).is_some_and(|before| before.ends_with('\n'));
+            let behind = text.get(at.saturating_add(found.len())..).unwrap_or_default();
+            before && (behind.trim_start_matches([' ', '\t', '\r']).starts_with('\n') || behind.trim().is_empty())
+        };
+        let count = lines.filter(is_line).count();
+        (count > 0).then(|| format!("repeated lines of the header are left out: {count}"))
     }
 
     /// Returns the separator in the rewritten text.
