@@ -227,8 +227,7 @@ pub enum IoError {
     },
     /// A column that does not exist in the file.
     #[error(
-        "{file} has no column {missing} (requested: {asked}{meant}); it has {available}; select columns with --input \
-         and --output as NAME, -NAME or NAME-NAME"
+        "{file} has no column {missing} (requested: {asked}{meant}); it has {available}; {remedy}"
     )]
     NoSuchColumn {
         /// Name of the file.
@@ -241,6 +240,8 @@ pub enum IoError {
         meant: String,
         /// Names that exist in the file.
         available: String,
+        /// The option with which the column was requested, and the form of its value.
+        remedy: &'static str,
     },
     /// Text that does not select a column.
     #[error("the column \"{found}\": {expected}")]

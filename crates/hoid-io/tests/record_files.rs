@@ -179,6 +179,73 @@ fn text_tables_under_other_names() {
     assert!(message.contains(".dat is not the extension"), "{message}");
 }
 
+/// Numbers as spreadsheets and programs in several languages write them, all with the values 0.5 and -1234.5 and one
+/// missing value.
+#[test]
+fn numbers_of_many_programs() {
+    let desk = Desk::new();
+    let fill = ReadOptions {
+        repair: hoid_io::Repair {
+            fill: true,
+            ..Default::default()
+        },
+        ..defaults()
+    };
+    for (mark, half, large, missing) in [
+        (";", "0,5", "-1.234,5", "n.a."),
+        (";", "0.5", "-1,234.5", "#N/A"),
+        (";", "0.5", "-1'234.5", "#DIV/0!"),
+        ("\t", "0,5", "-1\u{a0}234,5", "null"),
+        ("\t", "0,5", "\u{2212}1\u{202f}234,5", ""),
+        (",", "\"0.5\"", "\"-1,234.5\"", "NA"),
+        (",", "5.0D-01", "-1.2345D+03", "NaN"),
+    ] {
+        let rows: Vec<String> = [half, large, missing, large].iter().map(|e| [half, e, half].join(mark)).collect();
+        let text = format!("{}\n{}\n", ["x", "e", "u"].join(mark), rows.join("\n"));
+        let fill = ReadOptions {
+            sampling_hz: Some(50.0),
+            ..fill.clone()
+        };
+        let read = desk.read(&text, &fill).unwrap_or_else(|error| panic!("{text}: {error}"));
+        assert_eq!(read.record.input(), [0.5, -1234.5, -1234.5, -1234.5], "{text}");
+        assert_eq!(read.record.output(), [0.5; 4], "{text}");
+    }
+}
+
+/// Rows below the table, repeated headers, preambles, and header cells that the rows lack do not change the record.
+#[test]
+fn lines_around_a_table() {
+    let desk = Desk::new();
+    let rows: Vec<String> = (0..30).map(|k| format!("{:.2},{k},{}", 0.02 * f64::from(k), -k)).collect();
+    let plain = format!("t,e,u\n{}\n", rows.join("\n"));
+    let expected = desk.read(&plain, &defaults()).unwrap().record;
+    let again = format!("t,e,u\n{}\nt,e,u\n{}\n", rows[..10].join("\n"), rows[10..].join("\n"));
+    for (text, note) in [
+        (format!("{plain}Mean,14.5,-14.5\n"), "the first of which is \"Mean,14.5,-14.5\""),
+        (format!("{plain}\nEnd of run\nOperator 3\n"), "below the table are left out: 2"),
+        (again, "repeated lines of the header are left out: 1"),
+        (format!("sep=,\n{plain}"), "lines above the header are left out: 1"),
+        (format!("Rate,50,Hz\n\nRun 1,,\n{plain}"), "lines above the header are left out: 2"),
+        (format!("# {plain}"), "the comment above the first row is taken as the header"),
+        (plain.replace(',', " "), "separated by blanks"),
+        (plain.replace(',', "|"), "separated by vertical bars"),
+    ] {
+        let read = desk.read(&text, &defaults()).unwrap_or_else(|error| panic!("{text}: {error}"));
+        assert_eq!(read.record, expected, "{text}");
+        assert!(read.notes.iter().any(|found| found.contains(note)), "{text}: {:?}", read.notes);
+    }
+    for text in [
+        plain.replace('\n', ",\n"),
+        plain.replacen("u\n", "u,\n", 1),
+        plain.replacen("u\n", "u,Comment\n", 1),
+        plain.replace('\n', "\r"),
+        plain.replace('\n', "\r\r\n"),
+    ] {
+        let read = desk.read(&text, &defaults()).unwrap_or_else(|error| panic!("{text}: {error}"));
+        assert_eq!(read.record, expected, "{text}");
+    }
+}
+
 #[test]
 fn expressions_choose_and_combine() {
     let desk = Desk::new();
@@ -207,8 +274,20 @@ fn expressions_choose_and_combine() {
 
     assert!(
         desk.error(text, &defaults())
-            .contains("has no column \"e\" (requested: e); it has t, r, y, stick")
+            .contains("has no column \"e\" (requested: e); it has t, r, y, stick; select columns with --input and --output")
     );
+    let of_trial = ReadOptions {
+        trial: Some("run".parse().unwrap()),
+        ..options("r", "y")
+    };
+    let message = desk.error(text, &of_trial);
+    assert!(message.contains("no column \"run\"") && message.ends_with("--trial COLUMN or COLUMN=VALUE"), "{message}");
+    let kept = ReadOptions {
+        columns: Some(vec![String::from("z")]),
+        ..options("r", "y")
+    };
+    let message = desk.error(text, &kept);
+    assert!(message.contains("no column \"z\"") && message.ends_with("--columns NAME,NAME, or none"), "{message}");
     assert!(
         desk.error(text, &options("r-y", "r-y"))
             .contains("input and output are both r-y")

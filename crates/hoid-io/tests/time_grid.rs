@@ -81,7 +81,26 @@ fn times_in_any_unit_and_form_are_the_same_record() {
         )
     };
     let s = |k: i64| format!("{:.2}", 0.02 * k as f64);
-    let found: [Written<'_>; 14] = [
+    let days = |from: f64| move |k: i64| format!("{:.10}", from + 0.02 * k as f64 / 86_400.0);
+    let (excel, matlab) = (days(45_321.5), days(739_000.5));
+    let evening = |k: i64| match 86_399_500 + 20 * k {
+        ms @ ..86_400_000 => format!("23:59:{:02}.{:03}", ms / 1000 % 60, ms % 1000),
+        ms => format!("00:00:00,{:03}", ms % 1000),
+    };
+    let found: [Written<'_>; 27] = [
+        ("Date Time", &excel, None),
+        ("Time", &excel, None),
+        ("t", &excel, None),
+        ("datenum", &matlab, None),
+        ("clock", &excel, Some("clock:d")),
+        ("clock", &|k| format!("{:.10}", 0.02 * k as f64 / 86_400.0), Some("clock:days")),
+        ("time_stamps", &|k| format!("{:.2}", 123_456.7 + 0.02 * k as f64), None),
+        ("xAxis [ms]", &|k| format!("{:.1}", 20.0 * k as f64), None),
+        ("clock", &|k| evening(k).replace(',', "."), None),
+        ("time", &|k| format!("{} sec", 0.02 * k as f64), None),
+        ("time", &|k| format!("0 days 00:00:{:09.6}", 0.02 * k as f64), None),
+        ("Time", &|k| format!("05-Mar-2024 10:11:{:06.3}", 0.02 * k as f64), None),
+        ("_time", &s, None),
         ("Zeit [s]", &s, None),
         ("elapsed", &s, None),
         ("elapsed", &ms, None),
@@ -107,7 +126,8 @@ fn times_in_any_unit_and_form_are_the_same_record() {
             (read.record.sample_time().s() - 0.02).abs() < 1e-9,
             "{header} {choice:?}"
         );
-        assert!(read.record.time_s(0).abs() < 1e-9, "{header} {choice:?}");
+        let first = if header == "time_stamps" { 123_456.7 } else { 0.0 };
+        assert!((read.record.time_s(0) - first).abs() < 1e-9, "{header} {choice:?}");
         assert_eq!(read.record.len(), 40);
     }
     // A row number is not a time, and a requested unit takes precedence over the detected one.
@@ -119,6 +139,10 @@ fn times_in_any_unit_and_form_are_the_same_record() {
     let message = record_with("clock", ms, Some("cloc")).unwrap_err().to_string();
     assert!(
         message.contains("no column \"cloc\"") && message.contains("clock"),
+        "{message}"
+    );
+    assert!(
+        message.ends_with("select the time column with --time COLUMN or COLUMN:UNIT"),
         "{message}"
     );
 }
@@ -380,4 +404,31 @@ fn what_lies_outside_the_span_is_not_looked_at() {
             "{message}"
         );
     }
+}
+
+/// Serial days are known by their size and their steps; the same numbers with longer steps are seconds.
+#[test]
+fn serial_days_and_seconds() {
+    let in_days = |header: &str, step_s: f64, decimals: usize| {
+        let time = |k: i64| format!("{:.decimals$}", 45_321.5 + step_s * k as f64 / 86_400.0);
+        record_with(header, time, None).unwrap()
+    };
+    // One unit of seven decimals is 8.64 ms.
+    let read = in_days("Time", 0.02, 7);
+    assert_eq!(read.record.sample_time().s(), 0.02);
+    assert_eq!(read.notes, ["Time is taken as t, in s from its first time, from days"]);
+    assert_eq!(in_days("t", 0.02, 10).notes, ["t is in s from its first time, from days"]);
+    let seconds = record_with("Time", |k| format!("{:.2}", 45_321.5 + 0.02 * k as f64), None).unwrap();
+    assert_eq!((seconds.record.time_s(0), seconds.record.sample_time().s()), (45_321.5, 0.02));
+    // A column of another name is no time.
+    assert!(record_with("level", |k| format!("{:.10}", 45_321.5 + 1e-6 * k as f64), None).is_err());
+}
+
+/// The unit below the header counts also where the name says only that it is a time.
+#[test]
+fn units_of_the_time_below_the_header() {
+    let desk = Desk::new();
+    let rows: String = (0..40).map(|k| format!("{:.1},{k},{}\n", 12.5 * f64::from(k), 2 * k)).collect();
+    let read = desk.read(format!("Time,e,u\nms,deg,V\n{rows}"), &defaults()).unwrap();
+    assert_eq!(read.record.sample_time().s(), 0.0125);
 }

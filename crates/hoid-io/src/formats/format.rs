@@ -9,7 +9,7 @@ use hoid_model::Record;
 
 use super::arrays::{Contents, output_table_of, table_of};
 use crate::IoError;
-use crate::record::{ReadOptions, trials};
+use crate::record::{ReadOptions, topics, trials};
 use crate::results::{OutputTable, TableSchema, Values};
 use crate::table::{Table, check_selected, selected};
 use crate::time::with_time;
@@ -118,5 +118,9 @@ pub(super) fn with_time_and_selection<'a>(
     if is_trial || by_itself {
         return Ok(table);
     }
+    let table = match options.trial {
+        Some(_) => table,
+        None => topics::joined(table, options),
+    };
     trials::of_table(table, options.trial.as_ref())
 }

@@ -65,7 +65,7 @@ impl RecordParts {
         let (step, old) = ("new-fs", self.sample_time);
         let new = SampleTime::new(1.0 / hz).map_err(|_| {
             self.error(
-                "rate",
+                step,
                 format!("{hz} Hz"),
                 "a positive finite number of samples per second",
             )

@@ -7,6 +7,7 @@
 //! |---|---|
 //! | `file` | [`read_record`], [`read_prepared`], [`write_record`] |
 //! | `read_options` | [`ReadOptions`], [`TrialChoice`]: selection of the data, and options for reading them |
+//! | `topics` | topics that follow one another in a table |
 //! | `trials` | division of a file into trials |
 //! | `from_table` | [`ReadRecord`]: conversion of the columns of a file to a record |
 //! | `table_reader` | checks and repairs of the columns, one by one |
@@ -27,6 +28,7 @@ mod segments;
 mod sparse;
 mod table_reader;
 mod time_grid;
+pub(crate) mod topics;
 pub(crate) mod trials;
 
 pub use alignment::read_aligned;

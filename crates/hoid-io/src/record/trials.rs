@@ -102,6 +102,7 @@ fn parts_by(table: &Table<'_>, choice: &TrialChoice) -> Result<Parts, IoError> {
             meant: did_you_mean(&[&choice.column], &names),
             asked: choice.to_string(),
             available: list(&names),
+            remedy: "select trials with --trial COLUMN or COLUMN=VALUE",
         });
     };
     let labels: Vec<Option<String>> = (0..table.rows).map(|row| cell(table, at, row)).collect();

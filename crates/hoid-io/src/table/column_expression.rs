@@ -124,6 +124,7 @@ impl ColumnExpression {
                     meant: did_you_mean(&unknown, names),
                     asked: self.text.clone(),
                     available: list(names),
+                    remedy: "select columns with --input and --output as NAME, -NAME or NAME-NAME",
                 })
             }
             _ => Err(IoError::Expression {

@@ -128,6 +128,8 @@ impl Table<'_> {
         if begun || column.texts.binary_search(&row).is_ok() {
             let remedy = if has_decimal_comma(&found) {
                 DECIMAL_COMMA
+            } else if is_moment(&found) && column.texts.len() == self.rows {
+                "the column holds dates or clock times: choose it with --time, or choose another column"
             } else if is_moment(&found) {
                 "the column mixes numbers with dates or clock times: write it in one format, or give --fs HZ if the \
                  samples are evenly spaced"

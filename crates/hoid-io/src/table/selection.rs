@@ -71,6 +71,7 @@ pub(crate) fn check_selected(names: &[&str], options: &ReadOptions, file: &str) 
             meant: did_you_mean(&[missing], names),
             asked: kept.join(","),
             available: list(names),
+            remedy: "name the columns to keep with --columns NAME,NAME, or none",
         }),
     }
 }

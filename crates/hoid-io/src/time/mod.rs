@@ -15,4 +15,4 @@ mod time_column;
 pub(crate) use moment::{Moments, seconds};
 pub use sampling::even_times;
 pub use time_choice::TimeChoice;
-pub(crate) use time_column::{is_time, may_be_time, with_time};
+pub(crate) use time_column::{is_time, is_time_unit, may_be_time, with_time};

@@ -117,6 +117,11 @@ pub(crate) fn may_be_time(at: usize, name: &str, choice: Option<&TimeChoice>) ->
         || (at == 0 && name.is_empty())
 }
 
+/// True if a column with this unit may become the time.
+pub(crate) fn is_time_unit(unit: &str) -> bool {
+    Unit::of(unit).is_some()
+}
+
 /// Returns the table, in which the column recognised or selected as the time, if any, is named t and is in s.
 pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -> Result<Table<'a>, IoError> {
     let found = match choice {
@@ -167,6 +172,7 @@ fn chosen(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize, Option<Unit>
         meant: did_you_mean(&[&choice.column], &names),
         asked: choice.to_string(),
         available: list(&names),
+        remedy: "select the time column with --time COLUMN or COLUMN:UNIT",
     })
 }
 
@@ -198,7 +204,7 @@ fn found(table: &Table<'_>) -> Option<(usize, Option<Unit>)> {
                 && (is_stamp() || is_serial_days(values) || runs_in_seconds(values))
         })
     };
-    let by_unit = || only(table, |_, column| Unit::of(&column.unit).is_some() && rises(&column.values));
+    let by_unit = || only(table, |_, column| is_time_unit(&column.unit) && rises(&column.values));
     let pair = || only(table, |at, _| nanoseconds_of(table, at).is_some());
     by_name()
         .or_else(by_type)
@@ -312,6 +318,10 @@ fn make_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
     };
     if was_t && unit == Unit::Power(0) {
         return;
+    }
+    // Of a column that does not look like a time by its name, the printed digits were not counted.
+    if time.precision == Precision::default() && !time.moments {
+        time.precision = Precision::of_times(&time.values, false);
     }
     let name = std::mem::replace(&mut time.name, String::from("t"));
     let name = if name.is_empty() {

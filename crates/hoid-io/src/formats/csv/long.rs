@@ -18,8 +18,8 @@ use super::span_end::SpanEnd;
 use super::table::{Parsed, nth_row, parsed};
 use crate::IoError;
 use crate::record::ReadOptions;
-use crate::table::{Cell, Source, Table, check_selected, selected};
-use crate::time::{is_time, may_be_time};
+use crate::table::{Cell, Column, Source, Table, check_selected, selected};
+use crate::time::{is_time, is_time_unit, may_be_time};
 use crate::wording::shown;
 
 /// Minimum size, in bytes, of a file that is read block by block.
@@ -76,8 +76,10 @@ fn of_length<'a>(
     if check_selected(&known, options, file).is_err() {
         return Ok(None);
     }
-    let wanted: Vec<bool> = (names.iter().enumerate())
-        .map(|(at, name)| options.wants(name) || may_be_time(at, name, options.time.as_ref()))
+    let wanted: Vec<bool> = (parsed.columns.iter().enumerate())
+        .map(|(at, Column { name, unit, .. })| {
+            options.wants(name) || may_be_time(at, name, options.time.as_ref()) || is_time_unit(unit)
+        })
         .collect();
     let times: Vec<bool> = names.iter().map(|name| is_time(name)).collect();
     let layout = Layout {
