@@ -68,3 +68,70 @@ fn packed_tables_and_sidecars() {
     std::fs::write(desk.path("run.npz.gz"), &packed).unwrap();
     assert!(message("run.npz.gz").contains("unpack it first"));
 }
+
+/// By the inheritance principle of BIDS a file with fewer entities, also above the recording, describes it.
+#[test]
+fn sidecars_of_many_recordings() {
+    let desk = Desk::new();
+    let folder = desk.path("sub-01/ses-1/beh");
+    std::fs::create_dir_all(&folder).unwrap();
+    let options = ReadOptions {
+        input: Some("error".parse().unwrap()),
+        output: "stick".parse().unwrap(),
+        ..ReadOptions::default()
+    };
+    let json = |hz: i32| {
+        format!(
+            r#"{{"SamplingFrequency": {hz}, "Columns": ["error", "stick"], "error": {{"Units": "deg"}}, "stick": 3}}"#
+        )
+    };
+    let name = folder.join("sub-01_ses-1_task-track_run-2_physio.tsv.gz");
+    std::fs::write(&name, gzip(b"1\t2\n3\t4\n5\t6\n")).unwrap();
+    let read = || read_record(&name, &options);
+    let message = read().unwrap_err().to_string();
+    assert!(message.contains("the first line holds numbers"), "{message}");
+    // Of another task, of another kind, and damaged.
+    std::fs::write(desk.path("task-rest_physio.json"), json(10)).unwrap();
+    std::fs::write(desk.path("task-track_stim.json"), json(20)).unwrap();
+    std::fs::write(folder.join("sub-01_physio.json"), "{").unwrap();
+    assert!(read().is_err());
+    for (path, hz) in [
+        (desk.path("task-track_physio.json"), 25),
+        (folder.join("task-track_physio.json"), 40),
+        (folder.join("sub-01_task-track_physio.json"), 50),
+    ] {
+        std::fs::write(path, json(hz)).unwrap();
+        let record = read().unwrap().record;
+        assert_eq!(record.input(), [1.0, 3.0, 5.0]);
+        assert!((record.sample_time().s() * f64::from(hz) - 1.0).abs() < 1e-12, "{hz}");
+        assert_eq!(record.input_channel().unwrap().unit, "deg");
+        assert_eq!(record.output_channel().unit, "");
+    }
+}
+
+#[test]
+fn motion_recordings_have_a_table_of_channels() {
+    let desk = Desk::new();
+    let name = desk.path("sub-01_task-track_motion.tsv");
+    std::fs::write(&name, "1\t2\n3\t4\n5\t6\n").unwrap();
+    std::fs::write(desk.path("sub-01_task-track_motion.json"), r#"{"SamplingFrequency": 50}"#).unwrap();
+    let options = ReadOptions {
+        input: Some("error".parse().unwrap()),
+        output: "stick".parse().unwrap(),
+        ..ReadOptions::default()
+    };
+    for (channels, is_read) in [
+        ("name\ttype\tunits\nerror\tPOS\tdeg\nstick\tPOS\tn/a\n", true),
+        ("name\ttype\tunits\nerror\tPOS\tdeg\n", false),
+        ("type\nPOS\nPOS\n", false),
+        ("", false),
+    ] {
+        std::fs::write(desk.path("sub-01_task-track_channels.tsv"), channels).unwrap();
+        let read = read_record(&name, &options);
+        assert_eq!(read.is_ok(), is_read, "{channels}");
+        if let Ok(read) = read {
+            assert_eq!(read.record.output(), [2.0, 4.0, 6.0]);
+            assert_eq!(read.record.input_channel().unwrap().unit, "deg");
+        }
+    }
+}

@@ -7,7 +7,7 @@ use std::path::Path;
 use flate2::read::MultiGzDecoder;
 
 use super::format::{Format, Writing, with_time_and_selection};
-use super::{ALL, csv, packed};
+use super::{ALL, bids, csv, packed};
 use crate::IoError;
 use crate::record::ReadOptions;
 use crate::table::Table;
@@ -198,7 +198,7 @@ pub(crate) fn bytes_of(path: &Path) -> Result<(&'static Format, Vec<u8>), IoErro
         (None, false) => read(path)?,
     };
     if format.extensions == csv::TSV.extensions {
-        bytes = packed::with_sidecar(bytes, inner.as_deref().unwrap_or(path));
+        bytes = bids::with_header(bytes, inner.as_deref().unwrap_or(path));
     }
     Ok((format, bytes))
 }

@@ -11,7 +11,8 @@
 //! | `npz` | NPZ and NPY of numpy |
 //! | `mat` | variables of MATLAB, HDF5 |
 //! | `xdf` | streams of the Lab Streaming Layer |
-//! | `packed` | text compressed by gzip, and tables of BIDS |
+//! | `packed` | text compressed by gzip |
+//! | `bids` | tables of BIDS without a header |
 //! | `arrays` | files of named arrays: paths, and selection of columns |
 //! | `budget` | limit of the memory that a file may take |
 //! | `guarded` | conversion of panics in third-party readers to errors |
@@ -19,6 +20,8 @@
 // Numbers from a file are checked before they serve as an index, a length or a summand.
 #[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 pub(crate) mod arrays;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
+mod bids;
 mod budget;
 #[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod csv;
