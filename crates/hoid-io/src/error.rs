@@ -226,9 +226,7 @@ pub enum IoError {
         expected: usize,
     },
     /// A column that does not exist in the file.
-    #[error(
-        "{file} has no column {missing} (requested: {asked}{meant}); it has {available}; {remedy}"
-    )]
+    #[error("{file} has no column {missing} (requested: {asked}{meant}); it has {available}; {remedy}")]
     NoSuchColumn {
         /// Name of the file.
         file: String,

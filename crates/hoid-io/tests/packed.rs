@@ -114,7 +114,11 @@ fn motion_recordings_have_a_table_of_channels() {
     let desk = Desk::new();
     let name = desk.path("sub-01_task-track_motion.tsv");
     std::fs::write(&name, "1\t2\n3\t4\n5\t6\n").unwrap();
-    std::fs::write(desk.path("sub-01_task-track_motion.json"), r#"{"SamplingFrequency": 50}"#).unwrap();
+    std::fs::write(
+        desk.path("sub-01_task-track_motion.json"),
+        r#"{"SamplingFrequency": 50}"#,
+    )
+    .unwrap();
     let options = ReadOptions {
         input: Some("error".parse().unwrap()),
         output: "stick".parse().unwrap(),

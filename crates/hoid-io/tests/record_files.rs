@@ -161,7 +161,15 @@ fn other_extensions_and_places() {
 fn text_tables_under_other_names() {
     let desk = Desk::new();
     let rows = |mark: &str| format!("t{mark}e{mark}u\n0.00{mark}1{mark}2\n0.01{mark}3{mark}4\n0.02{mark}5{mark}6\n");
-    for name in ["run.dat", "run.asc", "run.log", "run.PRN", "run", "run.lvm", "run 3.5 deg"] {
+    for name in [
+        "run.dat",
+        "run.asc",
+        "run.log",
+        "run.PRN",
+        "run",
+        "run.lvm",
+        "run 3.5 deg",
+    ] {
         for mark in [",", ";", "\t", " ", " | ", "|"] {
             fs::write(desk.path(name), rows(mark)).unwrap();
             let read = read_record(&desk.path(name), &defaults()).unwrap().record;
@@ -170,12 +178,23 @@ fn text_tables_under_other_names() {
             assert_eq!(read.sample_time().s(), 0.01, "{name} {mark}");
         }
     }
-    for words in ["", "\n", "one, two\nthree, four\n", "{\"t\": [0, 1]}\n", "[table]\nx = [1, 2]\n"] {
+    for words in [
+        "",
+        "\n",
+        "one, two\nthree, four\n",
+        "{\"t\": [0, 1]}\n",
+        "[table]\nx = [1, 2]\n",
+    ] {
         fs::write(desk.path("run.dat"), words).unwrap();
         let message = read_record(&desk.path("run.dat"), &defaults()).unwrap_err().to_string();
-        assert!(message.contains(".dat is not the extension of a record format"), "{message}");
+        assert!(
+            message.contains(".dat is not the extension of a record format"),
+            "{message}"
+        );
     }
-    let message = read_record(&desk.path("missing.dat"), &defaults()).unwrap_err().to_string();
+    let message = read_record(&desk.path("missing.dat"), &defaults())
+        .unwrap_err()
+        .to_string();
     assert!(message.contains(".dat is not the extension"), "{message}");
 }
 
@@ -200,13 +219,18 @@ fn numbers_of_many_programs() {
         (",", "\"0.5\"", "\"-1,234.5\"", "NA"),
         (",", "5.0D-01", "-1.2345D+03", "NaN"),
     ] {
-        let rows: Vec<String> = [half, large, missing, large].iter().map(|e| [half, e, half].join(mark)).collect();
+        let rows: Vec<String> = [half, large, missing, large]
+            .iter()
+            .map(|e| [half, e, half].join(mark))
+            .collect();
         let text = format!("{}\n{}\n", ["x", "e", "u"].join(mark), rows.join("\n"));
         let fill = ReadOptions {
             sampling_hz: Some(50.0),
             ..fill.clone()
         };
-        let read = desk.read(&text, &fill).unwrap_or_else(|error| panic!("{text}: {error}"));
+        let read = desk
+            .read(&text, &fill)
+            .unwrap_or_else(|error| panic!("{text}: {error}"));
         assert_eq!(read.record.input(), [0.5, -1234.5, -1234.5, -1234.5], "{text}");
         assert_eq!(read.record.output(), [0.5; 4], "{text}");
     }
@@ -216,23 +240,43 @@ fn numbers_of_many_programs() {
 #[test]
 fn lines_around_a_table() {
     let desk = Desk::new();
-    let rows: Vec<String> = (0..30).map(|k| format!("{:.2},{k},{}", 0.02 * f64::from(k), -k)).collect();
+    let rows: Vec<String> = (0..30)
+        .map(|k| format!("{:.2},{k},{}", 0.02 * f64::from(k), -k))
+        .collect();
     let plain = format!("t,e,u\n{}\n", rows.join("\n"));
     let expected = desk.read(&plain, &defaults()).unwrap().record;
     let again = format!("t,e,u\n{}\nt,e,u\n{}\n", rows[..10].join("\n"), rows[10..].join("\n"));
     for (text, note) in [
-        (format!("{plain}Mean,14.5,-14.5\n"), "the first of which is \"Mean,14.5,-14.5\""),
-        (format!("{plain}\nEnd of run\nOperator 3\n"), "below the table are left out: 2"),
+        (
+            format!("{plain}Mean,14.5,-14.5\n"),
+            "the first of which is \"Mean,14.5,-14.5\"",
+        ),
+        (
+            format!("{plain}\nEnd of run\nOperator 3\n"),
+            "below the table are left out: 2",
+        ),
         (again, "repeated lines of the header are left out: 1"),
         (format!("sep=,\n{plain}"), "lines above the header are left out: 1"),
-        (format!("Rate,50,Hz\n\nRun 1,,\n{plain}"), "lines above the header are left out: 2"),
-        (format!("# {plain}"), "the comment above the first row is taken as the header"),
+        (
+            format!("Rate,50,Hz\n\nRun 1,,\n{plain}"),
+            "lines above the header are left out: 2",
+        ),
+        (
+            format!("# {plain}"),
+            "the comment above the first row is taken as the header",
+        ),
         (plain.replace(',', " "), "separated by blanks"),
         (plain.replace(',', "|"), "separated by vertical bars"),
     ] {
-        let read = desk.read(&text, &defaults()).unwrap_or_else(|error| panic!("{text}: {error}"));
+        let read = desk
+            .read(&text, &defaults())
+            .unwrap_or_else(|error| panic!("{text}: {error}"));
         assert_eq!(read.record, expected, "{text}");
-        assert!(read.notes.iter().any(|found| found.contains(note)), "{text}: {:?}", read.notes);
+        assert!(
+            read.notes.iter().any(|found| found.contains(note)),
+            "{text}: {:?}",
+            read.notes
+        );
     }
     for text in [
         plain.replace('\n', ",\n"),
@@ -241,7 +285,9 @@ fn lines_around_a_table() {
         plain.replace('\n', "\r"),
         plain.replace('\n', "\r\r\n"),
     ] {
-        let read = desk.read(&text, &defaults()).unwrap_or_else(|error| panic!("{text}: {error}"));
+        let read = desk
+            .read(&text, &defaults())
+            .unwrap_or_else(|error| panic!("{text}: {error}"));
         assert_eq!(read.record, expected, "{text}");
     }
 }
@@ -272,22 +318,27 @@ fn expressions_choose_and_combine() {
         .labelled("run");
     assert_eq!(again, record);
 
-    assert!(
-        desk.error(text, &defaults())
-            .contains("has no column \"e\" (requested: e); it has t, r, y, stick; select columns with --input and --output")
-    );
+    assert!(desk.error(text, &defaults()).contains(
+        "has no column \"e\" (requested: e); it has t, r, y, stick; select columns with --input and --output"
+    ));
     let of_trial = ReadOptions {
         trial: Some("run".parse().unwrap()),
         ..options("r", "y")
     };
     let message = desk.error(text, &of_trial);
-    assert!(message.contains("no column \"run\"") && message.ends_with("--trial COLUMN or COLUMN=VALUE"), "{message}");
+    assert!(
+        message.contains("no column \"run\"") && message.ends_with("--trial COLUMN or COLUMN=VALUE"),
+        "{message}"
+    );
     let kept = ReadOptions {
         columns: Some(vec![String::from("z")]),
         ..options("r", "y")
     };
     let message = desk.error(text, &kept);
-    assert!(message.contains("no column \"z\"") && message.ends_with("--columns NAME,NAME, or none"), "{message}");
+    assert!(
+        message.contains("no column \"z\"") && message.ends_with("--columns NAME,NAME, or none"),
+        "{message}"
+    );
     assert!(
         desk.error(text, &options("r-y", "r-y"))
             .contains("input and output are both r-y")

@@ -93,7 +93,11 @@ fn times_in_any_unit_and_form_are_the_same_record() {
         ("t", &excel, None),
         ("datenum", &matlab, None),
         ("clock", &excel, Some("clock:d")),
-        ("clock", &|k| format!("{:.10}", 0.02 * k as f64 / 86_400.0), Some("clock:days")),
+        (
+            "clock",
+            &|k| format!("{:.10}", 0.02 * k as f64 / 86_400.0),
+            Some("clock:days"),
+        ),
         ("time_stamps", &|k| format!("{:.2}", 123_456.7 + 0.02 * k as f64), None),
         ("xAxis [ms]", &|k| format!("{:.1}", 20.0 * k as f64), None),
         ("clock", &|k| evening(k).replace(',', "."), None),
@@ -417,9 +421,15 @@ fn serial_days_and_seconds() {
     let read = in_days("Time", 0.02, 7);
     assert_eq!(read.record.sample_time().s(), 0.02);
     assert_eq!(read.notes, ["Time is taken as t, in s from its first time, from days"]);
-    assert_eq!(in_days("t", 0.02, 10).notes, ["t is in s from its first time, from days"]);
+    assert_eq!(
+        in_days("t", 0.02, 10).notes,
+        ["t is in s from its first time, from days"]
+    );
     let seconds = record_with("Time", |k| format!("{:.2}", 45_321.5 + 0.02 * k as f64), None).unwrap();
-    assert_eq!((seconds.record.time_s(0), seconds.record.sample_time().s()), (45_321.5, 0.02));
+    assert_eq!(
+        (seconds.record.time_s(0), seconds.record.sample_time().s()),
+        (45_321.5, 0.02)
+    );
     // A column of another name is no time.
     assert!(record_with("level", |k| format!("{:.10}", 45_321.5 + 1e-6 * k as f64), None).is_err());
 }
@@ -428,7 +438,9 @@ fn serial_days_and_seconds() {
 #[test]
 fn units_of_the_time_below_the_header() {
     let desk = Desk::new();
-    let rows: String = (0..40).map(|k| format!("{:.1},{k},{}\n", 12.5 * f64::from(k), 2 * k)).collect();
+    let rows: String = (0..40)
+        .map(|k| format!("{:.1},{k},{}\n", 12.5 * f64::from(k), 2 * k))
+        .collect();
     let read = desk.read(format!("Time,e,u\nms,deg,V\n{rows}"), &defaults()).unwrap();
     assert_eq!(read.record.sample_time().s(), 0.0125);
 }

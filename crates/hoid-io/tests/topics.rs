@@ -11,7 +11,9 @@ use hoid_io::{ReadOptions, Sparse};
 fn table(step_e: usize, step_u: usize) -> String {
     let stamp = |k: usize| format!("{},{}", 1_700_000_000 + k / 100, k % 100 * 10_000_000);
     let e = (0..300).step_by(step_e).map(|k| format!("{},/error,{k},\n", stamp(k)));
-    let u = (0..300).step_by(step_u).map(|k| format!("{},/stick,,{}\n", stamp(k), 2 * k));
+    let u = (0..300)
+        .step_by(step_u)
+        .map(|k| format!("{},/stick,,{}\n", stamp(k), 2 * k));
     format!("secs,nsecs,topic,e,u\n{}", e.chain(u).collect::<String>())
 }
 
@@ -21,14 +23,21 @@ fn topics_of_the_same_times_give_a_record() {
     assert_eq!((read.record.len(), read.record.sample_time().s()), (300, 0.01));
     assert_eq!(read.record.input()[299], 299.0);
     assert_eq!(read.record.output()[299], 598.0);
-    assert!(read.notes.iter().any(|note| note.contains("joined by t as topics")), "{:?}", read.notes);
+    assert!(
+        read.notes.iter().any(|note| note.contains("joined by t as topics")),
+        "{:?}",
+        read.notes
+    );
 }
 
 #[test]
 fn topics_of_two_rates_need_sparse() {
     let desk = Desk::new();
     let message = desk.error(&table(5, 1), &defaults());
-    assert!(message.contains("column e: the value is missing") && message.contains("--sparse e=hold"), "{message}");
+    assert!(
+        message.contains("column e: the value is missing") && message.contains("--sparse e=hold"),
+        "{message}"
+    );
     let options = ReadOptions {
         sparse: [(String::from("e"), Sparse::Linear)].into_iter().collect(),
         ..defaults()
@@ -41,7 +50,11 @@ fn topics_of_two_rates_need_sparse() {
 #[test]
 fn trials_and_tables_without_topics_are_not_joined() {
     let desk = Desk::new();
-    let trial = |first: i32| (0..20).map(|k| format!("{:.2},{},{k}\n", 0.02 * f64::from(k), first + k)).collect::<String>();
+    let trial = |first: i32| {
+        (0..20)
+            .map(|k| format!("{:.2},{},{k}\n", 0.02 * f64::from(k), first + k))
+            .collect::<String>()
+    };
     let message = desk.error(&format!("t,e,u\n{}{}", trial(0), trial(7)), &defaults());
     assert!(message.contains("2 trials by t"), "{message}");
     // One topic only, or no value at all.

@@ -77,7 +77,7 @@ def read(
         is read.
     time : str, optional
         Column of the time, with its unit if the file does not give it: ``"clock:ms"`` (s, ms, us, ns, min,
-        h, iso, sec+nanosec). By default ``t``, or a column with another common name for time.
+        h, days, iso, sec+nanosec). By default ``t``, or a column with another common name for time.
     trial : str, optional
         The trial to read from a file with several trials: ``"trial=3"``. `read_trials` reads all trials.
     sampling_frequency : float, optional

@@ -23,7 +23,7 @@ pub struct LookArgs {
     /// every target and disturbance is recorded
     #[arg(long, value_name = "ELEMENT", value_parser = parse_element, allow_hyphen_values = true)]
     pub controlled_element: Option<(String, ContinuousTransferFunction)>,
-    /// Time column, and its unit: s, ms, us, ns, min, h, iso, sec+nanosec [default: t, or a column recognised as time]
+    /// Time column, and its unit: s, ms, us, ns, min, h, days, iso, sec+nanosec [default: t, or a column recognised as time]
     #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
     pub time: Option<TimeChoice>,
     /// Column that numbers the trials, or t (time restarts at each trial); each trial becomes a record. COLUMN=VALUE,

@@ -21,7 +21,7 @@ pub struct ReadArgs {
     /// Output column (control): a name, -name, or a difference
     #[arg(long, value_name = "COLUMN", default_value = "u", allow_hyphen_values = true)]
     pub output: String,
-    /// Time column, and its unit if it is not recognised: s, ms, us, ns, min, h, iso (dates and times), sec+nanosec
+    /// Time column, and its unit if it is not recognised: s, ms, us, ns, min, h, days, iso (dates and times), sec+nanosec
     /// [default: t, or a column recognised as time]
     #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
     pub time: Option<TimeChoice>,

@@ -127,7 +127,7 @@ impl Excitation {
     /// or for a span that is not a whole number of periods; [`IdentError::NoExcitation`] for a constant channel;
     /// [`IdentError::NotWholePeriods`] if the span is not a whole number of the given periods.
     pub fn found_in(record: &Record, channel: &str, search: &LineSearch) -> Result<Self, IdentError> {
-        let values = channel_of(record, channel, "the channel in which to find lines")?;
+        let values = channel_of(record, channel, "the excitation (--excitation)")?;
         if !(search.least_amplitude > 0.0 && search.least_amplitude <= 1.0) {
             return refuse(
                 "the smallest amplitude of a line",

@@ -89,7 +89,10 @@ fn channels(path: &Path) -> Vec<(String, String)> {
         let channel = |line: &str| {
             let cells: Vec<&str> = line.split('\t').collect();
             let unit = units.and_then(|at| cells.get(at)).filter(|unit| **unit != "n/a");
-            Some(((*cells.get(name)?).to_owned(), unit.map_or_else(String::new, |unit| (*unit).to_owned())))
+            Some((
+                (*cells.get(name)?).to_owned(),
+                unit.map_or_else(String::new, |unit| (*unit).to_owned()),
+            ))
         };
         let filled = lines.filter(|line| !line.trim().is_empty());
         filled.map(channel).collect::<Option<Vec<_>>>()

@@ -15,9 +15,36 @@ pub(crate) enum Cell {
 
 /// Words for missing values in R, pandas, databases, spreadsheets, statistics packages and the C library of Windows.
 const MISSING: [&str; 30] = [
-    "", "na", "n/a", "n.a.", "null", "none", "nil", "missing", "<na>", "#n/a", "#na", "#nv", "#div/0!", "#value!",
-    "#wert!", "#num!", "#zahl!", "#ref!", "#bezug!", "#name?", "-", "--", ".", "?", "1.#ind", "-1.#ind", "1.#qnan",
-    "-1.#qnan", "nan(ind)", "-nan(ind)",
+    "",
+    "na",
+    "n/a",
+    "n.a.",
+    "null",
+    "none",
+    "nil",
+    "missing",
+    "<na>",
+    "#n/a",
+    "#na",
+    "#nv",
+    "#div/0!",
+    "#value!",
+    "#wert!",
+    "#num!",
+    "#zahl!",
+    "#ref!",
+    "#bezug!",
+    "#name?",
+    "-",
+    "--",
+    ".",
+    "?",
+    "1.#ind",
+    "-1.#ind",
+    "1.#qnan",
+    "-1.#qnan",
+    "nan(ind)",
+    "-nan(ind)",
 ];
 
 /// Typographic minus sign, U+2212.
@@ -89,7 +116,8 @@ fn without_thousands(cell: &str) -> Option<String> {
     let mut groups = whole.split(mark);
     let first = groups.next()?;
     let digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
-    let in_threes = (1..4).contains(&first.len()) && digits(first) && groups.all(|group| group.len() == 3 && digits(group));
+    let in_threes =
+        (1..4).contains(&first.len()) && digits(first) && groups.all(|group| group.len() == 3 && digits(group));
     (is_mark && in_threes && digits(decimals)).then(|| {
         let sign = text.strip_suffix(number).unwrap_or_default();
         format!("{sign}{}.{decimals}", whole.replace(mark, ""))
@@ -100,7 +128,9 @@ fn without_thousands(cell: &str) -> Option<String> {
 fn is_fortran(text: &str) -> bool {
     let digits = text.trim_start_matches(['+', '-']);
     let rest = digits.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
-    let exponent = rest.strip_prefix(['d', 'D']).map(|rest| rest.trim_start_matches(['+', '-']));
+    let exponent = rest
+        .strip_prefix(['d', 'D'])
+        .map(|rest| rest.trim_start_matches(['+', '-']));
     rest.len() < digits.len()
         && exponent.is_some_and(|digits| !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit()))
 }
@@ -122,7 +152,8 @@ mod tests {
     #[test]
     fn cells() {
         for missing in [
-            "", "  ", "NaN", "nan", "NA", "n/a", "NULL", "-NaN", "None", "<NA>", "#N/A", "-", "-1.#IND", "#DIV/0!", "n.a.",
+            "", "  ", "NaN", "nan", "NA", "n/a", "NULL", "-NaN", "None", "<NA>", "#N/A", "-", "-1.#IND", "#DIV/0!",
+            "n.a.",
         ] {
             assert_eq!(Cell::parse(missing), Cell::Missing, "{missing:?}");
         }
@@ -169,8 +200,24 @@ mod tests {
             assert!(matches!(Cell::parse(number), Cell::Number(_)), "{number}");
         }
         for cell in [
-            "4,000", "4.000", "1,234,567", "40,00.5", "1.2345,6", "1,23.4", "1.234,5,6", "1.234.5", "12 34", "1 234", "1234 567,5",
-            "1.234,5e3", "", "'", "10:11:12,5", "05.03.2024", "1 é34", "1.234,é",
+            "4,000",
+            "4.000",
+            "1,234,567",
+            "40,00.5",
+            "1.2345,6",
+            "1,23.4",
+            "1.234,5,6",
+            "1.234.5",
+            "12 34",
+            "1 234",
+            "1234 567,5",
+            "1.234,5e3",
+            "",
+            "'",
+            "10:11:12,5",
+            "05.03.2024",
+            "1 é34",
+            "1.234,é",
         ] {
             assert_eq!(with_decimal_point(cell, false), cell);
         }

@@ -312,7 +312,10 @@ mod tests {
         ] {
             assert_eq!(parse(cell).map(|moment| moment.ns), Some(ns), "{cell}");
         }
-        assert_eq!(parse("10:11:12.020").map(|moment| moment.precision.unit(0.0)), Some(1e-3));
+        assert_eq!(
+            parse("10:11:12.020").map(|moment| moment.precision.unit(0.0)),
+            Some(1e-3)
+        );
         assert_eq!(parse("20 ms").map(|moment| moment.precision.unit(0.0)), Some(1e-3));
     }
 
@@ -360,10 +363,16 @@ mod tests {
     fn a_clock_without_a_date_passes_midnight() {
         assert_eq!(column(&["23:59:59.5", "00:00:00.0", "00:00:00.5"]), [0.0, 0.5, 1.0]);
         assert_eq!(column(&["11:59:59 PM", "12:00:00 AM"]), [0.0, 1.0]);
-        assert_eq!(column(&["59:59.5", "00:00.0", "59:59.5", "00:00.0"]), [0.0, 0.5, 3600.0, 3600.5]);
+        assert_eq!(
+            column(&["59:59.5", "00:00.0", "59:59.5", "00:00.0"]),
+            [0.0, 0.5, 3600.0, 3600.5]
+        );
         // A time that starts again with each trial, a clock that is set back, and a date.
         assert_eq!(column(&["00:00:30", "00:00:00", "00:00:01"]), [0.0, -30.0, -29.0]);
         assert_eq!(column(&["12:00:00", "11:59:59"]), [0.0, -1.0]);
-        assert_eq!(column(&["2024-03-05 23:59:59", "2024-03-05 00:00:00"]), [0.0, -86_399.0]);
+        assert_eq!(
+            column(&["2024-03-05 23:59:59", "2024-03-05 00:00:00"]),
+            [0.0, -86_399.0]
+        );
     }
 }

@@ -70,7 +70,10 @@ pub(in crate::formats) fn whole_text(path: &Path, file: &str) -> Result<Vec<u8>,
     let mut limit = LineLimit::default();
     loop {
         let from = bytes.len();
-        let read = (&mut opened).take(PART as u64).read_to_end(&mut bytes).map_err(unreadable)?;
+        let read = (&mut opened)
+            .take(PART as u64)
+            .read_to_end(&mut bytes)
+            .map_err(unreadable)?;
         if read == 0 {
             return Ok(bytes);
         }
@@ -108,7 +111,12 @@ mod tests {
         let file = tempfile::Builder::new().suffix(".csv").tempfile().unwrap();
         std::fs::write(file.path(), "t,\"e\"\n0,1\n").unwrap();
         assert_eq!(whole_text(file.path(), "run.csv").unwrap(), b"t,\"e\"\n0,1\n");
-        File::options().write(true).open(file.path()).unwrap().set_len(1 << 30).unwrap();
+        File::options()
+            .write(true)
+            .open(file.path())
+            .unwrap()
+            .set_len(1 << 30)
+            .unwrap();
         let error = whole_text(file.path(), "run.csv").unwrap_err().to_string();
         assert!(error.contains("within 32 MB after byte 10"), "{error}");
         std::fs::write(file.path(), "").unwrap();

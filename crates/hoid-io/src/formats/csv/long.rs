@@ -42,12 +42,7 @@ pub(crate) fn table<'a>(path: &Path, file: &'a str, options: &ReadOptions) -> Re
 }
 
 /// Reads the table of a text of at least `long` bytes.
-fn of_length<'a>(
-    path: &Path,
-    file: &'a str,
-    options: &ReadOptions,
-    long: u64,
-) -> Result<Option<Table<'a>>, IoError> {
+fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -> Result<Option<Table<'a>>, IoError> {
     let unreadable = |source| IoError::Unreadable {
         file: file.to_owned(),
         source,

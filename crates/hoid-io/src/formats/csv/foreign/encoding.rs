@@ -96,7 +96,14 @@ mod tests {
         assert_eq!(dash, (String::from("t,e \u{2013} roll\n0,1\n"), true));
         // Damaged text is not converted: half a UTF-16 code unit, bytes that are not Latin 1 letters, or zero bytes
         // elsewhere.
-        for bytes in [&b"\xff\xfet\0e"[..], b"t,e\n0,\xff1\n", b"t,e\n0,\x801\n", b"t\0e,\n", b"\0", b""] {
+        for bytes in [
+            &b"\xff\xfet\0e"[..],
+            b"t,e\n0,\xff1\n",
+            b"t,e\n0,\x801\n",
+            b"t\0e,\n",
+            b"\0",
+            b"",
+        ] {
             assert!(!decoded(bytes).1, "{bytes:?}");
         }
     }

@@ -76,7 +76,8 @@ impl<'a> Layout<'a> {
             let values = |cell: &&str| is_value(cell) || is_missing(cell);
             let are_values = rows.iter().flatten().all(values);
             let (before, _) = filled.split_at_checked(at)?;
-            let found = Self::below(before, mark, &rows, row).or_else(|| Self::commented(text, before, mark, &rows, row));
+            let found =
+                Self::below(before, mark, &rows, row).or_else(|| Self::commented(text, before, mark, &rows, row));
             // A line of numbers above the header is a sample, which must not be left out.
             let is_sample = |(at, line): &(usize, &str)| {
                 let cells = mark.cells(line);

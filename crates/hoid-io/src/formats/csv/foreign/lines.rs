@@ -45,10 +45,7 @@ pub(super) fn unquoted(cell: &str) -> &str {
 
 /// True if a cell is a number with a decimal point or comma.
 pub(super) fn is_number(cell: &str) -> bool {
-    matches!(
-        Cell::parse(&with_decimal_point(unquoted(cell), true)),
-        Cell::Number(_)
-    )
+    matches!(Cell::parse(&with_decimal_point(unquoted(cell), true)), Cell::Number(_))
 }
 
 /// True if a cell is a number or a clock time.
@@ -83,7 +80,12 @@ mod tests {
         assert_eq!(Mark::Char(',').cells("a,\"b,c\",,"), ["a", "\"b,c\"", "", ""]);
         assert_eq!(Mark::Blanks.cells("  a \"b c\"\td "), ["a", "\"b c\"", "d"]);
         assert_eq!(Mark::Blanks.cells(""), [""; 0]);
-        for row in [&["0", "\"1,5\""][..], &["10:11:12", "1", "go"], &["0", "", "", "1"], &["1", "NaN"]] {
+        for row in [
+            &["0", "\"1,5\""][..],
+            &["10:11:12", "1", "go"],
+            &["0", "", "", "1"],
+            &["1", "NaN"],
+        ] {
             assert!(is_row(row), "{row:?}");
         }
         for other in [&["0"][..], &["Rate", "50"], &["", ""], &["t", "e"], &[]] {

@@ -146,7 +146,12 @@ mod tests {
         ] {
             assert_eq!(plain(text).0, found, "{text:?}");
         }
-        for text in ["# units: t s, e deg\n0,1\n", "# columns: 3\n0,1,2\n", "# a\nt,e\n#x,y\n0,1\n", "#\n0,1\n"] {
+        for text in [
+            "# units: t s, e deg\n0,1\n",
+            "# columns: 3\n0,1,2\n",
+            "# a\nt,e\n#x,y\n0,1\n",
+            "#\n0,1\n",
+        ] {
             same(text);
         }
     }
@@ -168,7 +173,10 @@ mod tests {
     fn cells_beside_the_named_ones() {
         for (text, found) in [
             ("t,e\n0,1,\n0.1,2,\n", "t,e\n0,1\n0.1,2\n"),
-            ("\"t\" \"e\"\n\"1\" 0 5\n\"2\" 0.1 6\n", "\t\"t\"\t\"e\"\n\"1\"\t0\t5\n\"2\"\t0.1\t6\n"),
+            (
+                "\"t\" \"e\"\n\"1\" 0 5\n\"2\" 0.1 6\n",
+                "\t\"t\"\t\"e\"\n\"1\"\t0\t5\n\"2\"\t0.1\t6\n",
+            ),
             ("t;e;Comment\n0;1\n0.1;2\n", "t;e\n0;1\n0.1;2\n"),
             ("| t | e |\n|---|---|\n| 0 | 1 |\n", "t\te\n#|---|---|\n0\t1\n"),
         ] {
@@ -189,7 +197,14 @@ mod tests {
         for table in [&b"t e\n0 1\n"[..], b"x\n# y\n0,1\n", b"|t|e|\n|0|1|\n", b"0,1", &utf16] {
             assert!(is_table(table), "{table:?}");
         }
-        for other in [&b""[..], b"a = [1, 2]\n", b"{\"t\": 1}\n", b"PK\x03\x04\0\0 1,2\n", b"words only, here\n", b"5\n6\n"] {
+        for other in [
+            &b""[..],
+            b"a = [1, 2]\n",
+            b"{\"t\": 1}\n",
+            b"PK\x03\x04\0\0 1,2\n",
+            b"words only, here\n",
+            b"5\n6\n",
+        ] {
             assert!(!is_table(other), "{other:?}");
         }
     }

@@ -123,15 +123,33 @@ mod tests {
             ("# t e u", ["t", "e", "u"]),
             ("%t e u", ["t", "e", "u"]),
             ("\"t\" \"roll e\" u", ["\"t\"", "\"roll e\"", "u"]),
-            ("Time (s) Roll error (deg) Stick (-)", ["Time (s)", "Roll error (deg)", "Stick (-)"]),
-            ("Time [s] Error [left hand] Stick cmd", ["Time [s]", "Error [left hand]", "Stick cmd"]),
+            (
+                "Time (s) Roll error (deg) Stick (-)",
+                ["Time (s)", "Roll error (deg)", "Stick (-)"],
+            ),
+            (
+                "Time [s] Error [left hand] Stick cmd",
+                ["Time [s]", "Error [left hand]", "Stick cmd"],
+            ),
             ("Time   Roll error\tStick  ", ["Time", "Roll error", "Stick"]),
         ] {
             let names = names.map(str::to_owned).to_vec();
-            assert_eq!(found(header, Mark::Blanks, &rows), Some((names, Extra::None)), "{header}");
+            assert_eq!(
+                found(header, Mark::Blanks, &rows),
+                Some((names, Extra::None)),
+                "{header}"
+            );
         }
         for header in [
-            "", "t", "t e", "Time s Roll error Stick", "t e u x y", "t 1 2", "(s) (deg) (V) x", "t (s) e u x", "\"t e",
+            "",
+            "t",
+            "t e",
+            "Time s Roll error Stick",
+            "t e u x y",
+            "t 1 2",
+            "(s) (deg) (V) x",
+            "t (s) e u x",
+            "\"t e",
         ] {
             assert_eq!(found(header, Mark::Blanks, &rows), None, "{header}");
         }
@@ -142,19 +160,38 @@ mod tests {
         let comma = Mark::Char(',');
         let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
         let rows = ["0,5,", "1,6,"];
-        assert_eq!(found("t,e", comma, &rows), Some((names(&["t", "e"]), Extra::SeparatorInRows)));
-        for rows in [["0,5.1,7", "1,5.2,7"], ["1,5.1,7", "2,5.2,7"], ["\"1\",5.1,7", "\"2\",5.2,7"]] {
-            assert_eq!(found("t,e", comma, &rows), Some((names(&["t", "e"]), Extra::RowNumbers)));
+        assert_eq!(
+            found("t,e", comma, &rows),
+            Some((names(&["t", "e"]), Extra::SeparatorInRows))
+        );
+        for rows in [
+            ["0,5.1,7", "1,5.2,7"],
+            ["1,5.1,7", "2,5.2,7"],
+            ["\"1\",5.1,7", "\"2\",5.2,7"],
+        ] {
+            assert_eq!(
+                found("t,e", comma, &rows),
+                Some((names(&["t", "e"]), Extra::RowNumbers))
+            );
         }
         for rows in [["0,5,7", "0.1,6,7"], ["3,5,7", "4,6,7"], ["0,5,", "0.1,6,7"]] {
             assert_eq!(found("t,e", comma, &rows), None, "{rows:?}");
         }
         for header in ["t,e,", "t,e,Comment"] {
-            assert_eq!(found(header, comma, &["0,5", "1,6"]), Some((names(&["t", "e"]), Extra::NameInHeader)));
+            assert_eq!(
+                found(header, comma, &["0,5", "1,6"]),
+                Some((names(&["t", "e"]), Extra::NameInHeader))
+            );
         }
         assert_eq!(found("t,e,u", comma, &["0,5", "1,6"]), None);
-        assert_eq!(found("%time,e", comma, &["0,5", "1,6"]), Some((names(&["%time", "e"]), Extra::None)));
-        assert_eq!(found("% t,e", comma, &["0,5", "1,6"]), Some((names(&["t", "e"]), Extra::None)));
+        assert_eq!(
+            found("%time,e", comma, &["0,5", "1,6"]),
+            Some((names(&["%time", "e"]), Extra::None))
+        );
+        assert_eq!(
+            found("% t,e", comma, &["0,5", "1,6"]),
+            Some((names(&["t", "e"]), Extra::None))
+        );
         assert_eq!(found("t,e", comma, &[]), None);
         assert_eq!(found(",", comma, &["0,5"]), None);
     }

@@ -54,7 +54,10 @@ pub(super) fn with_tabs(text: &str) -> Option<String> {
 
 /// True if a line consists of dashes, colons and bars, such as `|---|:-:|`.
 fn is_rule(line: &str) -> bool {
-    line.contains("--") && line.chars().all(|c| matches!(c, '|' | '-' | ':' | '+') || c.is_whitespace())
+    line.contains("--")
+        && line
+            .chars()
+            .all(|c| matches!(c, '|' | '-' | ':' | '+') || c.is_whitespace())
 }
 
 #[cfg(test)]
@@ -80,7 +83,16 @@ mod tests {
 
     #[test]
     fn other_text_with_bars() {
-        for text in ["", "|", "a|b\n", "a|b\nc|d\n", "t,e|f\n0,1\n", "t|e\n0|1|2\n", "t|e\n0\t5|1\n", "|--|\n"] {
+        for text in [
+            "",
+            "|",
+            "a|b\n",
+            "a|b\nc|d\n",
+            "t,e|f\n0,1\n",
+            "t|e\n0|1|2\n",
+            "t|e\n0\t5|1\n",
+            "|--|\n",
+        ] {
             assert_eq!(with_tabs(text), None, "{text:?}");
         }
     }

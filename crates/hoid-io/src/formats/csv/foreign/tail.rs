@@ -52,7 +52,13 @@ mod tests {
     #[test]
     fn words_below_a_table() {
         let rows = "t,e\n0,1\n1,2\n2,3\n";
-        for words in ["Mean,2\n", "End of recording\n", "\n\nMean,2\nMax,3\n\n", "End", "# aside\nMean,2\n"] {
+        for words in [
+            "Mean,2\n",
+            "End of recording\n",
+            "\n\nMean,2\nMax,3\n\n",
+            "End",
+            "# aside\nMean,2\n",
+        ] {
             let text = format!("{rows}{words}");
             let (at, note) = words_below(&text, Mark::Char(',')).unwrap();
             assert_eq!(text[..at].trim_end(), rows.trim_end(), "{words:?}");

@@ -6,8 +6,8 @@ use super::lines::{is_number, unquoted};
 /// Known units. A line of units must contain at least one of them; its other entries may be any short words.
 const UNITS: [&str; 33] = [
     "s", "sec", "secs", "seconds", "ms", "us", "µs", "min", "deg", "degs", "degree", "degrees", "°", "rad", "radians",
-    "mrad", "deg/s", "rad/s", "m", "mm", "cm", "ft", "m/s", "v", "volt", "volts", "mv", "ma", "n", "nm", "%", "percent",
-    "hz",
+    "mrad", "deg/s", "rad/s", "m", "mm", "cm", "ft", "m/s", "v", "volt", "volts", "mv", "ma", "n", "nm", "%",
+    "percent", "hz",
 ];
 
 /// Returns the unit in a cell below the header, without brackets; `None` if the cell contains no unit.
@@ -46,7 +46,10 @@ mod tests {
             (["s", "deg", "V"], Some("units: t s, e deg, u V")),
             (["[s]", "(deg)", "\"V\""], Some("units: t s, e deg, u V")),
             (["s", "", "-"], Some("units: t s")),
-            (["seconds", "degrees", "volts"], Some("units: t seconds, e degrees, u volts")),
+            (
+                ["seconds", "degrees", "volts"],
+                Some("units: t seconds, e degrees, u volts"),
+            ),
             (["start", "here", "now"], None),
             (["s", "1", "2"], None),
             (["s", "deg", "a unit of many words"], None),
