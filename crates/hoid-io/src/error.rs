@@ -3,6 +3,7 @@
 use hoid_model::ModelError;
 use thiserror::Error;
 
+use crate::table::ColumnOption;
 use crate::wording::{counted, list, sparse_option};
 
 /// Reason why a file could not be read or written. Each message gives the file, the place in it, the contents found,
@@ -226,7 +227,7 @@ pub enum IoError {
         expected: usize,
     },
     /// A column that does not exist in the file.
-    #[error("{file} has no column {missing} (requested: {asked}{meant}); it has {available}; {remedy}")]
+    #[error("{file} has no column {missing} (requested: {asked}{meant}); it has {available}; {}", option.remedy())]
     NoSuchColumn {
         /// Name of the file.
         file: String,
@@ -235,11 +236,11 @@ pub enum IoError {
         /// The complete requested expression.
         asked: String,
         /// Suggestion such as "; did you mean "u"?"; empty if no name is similar.
-        meant: String,
+        meant: Box<str>,
         /// Names that exist in the file.
         available: String,
-        /// The option with which the column was requested, and the form of its value.
-        remedy: &'static str,
+        /// The option with which the column was requested.
+        option: ColumnOption,
     },
     /// Text that does not select a column.
     #[error("the column \"{found}\": {expected}")]

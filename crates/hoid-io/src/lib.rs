@@ -79,6 +79,6 @@ pub use scenario::{
     read_scenario, scenario_schema,
 };
 pub use survey::{ColumnSurvey, FileSurvey, SamplingSurvey, ValueSurvey, survey};
-pub use table::{ColumnExpression, control_among, error_among};
+pub use table::{ColumnExpression, ColumnOption, control_among, error_among};
 pub use time::{TimeChoice, even_times};
 pub use wording::printable;

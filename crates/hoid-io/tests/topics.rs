@@ -33,7 +33,7 @@ fn topics_of_the_same_times_give_a_record() {
 #[test]
 fn topics_of_two_rates_need_sparse() {
     let desk = Desk::new();
-    let message = desk.error(&table(5, 1), &defaults());
+    let message = desk.error(table(5, 1), &defaults());
     assert!(
         message.contains("column e: the value is missing") && message.contains("--sparse e=hold"),
         "{message}"
@@ -55,7 +55,7 @@ fn trials_and_tables_without_topics_are_not_joined() {
             .map(|k| format!("{:.2},{},{k}\n", 0.02 * f64::from(k), first + k))
             .collect::<String>()
     };
-    let message = desk.error(&format!("t,e,u\n{}{}", trial(0), trial(7)), &defaults());
+    let message = desk.error(format!("t,e,u\n{}{}", trial(0), trial(7)), &defaults());
     assert!(message.contains("2 trials by t"), "{message}");
     // One topic only, or no value at all.
     for text in ["t,e,u\n0,1,\n1,2,\n0,1,\n1,2,\n", "t,e,u\n1,,\n0,,\n"] {

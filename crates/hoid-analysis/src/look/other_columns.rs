@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use hoid_io::{ColumnExpression, IoError, ReadOptions, survey};
+use hoid_io::{ColumnExpression, ColumnOption, IoError, ReadOptions, survey};
 use thiserror::Error;
 
 use super::{advice::typed, columns::Roles, file::names};
@@ -75,18 +75,13 @@ pub fn other_columns(error: &IoError, path: &Path, options: &ReadOptions) -> Opt
     let IoError::NoSuchColumn {
         file,
         missing,
-        asked,
+        option: ColumnOption::Signals,
         available,
         ..
     } = error
     else {
         return None;
     };
-    // A column of the time or the trials may be missing as well; other signals do not help there.
-    let mut signals = options.input.iter().chain([&options.output]);
-    if !signals.any(|signal| signal.to_string() == *asked) {
-        return None;
-    }
     let found = survey(path).ok()?;
     let names = names(&found);
     // Only default names are replaced; the user typed any other name deliberately.

@@ -12,7 +12,7 @@ use std::ops::Range;
 use super::read_options::TrialChoice;
 use crate::IoError;
 use crate::formats::arrays::Contents;
-use crate::table::{Column, Table, kept};
+use crate::table::{Column, ColumnOption, Table, kept};
 use crate::time::sampling::pairs;
 use crate::wording::{did_you_mean, list, shown};
 
@@ -99,10 +99,10 @@ fn parts_by(table: &Table<'_>, choice: &TrialChoice) -> Result<Parts, IoError> {
         return Err(IoError::NoSuchColumn {
             file: table.source.file().to_owned(),
             missing: format!("\"{}\"", choice.column),
-            meant: did_you_mean(&[&choice.column], &names),
+            meant: did_you_mean(&[&choice.column], &names).into_boxed_str(),
             asked: choice.to_string(),
             available: list(&names),
-            remedy: "select trials with --trial COLUMN or COLUMN=VALUE",
+            option: ColumnOption::Trial,
         });
     };
     let labels: Vec<Option<String>> = (0..table.rows).map(|row| cell(table, at, row)).collect();

@@ -7,6 +7,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use super::column_option::ColumnOption;
 use crate::IoError;
 use crate::wording::{did_you_mean, list};
 
@@ -121,10 +122,10 @@ impl ColumnExpression {
                 Err(IoError::NoSuchColumn {
                     file: file.to_owned(),
                     missing: missing.join(" and no "),
-                    meant: did_you_mean(&unknown, names),
+                    meant: did_you_mean(&unknown, names).into_boxed_str(),
                     asked: self.text.clone(),
                     available: list(names),
-                    remedy: "select columns with --input and --output as NAME, -NAME or NAME-NAME",
+                    option: ColumnOption::Signals,
                 })
             }
             _ => Err(IoError::Expression {

@@ -6,11 +6,13 @@
 //! | `cell` | [`Cell`]: numbers with a decimal point or comma, missing values, text |
 //! | `precision` | [`Precision`]: the number of digits with which a column is printed |
 //! | `column_expression` | [`ColumnExpression`]: choice of the input and output columns |
+//! | `column_option` | [`ColumnOption`]: the option with which a column was requested |
 //! | `selection` | selection of the columns that are kept |
 //! | `common_names` | recognition of error and control by common column names |
 
 mod cell;
 pub(crate) mod column_expression;
+mod column_option;
 mod columns;
 mod common_names;
 mod precision;
@@ -19,6 +21,7 @@ mod selection;
 pub(crate) use cell::{Cell, DECIMAL_COMMA, has_decimal_comma, is_moment, with_decimal_point};
 pub use column_expression::ColumnExpression;
 pub(crate) use column_expression::Signal;
+pub use column_option::ColumnOption;
 pub(crate) use columns::{Column, Source, Table, UNITS_ROW, check_names, check_number, kept, read_comments};
 pub use common_names::{control_among, error_among};
 pub(crate) use precision::Precision;

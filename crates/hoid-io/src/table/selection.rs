@@ -1,5 +1,6 @@
 //! Selection of the columns of a table that are kept.
 
+use super::column_option::ColumnOption;
 use super::columns::{Source, Table};
 use crate::IoError;
 use crate::record::ReadOptions;
@@ -68,10 +69,10 @@ pub(crate) fn check_selected(names: &[&str], options: &ReadOptions, file: &str) 
         Some(missing) => Err(IoError::NoSuchColumn {
             file: file.to_owned(),
             missing: format!("\"{missing}\""),
-            meant: did_you_mean(&[missing], names),
+            meant: did_you_mean(&[missing], names).into_boxed_str(),
             asked: kept.join(","),
             available: list(names),
-            remedy: "name the columns to keep with --columns NAME,NAME, or none",
+            option: ColumnOption::Kept,
         }),
     }
 }

@@ -22,7 +22,7 @@ use std::ops::Range;
 use super::sampling::{pairs, steps};
 use super::time_choice::{TimeChoice, Unit};
 use crate::IoError;
-use crate::table::{Column, Precision, Table};
+use crate::table::{Column, ColumnOption, Precision, Table};
 use crate::wording::{did_you_mean, list, named, shown};
 
 /// Size above which the numbers in a time stamp column are taken to be counted from 1970: 1e8 s falls in 1973.
@@ -169,10 +169,10 @@ fn chosen(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize, Option<Unit>
     Err(IoError::NoSuchColumn {
         file: table.source.file().to_owned(),
         missing: format!("\"{}\"", choice.column),
-        meant: did_you_mean(&[&choice.column], &names),
+        meant: did_you_mean(&[&choice.column], &names).into_boxed_str(),
         asked: choice.to_string(),
         available: list(&names),
-        remedy: "select the time column with --time COLUMN or COLUMN:UNIT",
+        option: ColumnOption::Time,
     })
 }
 
