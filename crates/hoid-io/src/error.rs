@@ -154,10 +154,10 @@ pub enum IoError {
         /// Maximum length of a line in MB.
         most_mb: usize,
     },
-    /// A header separated by blanks whose words cannot be assigned to the cells below it.
+    /// A header whose words cannot be assigned to the cells below it.
     #[error(
-        "{file}, {place}: the header has {}, expected {} as in the rows below it; write each name as one word \
-         (Roll_error) or in quotation marks, or separate the columns by commas, semicolons or tabs",
+        "{file}, {place}: the header has {}, expected {} as in the rows below it; write one name for each column in \
+         this line, names of several words in quotation marks or joined (Roll_error)",
         counted(*words, "word"),
         counted(*cells, "name")
     )]
@@ -198,8 +198,8 @@ pub enum IoError {
     },
     /// A row that is shorter or longer than the header.
     #[error(
-        "{file}, {place}: {found} values, expected {expected} as in the header; look for a truncated line, a stray \
-         separator or an open quotation mark"
+        "{file}, {place}: {found} values, expected {expected} as in the header; {}",
+        remedy_of_row(*found, *expected)
     )]
     RowLength {
         /// Name of the file.
@@ -625,6 +625,17 @@ pub enum IoError {
         /// Reason for the error.
         source: ModelError,
     },
+}
+
+/// Returns the remedy for a row of another length than the header.
+fn remedy_of_row(found: usize, expected: usize) -> &'static str {
+    // The decimal commas of such a row separate each number into two cells.
+    if expected > 1 && expected.checked_mul(2) == Some(found) {
+        "if the numbers have decimal commas, save the table with semicolons or tabs between the columns; otherwise look \
+         for a stray separator"
+    } else {
+        "look for a truncated line, a stray separator or an open quotation mark"
+    }
 }
 
 /// Returns the remedy for a file that cannot be written.

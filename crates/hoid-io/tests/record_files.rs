@@ -280,6 +280,14 @@ fn lines_around_a_table() {
     }
     for text in [
         plain.replace('\n', ",\n"),
+        plain.replacen("t,e,u", "t;e;u", 1),
+        plain.replacen("t,e,u", "'t','e','u'", 1),
+        plain.replacen("t,e,u", "\"t\", \"e\", \"u\"", 1),
+        plain
+            .replace(',', ", \"")
+            .replace('\n', "\"\n")
+            .replacen("u\"\n", "u\"\n", 1),
+        format!("{plain}\u{1a}"),
         plain.replacen("u\n", "u,\n", 1),
         plain.replacen("u\n", "u,Comment\n", 1),
         plain.replace('\n', "\r"),
@@ -407,8 +415,24 @@ fn errors_name_line_column_and_remedy() {
         &["line 3: the header has 4 words, expected 3 names"],
     );
     says(
+        "@relation run\n@attribute t numeric\n@data\n0,1,2\n1,1,2\n2,1,2\n",
+        &["line 3: the header has 1 word, expected 3 names"],
+    );
+    says(
+        "0,00;1,5;2\n0,01;1,6;2\n0,02;1,6;2\n",
+        &["line 1: the first line holds numbers (0,00, 1,5, 2)"],
+    );
+    says(
+        "t,e,u\n0,00,1,5,2,5\n0,01,1,6,2,5\n",
+        &[
+            "line 2: 6 values, expected 3 as in the header",
+            "decimal commas",
+            "semicolons or tabs",
+        ],
+    );
+    says(
         "0.00 1.5 2\n0.01 1.6 2\n",
-        &["line 1: the first line holds numbers (0.00 1.5 2)", "insert a header"],
+        &["line 1: the first line holds numbers (0.00, 1.5, 2)", "insert a header"],
     );
     says(
         "t,e,u\n0,1,2\n#\n1,NaN,2\n2,,2\n",

@@ -71,7 +71,8 @@ impl Cell {
 }
 
 /// Remedy for cells for which [`has_decimal_comma`] is true.
-pub(crate) const DECIMAL_COMMA: &str = "write the numbers with a decimal point instead of a comma";
+pub(crate) const DECIMAL_COMMA: &str =
+    "write the numbers with a decimal point instead of a comma, and without separators of thousands";
 
 /// True if a text cell would be a number with a decimal point instead of its comma.
 pub(crate) fn has_decimal_comma(cell: &str) -> bool {
@@ -136,7 +137,7 @@ fn is_fortran(text: &str) -> bool {
 }
 
 /// True if a cell looks like a date or a clock time, such as `2024-03-01 10:00:00.5` or `10:00:00,5`.
-pub(crate) fn is_moment(cell: &str) -> bool {
+pub(super) fn is_moment(cell: &str) -> bool {
     let parts = |marks: &[char]| {
         cell.split(marks)
             .filter(|part| part.starts_with(|c: char| c.is_ascii_digit()))

@@ -18,7 +18,7 @@ mod common_names;
 mod precision;
 mod selection;
 
-pub(crate) use cell::{Cell, DECIMAL_COMMA, has_decimal_comma, is_moment, with_decimal_point};
+pub(crate) use cell::{Cell, DECIMAL_COMMA, has_decimal_comma, with_decimal_point};
 pub use column_expression::ColumnExpression;
 pub(crate) use column_expression::Signal;
 pub use column_option::ColumnOption;

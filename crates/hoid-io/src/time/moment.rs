@@ -94,6 +94,11 @@ fn duration(cell: &str) -> Option<Moment> {
     })
 }
 
+/// True if a cell is a date, a clock time or a duration with a unit.
+pub(crate) fn is_clock_time(cell: &str) -> bool {
+    parse(cell).is_some()
+}
+
 /// Interpretation of the texts of a column, row by row: they are clock times unless some cell has other contents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Moments {

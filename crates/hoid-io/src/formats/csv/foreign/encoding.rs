@@ -18,8 +18,30 @@ pub(super) fn decode(bytes: &mut Vec<u8>) -> Option<String> {
         *bytes = bytes.iter().map(|byte| latin(*byte)).collect::<String>().into_bytes();
         note = Some(String::from("the text is taken as Latin 1"));
     }
+    let cut = without_end(bytes);
     end_with_line_feeds(bytes);
-    note
+    note.or(cut)
+}
+
+/// Removes the character of DOS that ends a text, and zero bytes that a recorder left when it lost power; returns a note
+/// on the zero bytes.
+fn without_end(bytes: &mut Vec<u8>) -> Option<String> {
+    let kept = bytes
+        .iter()
+        .rposition(|byte| *byte != 0)
+        .map_or(0, |last| last.saturating_add(1));
+    let zeros = bytes.len().saturating_sub(kept);
+    let is_text = kept > 0 && bytes.get(..kept).is_some_and(|text| !text.contains(&0));
+    if zeros > 0 && is_text {
+        bytes.truncate(kept);
+        return Some(format!(
+            "zero bytes at the end of the file are left out: {zeros}; the recording may be incomplete"
+        ));
+    }
+    if bytes.ends_with(b"\x1a") {
+        bytes.pop();
+    }
+    None
 }
 
 /// Decodes UTF-16 text, which is recognised by its byte order mark, or by zeros in every second byte of its start;
@@ -101,11 +123,20 @@ mod tests {
             b"t,e\n0,\xff1\n",
             b"t,e\n0,\x801\n",
             b"t\0e,\n",
+            b"\0\0\0",
             b"\0",
             b"",
         ] {
             assert!(!decoded(bytes).1, "{bytes:?}");
         }
+    }
+
+    #[test]
+    fn ends_of_texts() {
+        let text = String::from("t,e\n0,1\n");
+        assert_eq!(decoded(b"t,e\n0,1\n\0\0\0"), (text.clone(), true));
+        assert_eq!(decoded(b"t,e\n0,1\n\x1a"), (text, false));
+        assert!(!decoded(b"t,\0e\n0,1\n\0").1);
     }
 
     #[test]

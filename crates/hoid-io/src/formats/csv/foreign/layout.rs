@@ -34,7 +34,7 @@ pub(super) struct Layout<'a> {
     above: Vec<usize>,
 }
 
-/// A header separated by blanks that does not name the cells below it with certainty.
+/// A header that does not name the cells below it with certainty.
 #[derive(Debug, PartialEq, Eq)]
 pub(in crate::formats::csv) struct Mismatch {
     /// Line of the header, counted from 1.
@@ -55,6 +55,13 @@ fn first_rows<'a>(filled: &[(usize, &'a str)], from: usize, mark: Mark) -> Optio
         let are_rows = rows.iter().all(|row| row.len() == count && is_row(row));
         are_rows.then_some((at, rows))
     })
+}
+
+/// Returns the names in a header that separates them by another mark than the rows separate their cells.
+fn names_of_other<'a>(header: &'a str, rows: &[Vec<&str>]) -> Option<Names<'a>> {
+    let marks = Mark::ALL.iter().filter(|mark| **mark != Mark::Blanks);
+    let mut names = marks.filter_map(|mark| names_of(header, *mark, rows));
+    names.find(|names| names.extra == Extra::None)
 }
 
 impl<'a> Layout<'a> {
@@ -120,7 +127,7 @@ impl<'a> Layout<'a> {
         if let Some(layout) = of_units() {
             return Some(layout);
         }
-        let names = names_of(line, mark, rows)?;
+        let names = names_of(line, mark, rows).or_else(|| names_of_other(line, rows))?;
         let filled = |names: &[&str]| names.iter().filter(|name| !unquoted(name).is_empty()).count();
         // If another line above may be the header, the line found may be its units or damaged.
         let is_rival = |(_, line): &(usize, &str)| {
@@ -153,8 +160,8 @@ impl<'a> Layout<'a> {
         if OWN.iter().any(|own| words.starts_with(own)) {
             return None;
         }
-        let marks = [mark].into_iter().chain(Mark::ALL);
-        let names = marks.filter_map(|mark| names_of(words, mark, rows)).next()?;
+        let own = names_of(words, mark, rows).or_else(|| names_of_other(words, rows));
+        let names = own.or_else(|| names_of(words, Mark::Blanks, rows))?;
         Some(Self {
             mark,
             names,
@@ -192,8 +199,10 @@ impl<'a> Layout<'a> {
         notes.extend(repeated);
         // Blank lines of separators above the header would be read as a header without names.
         let is_blank = |line: &str| !line.is_empty() && line.trim().is_empty();
-        let mut start = text.lines().take(self.row);
-        if notes.is_empty() && self.names.extra == Extra::None && as_found && !start.any(is_blank) {
+        let padding = format!("{} \"", self.separator());
+        let mut start = text.lines().take(self.row.saturating_add(ROWS));
+        let is_odd = |line: &str| is_blank(line) || line.contains(&padding);
+        if notes.is_empty() && self.names.extra == Extra::None && as_found && !start.any(is_odd) {
             return None;
         }
         let line = |(at, line): (usize, &str)| -> String {
@@ -241,11 +250,17 @@ impl<'a> Layout<'a> {
     /// Returns the header of the rewritten text.
     fn header(&self) -> String {
         let separator = self.separator();
-        let name = |name: &&str| match name.contains(separator) && !name.contains('"') {
+        // Some programs put names into single quotation marks.
+        let inside = |name: &&str| Some(name.trim().strip_prefix('\'')?.strip_suffix('\'')?.to_owned());
+        let single: Option<Vec<String>> = self.names.names.iter().map(inside).collect();
+        let name = |name: &str| match name.contains(separator) && !name.contains('"') {
             true => format!("\"{name}\""),
-            false => (*name).to_owned(),
+            false => self.without_padding(name),
         };
-        let names: Vec<String> = self.names.names.iter().map(name).collect();
+        let names: Vec<String> = match single {
+            Some(names) => names.iter().map(|inside| name(inside)).collect(),
+            None => self.names.names.iter().map(|found| name(found)).collect(),
+        };
         let names = names.join(&separator.to_string());
         match self.names.extra {
             Extra::RowNumbers => format!("{separator}{names}"),
@@ -259,27 +274,55 @@ impl<'a> Layout<'a> {
             Mark::Blanks => return Cow::Owned(self.mark.cells(line).join("\t")),
             Mark::Char(_) => line,
         };
-        match self.names.extra {
-            Extra::SeparatorInRows => Cow::Borrowed(line.strip_suffix(self.separator()).unwrap_or(line)),
-            _ => Cow::Borrowed(line),
+        let line = match self.names.extra {
+            Extra::SeparatorInRows => line.strip_suffix(self.separator()).unwrap_or(line),
+            _ => line,
+        };
+        let padding = format!("{} \"", self.separator());
+        match line.contains(&padding) {
+            true => {
+                let cells = self.mark.cells(line).into_iter().map(|cell| self.without_padding(cell));
+                Cow::Owned(cells.collect::<Vec<_>>().join(&self.separator().to_string()))
+            }
+            false => Cow::Borrowed(line),
         }
+    }
+
+    /// Returns a cell without blanks before its quotation mark, with which the mark would be part of the text.
+    fn without_padding(&self, cell: &str) -> String {
+        let inside = cell.trim();
+        if inside.starts_with('"') { inside } else { cell }.to_owned()
     }
 }
 
-/// Returns the header and the cells of a table separated by blanks whose names are not certain; `None` for other text.
+/// Returns the header and the cells of a table whose names are not certain; `None` for other text. Of a table whose
+/// separator is certain and whose header is the first line, each row is compared with the header later.
 pub(in crate::formats::csv) fn mismatch(text: &str) -> Option<Mismatch> {
     let filled = filled(text);
-    let (at, rows) = first_rows(&filled, 0, Mark::Blanks)?;
-    let (row, numbers) = filled.get(at)?;
+    let found = Mark::ALL.iter().filter_map(|mark| {
+        let (at, rows) = first_rows(&filled, 0, *mark)?;
+        let are_values = rows.iter().flatten().all(|cell| is_value(cell) || is_missing(cell));
+        Some((*mark, at, rows, are_values))
+    });
+    let (mark, at, rows, are_values) = found.min_by_key(|(_, at, _, are_values)| (*at, !*are_values))?;
+    let (row, _) = filled.get(at)?;
+    let numbers: Vec<&str> = rows.first()?.iter().map(|cell| unquoted(cell)).collect();
     let header = at.checked_sub(1).and_then(|above| filled.get(above));
     let (line, header) = header.copied().unwrap_or((*row, ""));
-    let words = Mark::Blanks.cells(header);
-    let is_separated = |line: &str| line.contains(['\t', ';']) || line.contains(", ") || line.ends_with(',');
-    let is_certain = words.iter().any(|word| is_number(word)) || header.contains(',');
-    (!is_certain && !is_separated(header) && !is_separated(numbers)).then(|| Mismatch {
+    let words = mark.cells(header);
+    let words = if header.is_empty() { 0 } else { words.len() };
+    let cells = rows.first().map_or(0, Vec::len);
+    let is_named = at > 0 && mark.cells(header).iter().any(|word| is_number(word));
+    let is_uncertain = match (at, mark) {
+        (0, _) => are_values,
+        (_, Mark::Blanks) => words != cells && !header.contains([',', ';', '\t']),
+        (1, _) => false,
+        _ => words != cells,
+    };
+    (is_uncertain && !is_named).then(|| Mismatch {
         line: line.saturating_add(1),
-        words: words.len(),
-        cells: rows.first().map_or(0, Vec::len),
-        first_row: shown(numbers),
+        words,
+        cells,
+        first_row: shown(&numbers.join(", ")),
     })
 }

@@ -1,7 +1,8 @@
 //! Cells of a line before the separator of a table is known.
 
 use super::super::text::is_aside;
-use crate::table::{Cell, is_moment, with_decimal_point};
+use crate::table::{Cell, with_decimal_point};
+use crate::time::is_clock_time;
 
 /// Number of lines at the start of a file in which the header and the first rows are searched for.
 pub(super) const LINES: usize = 250;
@@ -50,7 +51,7 @@ pub(super) fn is_number(cell: &str) -> bool {
 
 /// True if a cell is a number or a clock time.
 pub(super) fn is_value(cell: &str) -> bool {
-    is_number(cell) || is_moment(unquoted(cell))
+    is_number(cell) || is_clock_time(unquoted(cell))
 }
 
 /// True if a cell is empty or a word for a missing value.
