@@ -283,10 +283,10 @@ fn lines_around_a_table() {
         plain.replacen("t,e,u", "t;e;u", 1),
         plain.replacen("t,e,u", "'t','e','u'", 1),
         plain.replacen("t,e,u", "\"t\", \"e\", \"u\"", 1),
-        plain
-            .replace(',', ", \"")
-            .replace('\n', "\"\n")
-            .replacen("u\"\n", "u\"\n", 1),
+        (plain
+            .lines()
+            .map(|line| format!("\"{}\"\n", line.replace(',', "\", \""))))
+        .collect(),
         format!("{plain}\u{1a}"),
         plain.replacen("u\n", "u,\n", 1),
         plain.replacen("u\n", "u,Comment\n", 1),
