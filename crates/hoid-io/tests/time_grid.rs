@@ -434,7 +434,7 @@ fn serial_days_and_seconds() {
     assert!(record_with("level", |k| format!("{:.10}", 45_321.5 + 1e-6 * k as f64), None).is_err());
 }
 
-/// The unit below the header counts also where the name says only that it is a time.
+/// The unit below the header counts also where the name shows only that it is a time.
 #[test]
 fn units_of_the_time_below_the_header() {
     let desk = Desk::new();

@@ -125,15 +125,13 @@ fn without_thousands(cell: &str) -> Option<String> {
     })
 }
 
-/// True for a number such as `1.5D+03`.
+/// True for a number such as `1.5D+03`. Without a point and a sign, as in `2D1`, the text may be a label.
 fn is_fortran(text: &str) -> bool {
-    let digits = text.trim_start_matches(['+', '-']);
-    let rest = digits.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
-    let exponent = rest
-        .strip_prefix(['d', 'D'])
-        .map(|rest| rest.trim_start_matches(['+', '-']));
-    rest.len() < digits.len()
-        && exponent.is_some_and(|digits| !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit()))
+    let Some((number, exponent)) = text.split_once(['d', 'D']) else {
+        return false;
+    };
+    let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    number.contains('.') && exponent.strip_prefix(['+', '-']).is_some_and(digits)
 }
 
 /// True if a cell looks like a date or a clock time, such as `2024-03-01 10:00:00.5` or `10:00:00,5`.
@@ -177,7 +175,7 @@ mod tests {
         assert_eq!(Cell::parse("\u{2212}1.5e\u{2212}3"), Cell::Number(-1.5e-3));
         assert_eq!(Cell::parse("1e999"), Cell::Number(f64::INFINITY));
         assert_eq!(Cell::parse("-1.5D+03"), Cell::Number(-1500.0));
-        for text in ["1.5D", "D3", "1D2D3", "d", "1.5d+", ".D"] {
+        for text in ["1.5D", "D3", "1.D2D+3", "d", "1.5d+", ".D", "2D1", "1.5D3", ".D+1"] {
             assert_eq!(Cell::parse(text), Cell::Text, "{text:?}");
         }
     }

@@ -1,4 +1,5 @@
-//! CSV: text with a header and one line per row, separated by commas, semicolons or tabs.
+//! CSV: text with a header and one line per row, separated by commas, semicolons or tabs; `foreign` converts other
+//! separators.
 //!
 //! | module | contents |
 //! |---|---|

@@ -2,7 +2,7 @@
 
 use super::lines::{Mark, is_number, unquoted};
 
-/// Names of the columns of a table, and how many cells a line has beside the named ones.
+/// Names of the columns of a table, and the cells of a line that have no name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Names<'a> {
     pub(super) names: Vec<&'a str>,
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_beside_the_names() {
+    fn cells_without_names() {
         let comma = Mark::Char(',');
         let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
         let rows = ["0,5,", "1,6,"];

@@ -20,11 +20,11 @@ pub(super) fn with_tabs(text: &str) -> Option<String> {
         .collect();
     let bars = |line: &str| line.matches('|').count();
     let (header, rows) = first.split_first()?;
-    let begins = first.iter().all(|line| line.trim_start().starts_with('|'));
+    let starts = first.iter().all(|line| line.trim_start().starts_with('|'));
     let ends = first.iter().all(|line| line.trim_end().ends_with('|'));
     let inside = |line: &'_ str| -> String {
         let mut inside = line.trim();
-        if begins {
+        if starts {
             inside = inside.strip_prefix('|').unwrap_or(inside);
         }
         if ends {

@@ -9,7 +9,7 @@ const MOST: usize = 60;
 /// Number of rows above the words with which their first cells are compared.
 const COMPARED: usize = 3;
 
-/// Returns the position at which words below a table begin, and a note; `None` if the table ends with a row.
+/// Returns the position at which words below a table start, and a note; `None` if the table ends with a row.
 ///
 /// A line belongs to the words if its first cell is a text, whereas the first cells of the rows above are numbers or
 /// clock times. A last line without a line end may be truncated, and is not left out.
