@@ -45,6 +45,25 @@ fn intervals_hold_the_truth_of_virtual_people() {
     assert!(off < 0.3, "{off}");
 }
 
+/// Without lines and with the form chosen, a wrong form must not count as the only one: the true form has a weight, or
+/// what is determined holds the truth.
+#[test]
+fn intervals_hold_the_truth_if_the_form_is_chosen_without_lines() {
+    let variant = Variant {
+        excitation: false,
+        form_given: false,
+    };
+    let all = sample(60_000..60_012, variant);
+    let found: Vec<_> = all.iter().map(|o| o.found.as_ref().unwrap()).collect();
+    let determined = found.iter().flat_map(|f| &f.quantities).filter(|q| q.determined);
+    let held: Vec<bool> = determined.filter_map(|q| q.holds()).collect();
+    let share = Share::over(held.iter().copied());
+    assert!(share.all >= 25 && share.percent() >= 88.0, "{}", share.text());
+    let settled = |f: &people_coverage::fits::FitOutcome| !f.kinds.iter().any(|kind| kind == "form");
+    let wrong = (found.iter().zip(&all)).filter(|(f, o)| f.form != o.true_form && settled(f));
+    assert!(wrong.count() <= 2);
+}
+
 #[test]
 fn a_sample_is_the_same_on_any_number_of_threads() {
     let on = |threads: usize| {

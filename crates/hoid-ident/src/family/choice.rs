@@ -39,13 +39,18 @@ pub const LEAST_WEIGHT: f64 = 0.02;
 /// Maximum number of forms that are averaged.
 const MOST_FORMS: usize = 4;
 
-/// Returns the index of the best form and the weight of each form, given their criteria with the simplest form first. A
-/// criterion of `None` excludes a form. `None` if all forms are excluded.
-pub(super) fn weigh(criteria: &[Option<f64>]) -> Option<(usize, Vec<f64>)> {
+/// Returns the index of the best form, given the criteria of all forms with the simplest form first. A criterion of
+/// `None` excludes a form. `None` if all forms are excluded.
+pub(super) fn best_form(criteria: &[Option<f64>]) -> Option<usize> {
     let least = criteria.iter().flatten().copied().min_by(f64::total_cmp)?;
-    let front = criteria
+    criteria
         .iter()
-        .position(|c| c.is_some_and(|c| c - least <= NO_EVIDENCE))?;
+        .position(|c| c.is_some_and(|c| c - least <= NO_EVIDENCE))
+}
+
+/// Returns the weight of each form; a criterion of `None` excludes a form, and `front` is the best form.
+pub(super) fn weights(criteria: &[Option<f64>], front: usize) -> Vec<f64> {
+    let least = criteria.iter().flatten().copied().fold(f64::INFINITY, f64::min);
     // Akaike weights, exp(-Delta/2) (Burnham and Anderson 2002, section 2.9).
     let mut weights: Vec<f64> = (criteria.iter())
         .map(|c| c.map_or(0.0, |c| (0.5 * (least - c)).exp()))
@@ -59,12 +64,17 @@ pub(super) fn weigh(criteria: &[Option<f64>]) -> Option<(usize, Vec<f64>)> {
         }
     }
     let total: f64 = weights.iter().sum();
-    Some((front, weights.iter().map(|w| w / total).collect()))
+    weights.iter().map(|w| w / total).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn weigh(criteria: &[Option<f64>]) -> Option<(usize, Vec<f64>)> {
+        let front = best_form(criteria)?;
+        Some((front, weights(criteria, front)))
+    }
 
     #[test]
     fn weights_are_akaikes_and_the_simplest_near_form_is_in_front() {

@@ -1,7 +1,9 @@
 //! Comparison of the candidate forms, the basis of their weights in [`super::choice`].
 //!
 //! If an excitation was recorded, the forms are compared at its lines, otherwise by their prediction errors. All forms
-//! share one inflation kappa, so that a form does not profit from a large kappa of its own. With little noise
+//! share one inflation kappa, so that a form does not profit from a large kappa of its own. Without lines, the noise model
+//! biases the prediction errors: the best form is chosen as with lines, but its evidence against the other forms is
+//! reduced ([`bias_of_evidence`]), and forms that cannot be the best one count in the averages. With little noise
 //! ([`super::low_noise`]) one form is assumed to be true, and a parameter costs Schwarz's `ln n` (G. Schwarz, *Annals
 //! of Statistics* 6 (1978) 461-464) instead of Akaike's 2. A form with undetermined parameters counts only if all forms
 //! have undetermined parameters.
@@ -10,14 +12,15 @@ use hoid_model::{FamilyOperator, Form, operator_family::Coordinate};
 use hoid_numerics::statistics::upper_median;
 
 use super::{
-    choice::{FormFigures, weigh},
+    choice::{FormFigures, best_form, weights},
     covariances::{self, Covariances},
     diagnostics::MOST_DAMPED,
     line_fit::LineFit,
     prediction::Prediction,
     prediction_fit::PredictionFit,
+    sensitivity::rivals,
 };
-use crate::IdentError;
+use crate::{IdentError, criterion::Workspace};
 
 /// Difference of the criteria below which two forms count as equal.
 const EQUAL_CRITERIA: f64 = 0.05;
@@ -43,8 +46,13 @@ pub(super) struct Comparison {
 
 impl Comparison {
     /// Compares the forms, given in the order from the simplest.
-    pub fn of(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> Self {
-        let criteria = criteria(tried, prediction);
+    pub fn of(
+        tried: &[Tried<'_>],
+        prediction: &Prediction<'_>,
+        highest_order: usize,
+        workspace: &mut Workspace,
+    ) -> Self {
+        let mut criteria = criteria(tried, prediction, 1.0);
         let mut counting = criteria.clone();
         // If a form lacks a lag that the person has, the neuromuscular poles replace this lag.
         retain(&mut counting, |i| !neuromuscular_poles_are_lags(&tried[i]));
@@ -55,7 +63,18 @@ impl Comparison {
             keep_simplest(&mut counting, tried, prediction.equal());
         }
         count_once(&mut counting, tried);
-        let (front, weights) = weigh(&counting).map_or((None, Vec::new()), |(front, weights)| (Some(front), weights));
+        let front = best_form(&counting);
+        if let Some(front) = front.filter(|_| compares_biased(tried, prediction)) {
+            let bias = bias_of_evidence(&tried[front], prediction, highest_order, workspace);
+            criteria = self::criteria(tried, prediction, bias);
+            counting.clone_from(&criteria);
+            // A form that cannot be the best one still counts in the averages, if it has error bars.
+            retain(&mut counting, |i| {
+                i == front || tried[i].fit.as_ref().is_ok_and(has_errors)
+            });
+            count_once(&mut counting, tried);
+        }
+        let weights = front.map_or(Vec::new(), |front| weights(&counting, front));
         let figures = tried.iter().zip(criteria).enumerate();
         let figures =
             figures.map(|(i, (t, criterion))| figures_of(t, criterion, weights.get(i).copied().unwrap_or(0.0)));
@@ -140,8 +159,50 @@ fn common_inflation(tried: &[Tried<'_>]) -> f64 {
     upper_median(&mut all).unwrap_or(1.0)
 }
 
+/// True if the forms are compared by prediction errors alone, so that the noise model biases the comparison.
+fn compares_biased(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> bool {
+    tried.len() > 1 && prediction.little_noise.is_none() && tried.iter().all(|t| t.lines.is_none())
+}
+
+/// True if the fit has a covariance, so that it can be part of an average.
+fn has_errors(fit: &PredictionFit<'_>) -> bool {
+    fit.ridge == 0.0 && covariances::covariances(fit).is_some()
+}
+
+/// Returns the ratio of the mean squared error of the response, which includes the bias by the noise model, to its
+/// variance, averaged over the band of manual control.
+///
+/// In a closed loop without lines, an error of the noise model biases the estimate ([`super::sensitivity`]), and a wrong
+/// form may fit better than the right one because it compensates for that error. The likelihood ratio of two forms is a
+/// squared distance in units of the errors, so that errors that are larger by the bias reduce it by the same ratio.
+fn bias_of_evidence(
+    front: &Tried<'_>,
+    prediction: &Prediction<'_>,
+    highest_order: usize,
+    workspace: &mut Workspace,
+) -> f64 {
+    let ratio = front.fit.as_ref().ok().and_then(|fit| {
+        let mut covariances = covariances::covariances(fit)?;
+        let operator = fit.layout().operator(fit.eta(), 0).ok()?;
+        let errors = |covariances: &Covariances| {
+            let own = Covariances::of_operator(&covariances.clustered, fit.layout(), 0);
+            covariances::response_errors(&operator, Some(&own))
+        };
+        let before = errors(&covariances)?;
+        for other in rivals(prediction, fit, highest_order, workspace) {
+            covariances.add_bias(fit, &other);
+        }
+        let ratios = errors(&covariances)?
+            .into_iter()
+            .zip(before)
+            .map(|(after, before)| (after / before).powi(2));
+        Some(ratios.sum::<f64>() / before.len() as f64)
+    });
+    ratio.filter(|ratio| ratio.is_finite()).unwrap_or(1.0).max(1.0)
+}
+
 /// Returns the criterion of each form; `None` for a form that could not be fitted.
-fn criteria(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> Vec<Option<f64>> {
+fn criteria(tried: &[Tried<'_>], prediction: &Prediction<'_>, bias: f64) -> Vec<Option<f64>> {
     let little_noise = prediction.little_noise.is_some();
     let inflation = if little_noise {
         // The inflation of the form with the smallest loss is used, because the inflation of the other forms results
@@ -150,7 +211,7 @@ fn criteria(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> Vec<Option<f64>
         let least = fits.min_by(|a, b| a.loss.total_cmp(&b.loss));
         least.map_or(1.0, |fit| fit.inflation)
     } else {
-        common_inflation(tried)
+        bias * common_inflation(tried)
     };
     let of = |tried: &Tried<'_>| {
         let fit = tried.fit.as_ref().ok()?;

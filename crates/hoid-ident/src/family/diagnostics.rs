@@ -10,7 +10,7 @@ use super::{
     clusters::ClusterKind,
     instrumental::InstrumentalFit,
     line_fit::LineFit,
-    parameter::{LEAST_WEIGHT, Parameter},
+    parameter::{Parameter, least_weight},
     prior::OperatorPrior,
     result::{FreeModel, WeighedForm},
 };
@@ -191,7 +191,7 @@ impl<'a> OfSomeForms<'a> {
             let weight = (weighed.iter().filter(|of| forms.contains(&of.form)))
                 .map(|of| of.weight)
                 .sum();
-            if forms.is_empty() || weight > LEAST_WEIGHT {
+            if forms.is_empty() || weight > least_weight(&parameter.name) {
                 continue;
             }
             match all.iter_mut().find(|of| of.forms == forms) {
@@ -211,7 +211,7 @@ impl<'a> OfSomeForms<'a> {
         Finding::note(
             "undetermined-parameter",
             format!(
-                "not determined, because other forms are as likely: {}; the intervals apply only if the form is {} \
+                "not determined, because other forms are likely too: {}; the intervals apply only if the form is {} \
                  (weight {:.2}): use --form {} to report them",
                 self.names.join(", "),
                 forms.join(" or "),

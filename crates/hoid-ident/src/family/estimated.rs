@@ -5,7 +5,7 @@ use hoid_model::{FamilyOperator, NotConvertible, PolynomialModel, Structure, ope
 use super::{
     clusters::{ClusterKind, quantile},
     covariances::{self, Covariances},
-    parameter::{CoordinateEstimate, Parameter},
+    parameter::{CoordinateEstimate, DC_GAIN, Parameter, least_weight},
     prediction_fit::PredictionFit,
     profile::profile_interval,
     result::{OperatorInForm, OperatorOfRecord, WeighedForm, title},
@@ -221,13 +221,23 @@ pub(super) fn operator_of(
     })
 }
 
-/// Returns the average over the forms of the parameters with the same name.
+/// Returns the average over the forms of the parameters with the same name and meaning: K of a form with a lag is the
+/// gain at zero frequency, far below the band, and K of another form the gain in the band. K is not determined if forms
+/// with the other meaning are likely.
 fn averaged(own: &Parameter, weighed: &[WeighedForm], record: usize, clusters: usize) -> Option<Parameter> {
-    let each = weighed.iter().filter_map(|form| {
+    let lags = weighed.first()?.form.has_lag();
+    let is_other = |form: &&WeighedForm| own.name == DC_GAIN && form.form.has_lag() != lags;
+    let other: f64 = weighed.iter().filter(is_other).map(|form| form.weight).sum();
+    let alike = weighed.iter().filter(|form| !is_other(form));
+    let each = alike.filter_map(|form| {
         let mut all = form.of(record)?.parameters.iter();
         Some((form.form, form.weight, all.find(|p| p.name == own.name)?))
     });
-    Parameter::averaged(&each.collect::<Vec<_>>(), clusters)
+    let found = Parameter::averaged(&each.collect::<Vec<_>>(), clusters)?;
+    Some(Parameter {
+        determined: found.determined && other <= 1.0 - least_weight(DC_GAIN),
+        ..found
+    })
 }
 
 /// Returns the form of a fit with its weight and its operators as fitted, without averaging over forms.

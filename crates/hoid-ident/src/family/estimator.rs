@@ -120,7 +120,7 @@ impl FamilyEstimator {
             });
         }
         progress::step("forms", count, count);
-        let Comparison { front, figures } = Comparison::of(&tried, &prediction);
+        let Comparison { front, figures } = Comparison::of(&tried, &prediction, *self.nd.end(), &mut workspace);
         let Some(front) = front else {
             return Err(tried
                 .into_iter()

@@ -18,11 +18,24 @@ use hoid_model::{
 use super::mixture::{Component, Mixture, widened};
 
 /// Total weight of the forms with a parameter up to which the parameter counts as undetermined.
-pub(super) const LEAST_WEIGHT: f64 = 0.5;
+const LEAST_WEIGHT: f64 = 0.5;
+/// Name of the gain, which in forms with a lag is the gain at zero frequency and in other forms that in the band, and
+/// the total weight of the forms with the same meaning up to which it counts as undetermined.
+pub(super) const DC_GAIN: &str = "K";
+const LEAST_WEIGHT_OF_DC_GAIN: f64 = 0.95;
 /// Largest ratio of the posterior to the prior variance of a determined parameter.
 const LARGEST_PRIOR_SHARE: f64 = 0.5;
 /// Largest standard error of the logarithm of a determined parameter.
 const LARGEST_LOG_ERROR: f64 = 0.35;
+
+/// Returns the total weight of the forms with a parameter up to which the parameter counts as undetermined.
+pub(super) fn least_weight(name: &str) -> f64 {
+    if name == DC_GAIN {
+        LEAST_WEIGHT_OF_DC_GAIN
+    } else {
+        LEAST_WEIGHT
+    }
+}
 
 /// One parameter of an operator.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -71,15 +84,16 @@ impl Parameter {
     /// Returns the weighted mean over forms of a parameter, given in each form with the best form first.
     pub(super) fn averaged(each: &[(Form, f64, &Self)], clusters: usize) -> Option<Self> {
         let (_, _, front) = *each.first()?;
-        // A parameter at a bound has no error and is omitted from the mean.
+        // A parameter at a bound has no error and is omitted from the mean, but not from the interval.
+        let all = each;
         let with_error: Vec<_> = each
             .iter()
             .filter(|(_, _, p)| p.standard_error.is_some())
             .copied()
             .collect();
         let each = if with_error.is_empty() { each } else { &with_error };
-        if each.len() == 1 {
-            let (_, weight, only) = each[0];
+        if all.len() == 1 {
+            let (_, weight, only) = all[0];
             return Some(Self {
                 determined: only.determined && weight > LEAST_WEIGHT,
                 ..only.clone()
@@ -92,7 +106,18 @@ impl Parameter {
             interval: p.interval,
         };
         let components: Vec<Component> = each.iter().map(component).collect();
-        let Mixture { estimate, interval } = Mixture::of(&components, clusters)?;
+        let Mixture { estimate, mut interval } = Mixture::of(&components, clusters)?;
+        if each.len() < all.len() {
+            let at_bound = |p: &Self| p.interval.unwrap_or((p.value, p.value));
+            let with_bounds: Vec<Component> = (all.iter())
+                .map(|&(_, weight, p)| Component {
+                    weight,
+                    estimate: p.estimate(),
+                    interval: Some(at_bound(p)),
+                })
+                .collect();
+            interval = Mixture::of(&with_bounds, clusters).map_or(interval, |m| m.interval);
+        }
         let of_person: Vec<Component> = (components.iter().zip(each))
             .map(|(c, (_, _, p))| Component {
                 estimate: Estimate {
@@ -417,6 +442,30 @@ mod tests {
         assert!(!averaged([0.2, 0.2]).determined);
         assert_eq!(Parameter::averaged(&[(Form::LeadLag, 1.0, tau)], 8).as_ref(), Some(tau));
         assert_eq!(Parameter::averaged(&[], 8), None);
+    }
+
+    /// T_I of a pure integration has no error: it is not part of the mean, but the interval is open above.
+    #[test]
+    fn a_parameter_at_a_bound_in_a_form_with_weight_is_in_the_interval() {
+        let known = known(0.2, 0.02);
+        let lag = of(&known, "T_I");
+        let infinite = Parameter {
+            value: f64::INFINITY,
+            standard_error: None,
+            standard_error_person: None,
+            interval: None,
+            determined: false,
+            ..lag.clone()
+        };
+        let averaged = |weight: f64| {
+            let forms = [(Form::LeadLag, 1.0 - weight, lag), (Form::Lead2Lag, weight, &infinite)];
+            Parameter::averaged(&forms, 1000).unwrap()
+        };
+        let found = averaged(0.3);
+        assert_eq!((found.value, found.standard_error), (lag.value, lag.standard_error));
+        let (low, high) = found.interval.unwrap();
+        assert!(low > 0.0 && low < lag.value && high.is_infinite(), "{low} {high}");
+        assert!(averaged(0.01).interval.unwrap().1.is_finite());
     }
 
     #[test]
