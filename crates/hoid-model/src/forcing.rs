@@ -48,6 +48,21 @@ const TABLE_1: [(f64, f64, f64); 10] = [
     (229.0, 0.025, 0.604),
 ];
 
+/// Multiples and phases in rad of the disturbance: one line below each line of the target of Table 1, so that the lines
+/// of both alternate. With these phases, the largest value is 2.0 times the rms.
+const DISTURBANCE: [(f64, f64); 10] = [
+    (2.0, 0.7),
+    (4.0, -0.3),
+    (7.0, -2.9),
+    (11.0, -1.7),
+    (17.0, -2.0),
+    (29.0, 0.5),
+    (43.0, 2.2),
+    (67.0, 1.9),
+    (109.0, 1.8),
+    (181.0, 2.0),
+];
+
 /// Number of samples in one block of the table of angles: near the square root of the record length, for which the
 /// fewest sines are computed in total.
 const BLOCK: usize = 96;
@@ -98,6 +113,36 @@ impl ForcingFunction {
         Self {
             sinusoids: TABLE_1.into_iter().map(term).collect(),
         }
+    }
+
+    /// Returns a disturbance for the target of Table 1, with a root mean square in deg: ten lines between those of the
+    /// target, so that the responses to target and error can be separated. Each amplitude is proportional to the
+    /// geometric mean of the amplitudes of the neighbouring lines of the target.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] if the root mean square is negative or not finite.
+    pub fn reference_disturbance(rms_deg: f64) -> Result<Self, ModelError> {
+        if !(rms_deg.is_finite() && rms_deg >= 0.0) {
+            return Err(ModelError::OutOfRange {
+                quantity: "rms of the disturbance in deg",
+                found: rms_deg,
+                expected: "a finite number, zero or more",
+            });
+        }
+        if rms_deg == 0.0 {
+            return Ok(Self::default());
+        }
+        let term = |(k, (multiple, phase_rad)): (usize, (f64, f64))| Sinusoid {
+            amplitude_deg: (TABLE_1[k.saturating_sub(1)].1 * TABLE_1[k].1).sqrt(),
+            omega_rad_s: multiple * TAU / REFERENCE_PERIOD_S,
+            phase_rad,
+        };
+        let mut all = Self {
+            sinusoids: DISTURBANCE.into_iter().enumerate().map(term).collect(),
+        };
+        let scale = rms_deg / all.rms_deg();
+        all.sinusoids.iter_mut().for_each(|s| s.amplitude_deg *= scale);
+        Ok(all)
     }
 
     /// Returns the sinusoids.
@@ -165,6 +210,30 @@ mod tests {
             assert!((s.omega_rad_s - omega).abs() < 5.1e-4);
         }
         assert!((f.rms_deg() - 1.4996).abs() < 5e-5);
+    }
+
+    #[test]
+    fn lines_of_the_disturbance_alternate_with_those_of_the_target() {
+        let (f, d) = (
+            ForcingFunction::reference(),
+            ForcingFunction::reference_disturbance(0.2).unwrap(),
+        );
+        assert!((d.rms_deg() - 0.2).abs() < 1e-15);
+        let (of_f, of_d) = (f.sinusoids(), d.sinusoids());
+        for k in 0..10 {
+            assert!(of_d[k].omega_rad_s < of_f[k].omega_rad_s);
+            assert!(k == 9 || of_d[k + 1].omega_rad_s > of_f[k].omega_rad_s);
+        }
+        let values = d.samples(0.0, ts(), 8192);
+        let largest = values.iter().fold(0.0, |a: f64, v| a.max(v.abs()));
+        assert!((1.93..2.04).contains(&(largest / 0.2)), "{}", largest / 0.2);
+        assert_eq!(
+            ForcingFunction::reference_disturbance(0.0).unwrap(),
+            ForcingFunction::default()
+        );
+        for bad in [-0.1, f64::NAN, f64::INFINITY] {
+            assert!(ForcingFunction::reference_disturbance(bad).is_err());
+        }
     }
 
     #[test]

@@ -54,6 +54,7 @@
 //! | [`numbers`], [`estimate_table`] | numbers with as many digits as their standard error allows, also as a table |
 //! | [`controlled_element`], [`forcing`], [`schedule`], [`scenario`] | the task: plant, target signal, change over time, conditions C1-C6 |
 //! | [`family_scenario`] | tasks of people: any operator of the family, any controlled element, a remnant of several parts |
+//! | [`feedforward`] | response of a person to a displayed target, also as text |
 //! | [`held_system`] | exact zero-order hold of any rational transfer function |
 //! | [`margins`] | crossover frequency, phase and gain margin |
 //! | [`remnant_gain`] | the gain K_n for a given noise level |
@@ -73,6 +74,7 @@ pub mod delayed_operator;
 pub mod discretise;
 pub mod estimate_table;
 pub mod family_scenario;
+pub mod feedforward;
 pub mod forcing;
 pub mod held_system;
 pub mod interned;
@@ -99,6 +101,7 @@ pub use delayed_operator::{DelayedOperator, delayed_operator, delayed_operator_j
 pub use error::{ModelError, NotConvertible};
 pub use family_scenario::{FamilyScenario, FamilyState};
 pub use fault::{Fault, FaultAction, FaultHandling, FaultKind, MOST_MENDED, fault_findings};
+pub use feedforward::Feedforward;
 pub use finding::{Finding, Severity, Verdict, VerdictLevel};
 pub use gain_unit::GainUnit;
 pub use named_choice::{NamedChoice, UnknownName};

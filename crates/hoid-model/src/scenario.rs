@@ -14,12 +14,14 @@
 //! changes, it follows the same sigmoid, in steps of one sample. The remnant gain of each state is the gain that gives
 //! the required noise level in that state (eq. 43 or A.17).
 
+use num_complex::Complex64;
+
 use crate::{
-    ModelError, OperatorParameters, SampleTime,
+    FamilyOperator, Feedforward, ModelError, OperatorParameters, SampleTime,
     controlled_element::ControlledElement,
     forcing::{ForcingFunction, REFERENCE_PERIOD_S},
     remnant::RemnantFilter,
-    remnant_gain::{NoiseDefinition, remnant_gain},
+    remnant_gain::{NoiseDefinition, SpectralLine, remnant_gain},
     schedule::Schedule,
 };
 
@@ -180,6 +182,11 @@ pub struct Scenario {
     pub schedule: Schedule,
     /// Target signal.
     pub forcing: ForcingFunction,
+    /// Response of u to the displayed target; `None` if the display shows only the error. Its neuromuscular system is
+    /// that of the operator.
+    pub feedforward: Option<Feedforward>,
+    /// Disturbance d at the input of the controlled element, held over each sample; without sinusoids, there is none.
+    pub disturbance: ForcingFunction,
     /// Remnant.
     pub remnant: RemnantSetting,
     /// Time between two samples. Default 0.01 s.
@@ -236,6 +243,8 @@ impl Scenario {
                 midpoint_s: REFERENCE_PERIOD_S / 2.0,
             }),
             forcing: ForcingFunction::reference(),
+            feedforward: None,
+            disturbance: ForcingFunction::default(),
             remnant: RemnantSetting::default(),
             // 0.01 s is the sample time of the thesis.
             sample_time: SampleTime::HUNDREDTH,
@@ -251,6 +260,10 @@ impl Scenario {
     /// # Errors
     /// As [`remnant_gain`].
     pub fn remnant_gain_of(&self, state: &OperatingState, given: f64) -> Result<f64, ModelError> {
+        self.remnant_gain_in(state, *state == self.last && *state != self.initial, given)
+    }
+
+    fn remnant_gain_in(&self, state: &OperatingState, is_last: bool, given: f64) -> Result<f64, ModelError> {
         let RemnantStrength::Level { level, definition } = self.remnant.strength else {
             return Ok(given);
         };
@@ -261,9 +274,59 @@ impl Scenario {
             self.remnant.time_constant_s,
             &state.operator.transfer_function()?,
             &state.controlled_element.transfer_function()?,
-            &self.forcing.lines(),
+            &self.equivalent_lines(state, is_last)?,
             self.sample_time,
         )
+    }
+
+    /// Returns the lines of a target that would cause the same variance of u in a compensatory loop without a
+    /// disturbance: with the responses B to the error and F to the target, and the element P, `u = B/(1 + B P) ((1 +
+    /// F/B) f_t - P d)`.
+    fn equivalent_lines(&self, state: &OperatingState, is_last: bool) -> Result<Vec<SpectralLine>, ModelError> {
+        let mut lines = self.forcing.lines();
+        let operator = state.operator.transfer_function()?;
+        let scaled = |line: &SpectralLine, by: f64| SpectralLine {
+            // A response of zero to the error, for which the ratio is infinite, has no stable loop with a noise level.
+            amplitude: if by.is_finite() {
+                line.amplitude * by
+            } else {
+                line.amplitude
+            },
+            ..*line
+        };
+        if let Some(seen) = self.feedforward_of(state)? {
+            let of = match &seen.last {
+                Some(last) if is_last => last,
+                _ => &seen.operator,
+            };
+            for line in &mut lines {
+                let ahead = Complex64::from_polar(1.0, line.omega_rad_s * seen.preview_s);
+                let ratio = of.response(line.omega_rad_s) * ahead / operator.response(line.omega_rad_s);
+                *line = scaled(line, (1.0 + ratio).norm());
+            }
+        }
+        let element = state.controlled_element.transfer_function()?;
+        let disturbed = self.disturbance.lines();
+        lines.extend((disturbed.iter()).map(|line| scaled(line, element.response(line.omega_rad_s).norm())));
+        Ok(lines)
+    }
+
+    /// Returns the response to the target with the neuromuscular system of a state.
+    fn feedforward_of(&self, state: &OperatingState) -> Result<Option<Feedforward>, ModelError> {
+        let Some(seen) = &self.feedforward else { return Ok(None) };
+        if !seen.operator.has_neuromuscular() {
+            return Err(ModelError::Operator {
+                reason: "the response to the target has no neuromuscular dynamics; expected those of the response to \
+                         the error"
+                    .to_owned(),
+            });
+        }
+        let OperatorParameters {
+            omega_nm_rad_s,
+            zeta_nm,
+            ..
+        } = state.operator;
+        Ok(Some(seen.with_neuromuscular(omega_nm_rad_s, zeta_nm)?))
     }
 
     /// Returns the remnant gain of a state for an order and a noise level other than those of the scenario.
@@ -316,14 +379,25 @@ impl Scenario {
         for (delay, state) in delay_samples.iter_mut().zip([&self.initial, &self.last]) {
             *delay = state.operator.discretise(self.sample_time)?.nk - 1;
             state.controlled_element.check()?;
+            if let Some(seen) = self.feedforward_of(state)? {
+                seen.check(&self.schedule, self.sample_time)?;
+                if self.forcing.sinusoids().is_empty() {
+                    return Err(ModelError::Operator {
+                        reason:
+                            "the person responds to a target, but the target is at rest; expected sinusoids of the \
+                                 target, or no response to it"
+                                .to_owned(),
+                    });
+                }
+            }
         }
         let given = match self.remnant.strength {
             RemnantStrength::Gain { initial, last } => [initial, last],
             RemnantStrength::Level { .. } => [0.0; 2],
         };
         let k_n = [
-            self.remnant_gain_of(&self.initial, given[0])?,
-            self.remnant_gain_of(&self.last, given[1])?,
+            self.remnant_gain_in(&self.initial, false, given[0])?,
+            self.remnant_gain_in(&self.last, true, given[1])?,
         ];
         for gain in k_n {
             RemnantFilter::new(gain, self.remnant.time_constant_s, self.remnant.order)?;
@@ -363,6 +437,32 @@ impl ResolvedScenario {
     /// Number of samples of the measurement.
     pub fn measurement_samples(&self) -> usize {
         self.measurement_samples
+    }
+
+    /// True if the response to the target changes in time, in itself or by its neuromuscular system.
+    pub fn feedforward_changes(&self) -> bool {
+        let Scenario { initial, last, .. } = &self.scenario;
+        let muscles = |state: &OperatingState| (state.operator.omega_nm_rad_s, state.operator.zeta_nm);
+        let seen = self.scenario.feedforward.as_ref();
+        self.scenario.schedule != Schedule::Constant
+            && seen.is_some_and(|seen| seen.last.is_some() || muscles(initial) != muscles(last))
+    }
+
+    /// Returns the response to the target at time `t_s`, with its delay as a number of whole samples and a fraction of
+    /// a sample; `None` if the person does not see the target.
+    ///
+    /// # Errors
+    /// As [`Feedforward::at`].
+    pub fn feedforward_at(&self, t_s: f64) -> Result<Option<(FamilyOperator, (usize, f64))>, ModelError> {
+        let Some(seen) = &self.scenario.feedforward else {
+            return Ok(None);
+        };
+        let operator = self.parameters_at(t_s).operator;
+        let muscles = (operator.omega_nm_rad_s, operator.zeta_nm);
+        let Scenario {
+            schedule, sample_time, ..
+        } = &self.scenario;
+        Ok(Some(seen.at(t_s, schedule, *sample_time, Some(muscles))?))
     }
 
     /// Returns the true parameters at time `t_s`; t = 0 is the start of the measurement.

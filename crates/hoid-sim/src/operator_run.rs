@@ -3,6 +3,7 @@
 //! Simulates `u = y(k - tau_e/Ts) + n` as [`Simulator`] does in a loop, with the same random numbers. A loop that
 //! responds to u like the controlled element of the scenario therefore gives a bit-identical run. The control at a
 //! sample does not depend on the error of the same sample, since the operator holds e over a sample before it responds.
+//! The response to a displayed target is not part of it: the target belongs to the loop that is closed elsewhere.
 
 use crate::{RunSeed, Simulator, cascade::HIGHEST_ORDER};
 

@@ -2,9 +2,10 @@
 //!
 //! At sample k, with the parameters at that time,
 //!
-//! `e = f_t - x`, `u = y(k - tau_e/Ts) + n`, `n = K_n z`,
+//! `e = f_t - x`, `u = y(k - tau_e/Ts) + r + n`, `n = K_n z`,
 //!
-//! where y is the response of the operator without delay, x the output of the controlled element, and z the output of
+//! where y is the response of the operator without delay, r the response to a displayed target ([`TargetResponse`]; zero
+//! if only the error is displayed), x the output of the controlled element for the input u + d with a disturbance d, and z the output of
 //! the remnant cascade for unit variance. Operator, controlled element and cascade are then each advanced exactly by
 //! one sample, for a held input: the operator is driven by e, the controlled element by u, and the cascade by one
 //! normal deviate. The hold delays the response by one more sample, so that `nk = tau_e/Ts + 1`. The remnant is not
@@ -30,6 +31,7 @@ use hoid_model::{
 use crate::{
     RunSeed, SimError,
     cascade::{Cascade, HIGHEST_ORDER},
+    target_response::TargetResponse,
 };
 
 /// Prepared scenario: forcing function, parameters and matrices for every sample.
@@ -37,10 +39,22 @@ use crate::{
 pub struct Simulator {
     scenario: ResolvedScenario,
     forcing_deg: Vec<f64>,
+    /// Response to the target, and disturbance of the controlled element: signals of all runs that do not depend on the
+    /// loop; `None` if there is neither.
+    given: Option<Given>,
+    /// Response to the target as an operator; `None` if the person does not see the target.
+    seen: Option<TargetResponse>,
     /// True parameters: one entry if nothing changes, otherwise one entry per sample.
     parameters: Vec<TrueParameters>,
     pub(crate) matrices: Vec<Matrices>,
     pub(crate) cascade: Cascade,
+}
+
+/// Signals that do not depend on the loop, in deg, one value per sample.
+#[derive(Debug, Clone)]
+struct Given {
+    response: Vec<f64>,
+    disturbance: Vec<f64>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -116,7 +130,25 @@ impl Simulator {
         let matrices = (parameters.iter().enumerate())
             .map(|(k, p)| Matrices::of(p, resolved.delay_samples_at(start_s + k as f64 * ts.s()), scenario))
             .collect();
+        let seen = (scenario.feedforward.as_ref()).map(|seen| {
+            let instants = if resolved.feedforward_changes() { samples } else { 1 };
+            let at = |k: usize| resolved.feedforward_at(start_s + k as f64 * ts.s());
+            TargetResponse::new(seen, instants, at, ts)
+        });
+        let seen = seen.transpose()?;
+        let response = seen.as_ref().map(|seen| {
+            let shown = scenario.forcing.samples(start_s + seen.preview_s(), ts, samples);
+            seen.of(&shown)
+        });
+        let response = response.transpose()?;
+        let is_given = response.is_some() || !scenario.disturbance.sinusoids().is_empty();
+        let given = is_given.then(|| Given {
+            response: response.unwrap_or_else(|| vec![0.0; samples]),
+            disturbance: scenario.disturbance.samples(start_s, ts, samples),
+        });
         Ok(Self {
+            given,
+            seen,
             forcing_deg: scenario.forcing.samples(start_s, ts, samples),
             cascade: Cascade::new(scenario.remnant.order, ts.s() / scenario.remnant.time_constant_s),
             parameters,
@@ -251,17 +283,18 @@ impl Simulator {
         noise: &[f64],
         out: [&mut [f64]; 4],
     ) {
-        if self.matrices.len() == 1 {
-            self.pass_through::<R, M, false>(state, range, noise, out);
-        } else {
-            self.pass_through::<R, M, true>(state, range, noise, out);
+        match (self.matrices.len() == 1, &self.given) {
+            (true, None) => self.pass_through::<R, M, false, false>(state, range, noise, out),
+            (false, None) => self.pass_through::<R, M, true, false>(state, range, noise, out),
+            // The matrices are read at every sample; one entry is the same for all samples.
+            (_, Some(_)) => self.pass_through::<R, M, true, true>(state, range, noise, out),
         }
     }
 
     /// As [`Simulator::pass`], compiled separately for constant and for changing parameters, so that constant matrices
-    /// stay in registers.
+    /// stay in registers, and for loops with and without given signals.
     #[inline(always)]
-    fn pass_through<R: Number, const M: usize, const CHANGES: bool>(
+    fn pass_through<R: Number, const M: usize, const CHANGES: bool, const GIVEN: bool>(
         &self,
         state: &mut LoopState<R>,
         range: Range<usize>,
@@ -271,6 +304,12 @@ impl Simulator {
         let zero = state.operator[0].splat(0.0);
         let width = zero.lanes();
         let always = self.matrices[0];
+        let end = self.matrices.len() - 1;
+        let none = Given {
+            response: Vec::new(),
+            disturbance: Vec::new(),
+        };
+        let given = self.given.as_ref().unwrap_or(&none);
         let (mut operator, mut element) = (state.operator, state.element);
         let mut remnant: [R; M] = [zero; M];
         remnant.copy_from_slice(&state.remnant[..M]);
@@ -285,7 +324,11 @@ impl Simulator {
         let memory = &mut state.memory[..];
         let last = memory.len() - 1;
         for (i, k) in range.enumerate() {
-            let m = if CHANGES { self.matrices[k] } else { always };
+            let m = match (CHANGES, GIVEN) {
+                (false, _) => always,
+                (true, false) => self.matrices[k],
+                (true, true) => self.matrices[k.min(end)],
+            };
             let at = i * width;
             let x = zero.splat(m.element_output) * element[0];
             let e = zero.splat(self.forcing_deg[k]) - x;
@@ -294,9 +337,14 @@ impl Simulator {
             memory[k & last] = zero.splat(of_output) * operator[0] + zero.splat(of_rate) * operator[1];
             let response = memory[k.wrapping_sub(m.delay) & last];
             let n = zero.splat(m.k_n) * remnant[M - 1];
-            let u = response + n;
+            let (u, driving) = if GIVEN {
+                let u = response + n + zero.splat(given.response[k]);
+                (u, u + zero.splat(given.disturbance[k]))
+            } else {
+                (response + n, response + n)
+            };
             operator = m.operator.step(operator, e);
-            element = m.element.step(element, zero.splat(m.element_input) * u);
+            element = m.element.step(element, zero.splat(m.element_input) * driving);
             remnant = self.cascade.step(remnant, zero.load(&noise[at..]));
             e.store(&mut e_out[at..]);
             u.store(&mut u_out[at..]);
@@ -320,6 +368,7 @@ impl Simulator {
             [only] => vec![get(only); self.samples() - first],
             all => all[first..].iter().map(get).collect(),
         };
+        let target = Channel::new("f_t", "deg", self.forcing_deg[first..].to_vec());
         let mut record = Record::new(
             ts,
             Channel::new("e", "deg", cut(signals.e)),
@@ -327,7 +376,10 @@ impl Simulator {
         )?
         .labelled(self.scenario.scenario().name.clone())
         .starting_at((first as f64 - run_in as f64) * ts.s())
-        .with_channel(Channel::new("f_t", "deg", self.forcing_deg[first..].to_vec()))?
+        .with_channel(match &self.seen {
+            Some(seen) => seen.target(target),
+            None => target,
+        })?
         .with_channel(Channel::new("x", "deg", cut(signals.x)))?
         .with_channel(Channel::new("n", "deg", cut(signals.n)))?;
         for (name, unit, values) in [
@@ -343,6 +395,13 @@ impl Simulator {
             ("omega_b", "rad/s", truth(&|p| p.controlled_element.omega_b_rad_s)),
         ] {
             record = record.with_channel(Channel::new(name, unit, values))?;
+        }
+        let disturbed = !self.scenario.scenario().disturbance.sinusoids().is_empty();
+        if let Some(given) = self.given.as_ref().filter(|_| disturbed) {
+            record = record.with_channel(Channel::new("d", "deg", given.disturbance[first..].to_vec()))?;
+        }
+        for channel in self.seen.iter().flat_map(|seen| seen.truth(first, self.samples())) {
+            record = record.with_channel(channel)?;
         }
         Ok(record)
     }

@@ -388,10 +388,10 @@ fn each_remnant_has_its_share_of_the_variance() {
     seen.target = sum(1.0, Interleaved::Even).excitation().unwrap();
     seen.disturbance = sum(0.2, Interleaved::Odd).excitation().unwrap();
     let x = [0.7, 11.0_f64.ln(), 0.3_f64.ln(), 0.2];
-    seen.feedforward = Some(Feedforward {
-        operator: FamilyOperator::new(Form::Derivative, true, &x).unwrap(),
-        preview_s: 0.25,
-    });
+    seen.feedforward = Some(Feedforward::new(
+        FamilyOperator::new(Form::Derivative, true, &x).unwrap(),
+        0.25,
+    ));
     let all = parts().into_iter().map(|remnant| (typical(), remnant));
     let all = all.chain([(seen, parts().swap_remove(0))]);
     for (kind, (mut scenario, remnant)) in all.enumerate() {
@@ -572,10 +572,7 @@ fn a_target_that_is_seen_moves_the_control_before_there_is_an_error() {
     let muscles = [12.0_f64.ln(), 0.4_f64.ln()];
     let seen = FamilyOperator::new(Form::Derivative, true, &[0.6, muscles[0], muscles[1], 0.21]).unwrap();
     let preview_s = 0.3;
-    scenario.feedforward = Some(Feedforward {
-        operator: seen.clone(),
-        preview_s,
-    });
+    scenario.feedforward = Some(Feedforward::new(seen.clone(), preview_s));
     let record = FamilySimulator::new(&scenario).unwrap().run(seed(0), false).unwrap();
     let ts = record.sample_time();
     let coefficient = |values: &[f64], omega: f64| -> Complex64 {
@@ -599,9 +596,6 @@ fn a_target_that_is_seen_moves_the_control_before_there_is_an_error() {
             of("u")
         );
     }
-    scenario.feedforward = Some(Feedforward {
-        operator: seen,
-        preview_s: 0.3001,
-    });
+    scenario.feedforward = Some(Feedforward::new(seen, 0.3001));
     assert!(FamilySimulator::new(&scenario).is_err());
 }

@@ -93,10 +93,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         x.extend(muscles);
         x.push(tau_f + PREVIEW_S);
         let target = FamilyOperator::new(form, true, &x)?;
-        scenario.feedforward = sees.then(|| Feedforward {
-            operator: target.clone(),
-            preview_s: PREVIEW_S,
-        });
+        scenario.feedforward = sees.then(|| Feedforward::new(target.clone(), PREVIEW_S));
         let simulator = FamilySimulator::new(&scenario)?;
         let records = (0..runs).map(|run| simulator.run(person.run_seed(run), false));
         let records: Vec<_> = records.collect::<Result<_, _>>()?;

@@ -67,10 +67,7 @@ pub(super) fn typical(state: &FamilyState, display: Display) -> Result<Feedforwa
     let ([a, b, c], _) = form.shape(&lead_s.into_iter().collect::<Vec<_>>());
     let shape = (a - c * omega * omega).hypot(b * omega);
     coordinates[0] = FOLLOWED_FRACTION / (shape * element.response(omega).norm());
-    Ok(Feedforward {
-        operator: FamilyOperator::new(form, neuromuscular, &coordinates)?,
-        preview_s,
-    })
+    Ok(Feedforward::new(FamilyOperator::new(form, neuromuscular, &coordinates)?, preview_s))
 }
 
 #[cfg(test)]

@@ -75,7 +75,7 @@ mod written {
 
     pub fn deserialize<'de, D: Deserializer<'de>>(reader: D) -> Result<Option<Feedforward>, D::Error> {
         let parts: Option<(FamilyOperator, f64)> = Deserialize::deserialize(reader)?;
-        Ok(parts.map(|(operator, preview_s)| Feedforward { operator, preview_s }))
+        Ok(parts.map(|(operator, preview_s)| Feedforward::new(operator, preview_s)))
     }
 }
 

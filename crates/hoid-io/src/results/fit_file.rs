@@ -185,7 +185,7 @@ impl FitObject {
             })
             .collect();
         let operator = FamilyOperator::of_names(form, &pairs?).ok()?;
-        Some(Feedforward { operator, preview_s })
+        Some(Feedforward::new(operator, preview_s))
     }
 
     fn operator(self, source: &str) -> Result<FittedOperator, String> {

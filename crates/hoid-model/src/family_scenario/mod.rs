@@ -20,8 +20,9 @@ mod remnant;
 mod scenario;
 mod state;
 
+pub use crate::feedforward::Feedforward;
 pub use display::Display;
 pub use multi_sine::{Excitation, Interleaved, MultiSine};
 pub use remnant::{Followed, Intermittence, PartStrength, Pulses, RemnantPart, RemnantShape, SignalDependence, Stick};
-pub use scenario::{FamilyScenario, Feedforward, ResolvedFamilyScenario};
+pub use scenario::{FamilyScenario, ResolvedFamilyScenario};
 pub use state::FamilyState;

@@ -6,12 +6,12 @@ use super::{
     state::FamilyState,
 };
 use crate::{
-    FamilyOperator, ModelError, SampleTime, delayed_operator::whole_samples, operator_family::Coordinate,
-    scenario::Realisation, schedule::Schedule,
+    FamilyOperator, Feedforward, ModelError, SampleTime,
+    feedforward::{delay_at, delays},
+    scenario::Realisation,
+    schedule::Schedule,
 };
 
-/// Longest preview, s.
-const LONGEST_PREVIEW_S: f64 = 60.0;
 /// Longest run, in samples.
 const MOST_SAMPLES: usize = 100_000_000;
 
@@ -44,15 +44,6 @@ pub struct FamilyScenario {
     pub run_in_s: f64,
     /// Position of the leading gain of the controlled element.
     pub realisation: Realisation,
-}
-
-/// Response of a person to the displayed target.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Feedforward {
-    /// Operator from the target to u; its delay is relative to the end of the preview.
-    pub operator: FamilyOperator,
-    /// Preview time, s.
-    pub preview_s: f64,
 }
 
 /// A scenario that has been checked.
@@ -127,24 +118,19 @@ impl FamilyScenario {
                 return Err(wrong("delay of the controlled element in s", delay, expected));
             }
         }
-        let changes = self.initial.operator.tau_e_s() != self.last.operator.tau_e_s();
-        let mut delays = [(0, 0.0); 2];
-        for (delay, state) in delays.iter_mut().zip([&self.initial, &self.last]) {
-            let tau = state.operator.tau_e_s() / self.sample_time.s();
-            let whole = whole_samples(state.operator.tau_e_s(), self.sample_time)?;
-            *delay = if changes {
-                (tau.round() as usize, 0.0)
-            } else {
-                // If tau is an integer number of samples, this remainder is only a rounding error.
-                let late = tau - whole as f64;
-                (whole, if late < 1e-9 { 0.0 } else { late })
-            };
-        }
+        let delays = delays(
+            [self.initial.operator.tau_e_s(), self.last.operator.tau_e_s()],
+            self.sample_time,
+        )?;
         if let Some(seen) = &self.feedforward {
-            whole("displayed future of the target in s", seen.preview_s)?;
-            if seen.preview_s > LONGEST_PREVIEW_S {
-                let quantity = "displayed future of the target in s";
-                return Err(wrong(quantity, seen.preview_s, "at most 60 s"));
+            seen.check(&self.schedule, self.sample_time)?;
+            if seen.operator.has_neuromuscular() != self.initial.operator.has_neuromuscular() {
+                return Err(ModelError::Operator {
+                    reason:
+                        "only one of the responses to error and target has neuromuscular dynamics; expected both or \
+                             neither, since they share one neuromuscular system"
+                            .to_owned(),
+                });
             }
         }
         self.remnant.iter().try_for_each(RemnantPart::check)?;
@@ -193,12 +179,55 @@ impl ResolvedFamilyScenario {
     /// Returns the delay at time `t_s` as a number of whole samples and a fraction of a sample; it is rounded to the
     /// nearest whole sample if the delay changes.
     pub fn delay_at(&self, t_s: f64) -> (usize, f64) {
-        let [initial, last] = self.delays;
-        if initial == last {
-            return initial;
+        delay_at(self.delays, &self.scenario.schedule, t_s)
+    }
+
+    /// True if the response to the target changes in time, in itself or by its neuromuscular system.
+    pub fn feedforward_changes(&self) -> bool {
+        let FamilyScenario { initial, last, .. } = &self.scenario;
+        let changes = self.scenario.schedule.change_s().is_some();
+        let seen = self.scenario.feedforward.as_ref();
+        let muscles = initial.operator.neuromuscular() != last.operator.neuromuscular();
+        changes && seen.is_some_and(|seen| seen.last.is_some() || muscles)
+    }
+
+    /// Returns the responses to the target before and after the change.
+    ///
+    /// # Errors
+    /// As [`FamilyOperator::new`].
+    pub fn feedforward_of_states(&self) -> Result<[Option<FamilyOperator>; 2], ModelError> {
+        let Some(seen) = &self.scenario.feedforward else {
+            return Ok([None, None]);
+        };
+        let FamilyScenario { initial, last, .. } = &self.scenario;
+        let mut after = seen.last.as_ref().unwrap_or(&seen.operator).clone();
+        let muscles = last.operator.neuromuscular();
+        if let Some((omega, zeta)) = muscles.filter(|_| muscles != initial.operator.neuromuscular()) {
+            after = after.with_neuromuscular(omega, zeta)?;
         }
-        let delay = self.scenario.schedule.value(initial.0 as f64, last.0 as f64, t_s);
-        (delay.round() as usize, 0.0)
+        Ok([Some(seen.operator.clone()), Some(after)])
+    }
+
+    /// Returns the response to the target at time `t_s`, with its delay as a number of whole samples and a fraction of
+    /// a sample; `None` if the person does not see the target.
+    ///
+    /// # Errors
+    /// As [`ResolvedFamilyScenario::state_at`].
+    pub fn feedforward_at(&self, t_s: f64) -> Result<Option<(FamilyOperator, (usize, f64))>, ModelError> {
+        let FamilyScenario {
+            initial,
+            last,
+            schedule,
+            sample_time,
+            feedforward,
+            ..
+        } = &self.scenario;
+        let Some(seen) = feedforward else { return Ok(None) };
+        let (before, after) = (initial.operator.neuromuscular(), last.operator.neuromuscular());
+        let between = |a: f64, b: f64| schedule.value(a, b, t_s);
+        let muscles = before.zip(after).filter(|(before, after)| before != after);
+        let muscles = muscles.map(|(a, b)| (between(a.0, b.0), between(a.1, b.1)));
+        Ok(Some(seen.at(t_s, schedule, *sample_time, muscles)?))
     }
 
     /// Returns operator and controlled element at time `t_s`.
@@ -217,16 +246,9 @@ impl ResolvedFamilyScenario {
         if initial.operator.tau_e_s() == last.operator.tau_e_s() {
             return Ok(state);
         }
-        let mut coordinates = state.operator.coordinates().to_vec();
-        let kinds = state.operator.form().coordinates(state.operator.has_neuromuscular());
-        for (x, kind) in coordinates.iter_mut().zip(kinds) {
-            if kind == Coordinate::Delay {
-                *x = self.delay_at(t_s).0 as f64 * sample_time.s();
-            }
-        }
-        let operator = &state.operator;
+        let delay_s = self.delay_at(t_s).0 as f64 * sample_time.s();
         Ok(FamilyState {
-            operator: FamilyOperator::new(operator.form(), operator.has_neuromuscular(), &coordinates)?,
+            operator: state.operator.with_delay(delay_s)?,
             ..state
         })
     }

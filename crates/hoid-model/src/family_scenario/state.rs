@@ -3,7 +3,6 @@
 use crate::{
     ContinuousTransferFunction, FamilyOperator, ModelError,
     margins::{Crossings, MANUAL_CONTROL_RANGE_RAD_S, Margins, closed_loop_is_stable, crossings},
-    operator_family::Coordinate,
 };
 
 /// Operator of the family and controlled element at one instant.
@@ -48,11 +47,8 @@ impl FamilyState {
 
     /// True if both states have the same form, so that a transition between them exists.
     pub(super) fn is_like(&self, other: &Self) -> bool {
-        let (a, b) = (&self.operator, &other.operator);
         let (c, d) = (&self.controlled_element, &other.controlled_element);
-        a.form() == b.form()
-            && a.has_neuromuscular() == b.has_neuromuscular()
-            && (c.num().len(), c.den().len()) == (d.num().len(), d.den().len())
+        self.operator.is_like(&other.operator) && (c.num().len(), c.den().len()) == (d.num().len(), d.den().len())
     }
 
     /// Returns a state between this state and another one. `between` computes each parameter of the operator
@@ -60,20 +56,6 @@ impl FamilyState {
     /// element (its leading gain, and the coefficients of numerator and denominator without this gain). The delay of
     /// this state is kept.
     pub(super) fn interpolated(&self, other: &Self, between: impl Fn(f64, f64) -> f64) -> Result<Self, ModelError> {
-        let (a, b) = (&self.operator, &other.operator);
-        let kinds = a.form().coordinates(a.has_neuromuscular());
-        let on_its_way = |(kind, (x, y)): (&Coordinate, (&f64, &f64))| match kind {
-            Coordinate::Delay => *x,
-            // If both values are equal, this value is kept exactly.
-            _ if x == y => *x,
-            Coordinate::LogOmega | Coordinate::LogZeta => between(x.exp(), y.exp()).ln(),
-            _ => between(*x, *y),
-        };
-        let coordinates: Vec<f64> = kinds
-            .iter()
-            .zip(a.coordinates().iter().zip(b.coordinates()))
-            .map(on_its_way)
-            .collect();
         let (c, d) = (&self.controlled_element, &other.controlled_element);
         let pairs = |p: &[f64], q: &[f64]| p.iter().zip(q).map(|(p, q)| between(*p, *q)).collect::<Vec<f64>>();
         let shape = |p: &[f64]| {
@@ -87,7 +69,7 @@ impl FamilyState {
             .map(|c| c * gain)
             .collect();
         Ok(Self {
-            operator: FamilyOperator::new(a.form(), a.has_neuromuscular(), &coordinates)?,
+            operator: self.operator.between(&other.operator, &between)?,
             controlled_element: ContinuousTransferFunction::new(&num, &pairs(c.den(), d.den()))?,
         })
     }

@@ -158,6 +158,15 @@ impl Form {
         matches!(self, Self::Derivative | Self::DerivativeLead)
     }
 
+    /// Returns the name of the parameter by which a gain of this form is given: `K`, `K_I` or `K_d`.
+    pub fn gain_name(self) -> &'static str {
+        match self {
+            Self::QuadraticIntegral => "K_I",
+            form if form.is_derivative() => "K_d",
+            _ => "K",
+        }
+    }
+
     /// Returns the degree of the numerator, which is the power p of the lead in forms that consist of lead and lag.
     pub fn degree(self) -> usize {
         match self {

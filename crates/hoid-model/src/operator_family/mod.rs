@@ -13,12 +13,14 @@
 //! |---|---|
 //! | `form` | [`Form`], [`Coordinate`] |
 //! | `operator` | [`FamilyOperator`]: one operator, its response, its named parameters |
+//! | `change` | operators between two states, with another neuromuscular system or delay |
 //! | `fitted` | [`FittedOperator`]: an operator with the results of its fit |
 //! | `zoh` | the exact discrete model of an operator for a held input, with derivatives |
 //! | `interpolate` | the discrete model for an error that is linear between samples |
 //! | `matrices` | the matrix exponential |
 //! | `dual` | dual numbers, which carry their derivatives |
 
+mod change;
 mod dual;
 #[cfg(test)]
 mod examples;

@@ -11,7 +11,7 @@
 //! The response h_i also shows whether the loop is stable, since it then decays to zero.
 
 use hoid_model::{
-    Complex64, ModelError,
+    Complex64, FamilyOperator, ModelError,
     family_scenario::{FamilyScenario, PartStrength},
     operator_family::HeldFamily,
     polynomial,
@@ -48,10 +48,11 @@ impl Calibration {
         scenario: &FamilyScenario,
         shapings: &[Shaping],
         is_last: bool,
+        seen: Option<&FamilyOperator>,
     ) -> Result<Self, ModelError> {
         // This call checks the stability of the loop even if there is no remnant.
         energy(held, &Shaping::White)?;
-        let mut sum = line_power(held, scenario)?;
+        let mut sum = line_power(held, scenario, seen)?;
         let mut energies = Vec::with_capacity(shapings.len());
         let mut shares = 0.0;
         for (shaping, part) in shapings.iter().zip(&scenario.remnant) {
@@ -105,7 +106,7 @@ fn scaled(a: MeanSquares, by: f64) -> MeanSquares {
 
 /// Returns the sums of the squared responses of u, of its steps and of e to one unit of w.
 fn energy(held: &HeldLoop, shaping: &Shaping) -> Result<MeanSquares, ModelError> {
-    let mut state = LoopState::at_rest(held, held.delay());
+    let mut state = LoopState::at_rest(held, held.operator.delay());
     let mut shaped = Shaped::at_rest(shaping);
     let (mut total, mut before, mut w) = ([0.0; 3], 0.0, 1.0);
     let mut horizon = FIRST;
@@ -148,9 +149,12 @@ fn held_response(held: &HeldFamily, backward: Complex64) -> Complex64 {
 }
 
 /// Returns the mean squares due to target and disturbance.
-fn line_power(held: &HeldLoop, scenario: &FamilyScenario) -> Result<MeanSquares, ModelError> {
-    let seen = scenario.feedforward.as_ref();
-    let seen = seen.map(|seen| seen.operator.zoh(scenario.sample_time)).transpose()?;
+fn line_power(
+    held: &HeldLoop,
+    scenario: &FamilyScenario,
+    seen: Option<&FamilyOperator>,
+) -> Result<MeanSquares, ModelError> {
+    let seen = seen.map(|seen| seen.zoh(scenario.sample_time)).transpose()?;
     let mut sum = [0.0; 3];
     for (excitation, is_target) in [(&scenario.target, true), (&scenario.disturbance, false)] {
         for line in excitation.function.sinusoids() {

@@ -3,14 +3,11 @@
 //! Simulates `u = r(k - l) + n` as [`FamilySimulator`] does in a loop, with the same random numbers, and with the
 //! remnant as strong as in the loop of the scenario. A loop that responds to u like the controlled element of the
 //! scenario therefore gives a bit-identical run. The offsets of the recorder in e and u (`offset_e`, `offset_u`) are
-//! not part of the operator. The control at a sample must not depend on the error of the same sample.
+//! not part of the operator, nor is the response to a displayed target, which belongs to the loop. The control at a sample
+//! must not depend on the error of the same sample.
 
-use super::{
-    FamilySimulator,
-    held_loop::{HeldLoop, OperatorState},
-    remnant_run::RemnantRun,
-};
-use crate::{RunSeed, SimError, operator_run::saved_sample};
+use super::{FamilySimulator, held_loop::HeldLoop, remnant_run::RemnantRun};
+use crate::{RunSeed, SimError, held_operator::OperatorState, operator_run::saved_sample};
 
 /// Running operator of a scenario of the family.
 #[derive(Debug, Clone)]
@@ -47,7 +44,7 @@ impl FamilyOperatorRun {
         let k = simulator.scenario.run_in_samples().saturating_add_signed(after_run_in);
         let mut remnant = RemnantRun::new(&simulator.scenario, &simulator.remnants, run);
         Ok(Self {
-            operator: OperatorState::at_rest(simulator.held(0), simulator.longest_delay()),
+            operator: OperatorState::at_rest(&simulator.held(0).operator, simulator.longest_delay()),
             n: remnant.next(&simulator.scenario, &simulator.remnants, k),
             remnant,
             k,
@@ -61,7 +58,7 @@ impl FamilyOperatorRun {
 
     /// Returns the control u of the next sample in deg.
     pub fn control(&self) -> f64 {
-        self.held().output(&self.operator).known + self.n
+        self.held().operator.output(&self.operator).known + self.n
     }
 
     /// Returns the remnant n of the next sample in deg, including the bias and the random walk of the stick.
@@ -71,9 +68,9 @@ impl FamilyOperatorRun {
 
     /// Takes the error e of the sample in deg and advances by one sample.
     pub fn take(&mut self, e: f64) {
-        let held = self.simulator.held(self.k);
+        let held = &self.simulator.held(self.k).operator;
         let answer = held.output(&self.operator);
-        held.advance_operator(&mut self.operator, answer, e);
+        held.advance(&mut self.operator, answer, e);
         let (scenario, remnants) = (&self.simulator.scenario, &self.simulator.remnants);
         self.remnant.follow(scenario, remnants, self.k, answer.known + self.n);
         self.k += 1;

@@ -7,7 +7,6 @@
 
 use std::f64::consts::TAU;
 
-use hoid_core::filter::{divide_in_place, fir};
 use hoid_model::{
     Channel, Record,
     family_scenario::{Excitation, FamilyScenario, FamilyState, ResolvedFamilyScenario, Stick},
@@ -20,7 +19,7 @@ use super::{
     noise::Shaping,
     remnant_run::{RemnantRun, Remnants},
 };
-use crate::{RunSeed, SimError};
+use crate::{RunSeed, SimError, target_response::TargetResponse};
 
 /// Prepared scenario: held models for all samples, and gains of the remnant.
 #[derive(Debug, Clone)]
@@ -31,6 +30,8 @@ pub struct FamilySimulator {
     /// Index in `loops` for each sample; empty if all samples have the same loop.
     places: Vec<usize>,
     pub(super) remnants: Remnants,
+    /// Response to the target; `None` if the person does not see it.
+    seen: Option<TargetResponse>,
 }
 
 /// Signals of one run, including the run-in.
@@ -63,7 +64,8 @@ impl FamilySimulator {
         let ts = scenario.sample_time;
         let held = |state: &FamilyState, delay| HeldLoop::new(state, delay, scenario.realisation, ts);
         let samples = resolved.run_in_samples() + resolved.measurement_samples();
-        let changes = scenario.initial != scenario.last && scenario.schedule.change_s().is_some();
+        let changes = scenario.schedule.change_s().is_some()
+            && (scenario.initial != scenario.last || resolved.feedforward_changes());
         let mut loops: Vec<(FamilyState, HeldLoop)> = Vec::new();
         let mut places = Vec::new();
         for k in 0..if changes { samples } else { 1 } {
@@ -80,9 +82,17 @@ impl FamilySimulator {
         let shapings = (scenario.remnant.iter())
             .map(|part| Shaping::new(&part.shape, ts))
             .collect::<Result<Vec<_>, _>>()?;
-        let calibrated =
-            |state: &FamilyState, delay, is_last| Calibration::of(&held(state, delay)?, scenario, &shapings, is_last);
+        let seen_in = resolved.feedforward_of_states()?;
+        let calibrated = |state: &FamilyState, delay, is_last| {
+            let seen = seen_in[usize::from(is_last)].as_ref();
+            Calibration::of(&held(state, delay)?, scenario, &shapings, is_last, seen)
+        };
         let delays = resolved.delays();
+        let seen = (scenario.feedforward.as_ref()).map(|seen| {
+            let instants = if resolved.feedforward_changes() { samples } else { 1 };
+            TargetResponse::new(seen, instants, |k| resolved.feedforward_at(resolved.time_s(k)), ts)
+        });
+        let seen = seen.transpose()?;
         let initial = calibrated(&scenario.initial, delays[0], false)?;
         let last = if changes {
             calibrated(&scenario.last, delays[1], true)?
@@ -93,6 +103,7 @@ impl FamilySimulator {
             scenario: resolved,
             loops,
             places,
+            seen,
             remnants: Remnants {
                 shapings,
                 calibrations: [initial, last],
@@ -133,7 +144,11 @@ impl FamilySimulator {
 
     /// Returns the longest delay in whole samples.
     pub(super) fn longest_delay(&self) -> usize {
-        self.loops.iter().map(|(_, held)| held.delay()).max().unwrap_or(0)
+        self.loops
+            .iter()
+            .map(|(_, held)| held.operator.delay())
+            .max()
+            .unwrap_or(0)
     }
 
     /// Returns the gains K of the parts of the remnant, before and after the change.
@@ -198,17 +213,12 @@ impl FamilySimulator {
     /// Returns the response of the person to a visible target, from rest; empty if the target is not visible.
     fn response_to_target(&self, run: RunSeed) -> Result<Vec<f64>, SimError> {
         let scenario = self.scenario.scenario();
-        let Some(seen) = &scenario.feedforward else {
+        let Some(seen) = &self.seen else {
             return Ok(Vec::new());
         };
-        let (ts, samples) = (scenario.sample_time, self.samples());
-        let shown_s = self.scenario.time_s(0) + seen.preview_s;
-        let shown = phased(&scenario.target, run, TARGET_PHASES)?.samples(shown_s, ts, samples);
-        let held = seen.operator.zoh(ts)?;
-        let mut response = vec![0.0; samples];
-        fir(&held.b, held.nk, &shown, &mut response);
-        divide_in_place(&held.f, &mut response);
-        Ok(response)
+        let shown_s = self.scenario.time_s(0) + seen.preview_s();
+        let target = phased(&scenario.target, run, TARGET_PHASES)?;
+        Ok(seen.of(&target.samples(shown_s, scenario.sample_time, self.samples()))?)
     }
 
     /// Returns one run as a record, from the start of the measurement or, with `keep_run_in`, of the run-in: e, u, d,
@@ -232,7 +242,11 @@ impl FamilySimulator {
             others.insert(0, ("f_t", signals.f));
         }
         for (name, values) in others {
-            record = record.with_channel(channel(name, values))?;
+            let channel = channel(name, values);
+            record = record.with_channel(match &self.seen {
+                Some(seen) if name == "f_t" => seen.target(channel),
+                _ => channel,
+            })?;
         }
         Ok(record)
     }
@@ -252,6 +266,9 @@ impl FamilySimulator {
             if values.iter().all(|v| v.is_finite()) {
                 record = record.with_channel(Channel::new(parameter.name, parameter.unit, values))?;
             }
+        }
+        for channel in self.seen.iter().flat_map(|seen| seen.truth(first, self.samples())) {
+            record = record.with_channel(channel)?;
         }
         Ok(record)
     }
