@@ -75,8 +75,8 @@ pub use results::{
     check_table_path, is_fit_file, parse_fit, read_fit, read_table, write_table,
 };
 pub use scenario::{
-    AnyScenario, ScenarioFileError, family_scenario_schema, parse_any_scenario, parse_scenario, read_any_scenario,
-    read_scenario, scenario_schema,
+    AnyScenario, ScenarioChangeError, ScenarioChanges, ScenarioFileError, WHOLE_KEYS, family_scenario_schema,
+    parse_any_scenario, parse_scenario, read_any_scenario, read_scenario, scenario_schema,
 };
 pub use survey::{ColumnSurvey, FileSurvey, SamplingSurvey, ValueSurvey, survey};
 pub use table::{ColumnExpression, ColumnOption, control_among, error_among};

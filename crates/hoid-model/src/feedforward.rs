@@ -16,6 +16,9 @@ const LONGEST_PREVIEW_S: f64 = 60.0;
 /// Largest sum of tau_f and preview, in s, that is attributed to rounding and counts as zero.
 const ROUNDING_S: f64 = 1e-12;
 
+/// Operator at one instant, and its delay as a number of whole samples and a fraction of a sample.
+pub type OperatorAt = (FamilyOperator, (usize, f64));
+
 /// Response of a person to the displayed target.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Feedforward {
@@ -190,7 +193,7 @@ impl Feedforward {
         schedule: &Schedule,
         sample_time: SampleTime,
         neuromuscular: Option<(f64, f64)>,
-    ) -> Result<(FamilyOperator, (usize, f64)), ModelError> {
+    ) -> Result<OperatorAt, ModelError> {
         let delays = self.check(schedule, sample_time)?;
         let mut operator = match &self.last {
             Some(last) => self.operator.between(last, |a, b| schedule.value(a, b, t_s))?,

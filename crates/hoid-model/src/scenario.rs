@@ -17,8 +17,9 @@
 use num_complex::Complex64;
 
 use crate::{
-    FamilyOperator, Feedforward, ModelError, OperatorParameters, SampleTime,
+    Feedforward, ModelError, OperatorParameters, SampleTime,
     controlled_element::ControlledElement,
+    feedforward::OperatorAt,
     forcing::{ForcingFunction, REFERENCE_PERIOD_S},
     remnant::RemnantFilter,
     remnant_gain::{NoiseDefinition, SpectralLine, remnant_gain},
@@ -453,7 +454,7 @@ impl ResolvedScenario {
     ///
     /// # Errors
     /// As [`Feedforward::at`].
-    pub fn feedforward_at(&self, t_s: f64) -> Result<Option<(FamilyOperator, (usize, f64))>, ModelError> {
+    pub fn feedforward_at(&self, t_s: f64) -> Result<Option<OperatorAt>, ModelError> {
         let Some(seen) = &self.scenario.feedforward else {
             return Ok(None);
         };

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use hoid_io::{AnyScenario, parse_any_scenario, read_any_scenario};
+use hoid_io::{AnyScenario, ScenarioChanges, parse_any_scenario, read_any_scenario};
 use hoid_model::{
     ContinuousTransferFunction, DiscreteOperator, FamilyScenario, ModelError, OperatorParameters, SampleTime,
     discretise::discretise,
@@ -41,7 +41,7 @@ fn scenario(condition: Option<&str>, file: Option<PathBuf>, text: Option<&str>) 
 /// Simulates one closed-loop run.
 #[pyfunction]
 #[pyo3(signature = (*, condition, scenario_file, scenario_text, remnant_order, noise_level, noise_definition, remnant_time_constant,
-    sample_time, realisation, seed, cell, replication, keep_run_in))]
+    sample_time, realisation, feedforward, disturbance, seed, cell, replication, keep_run_in))]
 #[allow(clippy::too_many_arguments)]
 pub fn simulate<'py>(
     py: Python<'py>,
@@ -54,6 +54,8 @@ pub fn simulate<'py>(
     remnant_time_constant: Option<f64>,
     sample_time: Option<f64>,
     realisation: Option<String>,
+    feedforward: Option<String>,
+    disturbance: Option<f64>,
     seed: u64,
     cell: u64,
     replication: u64,
@@ -64,46 +66,22 @@ pub fn simulate<'py>(
         cell,
         replication,
     };
-    let realisation = realisation.as_deref().map(names::realisation).transpose()?;
-    let mut scenario = match scenario(condition.as_deref(), scenario_file, scenario_text.as_deref())? {
-        AnyScenario::Reference(scenario) => *scenario,
-        AnyScenario::Family(mut scenario) => {
-            let has_remnant = remnant_order.is_some() || remnant_time_constant.is_some();
-            if has_remnant || noise_level.is_some() || noise_definition.is_some() {
-                return Err(bad_option(
-                    "remnant_order, remnant_time_constant, noise_level and noise_definition are for the remnant of the \
-                     thesis; in a scenario with a form, the tables [[remnant]] specify the remnant",
-                ));
-            }
-            if let Some(ts) = sample_time {
-                scenario.sample_time = SampleTime::new(ts)?;
-            }
-            if let Some(realisation) = realisation {
-                scenario.realisation = realisation;
-            }
-            let record = py.detach(|| FamilySimulator::new(&scenario)?.run_with_truth(run_seed, keep_run_in))?;
-            return Ok(parts(py, record)?);
-        }
+    let changes = ScenarioChanges {
+        remnant_order,
+        noise_level,
+        noise_definition: noise_definition.as_deref().map(names::noise_definition).transpose()?,
+        remnant_time_constant,
+        sample_time,
+        realisation: realisation.as_deref().map(names::realisation).transpose()?,
+        feedforward,
+        disturbance,
     };
-    if let Some(order) = remnant_order {
-        scenario.remnant.order = order;
-    }
-    if let Some(time_constant) = remnant_time_constant {
-        scenario.remnant.time_constant_s = time_constant;
-    }
-    if let Some(ts) = sample_time {
-        scenario.sample_time = SampleTime::new(ts)?;
-    }
-    if let Some(realisation) = realisation {
-        scenario.realisation = realisation;
-    }
-    let definition = noise_definition.as_deref().map(names::noise_definition).transpose()?;
-    scenario.remnant.strength = scenario
-        .remnant
-        .strength
-        .changed(noise_level, definition)
-        .ok_or_else(|| bad_option("noise_definition needs noise_level: the scenario gives K_n itself"))?;
-    let record = py.detach(|| Simulator::new(&scenario)?.run(run_seed, keep_run_in))?;
+    let base = scenario(condition.as_deref(), scenario_file, scenario_text.as_deref())?;
+    let changed = changes.apply(base).map_err(|error| bad_option(error.to_string()))?;
+    let record = py.detach(|| match changed {
+        AnyScenario::Reference(scenario) => Simulator::new(&scenario)?.run(run_seed, keep_run_in),
+        AnyScenario::Family(scenario) => FamilySimulator::new(&scenario)?.run_with_truth(run_seed, keep_run_in),
+    })?;
     Ok(parts(py, record)?)
 }
 

@@ -6,19 +6,16 @@
 //! ([`HeldOperator`]), with the parameters at each sample. Both give the same response up to rounding.
 
 use hoid_core::filter::{divide_in_place, fir};
-use hoid_model::{Channel, FamilyOperator, Feedforward, ModelError, SampleTime};
+use hoid_model::{Channel, FamilyOperator, Feedforward, ModelError, SampleTime, feedforward::OperatorAt};
 
 use crate::held_operator::{HeldOperator, OperatorState};
-
-/// Operator at one sample, and its delay as a number of whole samples and a fraction of a sample.
-type Instant = (FamilyOperator, (usize, f64));
 
 /// Prepared response to a target.
 #[derive(Debug, Clone)]
 pub(crate) struct TargetResponse {
     feedforward: Feedforward,
     /// One entry if nothing changes, otherwise one entry per sample.
-    instants: Vec<Instant>,
+    instants: Vec<OperatorAt>,
     sample_time: SampleTime,
 }
 
@@ -27,7 +24,7 @@ impl TargetResponse {
     pub fn new(
         feedforward: &Feedforward,
         instants: usize,
-        at: impl Fn(usize) -> Result<Option<Instant>, ModelError>,
+        at: impl Fn(usize) -> Result<Option<OperatorAt>, ModelError>,
         sample_time: SampleTime,
     ) -> Result<Self, ModelError> {
         let instants = (0..instants)
@@ -63,7 +60,7 @@ impl TargetResponse {
 
     fn of_changing(&self, shown: &[f64]) -> Result<Vec<f64>, ModelError> {
         let longest = self.instants.iter().map(|(_, (whole, _))| *whole).max().unwrap_or(0);
-        let mut current: Option<(&Instant, HeldOperator, OperatorState)> = None;
+        let mut current: Option<(&OperatorAt, HeldOperator, OperatorState)> = None;
         let mut response = Vec::with_capacity(shown.len());
         for (instant, f) in self.instants.iter().zip(shown) {
             let (_, held, mut state) = match current.take() {

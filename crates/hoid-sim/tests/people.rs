@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use hoid_model::{Form, operator_family::Coordinate};
+use hoid_model::{Complex64, Form, family_scenario::Display, operator_family::Coordinate};
 use hoid_sim::{
     SimError,
     people::{Person, Plant, Population, Range, RemnantKind, Task},
@@ -183,4 +183,63 @@ fn ranges_without_people_are_refused() {
         ..Task::default()
     };
     assert!(Person::draw(&typical, &spread, Plant::Integrator, None, kind, 1, 1).is_err());
+}
+
+/// A person with a displayed target is the same person with a response to it, which each run shares in part: the
+/// neuromuscular system of a run is that of both responses.
+#[test]
+fn people_respond_to_a_displayed_target() {
+    for plant in Plant::ALL {
+        for display in [Display::Pursuit, Display::Preview] {
+            let task = Task {
+                display,
+                preview_s: 0.5,
+                between_runs: 0.05,
+                ..Task::default()
+            };
+            let draw =
+                |task: &Task| Person::draw(&Population::default(), task, plant, None, RemnantKind::Lag, 11, 2).unwrap();
+            let (seen, plain) = (draw(&task), draw(&Task::default()));
+            assert_eq!(seen.state, plain.state);
+            assert!(plain.feedforward.is_none());
+            let of_person = seen.feedforward.clone().unwrap();
+            // Near 3 rad/s the machine follows 0.4 to 1 of the target, apart from the neuromuscular system.
+            let (nm, zeta) = seen.state.operator.neuromuscular().unwrap();
+            let z = 3.0 / nm;
+            let muscles = Complex64::new(1.0 - z * z, 2.0 * zeta * z).inv();
+            let followed =
+                of_person.operator.response(3.0) * plant.transfer_function().unwrap().response(3.0) / muscles;
+            assert!((0.4..=1.0).contains(&followed.norm()), "{plant} {followed}");
+            let run = seen.run(1).unwrap();
+            assert_eq!(run.record, draw(&task).run(1).unwrap().record);
+            let of_run = run.feedforward.unwrap();
+            assert_ne!(of_run, of_person);
+            let muscles = [&run.state.operator, &of_run.operator].map(|o| o.neuromuscular().unwrap());
+            assert!((muscles[0].0 / muscles[1].0 - 1.0).abs() < 1e-12);
+            assert!((muscles[0].1 / muscles[1].1 - 1.0).abs() < 1e-12);
+            let target = run.record.channels().find(|c| c.name == "f_t").unwrap();
+            let role = if display == Display::Preview {
+                "feedforward:0.5"
+            } else {
+                "feedforward"
+            };
+            assert_eq!(target.role, role);
+            assert!(plain.run(1).unwrap().record.channel("f_t").is_none());
+        }
+    }
+    let off_grid = Task {
+        display: Display::Preview,
+        preview_s: 0.501,
+        ..Task::default()
+    };
+    let refused = Person::draw(
+        &Population::default(),
+        &off_grid,
+        Plant::Integrator,
+        None,
+        RemnantKind::Lag,
+        1,
+        0,
+    );
+    assert!(matches!(refused, Err(SimError::Model(_))), "{refused:?}");
 }

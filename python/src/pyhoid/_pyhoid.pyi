@@ -609,6 +609,8 @@ def simulate(
     remnant_time_constant: float | None,
     sample_time: float | None,
     realisation: str | None,
+    feedforward: str | None,
+    disturbance: float | None,
     seed: int,
     cell: int,
     replication: int,

@@ -35,6 +35,8 @@ def simulate(
     remnant_time_constant: float | None = None,
     sample_time: float | None = None,
     realisation: str | None = None,
+    feedforward: str | None = None,
+    disturbance: float | None = None,
     seed: int = 0,
     cell: int = 0,
     replication: int = 0,
@@ -60,6 +62,12 @@ def simulate(
         Sample time Ts in s; by default 0.01.
     realisation : {"input", "output"}, optional
         Position of the gain K_c in the controlled element, which matters if K_c changes.
+    feedforward : str, optional
+        Response to a displayed target: its form and gain, then other parameters by name, such as
+        ``"derivative:0.15,tau_f=0.1,preview=0.25"``.
+    disturbance : float, optional
+        Rms in deg of a disturbance at the input of the controlled element of a condition, at lines
+        between those of the target.
     seed, cell, replication : int
         Numbers that select the random stream; runs with different replications are independent.
     keep_run_in : bool
@@ -86,6 +94,8 @@ def simulate(
         remnant_time_constant=remnant_time_constant,
         sample_time=sample_time,
         realisation=realisation,
+        feedforward=feedforward,
+        disturbance=disturbance,
         seed=seed,
         cell=cell,
         replication=replication,

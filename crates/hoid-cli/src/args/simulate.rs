@@ -57,6 +57,14 @@ pub struct SimulateArgs {
     /// input, or the scenario's]
     #[arg(long, value_name = "WHERE", value_parser = choice_of(&Realisation::ALL))]
     pub realisation: Option<Realisation>,
+    /// Response to a displayed target: its form and gain, then other parameters by name, such as
+    /// derivative:0.15,tau_f=0.1,preview=0.25 [default: none, or the scenario's]
+    #[arg(long, value_name = "FORM:GAIN,...")]
+    pub feedforward: Option<String>,
+    /// Rms in deg of a disturbance at the input of the controlled element, at lines between those of the target
+    /// [default: 0, or the scenario's]
+    #[arg(long, value_name = "RMS")]
+    pub disturbance: Option<f64>,
     /// Seed of the random streams
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use hoid::io::{AnyScenario, write_record, write_record_csv};
-use hoid::model::{FamilyScenario, Record, SampleTime, scenario::Scenario};
+use hoid::io::{AnyScenario, ScenarioChangeError, ScenarioChanges, write_record, write_record_csv};
+use hoid::model::Record;
 use hoid::numerics::statistics::root_mean_square;
 use hoid::report::numbers;
 use hoid::sim::{FamilySimulator, RunSeed, Simulator};
@@ -19,13 +19,12 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         cell: args.cell,
         replication: args.replication,
     };
-    let record = match chosen_scenario(&args.base)? {
-        AnyScenario::Reference(scenario) => {
-            Simulator::new(&with_changes(*scenario, args)?)?.run(run_seed, args.keep_run_in)?
-        }
-        AnyScenario::Family(scenario) => {
-            FamilySimulator::new(&of_family(*scenario, args)?)?.run_with_truth(run_seed, args.keep_run_in)?
-        }
+    let scenario = changes(args)
+        .apply(chosen_scenario(&args.base)?)
+        .map_err(|error| refused(&error))?;
+    let record = match scenario {
+        AnyScenario::Reference(scenario) => Simulator::new(&scenario)?.run(run_seed, args.keep_run_in)?,
+        AnyScenario::Family(scenario) => FamilySimulator::new(&scenario)?.run_with_truth(run_seed, args.keep_run_in)?,
     };
     let piped = args.out.as_os_str() == "-";
     if piped {
@@ -67,48 +66,20 @@ fn write_out(record: &Record) -> Result<(), CliError> {
     Ok(())
 }
 
-fn with_changes(mut scenario: Scenario, args: &SimulateArgs) -> Result<Scenario, CliError> {
-    if let Some(order) = args.remnant_order {
-        scenario.remnant.order = order;
+fn changes(args: &SimulateArgs) -> ScenarioChanges {
+    ScenarioChanges {
+        remnant_order: args.remnant_order,
+        noise_level: args.noise_level,
+        noise_definition: args.noise_definition,
+        remnant_time_constant: args.remnant_time_constant,
+        sample_time: args.sample_time,
+        realisation: args.realisation,
+        feedforward: args.feedforward.clone(),
+        disturbance: args.disturbance,
     }
-    if let Some(time_constant) = args.remnant_time_constant {
-        scenario.remnant.time_constant_s = time_constant;
-    }
-    if let Some(ts) = args.sample_time {
-        scenario.sample_time = SampleTime::new(ts)?;
-    }
-    if let Some(realisation) = args.realisation {
-        scenario.realisation = realisation;
-    }
-    let definition = args.noise_definition;
-    let Some(strength) = scenario.remnant.strength.changed(args.noise_level, definition) else {
-        return Err(CliError::Usage(
-            "--noise-definition needs --noise-level: the scenario gives the gain K_n itself".to_owned(),
-        ));
-    };
-    scenario.remnant.strength = strength;
-    Ok(scenario)
 }
 
-/// Rejects remnant options, since the remnant of an operator of the family is defined in its file.
-fn of_family(mut scenario: FamilyScenario, args: &SimulateArgs) -> Result<FamilyScenario, CliError> {
-    let remnant = [
-        ("--remnant-order", args.remnant_order.is_some()),
-        ("--noise-level", args.noise_level.is_some()),
-        ("--noise-definition", args.noise_definition.is_some()),
-        ("--remnant-time-constant", args.remnant_time_constant.is_some()),
-    ];
-    if let Some((option, _)) = remnant.iter().find(|(_, given)| *given) {
-        return Err(CliError::Usage(format!(
-            "{option} is for the remnant of the thesis; in a scenario with a form, the tables [[remnant]] specify the \
-             remnant"
-        )));
-    }
-    if let Some(ts) = args.sample_time {
-        scenario.sample_time = SampleTime::new(ts)?;
-    }
-    if let Some(realisation) = args.realisation {
-        scenario.realisation = realisation;
-    }
-    Ok(scenario)
+/// Names the option as on the command line.
+fn refused(error: &ScenarioChangeError) -> CliError {
+    CliError::Usage(format!("--{} {}", error.option.replace('_', "-"), error.reason))
 }

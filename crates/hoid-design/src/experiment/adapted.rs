@@ -16,18 +16,16 @@
 
 use hoid_ident::family::OperatorPrior;
 use hoid_model::{
-    ContinuousTransferFunction, FamilyOperator, FamilyState, Form, ModelError, operator_family::Coordinate,
+    ContinuousTransferFunction, FamilyOperator, FamilyState, Form, ModelError,
+    family_scenario::{LONGEST_LEAD_S, NEAR_CROSSOVER_RAD_S, SHORTEST_S, slope, time_constant},
+    operator_family::Coordinate,
 };
 
 use super::{DesignError, chosen::NamedState};
 
-/// Frequency at which slopes are evaluated, rad/s.
-pub(super) const NEAR_CROSSOVER_RAD_S: f64 = 3.0;
 /// Largest slope to be added for which the form has neither lead nor lag.
 const SMALL_SLOPE: f64 = 0.3;
-/// Shortest time constant, longest lead and longest lag, in s.
-const SHORTEST_S: f64 = 0.1;
-pub(super) const LONGEST_LEAD_S: f64 = 2.0;
+/// Longest lag, in s.
 const LONGEST_LAG_S: f64 = 3.0;
 /// Desired and smallest phase margin, in deg.
 const MARGIN_DEG: f64 = 40.0;
@@ -85,14 +83,6 @@ pub(super) fn population(
     Ok((typical, others))
 }
 
-/// Returns the slope `d ln|P|/d ln omega` near the crossover.
-pub(super) fn slope(element: &ContinuousTransferFunction) -> f64 {
-    let gain = |omega: f64| element.response(omega).norm().ln();
-    let step = 0.01_f64;
-    let (up, down) = (NEAR_CROSSOVER_RAD_S * step.exp(), NEAR_CROSSOVER_RAD_S * (-step).exp());
-    (gain(up) - gain(down)) / (2.0 * step)
-}
-
 /// Returns the form that people typically adopt with an element.
 fn form_of(element: &ContinuousTransferFunction) -> Form {
     match -1.0 - slope(element) {
@@ -100,12 +90,6 @@ fn form_of(element: &ContinuousTransferFunction) -> Form {
         added if added < -SMALL_SLOPE => Form::Lag,
         _ => Form::Gain,
     }
-}
-
-/// Returns the time constant of a lead that adds this slope at 3 rad/s, at least .1 s and at most `longest_s`.
-pub(super) fn time_constant(slope: f64, longest_s: f64) -> f64 {
-    let x = (slope.max(0.0) / (1.0 - slope).max(1e-9)).sqrt();
-    (x / NEAR_CROSSOVER_RAD_S).clamp(SHORTEST_S, longest_s)
 }
 
 fn adapted(

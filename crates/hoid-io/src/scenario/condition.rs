@@ -10,6 +10,7 @@ use hoid_model::{
     schedule::Schedule,
 };
 
+use super::changes::disturbance;
 use super::error::ScenarioFileError;
 use super::keys::{DefinitionKey, File, RealisationKey, RemnantTable, ScheduleTable, SinusoidTable, StateTable};
 use super::values::{Limits, Source};
@@ -65,14 +66,30 @@ impl Source<'_> {
                 self.keys("[last] is given, but nothing changes: add [schedule] with rate_per_s and midpoint_s")
             );
         }
-        if scenario.schedule != Schedule::Constant && scenario.initial == scenario.last {
+        if let Some(table) = &file.feedforward {
+            let of = scenario.initial.operator;
+            scenario.feedforward = Some(self.feedforward(table, Some((of.omega_nm_rad_s, of.zeta_nm)), ts)?);
+        }
+        let response_changes = scenario.feedforward.as_ref().is_some_and(|seen| seen.last.is_some());
+        if response_changes && scenario.schedule == Schedule::Constant {
+            return Err(self.keys(
+                "[feedforward.last] is given, but nothing changes: add [schedule] with rate_per_s and midpoint_s",
+            ));
+        }
+        if scenario.schedule != Schedule::Constant && scenario.initial == scenario.last && !response_changes {
             return Err(
                 self.keys("[schedule] is given, but both states are the same: add [last] with the values that change")
             );
         }
         self.remnant(&mut scenario, file.remnant)?;
         if let Some(tables) = file.forcing {
-            scenario.forcing = self.forcing(tables, scenario.measurement_s)?;
+            scenario.forcing = self.forcing("forcing", tables, scenario.measurement_s)?;
+        }
+        if let Some(tables) = file.disturbance {
+            scenario.disturbance = self.forcing("disturbance", tables, scenario.measurement_s)?;
+        }
+        if let Some(rms) = self.limited("disturbance_rms_deg", file.disturbance_rms_deg, Limits::NOISE_GAIN)? {
+            scenario.disturbance = disturbance(&scenario.disturbance, rms).map_err(|error| self.model(error))?;
         }
         Ok(scenario)
     }
@@ -211,30 +228,40 @@ impl Source<'_> {
         Ok(())
     }
 
-    fn forcing(&self, tables: Vec<SinusoidTable>, measurement_s: f64) -> Result<ForcingFunction, ScenarioFileError> {
+    /// Returns the sum of sines of a list of tables, `forcing` or `disturbance`.
+    fn forcing(
+        &self,
+        name: &str,
+        tables: Vec<SinusoidTable>,
+        measurement_s: f64,
+    ) -> Result<ForcingFunction, ScenarioFileError> {
         if tables.len() > MOST_LINES {
             return Err(self.keys(&format!(
-                "there are {} tables [[forcing]], expected at most {MOST_LINES}",
+                "there are {} tables [[{name}]], expected at most {MOST_LINES}",
                 tables.len()
             )));
         }
         let mut sinusoids = Vec::with_capacity(tables.len());
         for (k, table) in (1..).zip(tables) {
-            let omega = self.limited("forcing.omega_rad_s", table.omega_rad_s, Limits::FREQUENCY_RAD_S)?;
-            let cycles = self.limited("forcing.cycles", table.cycles, Limits::CYCLES)?;
+            let omega = self.limited(
+                &format!("{name}.omega_rad_s"),
+                table.omega_rad_s,
+                Limits::FREQUENCY_RAD_S,
+            )?;
+            let cycles = self.limited(&format!("{name}.cycles"), table.cycles, Limits::CYCLES)?;
             let omega_rad_s = match (omega, cycles) {
                 (Some(omega), None) => omega,
                 (None, Some(cycles)) => cycles * TAU / measurement_s,
                 _ => {
                     return Err(self.keys(&format!(
-                        "[[forcing]] number {k}: give either omega_rad_s or cycles (periods within measurement_s)"
+                        "[[{name}]] number {k}: give either omega_rad_s or cycles (periods within measurement_s)"
                     )));
                 }
             };
             sinusoids.push(Sinusoid {
-                amplitude_deg: self.number("forcing.amplitude_deg", &table.amplitude_deg, Limits::GAIN)?,
+                amplitude_deg: self.number(&format!("{name}.amplitude_deg"), &table.amplitude_deg, Limits::GAIN)?,
                 omega_rad_s,
-                phase_rad: self.number("forcing.phase_rad", &table.phase_rad, Limits::PHASE_RAD)?,
+                phase_rad: self.number(&format!("{name}.phase_rad"), &table.phase_rad, Limits::PHASE_RAD)?,
             });
         }
         ForcingFunction::new(sinusoids).map_err(|error| self.model(error))

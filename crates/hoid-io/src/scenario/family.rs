@@ -15,10 +15,8 @@ use toml::Spanned;
 
 use super::condition::MOST_LINES;
 use super::error::ScenarioFileError;
-use super::family_keys::{
-    ExcitationTable, FamilyFile, FamilyStateTable, FeedforwardTable, FollowsKey, PartTable, ShapeKey,
-};
-use super::keys::RealisationKey;
+use super::family_keys::{ExcitationTable, FamilyFile, FamilyStateTable, FollowsKey, PartTable, ShapeKey};
+use super::keys::{FeedforwardTable, RealisationKey};
 use super::values::{Limits, Source};
 
 impl Source<'_> {
@@ -75,7 +73,8 @@ impl Source<'_> {
             if scenario.target.function.sinusoids().is_empty() {
                 return Err(self.keys("[feedforward] is given, but no displayed [target]: add [target]"));
             }
-            scenario.feedforward = Some(self.feedforward(table, &scenario)?);
+            let muscles = scenario.initial.operator.neuromuscular();
+            scenario.feedforward = Some(self.feedforward(&table, muscles, sample_time)?);
         }
         if let Some(table) = file.disturbance {
             scenario.disturbance = self.excitation("disturbance", table)?;
@@ -190,39 +189,50 @@ impl Source<'_> {
         })
     }
 
-    /// Returns the person's response to a target, which passes through the neuromuscular system of the operator.
-    fn feedforward(
+    /// Returns the person's response to a target, which passes through the neuromuscular system of the operator, omega_nm
+    /// in rad/s and zeta_nm.
+    pub(super) fn feedforward(
         &self,
-        given: FeedforwardTable,
-        scenario: &FamilyScenario,
+        given: &FeedforwardTable,
+        neuromuscular: Option<(f64, f64)>,
+        sample_time: SampleTime,
     ) -> Result<Feedforward, ScenarioFileError> {
-        let of = &scenario.initial.operator;
-        self.checked("feedforward.tau_f_s", given.tau_f_s, Limits::LEAD_S)?;
-        let preview_s = self.whole("feedforward.preview_s", given.preview_s, 0.0, scenario.sample_time, 0.0)?;
-        let delay_s = given.tau_f_s + preview_s;
-        // A negative sum close to zero comes from rounding and is not an input error.
-        let delay_s = if delay_s.abs() < 1e-12 { 0.0 } else { delay_s };
-        if delay_s < 0.0 {
-            return Err(self.keys(&format!(
-                "feedforward.tau_f_s is {}, expected at least {}: a person cannot respond to a target before it is \
-                 displayed",
-                given.tau_f_s, -preview_s
-            )));
-        }
-        let table = FamilyStateTable {
-            k: given.k,
-            k_over_t_i: given.k_over_t_i,
-            k_d_s: given.k_d_s,
-            t_l_s: given.t_l_s,
-            t_i_s: given.t_i_s,
-            omega_nm_rad_s: of.neuromuscular().map(|(omega, _)| omega),
-            zeta_nm: of.neuromuscular().map(|(_, zeta)| zeta),
-            tau_e_s: Some(delay_s),
+        let form = self.form("feedforward.form", &given.form)?;
+        let preview_s = self.whole("feedforward.preview_s", given.preview_s.clone(), 0.0, sample_time, 0.0)?;
+        let of = |table: &str, tau_f_s: f64, gains: FamilyStateTable| {
+            self.checked(&format!("{table}.tau_f_s"), tau_f_s, Limits::LEAD_S)?;
+            let delay_s = Feedforward::delay_s(tau_f_s, preview_s).map_err(|_| {
+                self.keys(&format!(
+                    "{table}.tau_f_s is {tau_f_s}, expected at least {}: a person cannot respond to a target before it \
+                     is displayed",
+                    -preview_s
+                ))
+            })?;
+            let table_of_form = FamilyStateTable {
+                omega_nm_rad_s: neuromuscular.map(|(omega, _)| omega),
+                zeta_nm: neuromuscular.map(|(_, zeta)| zeta),
+                tau_e_s: Some(delay_s),
+                ..gains
+            };
+            self.operator(form, neuromuscular.is_some(), table, &table_of_form)
+        };
+        let gains = |k, k_over_t_i, k_d_s, t_l_s, t_i_s| FamilyStateTable {
+            k,
+            k_over_t_i,
+            k_d_s,
+            t_l_s,
+            t_i_s,
             ..FamilyStateTable::default()
         };
-        let form = self.form("feedforward.form", &given.form)?;
+        let before = || gains(given.k, given.k_over_t_i, given.k_d_s, given.t_l_s, given.t_i_s);
+        let last = given.last.as_ref().map(|last| {
+            let own = gains(last.k, last.k_over_t_i, last.k_d_s, last.t_l_s, last.t_i_s);
+            let tau_f_s = last.tau_f_s.unwrap_or(given.tau_f_s);
+            of("feedforward.last", tau_f_s, own.over(&before()))
+        });
         Ok(Feedforward {
-            operator: self.operator(form, of.has_neuromuscular(), "feedforward", &table)?,
+            operator: of("feedforward", given.tau_f_s, before())?,
+            last: last.transpose()?,
             preview_s,
         })
     }

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::keys::{Number, RealisationKey, ScheduleTable};
+use super::keys::{FeedforwardTable, Number, RealisationKey, ScheduleTable};
 
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -67,31 +67,6 @@ pub(super) struct FamilyStateTable {
     /// Transfer function in s, such as `90/(s(s+6))`, or `NUM/DEN` in descending powers of s, such as `90/1,6,0`.
     #[schemars(with = "Option<String>")]
     pub(super) controlled_element: Option<Spanned<String>>,
-}
-
-/// Response to a target; it includes the neuromuscular system of the operator.
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct FeedforwardTable {
-    /// Form of the response: `gain`, `lead`, `lag`, `derivative`, `derivative-lead` ...
-    #[schemars(with = "String")]
-    pub(super) form: Spanned<String>,
-    #[serde(rename = "K")]
-    pub(super) k: Option<f64>,
-    #[serde(rename = "K_over_T_I")]
-    pub(super) k_over_t_i: Option<f64>,
-    #[serde(rename = "K_d_s")]
-    pub(super) k_d_s: Option<f64>,
-    #[serde(rename = "T_L_s")]
-    pub(super) t_l_s: Option<f64>,
-    #[serde(rename = "T_I_s")]
-    pub(super) t_i_s: Option<f64>,
-    /// Delay relative to the present target, s; at least `-preview_s`.
-    #[serde(default)]
-    pub(super) tau_f_s: f64,
-    /// Time by which the target is displayed ahead, s. Default: zero.
-    #[schemars(with = "Option<f64>")]
-    pub(super) preview_s: Option<Number>,
 }
 
 /// A multisine with prime multiples of the base frequency, or with given lines.

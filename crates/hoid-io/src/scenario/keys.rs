@@ -28,6 +28,61 @@ pub(super) struct File {
     #[serde(default)]
     pub(super) remnant: RemnantTable,
     pub(super) forcing: Option<Vec<SinusoidTable>>,
+    /// Response of the person to a displayed target.
+    pub(super) feedforward: Option<FeedforwardTable>,
+    /// Disturbance at the input of the controlled element.
+    pub(super) disturbance: Option<Vec<SinusoidTable>>,
+    /// Root mean square of the disturbance, deg; without lines in `disturbance`, ten lines between those of the target
+    /// of the thesis.
+    #[schemars(with = "Option<f64>")]
+    pub(super) disturbance_rms_deg: Option<Number>,
+}
+
+/// Keys whose value is a list, so that a list in a plan of a study is one value and not several.
+pub const WHOLE_KEYS: [&str; 2] = ["forcing", "disturbance"];
+
+/// Response to a target; it includes the neuromuscular system of the operator.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FeedforwardTable {
+    /// Form of the response: `gain`, `lead`, `lag`, `derivative`, `derivative-lead` ...
+    #[schemars(with = "String")]
+    pub(super) form: Spanned<String>,
+    #[serde(rename = "K")]
+    pub(super) k: Option<f64>,
+    #[serde(rename = "K_over_T_I")]
+    pub(super) k_over_t_i: Option<f64>,
+    #[serde(rename = "K_d_s")]
+    pub(super) k_d_s: Option<f64>,
+    #[serde(rename = "T_L_s")]
+    pub(super) t_l_s: Option<f64>,
+    #[serde(rename = "T_I_s")]
+    pub(super) t_i_s: Option<f64>,
+    /// Delay relative to the present target, s; at least `-preview_s`.
+    #[serde(default)]
+    pub(super) tau_f_s: f64,
+    /// Time by which the target is displayed ahead, s. Default: zero.
+    #[schemars(with = "Option<f64>")]
+    pub(super) preview_s: Option<Number>,
+    /// Values after the change; missing values are those before it.
+    pub(super) last: Option<FeedforwardLastTable>,
+}
+
+/// Response to a target after the change of the scenario.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FeedforwardLastTable {
+    #[serde(rename = "K")]
+    pub(super) k: Option<f64>,
+    #[serde(rename = "K_over_T_I")]
+    pub(super) k_over_t_i: Option<f64>,
+    #[serde(rename = "K_d_s")]
+    pub(super) k_d_s: Option<f64>,
+    #[serde(rename = "T_L_s")]
+    pub(super) t_l_s: Option<f64>,
+    #[serde(rename = "T_I_s")]
+    pub(super) t_i_s: Option<f64>,
+    pub(super) tau_f_s: Option<f64>,
 }
 
 #[derive(Deserialize, JsonSchema)]

@@ -209,3 +209,64 @@ fn what_the_model_refuses_names_the_file() {
     let nowhere = read_scenario(Path::new("/nowhere/a.toml")).unwrap_err();
     assert!(matches!(nowhere, ScenarioFileError::Unreadable { .. }));
 }
+
+const SEEN: &str = "condition = \"C4\"\ndisturbance_rms_deg = 0.1\n[feedforward]\nform = \"derivative\"\nK_d_s = 0.15\n\
+                    tau_f_s = 0.1\npreview_s = 0.25\n";
+
+#[test]
+fn a_condition_with_a_displayed_target_and_a_disturbance() {
+    let scenario = parse(SEEN).unwrap();
+    let text = "derivative:0.15,tau_f=0.1,preview=0.25";
+    let expected = hoid_model::Feedforward::of_text(text, Some((11.25, 0.35))).unwrap();
+    assert_eq!(scenario.feedforward, Some(expected));
+    assert_eq!(scenario.disturbance.sinusoids().len(), 10);
+    assert!((scenario.disturbance.rms_deg() - 0.1).abs() < 1e-15);
+    // The response after the change, with lines of the disturbance and their rms.
+    let lines = "[[disturbance]]\namplitude_deg = 1\nphase_rad = 0\ncycles = 4\n\
+                 [[disturbance]]\namplitude_deg = 1\nphase_rad = 1\nomega_rad_s = 2\n";
+    let changing = parse(&format!(
+        "{SEEN}[feedforward.last]\nK_d_s = 0.3\ntau_f_s = 0.2\n{lines}"
+    ))
+    .unwrap();
+    let last = changing.feedforward.unwrap().last.unwrap();
+    assert_eq!(last.coordinates()[0], 0.3);
+    assert!((last.tau_e_s() - 0.45).abs() < 1e-15);
+    let amplitudes: Vec<f64> = changing
+        .disturbance
+        .sinusoids()
+        .iter()
+        .map(|s| s.amplitude_deg)
+        .collect();
+    assert!(amplitudes.iter().all(|a| (a - 0.1).abs() < 1e-15), "{amplitudes:?}");
+    // The response to the target may be all that changes.
+    let only = "condition = \"C1\"\n[schedule]\nrate_per_s = 1\nmidpoint_s = 40\n[feedforward]\nform = \"gain\"\nK = 0.1\n\
+                [feedforward.last]\nK = 0.2\n";
+    assert!(parse(only).unwrap().feedforward.unwrap().last.is_some());
+}
+
+#[test]
+fn displays_that_mean_nothing_are_refused() {
+    for (from, to, words) in [
+        ("form = \"derivative\"", "form = \"wheel\"", "feedforward.form is wheel"),
+        ("K_d_s = 0.15", "K = 0.15", "lacks K_d_s"),
+        ("K_d_s = 0.15", "K_d_s = 1e9", "feedforward.K_d_s"),
+        ("tau_f_s = 0.1", "tau_f_s = -0.3", "before it is displayed"),
+        ("preview_s = 0.25", "preview_s = 0.251", "feedforward.preview_s"),
+        ("preview_s = 0.25", "preview = 0.25", "unknown field"),
+        (
+            "condition = \"C4\"",
+            "condition = \"C4\"\nforcing = []",
+            "target is at rest",
+        ),
+        (
+            "disturbance_rms_deg = 0.1",
+            "disturbance_rms_deg = -1",
+            "disturbance_rms_deg",
+        ),
+    ] {
+        let error = refusal(&SEEN.replace(from, to));
+        assert!(error.contains(words), "{to}: {error}");
+    }
+    let constant = SEEN.replace("C4", "C1") + "[feedforward.last]\nK_d_s = 0.3\n";
+    assert!(refusal(&constant).contains("add [schedule]"));
+}

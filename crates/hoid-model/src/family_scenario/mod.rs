@@ -12,6 +12,7 @@
 //! | `display` | [`Display`]: the signals that the person sees |
 //! | `multi_sine` | [`MultiSine`], [`Excitation`]: targets and disturbances as used in experiments with people |
 //! | `remnant` | [`RemnantPart`], [`Stick`]: components of u other than the response to e and f |
+//! | `typical_feedforward` | [`typical_feedforward`](typical_feedforward()): response to a target with the inverse of the machine |
 //! | `scenario` | [`FamilyScenario`] and the quantities derived from it for a simulation |
 
 mod display;
@@ -19,6 +20,7 @@ mod multi_sine;
 mod remnant;
 mod scenario;
 mod state;
+mod typical_feedforward;
 
 pub use crate::feedforward::Feedforward;
 pub use display::Display;
@@ -26,3 +28,7 @@ pub use multi_sine::{Excitation, Interleaved, MultiSine};
 pub use remnant::{Followed, Intermittence, PartStrength, Pulses, RemnantPart, RemnantShape, SignalDependence, Stick};
 pub use scenario::{FamilyScenario, ResolvedFamilyScenario};
 pub use state::FamilyState;
+pub use typical_feedforward::{
+    FOLLOWED_FRACTION, LONGEST_LEAD_S, NEAR_CROSSOVER_RAD_S, PREVIEW_S, SHORTEST_S, slope, time_constant,
+    typical_feedforward,
+};

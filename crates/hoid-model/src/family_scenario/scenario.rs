@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     FamilyOperator, Feedforward, ModelError, SampleTime,
-    feedforward::{delay_at, delays},
+    feedforward::{OperatorAt, delay_at, delays},
     scenario::Realisation,
     schedule::Schedule,
 };
@@ -213,7 +213,7 @@ impl ResolvedFamilyScenario {
     ///
     /// # Errors
     /// As [`ResolvedFamilyScenario::state_at`].
-    pub fn feedforward_at(&self, t_s: f64) -> Result<Option<(FamilyOperator, (usize, f64))>, ModelError> {
+    pub fn feedforward_at(&self, t_s: f64) -> Result<Option<OperatorAt>, ModelError> {
         let FamilyScenario {
             initial,
             last,

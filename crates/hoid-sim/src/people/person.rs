@@ -6,8 +6,8 @@
 //! loop is unstable is drawn again.
 
 use hoid_model::{
-    Complex64, FamilyOperator, FamilyScenario, FamilyState, Form, ModelError, Record, SampleTime,
-    family_scenario::{RemnantPart, Stick},
+    Complex64, FamilyOperator, FamilyScenario, FamilyState, Feedforward, Form, ModelError, Record, SampleTime,
+    family_scenario::{Display, PREVIEW_S, RemnantPart, Stick, typical_feedforward},
     margins::{MANUAL_CONTROL_RANGE_RAD_S, closed_loop_is_stable, margins},
     operator_family::Coordinate,
 };
@@ -29,6 +29,11 @@ pub struct Task {
     pub run_in_s: f64,
     /// Spread of the parameters between runs, such as 0.03 for 3 %. Default: 0.
     pub between_runs: f64,
+    /// Display of the task. Unless only the error is displayed, a target with lines between those of the disturbance is
+    /// displayed, and the person responds to it. Default: only the error.
+    pub display: Display,
+    /// Time by which [`Display::Preview`] shows the target ahead, in s. Default: 1 s.
+    pub preview_s: f64,
 }
 
 impl Default for Task {
@@ -38,6 +43,8 @@ impl Default for Task {
             measurement_s: 40.0,
             run_in_s: 5.0,
             between_runs: 0.0,
+            display: Display::Compensatory,
+            preview_s: PREVIEW_S,
         }
     }
 }
@@ -49,6 +56,8 @@ pub struct Person {
     pub plant: Plant,
     /// Operator and controlled element, without the spread between runs.
     pub state: FamilyState,
+    /// Response to the displayed target, without the spread between runs; `None` if only the error is displayed.
+    pub feedforward: Option<Feedforward>,
     /// Kind of remnant.
     pub kind: RemnantKind,
     /// Share of the variance of u that is due to the remnant.
@@ -71,7 +80,9 @@ pub struct Person {
 pub struct PersonRun {
     /// Operator and controlled element of this run; the same as those of the person if there is no spread between runs.
     pub state: FamilyState,
-    /// Record of e, u, d, y and n from the start of the measurement.
+    /// Response to the displayed target in this run.
+    pub feedforward: Option<Feedforward>,
+    /// Record of e, u, d, y and n, and of f_t if it is displayed, from the start of the measurement.
     pub record: Record,
 }
 
@@ -82,6 +93,8 @@ const MOST_RUN_DRAWS: usize = 50;
 /// Number of random values per draw.
 const NUMBERS: usize = 16;
 const PERSON: u64 = u64::from_le_bytes(*b"person\0\0");
+const DISPLAY: u64 = u64::from_le_bytes(*b"display\0");
+const TARGET_SPREAD: u64 = u64::from_le_bytes(*b"tspread\0");
 const SPREAD: u64 = u64::from_le_bytes(*b"spread\0\0");
 
 impl Person {
@@ -133,6 +146,13 @@ impl Person {
             let mut scenario = FamilyScenario::new(state.clone(), task.sample_time);
             scenario.name = format!("person {person}");
             scenario.disturbance = plant.disturbance().excitation()?;
+            if task.display != Display::Compensatory {
+                let followed = population.followed.at(streams.uniform_of(DISPLAY, 1)[0]);
+                let [target, disturbance] = plant.interleaved();
+                scenario.target = target.excitation()?;
+                scenario.disturbance = disturbance.excitation()?;
+                scenario.feedforward = typical_feedforward(&state, task.display, followed, task.preview_s)?;
+            }
             scenario.remnant.clone_from(&remnant);
             scenario.measurement_s = task.measurement_s;
             scenario.run_in_s = task.run_in_s;
@@ -150,6 +170,7 @@ impl Person {
                 offset_u: population.offset * (2.0 * draw[14] - 1.0) * of_u,
             };
             return Ok(Self {
+                feedforward: scenario.feedforward,
                 plant,
                 kind,
                 remnant_share,
@@ -192,35 +213,36 @@ impl Person {
         if self.task.between_runs == 0.0 {
             return Ok(PersonRun {
                 state: self.state.clone(),
+                feedforward: self.feedforward.clone(),
                 record: self.simulator.run(seed, false)?,
             });
         }
-        let kinds = self
-            .state
-            .operator
-            .form()
-            .coordinates(self.state.operator.has_neuromuscular());
-        let deviates = seed.white_noise_of(SPREAD, kinds.len() * MOST_RUN_DRAWS);
-        for z in deviates.chunks_exact(kinds.len()) {
-            let spread = |((x, kind), z): ((&f64, &Coordinate), &f64)| {
-                let by = self.task.between_runs * z;
-                match kind {
-                    Coordinate::LogOmega | Coordinate::LogZeta => x + by,
-                    _ => x * by.exp(),
-                }
-            };
-            let own = self.state.operator.coordinates();
-            let coordinates: Vec<f64> = own.iter().zip(&kinds).zip(z).map(spread).collect();
-            let operator = &self.state.operator;
+        let number = |operator: &FamilyOperator| operator.coordinates().len();
+        let deviates = seed.white_noise_of(SPREAD, number(&self.state.operator) * MOST_RUN_DRAWS);
+        let of_target = self.feedforward.as_ref().map_or(0, |seen| number(&seen.operator));
+        // Without a displayed target, there are no deviates for its response in any draw.
+        let of_target = seed.white_noise_of(TARGET_SPREAD, of_target * MOST_RUN_DRAWS);
+        for (draw, z) in deviates.chunks_exact(number(&self.state.operator)).enumerate() {
             let state = FamilyState {
-                operator: FamilyOperator::new(operator.form(), operator.has_neuromuscular(), &coordinates)?,
+                operator: self.task.spread(&self.state.operator, z)?,
                 ..self.state.clone()
+            };
+            let feedforward = match &self.feedforward {
+                Some(seen) => Some(self.task.spread_feedforward(seen, &state.operator, &of_target, draw)?),
+                None => None,
             };
             let mut scenario = self.scenario().clone();
             scenario.initial = state.clone();
             scenario.last = state.clone();
+            scenario.feedforward.clone_from(&feedforward);
             match FamilySimulator::new(&scenario).and_then(|simulator| simulator.run(seed, false)) {
-                Ok(record) => return Ok(PersonRun { state, record }),
+                Ok(record) => {
+                    return Ok(PersonRun {
+                        state,
+                        feedforward,
+                        record,
+                    });
+                }
                 Err(SimError::Model(ModelError::UnstableLoop { .. }) | SimError::Diverged { .. }) => {}
                 Err(other) => return Err(other),
             }
@@ -230,6 +252,40 @@ impl Person {
             plant: self.plant.to_string(),
             draws: MOST_RUN_DRAWS,
         })
+    }
+}
+
+impl Task {
+    /// Returns an operator whose parameters are multiplied by `exp(b z)`, where b is the spread between runs.
+    fn spread(&self, operator: &FamilyOperator, z: &[f64]) -> Result<FamilyOperator, ModelError> {
+        let kinds = operator.form().coordinates(operator.has_neuromuscular());
+        let spread = |((x, kind), z): ((&f64, &Coordinate), &f64)| {
+            let by = self.between_runs * z;
+            match kind {
+                Coordinate::LogOmega | Coordinate::LogZeta => x + by,
+                _ => x * by.exp(),
+            }
+        };
+        let own = operator.coordinates();
+        let coordinates: Vec<f64> = own.iter().zip(&kinds).zip(z).map(spread).collect();
+        FamilyOperator::new(operator.form(), operator.has_neuromuscular(), &coordinates)
+    }
+
+    /// Returns a response to the target with the spread of a run and the neuromuscular system of the run.
+    fn spread_feedforward(
+        &self,
+        seen: &Feedforward,
+        of_run: &FamilyOperator,
+        deviates: &[f64],
+        draw: usize,
+    ) -> Result<Feedforward, ModelError> {
+        let number = seen.operator.coordinates().len();
+        let own = self.spread(&seen.operator, &deviates[draw * number..(draw + 1) * number])?;
+        let shared = match of_run.neuromuscular() {
+            Some((omega, zeta)) => own.with_neuromuscular(omega, zeta)?,
+            None => own,
+        };
+        Ok(Feedforward::new(shared, seen.preview_s))
     }
 }
 

@@ -11,9 +11,13 @@
 //! | omega_nm | 8 to 16 rad/s | R. E. Magdaleno and D. T. McRuer, NASA CR-1757 (1971); M. M. van Paassen, *Biophysics in Aircraft Control* (1994) |
 //! | zeta_nm | 0.1 to 0.6 | Magdaleno and McRuer; van Paassen |
 //! | tau | 0.12 to 0.4 s | McRuer and Jex: 0.12 to 0.2 s for practised people on `K/s`, longer for elements of higher order |
+//! | followed fraction of a displayed target | 0.4 to 1 | R. J. Wasicko, D. T. McRuer and R. E. Magdaleno, AFFDL-TR-66-137 (1966) |
 //! | phase margin | 20 to 65 deg | McRuer and Jex |
 
-use hoid_model::{ContinuousTransferFunction, Form, ModelError, family_scenario::MultiSine};
+use hoid_model::{
+    ContinuousTransferFunction, Form, ModelError,
+    family_scenario::{Interleaved, MultiSine},
+};
 
 /// Range of values.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,6 +86,9 @@ pub struct Population {
     pub largest_sensitivity: f64,
     /// Share of the variance of u that is due to the remnant. Default: 0.05 to 0.5.
     pub remnant_share: Range,
+    /// Fraction of a displayed target that the machine follows by the response to the target alone, near 3 rad/s
+    /// ([`typical_feedforward`](hoid_model::family_scenario::typical_feedforward)). Default: 0.4 to 1.
+    pub followed: Range,
     /// Largest offset of the recorded e and u, in either direction, relative to the rms of the signal. Default: 0.3.
     pub offset: f64,
     /// Random walk of the stick, in rms of u per square root of a second. Default: 0.03.
@@ -101,6 +108,7 @@ impl Default for Population {
             phase_margin_deg: Range::new(20.0, 65.0),
             largest_sensitivity: 4.0,
             remnant_share: Range::new(0.05, 0.5),
+            followed: Range::new(0.4, 1.0),
             offset: 0.3,
             walk_per_root_s: 0.03,
         }
@@ -120,6 +128,7 @@ impl Population {
         self.phase_margin_deg
             .check("phase margin of the population in deg", 0.0)?;
         self.remnant_share.check("remnant share of the population", 0.0)?;
+        self.followed.check("followed fraction of the target", 0.0)?;
         for (quantity, found, most) in [
             ("chance of an infinite T_I", self.integrates, 1.0),
             ("remnant share of the population", self.remnant_share.high, 0.9),
@@ -196,6 +205,15 @@ impl Plant {
             Self::Integrator => &[Form::LeadLag],
             Self::LaggedIntegrator | Self::DoubleIntegrator => &[Form::Lead2Lag, Form::Lead],
         }
+    }
+
+    /// Returns target and disturbance of a task with a displayed target: the multi-sine of [`Plant::disturbance`], whose
+    /// primes are used alternately by target and disturbance.
+    pub fn interleaved(self) -> [MultiSine; 2] {
+        [Interleaved::Even, Interleaved::Odd].map(|interleaved| MultiSine {
+            interleaved,
+            ..self.disturbance()
+        })
     }
 
     /// Returns the disturbance: a multi-sine at the prime multiples of 0.05 Hz, up to 31 times with `1/s` and up to 17

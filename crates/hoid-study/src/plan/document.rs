@@ -144,7 +144,7 @@ impl Plan {
             text: text.to_owned(),
         };
         for table in &scenarios {
-            for variant in variants(table, text, &["forcing"])? {
+            for variant in variants(table, text, &hoid_io::WHOLE_KEYS)? {
                 let index = plan.cells.len() as u64;
                 plan.cells.push(cell(&variant, index, plan.replications)?);
             }

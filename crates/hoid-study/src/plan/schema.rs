@@ -30,7 +30,10 @@ pub fn plan_schema_of(methods: &[MethodSpec]) -> String {
     add_settings(&mut estimator, methods);
     let whole = whole_keys();
     let whole: Vec<&str> = whole.iter().map(String::as_str).collect();
-    for (table, whole) in [(&mut estimator, whole.as_slice()), (&mut scenario, &["forcing"])] {
+    for (table, whole) in [
+        (&mut estimator, whole.as_slice()),
+        (&mut scenario, hoid_io::WHOLE_KEYS.as_slice()),
+    ] {
         strip(table);
         with_lists(table, whole);
     }
