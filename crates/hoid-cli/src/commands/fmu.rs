@@ -93,7 +93,18 @@ fn of_operator(operator: &OperatorChoice, seed: i32) -> Result<Unit, CliError> {
         OperatorChoice::File(file) => (read_settings(file)?, file.display().to_string(), vec![file.clone()]),
     };
     // An error that would prevent the unit from starting in a simulator is reported here.
-    let step_s = match parse_any_scenario(&text, &source, &source)? {
+    let scenario = parse_any_scenario(&text, &source, &source)?;
+    let seen = match &scenario {
+        AnyScenario::Reference(scenario) => scenario.feedforward.is_some(),
+        AnyScenario::Family(scenario) => scenario.feedforward.is_some(),
+    };
+    if seen {
+        return Err(CliError::Usage(format!(
+            "{source} has [feedforward], but the input of the unit is the error alone; remove [feedforward], or add the \
+             response to the target outside the unit"
+        )));
+    }
+    let step_s = match scenario {
         AnyScenario::Reference(scenario) => {
             Simulator::new(&scenario)?;
             scenario.sample_time.s()

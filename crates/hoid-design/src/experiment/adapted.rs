@@ -17,7 +17,7 @@
 use hoid_ident::family::OperatorPrior;
 use hoid_model::{
     ContinuousTransferFunction, FamilyOperator, FamilyState, Form, ModelError,
-    family_scenario::{LONGEST_LEAD_S, NEAR_CROSSOVER_RAD_S, SHORTEST_S, slope, time_constant},
+    family_scenario::{LONGEST_LEAD_S, NEAR_CROSSOVER_RAD_S, slope, time_constant},
     operator_family::Coordinate,
 };
 

@@ -17,7 +17,7 @@ use crate::{ContinuousTransferFunction, FamilyOperator, Feedforward, Form, Model
 /// Frequency at which slopes are evaluated, rad/s.
 pub const NEAR_CROSSOVER_RAD_S: f64 = 3.0;
 /// Shortest time constant of people, s.
-pub const SHORTEST_S: f64 = 0.1;
+const SHORTEST_S: f64 = 0.1;
 /// Longest lead of people, s.
 pub const LONGEST_LEAD_S: f64 = 2.0;
 /// Fraction of the target that the machine follows.
