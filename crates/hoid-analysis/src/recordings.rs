@@ -133,10 +133,15 @@ impl Recordings {
         let all = self.records.iter().flat_map(Record::channels);
         let Channel { name, role, .. } = all.into_iter().find(is_missing)?;
         let error = first.input_channel().map_or("e", |error| error.name.as_str());
+        let received = if role.starts_with("motion") {
+            "the person felt"
+        } else {
+            "the display showed"
+        };
         Some(Finding::doubt(
             "displayed",
             format!(
-                "the display showed {name} ({role}), but the model lacks this input: the response to the \
+                "{received} {name} ({role}), but the model lacks this input: the response to the \
                  error, crossover and margins are not those of the person; use hoid identify --input {error} --input \
                  {name} --role {name}={role}"
             ),

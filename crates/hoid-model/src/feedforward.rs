@@ -73,7 +73,7 @@ impl Feedforward {
                 None => [number(name, text)?; 2],
             })
         };
-        let of_gain = form.gain_name();
+        let (of_gain, _) = form.gain();
         let mut pairs = vec![(of_gain.to_owned(), both(of_gain, gain)?)];
         let (mut tau_f, mut preview_s) = ([0.0; 2], 0.0);
         for part in parts {
@@ -209,20 +209,6 @@ impl Feedforward {
         Ok((operator, delay))
     }
 
-    /// Returns name, unit and value of the parameters of this response in one of its states: those of the form, and
-    /// tau_f. The parameters of the neuromuscular system are those of the response to the error.
-    pub fn named(&self, state: &FamilyOperator) -> Vec<(&'static str, &'static str, f64)> {
-        let own = state
-            .named()
-            .into_iter()
-            .filter(|p| !["omega_nm", "zeta_nm"].contains(&p.name));
-        let of = |p: crate::operator_family::NamedParameter| match p.name {
-            "tau_e" => ("tau_f", p.unit, p.value - self.preview_s),
-            name => (name, p.unit, p.value),
-        };
-        own.map(of).collect()
-    }
-
     /// Returns the role of the target in a recording: `feedforward`, or `feedforward:0.25` with a preview of 0.25 s.
     pub fn role(&self) -> String {
         if self.preview_s > 0.0 {
@@ -231,6 +217,19 @@ impl Feedforward {
             "feedforward".to_owned()
         }
     }
+}
+
+/// Returns name, unit and value of the parameters of the response to a further input: those of its form, and the delay
+/// tau_f relative to the present input. The parameters of the neuromuscular system are those of the response to the
+/// error.
+pub fn response_parameters(operator: &FamilyOperator, preview_s: f64) -> Vec<(&'static str, &'static str, f64)> {
+    let named = operator.named().into_iter();
+    let own = named.filter(|p| !["omega_nm", "zeta_nm"].contains(&p.name));
+    let of = |p: crate::operator_family::NamedParameter| match p.name {
+        "tau_e" => ("tau_f", p.unit, p.value - preview_s),
+        name => (name, p.unit, p.value),
+    };
+    own.map(of).collect()
 }
 
 /// Returns the delays before and after a change, each as a number of whole samples and a fraction of a sample. If the
@@ -282,8 +281,9 @@ mod tests {
         let late = of("derivative:0.15,tau_f=0.1,preview=0.25");
         assert!((late.operator.tau_e_s() - 0.35).abs() < 1e-15);
         assert_eq!(late.role(), "feedforward:0.25");
-        assert_eq!(late.named(&late.operator)[0], ("K_d", "s", 0.15));
-        assert!((late.named(&late.operator)[1].2 - 0.1).abs() < 1e-15);
+        let parameters = response_parameters(&late.operator, late.preview_s);
+        assert_eq!(parameters[0], ("K_d", "s", 0.15));
+        assert!(parameters[1].0 == "tau_f" && (parameters[1].2 - 0.1).abs() < 1e-15);
         let early = of("lag:0.5, T_I=2, tau_f=-0.25, preview=0.25");
         assert_eq!(early.operator.tau_e_s(), 0.0);
         assert_eq!(early.operator.coordinates()[..2], [0.25, 0.5]);

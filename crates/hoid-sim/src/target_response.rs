@@ -6,7 +6,10 @@
 //! ([`HeldOperator`]), with the parameters at each sample. Both give the same response up to rounding.
 
 use hoid_core::filter::{divide_in_place, fir};
-use hoid_model::{Channel, FamilyOperator, Feedforward, ModelError, SampleTime, feedforward::OperatorAt};
+use hoid_model::{
+    Channel, FamilyOperator, Feedforward, ModelError, SampleTime,
+    feedforward::{OperatorAt, response_parameters},
+};
 
 use crate::held_operator::{HeldOperator, OperatorState};
 
@@ -90,20 +93,30 @@ impl TargetResponse {
     /// Returns the true parameters of the response at each sample from `first` to before `end`, named after the target:
     /// `f_t_K_d`, `f_t_tau_f` and so on. Only parameters that are finite throughout are included.
     pub fn truth(&self, first: usize, end: usize) -> Vec<Channel> {
-        let named: Vec<_> = self
-            .instants
-            .iter()
-            .map(|(operator, _)| self.feedforward.named(operator))
-            .collect();
-        let Some(any) = named.first() else { return Vec::new() };
-        let channel = |(i, (name, unit, _)): (usize, &(&str, &str, f64))| {
-            let value = |k: usize| named[k.min(named.len() - 1)][i].2;
-            Channel::new(format!("f_t_{name}"), *unit, (first..end).map(value).collect())
-        };
-        let all = any.iter().enumerate().map(channel);
-        all.filter(|channel| channel.values.iter().all(|v| v.is_finite()))
-            .collect()
+        let preview_s = self.feedforward.preview_s;
+        let of = |(operator, _): &OperatorAt| response_parameters(operator, preview_s);
+        let named: Vec<_> = self.instants.iter().map(of).collect();
+        truth_of("f_t", (first, end), |k| &named[k.min(named.len() - 1)])
     }
+}
+
+/// Returns the true parameters of the response to a further input at each sample from `first` to before `end`, named
+/// after the input. Only parameters that are finite throughout are included.
+pub(crate) fn truth_of<'n>(
+    input: &str,
+    (first, end): (usize, usize),
+    at: impl Fn(usize) -> &'n [(&'static str, &'static str, f64)],
+) -> Vec<Channel> {
+    if first >= end {
+        return Vec::new();
+    }
+    let channel = |(i, (name, unit, _)): (usize, &(&str, &str, f64))| {
+        let values = (first..end).map(|k| at(k)[i].2).collect();
+        Channel::new(format!("{input}_{name}"), *unit, values)
+    };
+    let all = at(first).iter().enumerate().map(channel);
+    all.filter(|channel| channel.values.iter().all(|v| v.is_finite()))
+        .collect()
 }
 
 #[cfg(test)]

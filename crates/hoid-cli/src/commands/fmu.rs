@@ -96,12 +96,12 @@ fn of_operator(operator: &OperatorChoice, seed: i32) -> Result<Unit, CliError> {
     let scenario = parse_any_scenario(&text, &source, &source)?;
     let seen = match &scenario {
         AnyScenario::Reference(scenario) => scenario.feedforward.is_some(),
-        AnyScenario::Family(scenario) => scenario.feedforward.is_some(),
+        AnyScenario::Family(scenario) => scenario.feedforward.is_some() || scenario.motion.is_some(),
     };
     if seen {
         return Err(CliError::Usage(format!(
-            "{source} has [feedforward], but the input of the unit is the error alone; remove [feedforward], or add the \
-             response to the target outside the unit"
+            "{source} has [feedforward] or [motion], but the input of the unit is the error alone; remove this table, or \
+             add the response outside the unit"
         )));
     }
     let step_s = match scenario {

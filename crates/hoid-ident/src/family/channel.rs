@@ -26,6 +26,16 @@ hoid_model::named_choice!(ChannelRole, "role of a channel", 3, {
     Output => "output",
 });
 
+impl ChannelRole {
+    /// Forms that are compared for a channel with this role.
+    pub fn forms(self) -> &'static [Form] {
+        match self {
+            Self::Feedforward | Self::Output => &Form::OF_TARGET,
+            Self::Motion => &Form::OF_MOTION,
+        }
+    }
+}
+
 /// A requested further input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeenChannel {
@@ -46,7 +56,7 @@ impl SeenChannel {
             name: name.into(),
             role,
             preview_s: 0.0,
-            forms: Form::OF_TARGET.to_vec(),
+            forms: role.forms().to_vec(),
         }
     }
 }

@@ -299,7 +299,7 @@ mod tests {
             Form::LeadLag | Form::Lead2Lag => &[4.0, 0.6, 0.2],
             Form::QuadraticIntegral => &[2.0, 0.9, 0.3],
             Form::LeadDroop => &[1.5, 0.5, 0.4],
-            Form::Derivative => &[1.5],
+            Form::Derivative | Form::Canals | Form::CanalsRate => &[1.5],
             Form::DerivativeLead => &[1.5, 0.4],
         };
         FamilyOperator::new(form, true, &[head, &tail].concat()).unwrap()

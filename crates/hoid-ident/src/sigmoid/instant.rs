@@ -1,5 +1,7 @@
 //! The sigmoid (eq. 5) and the numerator of the operator at one time.
 
+use hoid_model::operator_family::POWERS;
+
 use super::layout::{Layout, MOST_VARYING};
 
 /// Argument above which `e^-x` is zero in double precision.
@@ -17,9 +19,9 @@ pub(crate) struct Instant {
     /// Parameters of the numerator, starting with the gain.
     pub values: [f64; MOST_VARYING],
     /// The numerator divided by its gain, in ascending powers of s.
-    pub shape: [f64; 3],
+    pub shape: [f64; POWERS],
     /// Derivatives of the shape with respect to all parameters except the gain.
-    pub slopes: [[f64; 3]; 2],
+    pub slopes: [[f64; POWERS]; 2],
 }
 
 impl Instant {

@@ -187,9 +187,8 @@ impl Layout {
     fn parameter(&self, coordinate: Coordinate) -> &'static str {
         match (coordinate, self.form) {
             (Coordinate::Gain, Form::Lead) => "K_e",
-            (Coordinate::Gain, Form::QuadraticIntegral) => "K_I",
-            (Coordinate::Gain, form) if form.is_derivative() => "K_d",
             (Coordinate::Gain, form) if form.has_lag() => "K_over_T_I",
+            (Coordinate::Gain, form) => form.gain().0,
             _ => coordinate.parameter(),
         }
     }

@@ -190,6 +190,12 @@ fn parameters(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f
         Form::Lead | Form::LeadLag => [n[0], over(n[1], n[0]), 0.0],
         Form::QuadraticIntegral => [n[0], over(n[1], n[0]), over(n[2], n[0])],
         Form::Derivative => [n[1], 0.0, 0.0],
+        // The first power of s with a coefficient gives the gain.
+        Form::Canals | Form::CanalsRate => {
+            let (shape, _) = form.shape(&[]);
+            let first = shape.iter().position(|m| *m != 0.0).unwrap_or(0);
+            [over(n[first], shape[first]), 0.0, 0.0]
+        }
         Form::DerivativeLead => [n[1], over(n[2], n[1]), 0.0],
         Form::Lead2 | Form::Lead2Lag => square_of_a_lead(form, n, metric),
         Form::LeadDroop => {

@@ -76,6 +76,13 @@ impl Source<'_> {
             let muscles = scenario.initial.operator.neuromuscular();
             scenario.feedforward = Some(self.feedforward(&table, muscles, sample_time)?);
         }
+        if let Some(table) = file.motion {
+            if table.preview_s.is_some() || table.last.is_some() {
+                return Err(self.keys("[motion] has a preview or values after the change; expected neither"));
+            }
+            let muscles = scenario.initial.operator.neuromuscular();
+            scenario.motion = Some(self.further_input("motion", &table, muscles, sample_time)?.operator);
+        }
         if let Some(table) = file.disturbance {
             scenario.disturbance = self.excitation("disturbance", table)?;
         }
@@ -150,9 +157,13 @@ impl Source<'_> {
                         (&["K"], need("K or K_over_T_I", given.k)? / t_i)
                     }
                 },
-                Coordinate::Gain if form == Form::QuadraticIntegral => (&["K_I"], need("K_I", given.k_i)?),
-                Coordinate::Gain if form.is_derivative() => (&["K_d_s"], need("K_d_s", given.k_d_s)?),
-                Coordinate::Gain => (&["K"], need("K", given.k)?),
+                Coordinate::Gain => match form.gain().0 {
+                    "K_I" => (&["K_I"], need("K_I", given.k_i)?),
+                    "K_d" => (&["K_d_s"], need("K_d_s", given.k_d_s)?),
+                    "K_m" => (&["K_m_s2"], need("K_m_s2", given.k_m_s2)?),
+                    "K_m_rate" => (&["K_m_rate_s"], need("K_m_rate_s", given.k_m_rate_s)?),
+                    _ => (&["K"], need("K", given.k)?),
+                },
                 Coordinate::Lead => (&["T_L_s"], need("T_L_s", given.t_l_s)?),
                 Coordinate::LagRate => (&["T_I_s"], 1.0 / positive("T_I_s", given.t_i_s)?),
                 Coordinate::Linear => (&["c_1_s"], need("c_1_s", given.c_1_s)?),
@@ -197,8 +208,20 @@ impl Source<'_> {
         neuromuscular: Option<(f64, f64)>,
         sample_time: SampleTime,
     ) -> Result<Feedforward, ScenarioFileError> {
-        let form = self.form("feedforward.form", &given.form)?;
-        let preview_s = self.whole("feedforward.preview_s", given.preview_s.clone(), 0.0, sample_time, 0.0)?;
+        self.further_input("feedforward", given, neuromuscular, sample_time)
+    }
+
+    /// As [`Self::feedforward`], for a table with another name.
+    fn further_input(
+        &self,
+        name: &str,
+        given: &FeedforwardTable,
+        neuromuscular: Option<(f64, f64)>,
+        sample_time: SampleTime,
+    ) -> Result<Feedforward, ScenarioFileError> {
+        let form = self.form(&format!("{name}.form"), &given.form)?;
+        let preview_s = given.preview_s.clone();
+        let preview_s = self.whole(&format!("{name}.preview_s"), preview_s, 0.0, sample_time, 0.0)?;
         let of = |table: &str, tau_f_s: f64, gains: FamilyStateTable| {
             self.checked(&format!("{table}.tau_f_s"), tau_f_s, Limits::LEAD_S)?;
             let delay_s = Feedforward::delay_s(tau_f_s, preview_s).map_err(|_| {
@@ -216,22 +239,32 @@ impl Source<'_> {
             };
             self.operator(form, neuromuscular.is_some(), table, &table_of_form)
         };
-        let gains = |k, k_over_t_i, k_d_s, t_l_s, t_i_s| FamilyStateTable {
-            k,
-            k_over_t_i,
-            k_d_s,
-            t_l_s,
-            t_i_s,
+        let before = || FamilyStateTable {
+            k: given.k,
+            k_over_t_i: given.k_over_t_i,
+            k_d_s: given.k_d_s,
+            k_m_s2: given.k_m_s2,
+            k_m_rate_s: given.k_m_rate_s,
+            t_l_s: given.t_l_s,
+            t_i_s: given.t_i_s,
             ..FamilyStateTable::default()
         };
-        let before = || gains(given.k, given.k_over_t_i, given.k_d_s, given.t_l_s, given.t_i_s);
         let last = given.last.as_ref().map(|last| {
-            let own = gains(last.k, last.k_over_t_i, last.k_d_s, last.t_l_s, last.t_i_s);
+            let own = FamilyStateTable {
+                k: last.k,
+                k_over_t_i: last.k_over_t_i,
+                k_d_s: last.k_d_s,
+                k_m_s2: last.k_m_s2,
+                k_m_rate_s: last.k_m_rate_s,
+                t_l_s: last.t_l_s,
+                t_i_s: last.t_i_s,
+                ..FamilyStateTable::default()
+            };
             let tau_f_s = last.tau_f_s.unwrap_or(given.tau_f_s);
-            of("feedforward.last", tau_f_s, own.over(&before()))
+            of(&format!("{name}.last"), tau_f_s, own.over(&before()))
         });
         Ok(Feedforward {
-            operator: of("feedforward", given.tau_f_s, before())?,
+            operator: of(name, given.tau_f_s, before())?,
             last: last.transpose()?,
             preview_s,
         })
@@ -426,7 +459,7 @@ impl Source<'_> {
 /// Returns the admissible range of an operator parameter.
 fn limits_of(key: &str) -> Limits {
     match key {
-        "T_L_s" | "T_I_s" | "c_1_s" | "c_2_s2" | "tau_e_s" | "K_d_s" => Limits::LEAD_S,
+        "T_L_s" | "T_I_s" | "c_1_s" | "c_2_s2" | "tau_e_s" | "K_d_s" | "K_m_s2" | "K_m_rate_s" => Limits::LEAD_S,
         "omega_nm_rad_s" => Limits::FREQUENCY_RAD_S,
         "zeta_nm" => Limits::DAMPING,
         _ => Limits::GAIN,
@@ -434,12 +467,14 @@ fn limits_of(key: &str) -> Limits {
 }
 
 impl FamilyStateTable {
-    fn numbers(&self) -> [(&'static str, Option<f64>); 12] {
+    fn numbers(&self) -> [(&'static str, Option<f64>); 14] {
         [
             ("K", self.k),
             ("K_over_T_I", self.k_over_t_i),
             ("K_I", self.k_i),
             ("K_d_s", self.k_d_s),
+            ("K_m_s2", self.k_m_s2),
+            ("K_m_rate_s", self.k_m_rate_s),
             ("T_L_s", self.t_l_s),
             ("T_I_s", self.t_i_s),
             ("c_1_s", self.c_1_s),
@@ -460,6 +495,8 @@ impl FamilyStateTable {
             k_over_t_i: gain(self.k_over_t_i, base.k_over_t_i),
             k_i: self.k_i.or(base.k_i),
             k_d_s: self.k_d_s.or(base.k_d_s),
+            k_m_s2: self.k_m_s2.or(base.k_m_s2),
+            k_m_rate_s: self.k_m_rate_s.or(base.k_m_rate_s),
             t_l_s: self.t_l_s.or(base.t_l_s),
             t_i_s: self.t_i_s.or(base.t_i_s),
             c_1_s: self.c_1_s.or(base.c_1_s),

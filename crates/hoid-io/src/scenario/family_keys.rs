@@ -31,6 +31,8 @@ pub(super) struct FamilyFile {
     pub(super) target: Option<ExcitationTable>,
     /// Response of the person to a displayed target.
     pub(super) feedforward: Option<FeedforwardTable>,
+    /// Response of the person to the motion of the controlled element, its output.
+    pub(super) motion: Option<FeedforwardTable>,
     pub(super) disturbance: Option<ExcitationTable>,
     #[serde(default)]
     pub(super) remnant: Vec<PartTable>,
@@ -53,6 +55,10 @@ pub(super) struct FamilyStateTable {
     pub(super) k_i: Option<f64>,
     #[serde(rename = "K_d_s")]
     pub(super) k_d_s: Option<f64>,
+    #[serde(rename = "K_m_s2")]
+    pub(super) k_m_s2: Option<f64>,
+    #[serde(rename = "K_m_rate_s")]
+    pub(super) k_m_rate_s: Option<f64>,
     #[serde(rename = "T_L_s")]
     pub(super) t_l_s: Option<f64>,
     /// Lag time constant in s; `inf` makes the lag a pure integrator.

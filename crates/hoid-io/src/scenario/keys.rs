@@ -41,7 +41,7 @@ pub(super) struct File {
 /// Keys whose value is a list, so that a list in a plan of a study is one value and not several.
 pub const WHOLE_KEYS: [&str; 2] = ["forcing", "disturbance"];
 
-/// Response to a target; it includes the neuromuscular system of the operator.
+/// Response to a target or to motion; it includes the neuromuscular system of the operator.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct FeedforwardTable {
@@ -54,11 +54,17 @@ pub(super) struct FeedforwardTable {
     pub(super) k_over_t_i: Option<f64>,
     #[serde(rename = "K_d_s")]
     pub(super) k_d_s: Option<f64>,
+    /// Gain of the semicircular canals for an angle, s^2.
+    #[serde(rename = "K_m_s2")]
+    pub(super) k_m_s2: Option<f64>,
+    /// Gain of the semicircular canals for an angular rate, s.
+    #[serde(rename = "K_m_rate_s")]
+    pub(super) k_m_rate_s: Option<f64>,
     #[serde(rename = "T_L_s")]
     pub(super) t_l_s: Option<f64>,
     #[serde(rename = "T_I_s")]
     pub(super) t_i_s: Option<f64>,
-    /// Delay relative to the present target, s; at least `-preview_s`.
+    /// Delay relative to the present input, s; at least `-preview_s`.
     #[serde(default)]
     pub(super) tau_f_s: f64,
     /// Time by which the target is displayed ahead, s. Default: zero.
@@ -78,6 +84,12 @@ pub(super) struct FeedforwardLastTable {
     pub(super) k_over_t_i: Option<f64>,
     #[serde(rename = "K_d_s")]
     pub(super) k_d_s: Option<f64>,
+    /// Gain of the semicircular canals for an angle, s^2.
+    #[serde(rename = "K_m_s2")]
+    pub(super) k_m_s2: Option<f64>,
+    /// Gain of the semicircular canals for an angular rate, s.
+    #[serde(rename = "K_m_rate_s")]
+    pub(super) k_m_rate_s: Option<f64>,
     #[serde(rename = "T_L_s")]
     pub(super) t_l_s: Option<f64>,
     #[serde(rename = "T_I_s")]

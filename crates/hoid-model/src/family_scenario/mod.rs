@@ -1,8 +1,8 @@
 //! Tasks of people: any operator of the family in a loop with any proper controlled element, with a remnant of several
 //! parts and a stick that drifts.
 //!
-//! `e = f - y`, `u = Y e + F f + n`, `y = P (u + d)`, where f is a target that the person may see (F, [`Feedforward`])
-//! and d is a disturbance at the input of the controlled element P. Changes follow the sigmoid of eq. 5, as in
+//! `e = f - y`, `u = Y e + F f + M y + n`, `y = P (u + d)`, where f is a target that the person may see (F,
+//! [`Feedforward`]), y a motion that the person may feel (M), and d is a disturbance at the input of the controlled element P. Changes follow the sigmoid of eq. 5, as in
 //! [`Scenario`](crate::scenario::Scenario). `Scenario` is the task of the thesis and remains a separate type: its
 //! operator is a gain with a lead, and its controlled element is `K_c/(s(s + omega_b))`.
 //!

@@ -7,6 +7,7 @@ use super::{
 };
 use crate::{
     FamilyOperator, Feedforward, ModelError, SampleTime,
+    delayed_operator::whole_samples,
     feedforward::{OperatorAt, delay_at, delays},
     scenario::Realisation,
     schedule::Schedule,
@@ -30,6 +31,9 @@ pub struct FamilyScenario {
     pub target: Excitation,
     /// Response of u to the displayed target; `None` if the display shows only the error.
     pub feedforward: Option<Feedforward>,
+    /// Response of u to the motion of the controlled element, its output y, which the person feels; `None` without
+    /// motion. Its neuromuscular system is that of the response to the error.
+    pub motion: Option<FamilyOperator>,
     /// Disturbance d at the input of the controlled element, held over each sample.
     pub disturbance: Excitation,
     /// Independent parts of the remnant.
@@ -67,6 +71,7 @@ impl FamilyScenario {
             schedule: Schedule::Constant,
             target: Excitation::default(),
             feedforward: None,
+            motion: None,
             disturbance: Excitation::default(),
             remnant: Vec::new(),
             stick: Stick::default(),
@@ -133,6 +138,17 @@ impl FamilyScenario {
                 });
             }
         }
+        if let Some(felt) = &self.motion {
+            if felt.has_neuromuscular() != self.initial.operator.has_neuromuscular() {
+                return Err(ModelError::Operator {
+                    reason:
+                        "only one of the responses to error and motion has neuromuscular dynamics; expected both or \
+                             neither, since they share one neuromuscular system"
+                            .to_owned(),
+                });
+            }
+            whole_samples(felt.tau_e_s(), self.sample_time)?;
+        }
         self.remnant.iter().try_for_each(RemnantPart::check)?;
         self.stick.check()?;
         let share: f64 = self.remnant.iter().filter_map(RemnantPart::share).sum();
@@ -189,6 +205,26 @@ impl ResolvedFamilyScenario {
         let seen = self.scenario.feedforward.as_ref();
         let muscles = initial.operator.neuromuscular() != last.operator.neuromuscular();
         changes && seen.is_some_and(|seen| seen.last.is_some() || muscles)
+    }
+
+    /// Returns the response to motion of a person in a state, with the neuromuscular system of the state and its delay as
+    /// a number of whole samples and a fraction of a sample; `None` without motion.
+    ///
+    /// # Errors
+    /// As [`FamilyOperator::new`].
+    pub fn motion_in(&self, state: &FamilyState) -> Result<Option<OperatorAt>, ModelError> {
+        let FamilyScenario { initial, last, .. } = &self.scenario;
+        let Some(felt) = &self.scenario.motion else {
+            return Ok(None);
+        };
+        let changes = initial.operator.neuromuscular() != last.operator.neuromuscular();
+        let felt = match state.operator.neuromuscular().filter(|_| changes) {
+            Some((omega, zeta)) => felt.with_neuromuscular(omega, zeta)?,
+            None => felt.clone(),
+        };
+        let tau_s = felt.tau_e_s();
+        let [delay, _] = delays([tau_s; 2], self.scenario.sample_time)?;
+        Ok(Some((felt, delay)))
     }
 
     /// Returns the responses to the target before and after the change.

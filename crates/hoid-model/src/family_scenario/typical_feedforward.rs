@@ -86,7 +86,7 @@ pub fn typical_feedforward(
     };
     // The gain is set for the intended motion of the hand, which excludes the neuromuscular system.
     let omega = NEAR_CROSSOVER_RAD_S;
-    let ([a, b, c], _) = form.shape(&lead_s.into_iter().collect::<Vec<_>>());
+    let ([a, b, c, _], _) = form.shape(&lead_s.into_iter().collect::<Vec<_>>());
     let shape = (a - c * omega * omega).hypot(b * omega);
     coordinates[0] = followed / (shape * element.response(omega).norm());
     Ok(Some(Feedforward::new(

@@ -28,9 +28,16 @@ pub enum Form {
     Derivative,
     /// `K_d s (T_L s + 1)`: the response to rate and acceleration of a displayed target.
     DerivativeLead,
+    /// `K_m s^2 (0.11 s + 1)/(5.9 s + 1)`: the response of the semicircular canals to rotation, for an input that is an
+    /// angle. The canals respond to the angular acceleration with fixed time constants (R. J. A. W. Hosman, *Pilot's
+    /// Perception and Control of Aircraft Motions*, 1996; P. M. T. Zaal et al., J. Guidance, Control, and Dynamics 32
+    /// (2009) 1089-1099).
+    Canals,
+    /// `K_m s (0.11 s + 1)/(5.9 s + 1)`: as [`Form::Canals`], for an input that is an angular rate.
+    CanalsRate,
 }
 
-crate::named_choice!(Form, "form of the operator", 10, {
+crate::named_choice!(Form, "form of the operator", 12, {
     Gain => "gain",
     Lead => "lead",
     Lead2 => "lead2",
@@ -41,16 +48,26 @@ crate::named_choice!(Form, "form of the operator", 10, {
     LeadDroop => "lead-droop",
     Derivative => "derivative",
     DerivativeLead => "derivative-lead",
+    Canals => "canals",
+    CanalsRate => "canals-rate",
 });
 
 /// Leak rate of an integration, 1/s. It is too low to be visible in a record, but keeps the discrete model stable.
 const LEAK: f64 = 1e-4;
 
+/// Time constants of the semicircular canals, s: of the lead and of the lag, which turns the response to the angular
+/// acceleration into one to the angular rate between 0.17 and 9 rad/s.
+const CANALS_S: (f64, f64) = (0.11, 5.9);
+
+/// Number of coefficients of the numerator, for powers of s from 0 to 3.
+pub const POWERS: usize = 4;
+
 /// A coordinate in which an operator is fitted. Lag and neuromuscular part are fitted in coordinates whose estimates
 /// are nearly normal even if the data carry little information.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Coordinate {
-    /// Gain of the form: K without a pole, `K/T_I` with a lag, K_I with an integration, K_d (in s) of a derivative.
+    /// Gain of the form: K without a pole, `K/T_I` with a lag, K_I with an integration, K_d (in s) of a derivative, K_m of the
+    /// semicircular canals.
     Gain,
     /// T_L, s.
     Lead,
@@ -104,7 +121,7 @@ impl Coordinate {
     /// coordinates, and for unknown names.
     pub fn of_parameter(name: &str) -> Option<Self> {
         match name {
-            "K_over_T_I" | "K_I" | "K_e" | "K_d" => Some(Self::Gain),
+            "K_over_T_I" | "K_I" | "K_e" | "K_d" | "K_m" | "K_m_rate" => Some(Self::Gain),
             _ => Self::ALL.into_iter().find(|coordinate| coordinate.parameter() == name),
         }
     }
@@ -125,9 +142,9 @@ impl Coordinate {
     }
 }
 
-/// Numerator `n_0 + n_1 s + n_2 s^2` of an operator, and its pole `-a`, if it has one.
+/// Numerator `n_0 + n_1 s + n_2 s^2 + n_3 s^3` of an operator, and its pole `-a`, if it has one.
 pub(super) struct Rational {
-    pub numerator: [Dual; 3],
+    pub numerator: [Dual; POWERS],
     pub pole: Option<Dual>,
 }
 
@@ -153,17 +170,27 @@ impl Form {
         Self::DerivativeLead,
     ];
 
+    /// Forms of the response to motion, for an input that is an angle: to the angle, to its rate, and by the
+    /// semicircular canals (R. A. Hess, J. Guidance, Control, and Dynamics 13 (1990) 131-140, for the rate; D. M. Pool,
+    /// *Objective Evaluation of Flight Simulator Motion Cueing Fidelity*, 2012, for the canals).
+    pub const OF_MOTION: [Self; 4] = [Self::Gain, Self::Lag, Self::Derivative, Self::Canals];
+
     /// True if the steady response of the form to a constant input is zero.
     pub fn is_derivative(self) -> bool {
-        matches!(self, Self::Derivative | Self::DerivativeLead)
+        matches!(
+            self,
+            Self::Derivative | Self::DerivativeLead | Self::Canals | Self::CanalsRate
+        )
     }
 
-    /// Returns the name of the parameter by which a gain of this form is given: `K`, `K_I` or `K_d`.
-    pub fn gain_name(self) -> &'static str {
+    /// Returns name and unit of the parameter by which a gain of this form is given: `K`, `K_I`, `K_d` or `K_m`.
+    pub fn gain(self) -> (&'static str, &'static str) {
         match self {
-            Self::QuadraticIntegral => "K_I",
-            form if form.is_derivative() => "K_d",
-            _ => "K",
+            Self::QuadraticIntegral => ("K_I", "1/s"),
+            Self::Derivative | Self::DerivativeLead => ("K_d", "s"),
+            Self::Canals => ("K_m", "s^2"),
+            Self::CanalsRate => ("K_m_rate", "s"),
+            _ => ("K", ""),
         }
     }
 
@@ -173,12 +200,17 @@ impl Form {
             Self::Gain | Self::Lag => 0,
             Self::Lead | Self::LeadLag | Self::Derivative => 1,
             Self::Lead2 | Self::Lead2Lag | Self::QuadraticIntegral | Self::LeadDroop | Self::DerivativeLead => 2,
+            Self::CanalsRate => 2,
+            Self::Canals => 3,
         }
     }
 
-    /// True if the form has a pole, without the neuromuscular part: a lag or an integration.
+    /// True if the form has a pole, without the neuromuscular part: a lag, an integration, or the pole of the canals.
     pub fn has_pole(self) -> bool {
-        !matches!(self, Self::Gain | Self::Lead | Self::Lead2) && !self.is_derivative()
+        !matches!(
+            self,
+            Self::Gain | Self::Lead | Self::Lead2 | Self::Derivative | Self::DerivativeLead
+        )
     }
 
     /// True if the pole is a lag with a time constant T_I.
@@ -202,7 +234,7 @@ impl Form {
     pub fn coordinates(self, neuromuscular: bool) -> Vec<Coordinate> {
         let mut all = vec![Coordinate::Gain];
         match self {
-            Self::Gain | Self::Derivative => {}
+            Self::Gain | Self::Derivative | Self::Canals | Self::CanalsRate => {}
             Self::Lead | Self::Lead2 | Self::DerivativeLead => all.push(Coordinate::Lead),
             Self::Lag => all.push(Coordinate::LagRate),
             Self::LeadLag | Self::Lead2Lag => all.extend([Coordinate::Lead, Coordinate::LagRate]),
@@ -220,30 +252,37 @@ impl Form {
     /// coordinates follow the gain in [`Form::coordinates`] and precede the coordinates of the poles.
     pub fn varying_beside_gain(self) -> usize {
         match self {
-            Self::Gain | Self::Lag | Self::Derivative => 0,
+            Self::Gain | Self::Lag | Self::Derivative | Self::Canals | Self::CanalsRate => 0,
             Self::Lead | Self::Lead2 | Self::LeadLag | Self::Lead2Lag | Self::DerivativeLead => 1,
             Self::QuadraticIntegral | Self::LeadDroop => 2,
         }
     }
 
-    /// Returns the numerator divided by its gain, `m_0 + m_1 s + m_2 s^2`, and the derivatives of m_0, m_1 and m_2 with
-    /// respect to x. Here x contains the coordinates of the numerator that follow the gain.
-    pub fn shape(self, x: &[f64]) -> ([f64; 3], [[f64; 3]; 2]) {
-        let none = [0.0; 3];
+    /// Returns the numerator divided by its gain, `m_0 + m_1 s + m_2 s^2 + m_3 s^3`, and the derivatives of these
+    /// coefficients with respect to x. Here x contains the coordinates of the numerator that follow the gain.
+    pub fn shape(self, x: &[f64]) -> ([f64; POWERS], [[f64; POWERS]; 2]) {
+        let none = [0.0; POWERS];
+        let (lead, lag) = CANALS_S;
         match self {
-            Self::Gain | Self::Lag => ([1.0, 0.0, 0.0], [none; 2]),
-            Self::Lead | Self::LeadLag => ([1.0, x[0], 0.0], [[0.0, 1.0, 0.0], none]),
+            Self::Gain | Self::Lag => ([1.0, 0.0, 0.0, 0.0], [none; 2]),
+            Self::Lead | Self::LeadLag => ([1.0, x[0], 0.0, 0.0], [[0.0, 1.0, 0.0, 0.0], none]),
             Self::Lead2 | Self::Lead2Lag => {
                 let t = x[0];
-                ([1.0, 2.0 * t, t * t], [[0.0, 2.0, 2.0 * t], none])
+                ([1.0, 2.0 * t, t * t, 0.0], [[0.0, 2.0, 2.0 * t, 0.0], none])
             }
-            Self::QuadraticIntegral => ([1.0, x[0], x[1]], [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+            Self::QuadraticIntegral => ([1.0, x[0], x[1], 0.0], [[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]),
             Self::LeadDroop => {
                 let (t, alpha) = (x[0], x[1]);
-                ([alpha, 1.0 + t * alpha, t], [[0.0, alpha, 1.0], [1.0, t, 0.0]])
+                (
+                    [alpha, 1.0 + t * alpha, t, 0.0],
+                    [[0.0, alpha, 1.0, 0.0], [1.0, t, 0.0, 0.0]],
+                )
             }
-            Self::Derivative => ([0.0, 1.0, 0.0], [none; 2]),
-            Self::DerivativeLead => ([0.0, 1.0, x[0]], [[0.0, 0.0, 1.0], none]),
+            Self::Derivative => ([0.0, 1.0, 0.0, 0.0], [none; 2]),
+            Self::DerivativeLead => ([0.0, 1.0, x[0], 0.0], [[0.0, 0.0, 1.0, 0.0], none]),
+            // The denominator is s + 1/5.9, so that the numerator is divided by 5.9.
+            Self::Canals => ([0.0, 0.0, 1.0 / lag, lead / lag], [none; 2]),
+            Self::CanalsRate => ([0.0, 1.0 / lag, lead / lag, 0.0], [none; 2]),
         }
     }
 
@@ -251,17 +290,24 @@ impl Form {
     pub(super) fn rational(self, x: &[Dual]) -> Rational {
         let zero = Dual::constant(0.0);
         let k = x[0];
+        let (lead, lag) = CANALS_S;
+        let canals = Some(Dual::constant(1.0 / lag));
         let (numerator, pole) = match self {
-            Self::Gain => ([k, zero, zero], None),
-            Self::Lead => ([k, k * x[1], zero], None),
-            Self::Lead2 => ([k, (k * x[1]).scaled(2.0), k * x[1] * x[1]], None),
-            Self::Lag => ([k, zero, zero], Some(x[1])),
-            Self::LeadLag => ([k, k * x[1], zero], Some(x[2])),
-            Self::Lead2Lag => ([k, (k * x[1]).scaled(2.0), k * x[1] * x[1]], Some(x[2])),
-            Self::QuadraticIntegral => ([k, k * x[1], k * x[2]], Some(Dual::constant(LEAK))),
-            Self::LeadDroop => ([k * x[2], k + k * x[1] * x[2], k * x[1]], Some(Dual::constant(LEAK))),
-            Self::Derivative => ([zero, k, zero], None),
-            Self::DerivativeLead => ([zero, k, k * x[1]], None),
+            Self::Gain => ([k, zero, zero, zero], None),
+            Self::Lead => ([k, k * x[1], zero, zero], None),
+            Self::Lead2 => ([k, (k * x[1]).scaled(2.0), k * x[1] * x[1], zero], None),
+            Self::Lag => ([k, zero, zero, zero], Some(x[1])),
+            Self::LeadLag => ([k, k * x[1], zero, zero], Some(x[2])),
+            Self::Lead2Lag => ([k, (k * x[1]).scaled(2.0), k * x[1] * x[1], zero], Some(x[2])),
+            Self::QuadraticIntegral => ([k, k * x[1], k * x[2], zero], Some(Dual::constant(LEAK))),
+            Self::LeadDroop => (
+                [k * x[2], k + k * x[1] * x[2], k * x[1], zero],
+                Some(Dual::constant(LEAK)),
+            ),
+            Self::Derivative => ([zero, k, zero, zero], None),
+            Self::DerivativeLead => ([zero, k, k * x[1], zero], None),
+            Self::Canals => ([zero, zero, k.scaled(1.0 / lag), k.scaled(lead / lag)], canals),
+            Self::CanalsRate => ([zero, k.scaled(1.0 / lag), k.scaled(lead / lag), zero], canals),
         };
         Rational { numerator, pole }
     }
@@ -288,5 +334,33 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn the_canals_are_those_of_the_literature() {
+        use crate::FamilyOperator;
+        let (nm, zeta): (f64, f64) = (11.0, 0.3);
+        let x = [-0.4, nm.ln(), zeta.ln(), 0.18];
+        for (form, power) in [(Form::Canals, 2), (Form::CanalsRate, 1)] {
+            let operator = FamilyOperator::new(form, true, &x).unwrap();
+            for omega in [0.05, 0.7, 3.0, 20.0] {
+                let s = num_complex::Complex64::new(0.0, omega);
+                let canals = (0.11 * s + 1.0) / (5.9 * s + 1.0);
+                let muscles = nm * nm / (s * s + 2.0 * zeta * nm * s + nm * nm);
+                let expected = -0.4 * s.powi(power) * canals * muscles * (-0.18 * s).exp();
+                assert!(
+                    (operator.response(omega) / expected - 1.0).norm() < 1e-13,
+                    "{form} {omega}"
+                );
+            }
+            assert!(form.is_derivative() && form.is_proper(true) && !form.is_proper(false));
+            assert!(FamilyOperator::new(form, false, &[1.0, 0.2]).is_err());
+        }
+        // Near 1 rad/s the canals respond to the rate.
+        let rate = FamilyOperator::new(Form::Canals, true, &x)
+            .unwrap()
+            .response(1.0)
+            .norm();
+        assert!((rate / (0.4 / 5.9) - 1.0).abs() < 0.02, "{rate}");
     }
 }

@@ -33,6 +33,6 @@ mod zoh;
 
 pub use dual::PARTIALS;
 pub use fitted::FittedOperator;
-pub use form::{Coordinate, Form};
+pub use form::{Coordinate, Form, POWERS};
 pub use operator::{FamilyOperator, FamilyResponse, NamedParameter, PARAMETERS};
 pub use zoh::HeldFamily;

@@ -12,11 +12,13 @@ use crate::{
 };
 
 /// Names and units of the parameters of all forms; the names are those of [`FamilyOperator::named`].
-pub const PARAMETERS: [(&str, &str); 14] = [
+pub const PARAMETERS: [(&str, &str); 16] = [
     ("K", ""),
     ("K_over_T_I", "1/s"),
     ("K_I", "1/s"),
     ("K_d", "s"),
+    ("K_m", "s^2"),
+    ("K_m_rate", "s"),
     ("K_e", ""),
     ("K_e_dot", "s"),
     ("T_L", "s"),
@@ -147,7 +149,8 @@ impl FamilyOperator {
         })
     }
 
-    /// Creates an operator from the named parameters of its form: a gain (`K`, `K_over_T_I`, `K_e`, `K_I` or `K_d`),
+    /// Creates an operator from the named parameters of its form: a gain (`K`, `K_over_T_I`, `K_e`, `K_I`, `K_d`, `K_m` or
+    /// `K_m_rate`),
     /// `T_L`, `T_I`, `omega_nm`, `zeta_nm`, `tau_e`, `c_1`, `c_2`, `alpha`. The operator has a neuromuscular part if
     /// omega_nm or zeta_nm is given. A missing tau_e is zero.
     ///
@@ -175,11 +178,13 @@ impl FamilyOperator {
                     Some(ratio) => (&["K_over_T_I"], ratio),
                     None => (&["K"], need("K")? / positive("T_I")?),
                 },
-                Coordinate::Gain if form == Form::QuadraticIntegral => (&["K_I"], need("K_I")?),
-                Coordinate::Gain if form.is_derivative() => (&["K_d"], need("K_d")?),
-                Coordinate::Gain => match find("K") {
-                    Some(k) => (&["K"], k),
-                    None => (&["K_e"], need("K_e")?),
+                Coordinate::Gain => match form.gain() {
+                    ("K", _) if find("K").is_none() => (&["K_e"], need("K_e")?),
+                    ("K_I", _) => (&["K_I"], need("K_I")?),
+                    ("K_d", _) => (&["K_d"], need("K_d")?),
+                    ("K_m", _) => (&["K_m"], need("K_m")?),
+                    ("K_m_rate", _) => (&["K_m_rate"], need("K_m_rate")?),
+                    _ => (&["K"], need("K")?),
                 },
                 Coordinate::Lead => (&["T_L"], need("T_L")?),
                 Coordinate::LagRate => (&["T_I"], 1.0 / positive("T_I")?),
@@ -259,9 +264,10 @@ impl FamilyOperator {
                     put("K_over_T_I", "1/s", gain, own);
                 }
                 Coordinate::Gain if self.form == Form::Lead => put("K_e", "", gain, own),
-                Coordinate::Gain if self.form == Form::QuadraticIntegral => put("K_I", "1/s", gain, own),
-                Coordinate::Gain if self.form.is_derivative() => put("K_d", "s", gain, own),
-                Coordinate::Gain => put("K", "", gain, own),
+                Coordinate::Gain => {
+                    let (name, unit) = self.form.gain();
+                    put(name, unit, gain, own);
+                }
                 Coordinate::Lead => {
                     put("T_L", "s", x, own);
                     if self.form == Form::Lead {

@@ -20,7 +20,7 @@
 
 use super::{
     dual::{Dual, PARTIALS},
-    form::Rational,
+    form::{POWERS, Rational},
     matrices::{Matrix, SIZE, Vector, characteristic, companion, exponential, product, times},
     operator::FamilyOperator,
 };
@@ -163,7 +163,13 @@ impl FamilyOperator {
     }
 
     /// Returns the model with the given numerator and poles.
-    fn held(&self, poles: &HeldPoles, numerator: [Dual; 3], sample: usize, ts: f64) -> Result<HeldFamily, ModelError> {
+    fn held(
+        &self,
+        poles: &HeldPoles,
+        numerator: [Dual; POWERS],
+        sample: usize,
+        ts: f64,
+    ) -> Result<HeldFamily, ModelError> {
         let (zero, one) = (Dual::constant(0.0), Dual::constant(1.0));
         let order = self.order();
         let numerator = self.numerator_by_samples(numerator, poles.gain, ts);
@@ -213,9 +219,9 @@ impl FamilyOperator {
         self.neuromuscular_of(variables).map(|(omega, _)| omega * omega)
     }
 
-    fn numerator_by_samples(&self, numerator: [Dual; 3], gain: Option<Dual>, ts: f64) -> Vector {
+    fn numerator_by_samples(&self, numerator: [Dual; POWERS], gain: Option<Dual>, ts: f64) -> Vector {
         let mut num = [Dual::constant(0.0); SIZE];
-        num[..3].copy_from_slice(&numerator);
+        num[..POWERS].copy_from_slice(&numerator);
         if let Some(square) = gain {
             num = num.map(|c| c * square);
         }

@@ -4,7 +4,7 @@
 //! through the closed loop, to one unit of w at sample 0. The sinusoids of target and disturbance contribute
 //! `V_0 = sum of A^2/2 |u/f|^2` at their frequencies, with the responses of the sampled loop. For a target to which the
 //! person responds with F, `e/f = (1 - P F)/(1 + B P)` and `u/f = (B + F)/(1 + B P)`, where B is the response to the
-//! error. All parts are independent, so with shares p_i
+//! error. With a response M to motion, `1 + B P` is `1 + (B - M) P` and `e/f` has `M + F` in place of F. All parts are independent, so with shares p_i
 //!
 //! `var u = (V_0 + sum of K_j^2 V_j of given gains) / (1 - sum of p_i)`, `K_i^2 = p_i var u / V_i`.
 //!
@@ -106,7 +106,7 @@ fn scaled(a: MeanSquares, by: f64) -> MeanSquares {
 
 /// Returns the sums of the squared responses of u, of its steps and of e to one unit of w.
 fn energy(held: &HeldLoop, shaping: &Shaping) -> Result<MeanSquares, ModelError> {
-    let mut state = LoopState::at_rest(held, held.operator.delay());
+    let mut state = LoopState::at_rest(held, held.longest_delay());
     let mut shaped = Shaped::at_rest(shaping);
     let (mut total, mut before, mut w) = ([0.0; 3], 0.0, 1.0);
     let mut horizon = FIRST;
@@ -159,22 +159,25 @@ fn line_power(
     for (excitation, is_target) in [(&scenario.target, true), (&scenario.disturbance, false)] {
         for line in excitation.function.sinusoids() {
             let omega = line.omega_rad_s;
-            let [y, p] = held.responses(omega).ok_or(ModelError::OutOfRange {
+            let missing = || ModelError::OutOfRange {
                 quantity: "frequency of a sinusoid in rad/s",
                 found: omega,
                 expected: "a frequency that is not a pole of the operator or of the controlled element",
-            })?;
-            let closed = 1.0 + y * p;
+            };
+            let [y, p] = held.responses(omega).ok_or_else(missing)?;
+            let m = held.motion_response(omega).ok_or_else(missing)?;
+            let closed = 1.0 + (y - m) * p;
             let backward = Complex64::from_polar(1.0, -omega * scenario.sample_time.s());
             let (of_e, of_u) = match (is_target, &seen) {
                 (true, Some(seen)) => {
                     // The preview changes only the phase of F relative to f, which affects e.
                     let shown_s = scenario.feedforward.as_ref().map_or(0.0, |seen| seen.preview_s);
                     let f = held_response(seen, backward) * Complex64::from_polar(1.0, omega * shown_s);
-                    ((1.0 - p * f) / closed, (y + f) / closed)
+                    ((1.0 - p * (m + f)) / closed, (y + f) / closed)
                 }
+                (true, None) if scenario.motion.is_some() => ((1.0 - p * m) / closed, y / closed),
                 (true, None) => (1.0 / closed, y / closed),
-                (false, _) => (-p / closed, -y * p / closed),
+                (false, _) => (-p / closed, -(y - m) * p / closed),
             };
             let power = (line.amplitude_deg * of_u.norm()).powi(2) / 2.0;
             let step = (Complex64::from_polar(1.0, omega * scenario.sample_time.s()) - 1.0).norm_sqr();

@@ -2,15 +2,17 @@
 //!
 //! At sample k, with the parameters at that time,
 //!
-//! `u = r(k - l) + n`, `y = C x_p + D (u + d)`, `e = f - y`,
+//! `u = r(k - l) + m(k - l_m) + n`, `y = C x_p + D (u + d)`, `e = f - y`,
 //!
-//! where r is the response of the operator after the fractional part of the delay `tau = l Ts + delta`, and x_p the
+//! where r is the response of the operator after the fractional part of the delay `tau = l Ts + delta`, m likewise the
+//! response to the motion y if the person feels it, and x_p the
 //! state of the controlled element. Operator ([`HeldOperator`]) and element are then advanced exactly by one sample, for
 //! held inputs. If a direct response of the operator and D form a loop within a sample, both equations are solved
 //! together.
 
 use hoid_model::{
-    Complex64, ModelError, SampleTime, family_scenario::FamilyState, held_system::HeldSystem, scenario::Realisation,
+    Complex64, ModelError, SampleTime, family_scenario::FamilyState, feedforward::OperatorAt, held_system::HeldSystem,
+    scenario::Realisation,
 };
 
 use crate::held_operator::{HeldOperator, OperatorOutput, OperatorState};
@@ -22,6 +24,8 @@ const SMALLEST: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub(super) struct HeldLoop {
     pub operator: HeldOperator,
+    /// Response to the output of the element, which the person feels; `None` without motion.
+    motion: Option<HeldOperator>,
     element: HeldSystem,
     element_input: f64,
     element_output: f64,
@@ -46,6 +50,7 @@ pub(super) struct Outputs {
 /// State of the loop between two samples.
 pub(super) struct LoopState {
     operator: OperatorState,
+    motion: Option<OperatorState>,
     element: Vec<f64>,
     next: Vec<f64>,
 }
@@ -55,6 +60,7 @@ impl HeldLoop {
     pub fn new(
         state: &FamilyState,
         delay: (usize, f64),
+        motion: Option<&OperatorAt>,
         realisation: Realisation,
         sample_time: SampleTime,
     ) -> Result<Self, ModelError> {
@@ -71,7 +77,9 @@ impl HeldLoop {
             Realisation::Input => (gain, 1.0),
             Realisation::Output => (1.0, gain),
         };
+        let motion = motion.map(|(felt, delay)| HeldOperator::new(felt, *delay, sample_time));
         let held = Self {
+            motion: motion.transpose()?,
             operator: HeldOperator::new(&state.operator, delay, sample_time)?,
             element: HeldSystem::new(&num, p.den(), 0.0, sample_time)?,
             element_input,
@@ -89,9 +97,19 @@ impl HeldLoop {
         self.element_input * self.element_output * self.element.direct()
     }
 
-    /// Returns `1 + D Y`, where D and Y are the direct responses of element and operator within a sample.
+    /// Returns `1 + D (Y - M)`, where D, Y and M are the direct responses of the element, to the error and to motion
+    /// within a sample.
     fn return_difference(&self) -> f64 {
-        1.0 + self.element_direct() * self.operator.tap()
+        let felt = self.motion.as_ref().map_or(0.0, HeldOperator::tap);
+        1.0 + self.element_direct() * (self.operator.tap() - felt)
+    }
+
+    /// Returns the longer of the delays of both responses, in whole samples.
+    pub fn longest_delay(&self) -> usize {
+        self.motion
+            .as_ref()
+            .map_or(0, HeldOperator::delay)
+            .max(self.operator.delay())
     }
 
     /// True if u depends on the error of the same sample.
@@ -106,9 +124,23 @@ impl HeldLoop {
         let OperatorOutput { known, tap, .. } = output;
         let direct = self.element_direct();
         let of_state = self.element_output * self.element.output(&state.element);
-        let rest = inputs.target - of_state - direct * (known + inputs.remnant + inputs.disturbance);
-        let e = if tap == 0.0 { rest } else { rest / (1.0 + direct * tap) };
-        let u = known + tap * e + inputs.remnant;
+        let (e, u) = match (&self.motion, &mut state.motion) {
+            (Some(motion), Some(felt)) => {
+                let answer = motion.output(felt);
+                // y = f - e, so that both direct responses depend on e.
+                let known = known + answer.known + answer.tap * inputs.target;
+                let tap = tap - answer.tap;
+                let rest = inputs.target - of_state - direct * (known + inputs.remnant + inputs.disturbance);
+                let e = rest / (1.0 + direct * tap);
+                motion.advance(felt, answer, inputs.target - e);
+                (e, known + tap * e + inputs.remnant)
+            }
+            _ => {
+                let rest = inputs.target - of_state - direct * (known + inputs.remnant + inputs.disturbance);
+                let e = if tap == 0.0 { rest } else { rest / (1.0 + direct * tap) };
+                (e, known + tap * e + inputs.remnant)
+            }
+        };
         self.operator.advance(&mut state.operator, output, e);
         let driven = self.element_input * (u + inputs.disturbance);
         self.element.step(&state.element, driven, 0.0, &mut state.next);
@@ -117,6 +149,15 @@ impl HeldLoop {
             e,
             u,
             y: inputs.target - e,
+        }
+    }
+
+    /// Returns the frequency response to motion in the sampled loop; zero without motion, and `None` if the response does
+    /// not exist at this frequency.
+    pub fn motion_response(&self, omega_rad_s: f64) -> Option<Complex64> {
+        match &self.motion {
+            Some(motion) => motion.response(omega_rad_s),
+            None => Some(Complex64::new(0.0, 0.0)),
         }
     }
 
@@ -136,6 +177,7 @@ impl LoopState {
         let element = held.element.order();
         Self {
             operator: OperatorState::at_rest(&held.operator, longest_delay),
+            motion: (held.motion.as_ref()).map(|motion| OperatorState::at_rest(motion, longest_delay)),
             element: vec![0.0; element],
             next: vec![0.0; element],
         }

@@ -3,7 +3,8 @@
 //! Simulates `u = r(k - l) + n` as [`FamilySimulator`] does in a loop, with the same random numbers, and with the
 //! remnant as strong as in the loop of the scenario. A loop that responds to u like the controlled element of the
 //! scenario therefore gives a bit-identical run. The offsets of the recorder in e and u (`offset_e`, `offset_u`) are
-//! not part of the operator, nor is the response to a displayed target, which belongs to the loop. The control at a sample
+//! not part of the operator, nor are the responses to a displayed target and to motion, which belong to
+//! the loop. The control at a sample
 //! must not depend on the error of the same sample.
 
 use super::{FamilySimulator, held_loop::HeldLoop, remnant_run::RemnantRun};

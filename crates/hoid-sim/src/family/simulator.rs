@@ -10,6 +10,7 @@ use std::f64::consts::TAU;
 use hoid_model::{
     Channel, Record,
     family_scenario::{Excitation, FamilyScenario, FamilyState, ResolvedFamilyScenario, Stick},
+    feedforward::response_parameters,
     forcing::{ForcingFunction, Sinusoid},
 };
 
@@ -19,7 +20,10 @@ use super::{
     noise::Shaping,
     remnant_run::{RemnantRun, Remnants},
 };
-use crate::{RunSeed, SimError, target_response::TargetResponse};
+use crate::{
+    RunSeed, SimError,
+    target_response::{TargetResponse, truth_of},
+};
 
 /// Prepared scenario: held models for all samples, and gains of the remnant.
 #[derive(Debug, Clone)]
@@ -62,7 +66,10 @@ impl FamilySimulator {
     pub fn new(scenario: &FamilyScenario) -> Result<Self, SimError> {
         let resolved = scenario.resolve()?;
         let ts = scenario.sample_time;
-        let held = |state: &FamilyState, delay| HeldLoop::new(state, delay, scenario.realisation, ts);
+        let held = |state: &FamilyState, delay| -> Result<HeldLoop, SimError> {
+            let felt = resolved.motion_in(state)?;
+            Ok(HeldLoop::new(state, delay, felt.as_ref(), scenario.realisation, ts)?)
+        };
         let samples = resolved.run_in_samples() + resolved.measurement_samples();
         let changes = scenario.schedule.change_s().is_some()
             && (scenario.initial != scenario.last || resolved.feedforward_changes());
@@ -85,7 +92,13 @@ impl FamilySimulator {
         let seen_in = resolved.feedforward_of_states()?;
         let calibrated = |state: &FamilyState, delay, is_last| {
             let seen = seen_in[usize::from(is_last)].as_ref();
-            Calibration::of(&held(state, delay)?, scenario, &shapings, is_last, seen)
+            Ok::<_, SimError>(Calibration::of(
+                &held(state, delay)?,
+                scenario,
+                &shapings,
+                is_last,
+                seen,
+            )?)
         };
         let delays = resolved.delays();
         let seen = (scenario.feedforward.as_ref()).map(|seen| {
@@ -146,7 +159,7 @@ impl FamilySimulator {
     pub(super) fn longest_delay(&self) -> usize {
         self.loops
             .iter()
-            .map(|(_, held)| held.operator.delay())
+            .map(|(_, held)| held.longest_delay())
             .max()
             .unwrap_or(0)
     }
@@ -245,6 +258,7 @@ impl FamilySimulator {
             let channel = channel(name, values);
             record = record.with_channel(match &self.seen {
                 Some(seen) if name == "f_t" => seen.target(channel),
+                _ if name == "y" && scenario.motion.is_some() => channel.with_role("motion"),
                 _ => channel,
             })?;
         }
@@ -267,7 +281,11 @@ impl FamilySimulator {
                 record = record.with_channel(Channel::new(parameter.name, parameter.unit, values))?;
             }
         }
-        for channel in self.seen.iter().flat_map(|seen| seen.truth(first, self.samples())) {
+        let felt = self.scenario.scenario().motion.as_ref();
+        let felt = felt.map(|felt| response_parameters(felt, 0.0));
+        let felt = felt.map(|named| truth_of("y", (first, self.samples()), |_| &named));
+        let seen = self.seen.iter().flat_map(|seen| seen.truth(first, self.samples()));
+        for channel in seen.chain(felt.into_iter().flatten()) {
             record = record.with_channel(channel)?;
         }
         Ok(record)
