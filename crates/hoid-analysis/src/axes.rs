@@ -169,7 +169,7 @@ fn coupling(
 ) -> Coupling {
     let records = &identified.data.records;
     let tested = separate(records, pair, other, asked.period_s).and_then(|()| {
-        let channel = SeenChannel::new(other.input.clone(), ChannelRole::Output);
+        let channel = SeenChannel::new(other.input.clone(), ChannelRole::Feedforward);
         response_to(&asked.estimator, &identified.fit, records, channel)
             .map(|(found, _)| found.p_value)
             .ok_or_else(|| {

@@ -10,7 +10,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
     agreement::{Agreement, AgreementMethod, Side, agreement, with_level},
-    channel::ChannelFit,
+    channel::{ChannelFit, SeenChannel},
     channel_lines::{AtChannelLines, InForm, have_separate_lines},
     channels::with_responses,
     choice::FormFigures,
@@ -223,11 +223,14 @@ impl<'a> Chosen<'_, 'a> {
         with_lines(self.prediction, fit, (lines?, &data), workspace)
     }
 
-    /// True if every further input has lines of its own, and so has another signal.
+    /// As [`have_separate_lines`].
     fn have_separate_lines(&self) -> bool {
-        let names: Vec<String> = self.channels.iter().map(|channel| channel.name.clone()).collect();
+        let asked = self
+            .channels
+            .iter()
+            .map(|found| SeenChannel::new(found.name.clone(), found.role));
         let lines = self.lines.channels.as_ref().map(|at| at.lines.as_ref());
-        have_separate_lines(lines, &names)
+        have_separate_lines(lines, &asked.collect::<Vec<_>>())
     }
 
     /// Estimates one operator for all records by refined instrumental variables with the recorded excitation; `None`

@@ -27,6 +27,12 @@ hoid_model::named_choice!(ChannelRole, "role of a channel", 3, {
 });
 
 impl ChannelRole {
+    /// True if the channel enters the loop from outside. The output of the machine and its motion do not: they have the
+    /// lines of all excitations, and contain the remnant.
+    pub fn excites(self) -> bool {
+        self == Self::Feedforward
+    }
+
     /// Forms that are compared for a channel with this role.
     pub fn forms(self) -> &'static [Form] {
         match self {

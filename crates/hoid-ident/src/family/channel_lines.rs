@@ -24,6 +24,7 @@ use hoid_model::{
 use hoid_numerics::statistics::upper_median;
 
 use super::{
+    channel::SeenChannel,
     coordinates::{self, Grid},
     intersample::Intersample,
     layout::{ChannelInLayout, FamilyLayout},
@@ -88,16 +89,15 @@ pub(super) struct ChannelLines {
 }
 
 impl ChannelLines {
-    /// Finds the lines of the channels and of the excitation in these records. The excitation is the given channel or,
-    /// if none is given, any channel with one of the common names of an excitation. `None` if no signal has lines of
-    /// its own.
+    /// Finds the lines of the `exciting` channels and of the excitation in these records. The excitation is the given
+    /// channel or, if none is given, any channel with one of the common names. `None` if no signal has own lines.
     pub fn of(
         records: &[Record],
-        channels: &[String],
+        (channels, exciting): (&[String], &[String]),
         (excitation, period_s): (Option<&str>, Option<f64>),
     ) -> Option<Self> {
         let common = COMMON_EXCITATIONS.into_iter().filter(|_| excitation.is_none());
-        let mut exciters: Vec<String> = channels.to_vec();
+        let mut exciters: Vec<String> = exciting.to_vec();
         for name in excitation.into_iter().chain(common) {
             let is_signal = records[0].channels().take(2).any(|signal| signal.name == name);
             if !is_signal && !exciters.iter().any(|known| known == name) {
@@ -596,11 +596,11 @@ impl Objective for ChannelCriterion {
     }
 }
 
-/// True if every further input has lines of its own and another signal has lines too. The responses can then be
-/// distinguished without assuming a form.
-pub(super) fn have_separate_lines(lines: Option<&ChannelLines>, channels: &[String]) -> bool {
+/// True if every target among the further inputs has lines of its own, and as many further signals have lines as there
+/// are other responses. The responses can then be distinguished without assuming a form.
+pub(super) fn have_separate_lines(lines: Option<&ChannelLines>, channels: &[SeenChannel]) -> bool {
     lines.is_some_and(|lines| {
-        let has = |name: &String| lines.exciters.contains(name);
-        channels.iter().all(has) && lines.exciters.len() > channels.len()
+        let mut targets = channels.iter().filter(|channel| channel.role.excites());
+        targets.all(|target| lines.exciters.contains(&target.name)) && lines.exciters.len() > channels.len()
     })
 }

@@ -222,7 +222,9 @@ impl<'s> FurtherInputs<'s> {
 
     /// Returns the lines of all excitations of the loop; `None` if there are no lines.
     pub fn lines(&self, excitation: Option<&str>, period_s: Option<f64>) -> Option<Arc<ChannelLines>> {
-        ChannelLines::of(&self.whole, &self.names(), (excitation, period_s)).map(Arc::new)
+        let targets = self.all.iter().filter(|channel| channel.role.excites());
+        let targets: Vec<String> = targets.map(|channel| channel.name.clone()).collect();
+        ChannelLines::of(&self.whole, (&self.names(), &targets), (excitation, period_s)).map(Arc::new)
     }
 
     /// Returns a channel in a given form, with its preview and its delay range.
@@ -474,5 +476,7 @@ impl FamilyFit {
     }
 }
 
+#[cfg(test)]
+mod motion_tests;
 #[cfg(test)]
 mod tests;

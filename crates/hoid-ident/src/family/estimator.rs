@@ -169,7 +169,7 @@ impl FamilyEstimator {
     /// # Errors
     /// As [`FamilyEstimator::fit`].
     pub fn responds_to(&self, records: &[Record], channel: SeenChannel) -> Result<(ChannelFit, bool), IdentError> {
-        let names = [channel.name.clone()];
+        let asked = [channel.clone()];
         let with_channel = Self {
             channels: vec![channel],
             ..self.clone()
@@ -177,7 +177,7 @@ impl FamilyEstimator {
         let (records, seen) = with_channel.prepared(records)?;
         let mut workspace = Workspace::of_thread();
         let mut begun = with_channel.begin(&records, &seen, None, &mut workspace)?;
-        let apart = have_separate_lines(begun.channel_lines.as_deref(), &names);
+        let apart = have_separate_lines(begun.channel_lines.as_deref(), &asked);
         let found = begun.channels.pop().ok_or(IdentError::NoFiniteLoss)?;
         Ok((found, apart))
     }

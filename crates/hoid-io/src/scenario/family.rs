@@ -222,12 +222,16 @@ impl Source<'_> {
         let form = self.form(&format!("{name}.form"), &given.form)?;
         let preview_s = given.preview_s.clone();
         let preview_s = self.whole(&format!("{name}.preview_s"), preview_s, 0.0, sample_time, 0.0)?;
+        let early = if name == "motion" {
+            "to motion before it happens"
+        } else {
+            "to a target before it is displayed"
+        };
         let of = |table: &str, tau_f_s: f64, gains: FamilyStateTable| {
             self.checked(&format!("{table}.tau_f_s"), tau_f_s, Limits::LEAD_S)?;
             let delay_s = Feedforward::delay_s(tau_f_s, preview_s).map_err(|_| {
                 self.keys(&format!(
-                    "{table}.tau_f_s is {tau_f_s}, expected at least {}: a person cannot respond to a target before it \
-                     is displayed",
+                    "{table}.tau_f_s is {tau_f_s}, expected at least {}: a person cannot respond {early}",
                     -preview_s
                 ))
             })?;

@@ -166,3 +166,31 @@ fn a_target_that_is_seen_is_read() {
         assert!(error.contains(expected), "{to}: {error}");
     }
 }
+
+#[test]
+fn a_person_who_feels_motion() {
+    let motion = include_str!("../../../../fixtures/scenario/motion.toml");
+    let felt = parse(motion).unwrap().motion.unwrap();
+    assert_eq!(felt.form(), Form::Canals);
+    let expected = [-2.5, 11.0_f64.ln(), 0.3_f64.ln(), 0.18];
+    assert!(
+        felt.coordinates()
+            .iter()
+            .zip(expected)
+            .all(|(a, b)| (a - b).abs() < 1e-14)
+    );
+    let rate = motion
+        .replace("form = \"canals\"", "form = \"canals-rate\"")
+        .replace("K_m_s2", "K_m_rate_s");
+    assert_eq!(parse(&rate).unwrap().motion.unwrap().form(), Form::CanalsRate);
+    for (from, to, words) in [
+        ("K_m_s2 = -2.5", "K_m_rate_s = 1", "lacks K_m_s2"),
+        ("K_m_s2 = -2.5", "K_m_s2 = 1e9", "motion.K_m_s2"),
+        ("tau_f_s = 0.18", "tau_f_s = -0.1", "before it happens"),
+        ("tau_f_s = 0.18", "preview_s = 0.5", "[motion] has a preview"),
+        ("form = \"canals\"", "form = \"ears\"", "motion.form is ears"),
+    ] {
+        let error = parse(&motion.replace(from, to)).unwrap_err().to_string();
+        assert!(error.contains(words), "{to}: {error}");
+    }
+}
