@@ -199,6 +199,8 @@ class BatchSettings(TypedDict, total=False):
             "lead-droop",
             "derivative",
             "derivative-lead",
+            "canals",
+            "canals-rate",
         ]
         | None
     )
@@ -406,7 +408,7 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
         change : Literal['none', 'sigmoid']
             Change of the operator: none, or one sigmoid change of its gains (hoid identify then
             rejects --figure, --validate, --horizon and --report). For operators.
-        form : Literal['auto', 'gain', 'lead', 'lead2', 'lag', 'lead-lag', 'lead2-lag', 'quadratic-integral', 'lead-droop', 'derivative', 'derivative-lead']
+        form : Literal['auto', 'gain', 'lead', 'lead2', 'lag', 'lead-lag', 'lead2-lag', 'quadratic-integral', 'lead-droop', 'derivative', 'derivative-lead', 'canals', 'canals-rate']
             Form of operator; auto: average over the forms that the data allow; lead with
             --change sigmoid. For operator, change="sigmoid".
         neuromuscular : Literal['yes', 'no']
