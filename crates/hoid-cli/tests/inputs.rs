@@ -156,7 +156,7 @@ fn inputs_without_a_meaning_are_refused_with_the_remedy() {
         ),
         (
             &["track", run, "--input", "e", "--input", "f_t"],
-            "give only one --input here",
+            "use rls or rpem for f_t",
         ),
     ] {
         let (_, message) = bad(at.path(), options);
@@ -318,7 +318,18 @@ fn a_displayed_target_is_never_left_out_without_a_word() {
 fn a_recursion_tracks_both_responses() {
     let at = TempDir::new().unwrap();
     let run = runs(at.path(), PURSUIT, 1).remove(0);
-    let two = ["track", &run, "--input", "e", "--input", "f_t", "--role", "f_t=feedforward", "--at", "2,4"];
+    let two = [
+        "track",
+        &run,
+        "--input",
+        "e",
+        "--input",
+        "f_t",
+        "--role",
+        "f_t=feedforward",
+        "--at",
+        "2,4",
+    ];
     let model = ["--method", "rpem", "--orders", "nb=2,2,nf=2,nd=1", "--nk", "14,1"];
     let out = ["--out", "trace.csv", "--every", "60", "--json"];
     let found = json(at.path(), &[&two[..], &model, &out].concat());
@@ -326,7 +337,12 @@ fn a_recursion_tracks_both_responses() {
     let names: Vec<&str> = channels.iter().map(|c| c["input"].as_str().unwrap()).collect();
     let roles: Vec<&str> = channels.iter().map(|c| c["role"].as_str().unwrap()).collect();
     assert_eq!((names, roles), (vec!["e", "f_t"], vec!["feedback", "feedforward"]));
-    assert!(of(&channels[1]["parameters"], "b0[f_t]")["standard_error"].as_f64().unwrap() > 0.0);
+    assert!(
+        of(&channels[1]["parameters"], "b0[f_t]")["standard_error"]
+            .as_f64()
+            .unwrap()
+            > 0.0
+    );
     // The person responds to the target by K_d s: 6 dB an octave and 90 deg.
     let response = channels[1]["response"].as_array().unwrap();
     let gain = |k: usize| &response[k]["gain_db"];
@@ -335,7 +351,14 @@ fn a_recursion_tracks_both_responses() {
     assert!((gain(1)["value"].as_f64().unwrap() - gain(0)["value"].as_f64().unwrap() - 6.0).abs() < 1.5);
     let table = fs::read_to_string(at.path().join("trace.csv")).unwrap();
     let header = table.lines().find(|line| !line.starts_with('#')).unwrap();
-    for name in ["b0[f_t]", "b0[f_t]_se", "f2[f_t]", "gain_db[f_t]@2", "phase_deg[f_t]@4_se", "gain_db@2"] {
+    for name in [
+        "b0[f_t]",
+        "b0[f_t]_se",
+        "f2[f_t]",
+        "gain_db[f_t]@2",
+        "phase_deg[f_t]@4_se",
+        "gain_db@2",
+    ] {
         assert!(header.split(',').any(|column| column == name), "{name}: {header}");
     }
     assert!(!kinds(&found).contains(&"displayed".to_owned()));

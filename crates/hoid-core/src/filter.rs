@@ -180,6 +180,29 @@ pub fn fir(b: &[f64], nk: usize, x: &[f64], y: &mut [f64]) {
     }
 }
 
+/// Returns the coefficients `g_1 ... g_(nc+nf)` of `G = C F`, where C and F have a leading 1.
+#[inline(always)]
+pub(crate) fn product<const N: usize>(c: &[f64], f: &[f64]) -> [f64; N] {
+    let mut g = [0.0; N];
+    g[..f.len()].copy_from_slice(f);
+    for (i, c) in c.iter().enumerate() {
+        g[i] += c;
+        for (j, f) in f.iter().enumerate() {
+            g[i + j + 1] += c * f;
+        }
+    }
+    g
+}
+
+/// Inserts the newest value into a history of n values and drops the oldest value.
+#[inline(always)]
+pub(crate) fn push(history: &mut [f64], n: usize, value: f64) {
+    if n > 0 {
+        history.copy_within(0..n - 1, 1);
+        history[0] = value;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

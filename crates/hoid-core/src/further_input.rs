@@ -8,7 +8,11 @@
 
 use hoid_numerics::products::dot;
 
-use crate::{predictor::product, stability::roots_inside, state::State};
+use crate::{
+    filter::{product, push},
+    stability::roots_inside,
+    state::State,
+};
 
 /// Coefficients of the noise model of the current estimate, without their leading 1.
 #[derive(Debug, Clone, Copy)]
@@ -148,9 +152,9 @@ impl<const N: usize, const M: usize> FurtherInputs<N> for [FurtherInput<N>; M] {
                 let g: [f64; N] = product(c, f);
                 let poles = dot(&g[..c.len() + f.len()], &input.filtered_x);
                 let value = input.value + dot(d, &input.x) - poles;
-                push(&mut input.filtered_x, value);
+                push(&mut input.filtered_x, N, value);
             }
-            push(&mut input.x, input.value);
+            push(&mut input.x, N, input.value);
             let (x, w) = match filtered {
                 true => (&input.filtered_x, &input.filtered_w),
                 false => (&input.x, &input.w),
@@ -181,10 +185,10 @@ impl<const N: usize, const M: usize> FurtherInputs<N> for [FurtherInput<N>; M] {
             if input.nf > 0 && filtered {
                 let g: [f64; N] = product(c, f);
                 let value = w + dot(d, &input.w) - dot(&g[..c.len() + f.len()], &input.filtered_w);
-                push(&mut input.filtered_w, value);
+                push(&mut input.filtered_w, N, value);
             }
             if input.nf > 0 {
-                push(&mut input.w, w);
+                push(&mut input.w, N, w);
             }
             own = rest;
         }
@@ -194,13 +198,5 @@ impl<const N: usize, const M: usize> FurtherInputs<N> for [FurtherInput<N>; M] {
         for input in self {
             *input = FurtherInput::new(input.nb, input.nf);
         }
-    }
-}
-
-/// Inserts the newest value and drops the oldest value.
-fn push<const N: usize>(history: &mut [f64; N], value: f64) {
-    if N > 0 {
-        history.copy_within(0..N - 1, 1);
-        history[0] = value;
     }
 }

@@ -35,6 +35,7 @@ use core::hint::black_box;
 use hoid_numerics::products::dot;
 
 use crate::{
+    filter::{product, push},
     further_input::{FurtherInputs, NoFurtherInputs, NoiseFilters},
     sensitivities::{ErrorLayout, LinearForm, Sensitivities},
     shape::Shape,
@@ -343,29 +344,6 @@ fn dot_of_fresh(coefficients: &[f64], history: &[f64]) -> f64 {
         sum += c * black_box(*h);
     }
     sum
-}
-
-/// Returns the coefficients `g_1 ... g_(nc+nf)` of `G = C F`, where C and F have a leading 1.
-#[inline(always)]
-pub(crate) fn product<const N: usize>(c: &[f64], f: &[f64]) -> [f64; N] {
-    let mut g = [0.0; N];
-    g[..f.len()].copy_from_slice(f);
-    for (i, c) in c.iter().enumerate() {
-        g[i] += c;
-        for (j, f) in f.iter().enumerate() {
-            g[i + j + 1] += c * f;
-        }
-    }
-    g
-}
-
-/// Inserts the newest value into a history of n values and drops the oldest value.
-#[inline(always)]
-fn push(history: &mut [f64], n: usize, value: f64) {
-    if n > 0 {
-        history.copy_within(0..n - 1, 1);
-        history[0] = value;
-    }
 }
 
 /// Returns psi, assembled from the histories of x, u, eps, v and w.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use hoid::io::{AnyScenario, ScenarioChangeError, ScenarioChanges, write_record, write_record_csv};
-use hoid::model::Record;
+use hoid::model::{Record, SampleTime};
 use hoid::numerics::statistics::root_mean_square;
 use hoid::report::numbers;
 use hoid::sim::{FamilySimulator, RunSeed, Simulator};
@@ -19,6 +19,8 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         cell: args.cell,
         replication: args.replication,
     };
+    // A value out of range ends with 1, like that of a scenario file; an option that does not apply ends with 2.
+    args.sample_time.map(SampleTime::new).transpose()?;
     let scenario = changes(args)
         .apply(chosen_scenario(&args.base)?)
         .map_err(|error| refused(&error))?;

@@ -3,7 +3,7 @@
 //! If an excitation was recorded, the forms are compared at its lines, otherwise by their prediction errors. All forms
 //! share one inflation kappa, so that a form does not profit from a large kappa of its own. Without lines, the noise model
 //! biases the prediction errors: the best form is chosen as with lines, but its evidence against the other forms is
-//! reduced ([`bias_of_evidence`]), and forms that cannot be the best one count in the averages. With little noise
+//! reduced ([`bias_of_evidence`]), and forms whose neuromuscular poles are lags count in the averages. With little noise
 //! ([`super::low_noise`]) one form is assumed to be true, and a parameter costs Schwarz's `ln n` (G. Schwarz, *Annals
 //! of Statistics* 6 (1978) 461-464) instead of Akaike's 2. A form with undetermined parameters counts only if all forms
 //! have undetermined parameters.
@@ -68,9 +68,9 @@ impl Comparison {
             let bias = bias_of_evidence(&tried[front], prediction, highest_order, workspace);
             criteria = self::criteria(tried, prediction, bias);
             counting.clone_from(&criteria);
-            // A form that cannot be the best one still counts in the averages, if it has error bars.
+            // A form whose neuromuscular poles are lags cannot be the best one, but it counts in the averages.
             retain(&mut counting, |i| {
-                i == front || tried[i].fit.as_ref().is_ok_and(has_errors)
+                i == front || tried[i].fit.as_ref().is_ok_and(|fit| !is_undetermined(fit))
             });
             count_once(&mut counting, tried);
         }
@@ -162,11 +162,6 @@ fn common_inflation(tried: &[Tried<'_>]) -> f64 {
 /// True if the forms are compared by prediction errors alone, so that the noise model biases the comparison.
 fn compares_biased(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> bool {
     tried.len() > 1 && prediction.little_noise.is_none() && tried.iter().all(|t| t.lines.is_none())
-}
-
-/// True if the fit has a covariance, so that it can be part of an average.
-fn has_errors(fit: &PredictionFit<'_>) -> bool {
-    fit.ridge == 0.0 && covariances::covariances(fit).is_some()
 }
 
 /// Returns the ratio of the mean squared error of the response, which includes the bias by the noise model, to its
