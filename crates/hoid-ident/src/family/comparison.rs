@@ -3,7 +3,7 @@
 //! If an excitation was recorded, the forms are compared at its lines, otherwise by their prediction errors. All forms
 //! share one inflation kappa, so that a form does not profit from a large kappa of its own. Without lines, the noise model
 //! biases the prediction errors: the best form is chosen as with lines, but its evidence against the other forms is
-//! reduced ([`bias_of_evidence`]), and forms whose neuromuscular poles are lags count in the averages. With little noise
+//! reduced ([`bias_of_evidence`]). With little noise
 //! ([`super::low_noise`]) one form is assumed to be true, and a parameter costs Schwarz's `ln n` (G. Schwarz, *Annals
 //! of Statistics* 6 (1978) 461-464) instead of Akaike's 2. A form with undetermined parameters counts only if all forms
 //! have undetermined parameters.
@@ -52,29 +52,26 @@ impl Comparison {
         highest_order: usize,
         workspace: &mut Workspace,
     ) -> Self {
-        let mut criteria = criteria(tried, prediction, 1.0);
-        let mut counting = criteria.clone();
-        // If a form lacks a lag that the person has, the neuromuscular poles replace this lag.
-        retain(&mut counting, |i| !neuromuscular_poles_are_lags(&tried[i]));
-        retain(&mut counting, |i| {
-            tried[i].fit.as_ref().is_ok_and(|fit| !is_undetermined(fit))
-        });
-        if prediction.noise_free().is_some() {
-            keep_simplest(&mut counting, tried, prediction.equal());
-        }
-        count_once(&mut counting, tried);
-        let front = best_form(&counting);
+        let counted = |criteria: &[Option<f64>]| {
+            let mut counting = criteria.to_vec();
+            // If a form lacks a lag that the person has, the neuromuscular poles replace this lag.
+            retain(&mut counting, |i| !neuromuscular_poles_are_lags(&tried[i]));
+            retain(&mut counting, |i| {
+                tried[i].fit.as_ref().is_ok_and(|fit| !is_undetermined(fit))
+            });
+            if prediction.noise_free().is_some() {
+                keep_simplest(&mut counting, tried, prediction.equal());
+            }
+            count_once(&mut counting, tried);
+            counting
+        };
+        let mut criteria = self::criteria(tried, prediction, 1.0);
+        let front = best_form(&counted(&criteria));
         if let Some(front) = front.filter(|_| compares_biased(tried, prediction)) {
             let bias = bias_of_evidence(&tried[front], prediction, highest_order, workspace);
             criteria = self::criteria(tried, prediction, bias);
-            counting.clone_from(&criteria);
-            // A form whose neuromuscular poles are lags cannot be the best one, but it counts in the averages.
-            retain(&mut counting, |i| {
-                i == front || tried[i].fit.as_ref().is_ok_and(|fit| !is_undetermined(fit))
-            });
-            count_once(&mut counting, tried);
         }
-        let weights = front.map_or(Vec::new(), |front| weights(&counting, front));
+        let weights = front.map_or(Vec::new(), |front| weights(&counted(&criteria), front));
         let figures = tried.iter().zip(criteria).enumerate();
         let figures =
             figures.map(|(i, (t, criterion))| figures_of(t, criterion, weights.get(i).copied().unwrap_or(0.0)));

@@ -70,7 +70,7 @@ fn gradient_agrees_with_finite_differences() {
         for i in 0..theta.len() {
             // The lag of the canals, 5.9 s, loses further digits by 1/|F(1)|; a larger step loses fewer.
             let step = if matches!(layout.form, Form::Canals | Form::CanalsRate) {
-                1e-2
+                3e-3
             } else {
                 1e-3
             };
