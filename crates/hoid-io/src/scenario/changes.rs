@@ -1,4 +1,4 @@
-//! Changes of a scenario that commands and functions take beside it: the options of `hoid simulate` and
+//! Changes of a scenario that commands and functions take in addition to it: the options of `hoid simulate` and
 //! `pyhoid.simulate`.
 
 use hoid_model::{
