@@ -155,7 +155,7 @@ fn a_recording_states_what_was_displayed() {
     for column in ["f_t", "d", "f_t_K_d", "f_t_tau_f"] {
         assert!(header.split(',').any(|name| name == column), "{header}");
     }
-    // A fit that does not use the target is reported so.
+    // A fit that does not use the target is doubtful.
     let one = json(at.path(), &["identify", "run.csv", "--json"]);
     assert!(
         one["verdict"].to_string().contains("f_t=feedforward:0.25"),
