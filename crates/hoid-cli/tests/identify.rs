@@ -572,7 +572,7 @@ fn a_parameter_of_a_form_that_is_not_settled_has_a_condition() {
     good(d, &["simulate", "--condition", "C1", "--seed", "5", "--out", "c1.csv"]);
     let out = good(d, &["identify", "c1.csv", "--excitation", "none"]);
     let note = "not determined, because other forms are likely too: K_e, K_e_dot; the intervals apply only if the form \
-                is lead (weight 0.45): use --form lead to report them";
+                is lead (weight 0.49): use --form lead to report them";
     assert!(out.contains(note), "{out}");
     assert!(
         !out.contains("K_e is not determined, but") && !out.contains("not determined by the data"),
