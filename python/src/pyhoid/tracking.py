@@ -75,7 +75,7 @@ def track(
         must be given. The trace has the coefficients ``b0[r]``, ... and with `at` the columns
         ``gain_db[r]@2.5`` and ``phase_deg[r]@2.5``.
     roles : mapping of str to str, optional
-        Role of the further input: ``{"r": "feedforward"}`` (the default), ``"motion"`` or ``"output"``.
+        Role of the further input: ``{{"r": "feedforward"}}`` (the default), ``"motion"`` or ``"output"``.
     structure : str, optional
         By default ``"arx"`` for ``"rls"``, otherwise ``"bj"``.
     na, nb, nc, nd, nf, nk : int or (int, int) or range, optional
