@@ -26,7 +26,9 @@ _ORDERS = ("na", "nb", "nc", "nd", "nf", "nk")
 
 def _numbers(order: Order) -> list[int]:
     """Return an order of a model with two inputs as a list: one number for both, or one for each."""
-    return list(order) if isinstance(order, (tuple, list)) else [order]
+    if isinstance(order, (tuple, list, range)):
+        return [int(number) for number in order]
+    return [int(order)]
 
 
 def track(
