@@ -143,7 +143,7 @@ def track(
 
     A person who sees the target:
 
-    >>> trace = pyhoid.track(record, "rpem", inputs=["e", "f_t"], nb=(2, 1), nd=1, nk=(14, 1), at=[2])
+    >>> trace = pyhoid.track(record, "rpem", inputs=["e", "f_t"], nd=1, nk=(14, 1), at=[2])
     >>> trace["gain_db[f_t]@2"]
     """
     method = _recursion.name_of_now(method)
