@@ -91,6 +91,13 @@ impl TrackedInput {
     }
 }
 
+/// Returns the names of the coefficients of a model with these orders of the first input, in the order of theta.
+pub(crate) fn coefficient_names(orders: &Orders, further: Option<&TrackedInput>) -> Vec<String> {
+    let mut names = orders.parameter_names();
+    names.extend(further.into_iter().flat_map(TrackedInput::names));
+    names
+}
+
 /// Returns the rows and columns at `places` of a matrix of `width` rows.
 pub(crate) fn block(matrix: &[f64], width: usize, places: &[usize]) -> Vec<f64> {
     let rows = places.iter().flat_map(|i| places.iter().map(move |j| i * width + j));

@@ -7,7 +7,7 @@ use hoid_model::{ContinuousTransferFunction, Orders, Record, SampleTime, Structu
 
 use crate::{
     forgetting::ForgettingRule,
-    further_input::{TrackedInput, block},
+    further_input::{TrackedInput, block, coefficient_names},
     idle::default_start_span,
     memory::Memory,
     method::bad,
@@ -114,9 +114,7 @@ impl TrackOptions {
 
     /// Returns the names of the reported coefficients, in the order of theta.
     pub fn coefficient_names(&self) -> Vec<String> {
-        let mut names = self.polynomial_orders().parameter_names();
-        names.extend(self.further.iter().flat_map(TrackedInput::names));
-        names
+        coefficient_names(&self.polynomial_orders(), self.further.as_ref())
     }
 
     /// Returns the coefficients of the model of the first input and their covariance, by rows.

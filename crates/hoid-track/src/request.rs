@@ -4,10 +4,10 @@
 use std::collections::BTreeMap;
 
 use hoid_ident::{IdentError, NamedOrders, order_selection::Criterion, settings::DelayRange};
-use hoid_model::{ContinuousTransferFunction, Orders, SampleTime, Structure, theta_of};
+use hoid_model::{ContinuousTransferFunction, SampleTime, Structure, theta_of};
 
 use crate::{
-    further_input::TrackedInput,
+    further_input::{TrackedInput, coefficient_names},
     methods::Method,
     options::TrackOptions,
     plan::{TrackPlan, of_one_model, ranges_of},
@@ -85,13 +85,6 @@ impl TrackRequest {
         in_samples || self.further.is_some() || self.method.counts_samples()
     }
 
-    /// Returns the names of the coefficients of a model with these orders of the first input.
-    fn coefficient_names(&self, orders: &Orders) -> Vec<String> {
-        let mut names = orders.parameter_names();
-        names.extend(self.further.iter().flat_map(TrackedInput::names));
-        names
-    }
-
     /// Returns the plan for a sample time, after a check of everything that does not depend on data.
     ///
     /// # Errors
@@ -144,13 +137,13 @@ impl TrackRequest {
             RequestedStart::Default => StartAt::Span(None),
             RequestedStart::Nothing => StartAt::Nothing,
             RequestedStart::Coefficients(_) if combinations.len() > 1 => return Err(of_one_model()),
-            RequestedStart::Coefficients(named) => {
-                StartAt::Theta(theta_of(&self.coefficient_names(&largest), named).map_err(|reason| {
+            RequestedStart::Coefficients(named) => StartAt::Theta(
+                theta_of(&coefficient_names(&largest, self.further.as_ref()), named).map_err(|reason| {
                     IdentError::BadStart {
                         reason: format!("it {reason}"),
                     }
-                })?)
-            }
+                })?,
+            ),
         };
         let options = TrackOptions {
             start,

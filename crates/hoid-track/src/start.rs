@@ -13,7 +13,7 @@ use hoid_model::{Record, SampleTime, operator::retrieval_jacobian};
 use hoid_ident::{Constraint, Fit, GreyBox, IdentError};
 
 use crate::{
-    further_input::TrackedInput,
+    further_input::{TrackedInput, coefficient_names},
     setup::{PHYSICAL_NAMES, Setup, StartAt},
     start_noise::StartNoise,
 };
@@ -95,8 +95,7 @@ impl StartState {
 
     /// Computes the start from a given theta.
     fn given(setup: &Setup, theta: &[f64], sample_time: SampleTime) -> Result<Self, IdentError> {
-        let mut names = setup.orders.parameter_names();
-        names.extend(setup.further.iter().flat_map(TrackedInput::names));
+        let names = coefficient_names(&setup.orders, setup.further.as_ref());
         if theta.len() != names.len() || theta.iter().any(|t| !t.is_finite()) {
             return Err(IdentError::BadStart {
                 reason: format!("found {theta:?}; expected finite values of {}", names.join(", ")),

@@ -394,7 +394,7 @@ fn agreement_of(
 
 /// Fits a Box-Jenkins model with the orders and the delay of the fit, starting from the polynomials of the fit. `None`
 /// with several operators or several inputs, if the search fails, or if the model has no additional parameters.
-pub(super) fn free_model(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> Option<FreeModel> {
+fn free_model(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> Option<FreeModel> {
     let layout = fit.layout();
     if layout.elements.iter().any(|(_, record)| record.is_some()) || !layout.channels.is_empty() {
         return None;
