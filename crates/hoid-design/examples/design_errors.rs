@@ -15,7 +15,7 @@ use std::env;
 
 use hoid_design::experiment::ExperimentDesign;
 use hoid_ident::family::{ChannelRole, FamilyEstimator, Intersample, OperatorPrior, SeenChannel};
-use hoid_model::{FamilyScenario, Record, family_scenario::Display};
+use hoid_model::{FamilyScenario, Record};
 use simulated::{CASES, Case, Checked, Responses};
 
 fn main() {
@@ -28,7 +28,7 @@ fn main() {
         let held = found.iter().filter(|q| is_within(q)).count();
         (within, all) = (within + held, all + found.len());
         print(case, "at the lines", &found);
-        if identified > 0 && case.display != Display::Compensatory {
+        if identified > 0 {
             print(case, "identified", &case.checked_by(identified, seed, identify));
         }
     }
@@ -44,8 +44,8 @@ fn is_within(q: &Checked) -> bool {
 
 fn print(case: &Case, how: &str, found: &[Checked]) {
     println!(
-        "{}, {how}: {} of {} s, remnant {:?}",
-        case.name, case.runs, case.length_s, case.remnant
+        "{}, {how}: {} of {} s, remnant {:?}; {} experiments",
+        case.name, case.runs, case.length_s, case.remnant, found[0].experiments
     );
     for q in found {
         let mark = if is_within(q) { "" } else { " *" };
@@ -62,22 +62,28 @@ fn identify(
     _: &ExperimentDesign,
     scenario: &FamilyScenario,
 ) -> Option<Responses> {
-    let seen = SeenChannel {
-        preview_s: scenario.feedforward.as_ref()?.preview_s,
-        forms: vec![truth.target.as_ref()?.form()],
+    let seen = scenario.feedforward.as_ref().map(|seen| SeenChannel {
+        preview_s: seen.preview_s,
+        forms: vec![seen.operator.form()],
         ..SeenChannel::new("f_t", ChannelRole::Feedforward)
-    };
+    });
+    let excitation = ["d", "f_t"]
+        .into_iter()
+        .find(|name| records.iter().all(|record| record.channel(name).is_some()));
     let estimator = FamilyEstimator {
         forms: vec![truth.feedback.form()],
         prior: OperatorPrior::none(),
         intersample: Intersample::Zoh,
-        channels: vec![seen],
-        excitation: Some("d".to_owned()),
+        channels: seen.into_iter().collect(),
+        excitation: excitation.map(str::to_owned),
         ..FamilyEstimator::default()
     };
     let fit = estimator.fit(records).ok()?;
     Some(Responses {
         feedback: fit.operator(0).operator.clone(),
-        target: Some(fit.channels.first()?.response.as_ref()?.operator.clone()),
+        target: match fit.channels.first() {
+            Some(channel) => Some(channel.response.as_ref()?.operator.clone()),
+            None => None,
+        },
     })
 }

@@ -139,6 +139,8 @@ pub struct Checked {
     pub value: f64,
     pub predicted: f64,
     pub ratio: f64,
+    /// Number of experiments with an estimate.
+    pub experiments: usize,
     /// Mean deviation from the truth in predicted errors.
     pub off: f64,
 }
@@ -192,7 +194,8 @@ impl Case {
         })
     }
 
-    /// Scatter of the estimates that a method has of the runs of an experiment; those without a result are left out.
+    /// Scatter of the estimates that a method has of the runs of an experiment; those without a result or a
+    /// crossover are left out.
     pub fn checked_by(
         &self,
         experiments: u64,
@@ -221,8 +224,15 @@ impl Case {
             let Some(found) = estimate(&truth, &records, &design, &scenario) else {
                 continue;
             };
-            for (values, name) in all.iter_mut().zip(&names) {
-                values.push(value(&found, &scenario, name));
+            let Some(found) = names
+                .iter()
+                .map(|name| value(&found, &scenario, name))
+                .collect::<Option<Vec<_>>>()
+            else {
+                continue;
+            };
+            for (values, found) in all.iter_mut().zip(found) {
+                values.push(found);
             }
         }
         let of = |(name, values): (&&'static str, &Vec<f64>)| {
@@ -233,6 +243,7 @@ impl Case {
                 value: expected.value,
                 predicted,
                 ratio: hoid_numerics::statistics::sample_variance(values).sqrt() / predicted,
+                experiments: values.len(),
                 off: (hoid_numerics::statistics::mean(values) - expected.value) / predicted,
             }
         };
@@ -342,8 +353,8 @@ fn fitted(truth: &Responses, lines: &[Coefficients], time_constant_s: f64) -> Re
     found
 }
 
-/// A quantity by the name that it has in a design.
-fn value(found: &Responses, scenario: &FamilyScenario, name: &str) -> f64 {
+/// A quantity by the name that it has in a design; `None` if the loop has no crossover.
+fn value(found: &Responses, scenario: &FamilyScenario, name: &str) -> Option<f64> {
     let state = || FamilyState {
         operator: found.feedback.clone(),
         ..scenario.initial.clone()
@@ -353,11 +364,11 @@ fn value(found: &Responses, scenario: &FamilyScenario, name: &str) -> f64 {
         named.iter().find(|p| p.name == name).map(|p| p.value)
     };
     match name {
-        "crossover" => state().margins().unwrap().crossover_rad_s.unwrap(),
-        "phase_margin" => state().margins().unwrap().phase_margin_deg.unwrap(),
-        name => of(&found.feedback, name).unwrap_or_else(|| {
-            let (target, seen) = (found.target.as_ref().unwrap(), scenario.feedforward.as_ref().unwrap());
-            of_target(target, seen, name.strip_suffix("_f").unwrap())
+        "crossover" => state().margins().ok()?.crossover_rad_s,
+        "phase_margin" => state().margins().ok()?.phase_margin_deg,
+        name => of(&found.feedback, name).or_else(|| {
+            let (target, seen) = (found.target.as_ref()?, scenario.feedforward.as_ref()?);
+            Some(of_target(target, seen, name.strip_suffix("_f")?))
         }),
     }
 }

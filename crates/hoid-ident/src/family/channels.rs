@@ -27,7 +27,7 @@ use super::{
     arx_response::{MOST_GAINS, first_orders, frequencies, halved, measured},
     channel::{Channel, ChannelFit, ChannelResponse, SeenChannel, lead},
     channel_lines::{AtChannelLines, ChannelLines, InForm, own_places},
-    coordinates::{self, Grid},
+    coordinates,
     covariances::Covariances,
     estimated::Errors,
     intersample::Intersample,
@@ -353,7 +353,7 @@ impl<'s> FurtherInputs<'s> {
                 let prior = OperatorPrior::population().neuromuscular_only();
                 let points = &responses[k + 1];
                 let criterion = ResponseCriterion::new(form, neuromuscular, points, &prior, range, sampling);
-                let Ok(found) = criterion.fit_from_grid(search, Grid::Default) else {
+                let Ok(found) = criterion.fit(search) else {
                     continue;
                 };
                 let limits = coordinates::limits(form, neuromuscular, range, sampling.0);

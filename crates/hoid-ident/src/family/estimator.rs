@@ -21,6 +21,7 @@ use super::{
     options::{FamilyEstimator, HIGHEST_NOISE_ORDER},
     prediction::{NoiseOrders, Prediction},
     prediction_fit::PredictionFit,
+    prior::OperatorPrior,
     response_fit::{MeasuredResponse, ResponseCriterion},
     result::FamilyFit,
 };
@@ -33,6 +34,11 @@ use crate::{
 
 /// Maximum number of pairs (nc, nd) that are compared if nc is searched.
 const MOST_NOISE_PAIRS: usize = 60;
+
+/// Number of minima for the response from which the prediction error search runs.
+const SEARCHES: usize = 3;
+/// Order of the autoregression with which the minima for the response are compared.
+const FIRST_NOISE_ORDER: usize = 8;
 
 /// Reason why the lines are not used if there is little noise.
 const TOO_LITTLE_NOISE: &str = "the noise is weaker than the leakage";
@@ -241,7 +247,7 @@ impl FamilyEstimator {
         };
         let mut starts = Vec::new();
         for &form in &forms {
-            starts.push(self.start(form, lines.as_ref(), (&response, Grid::Default), &prediction)?);
+            starts.push(self.start(form, lines.as_ref(), &response, &prediction, workspace)?);
         }
         let (mut channels, mut in_form) = (Vec::new(), Vec::new());
         if let Some(lines) = &channel_lines {
@@ -303,12 +309,11 @@ impl FamilyEstimator {
         let prediction = self.prediction(self.intersample, records, &[form]).ok()?;
         self.check(records, prediction.first).ok()?;
         let response = ArxResponse::of(records).ok()?.points;
-        let start = self.start(form, None, (&response, Grid::Default), &prediction).ok()?;
+        let workspace = &mut Workspace::of_thread();
+        let start = self.start(form, None, &response, &prediction, workspace).ok()?;
         let coordinates = start.coordinates.into_iter().next()?;
         let operator = (form, self.neuromuscular);
-        let series = prediction
-            .unexplained(operator, &coordinates, &mut Workspace::of_thread())
-            .ok()?;
+        let series = prediction.unexplained(operator, &coordinates, workspace).ok()?;
         let products = NoiseProducts::new(&series, highest);
         let order = products.best_order(1..=highest, Penalty::Schwarz)?;
         Some((coordinates, products.fit(order)?))
@@ -385,10 +390,9 @@ impl FamilyEstimator {
         let clean = ArxResponse::without_noise(records, self.delay_range_s.1);
         if let Some(clean) = &clean {
             for (form, coordinates) in &mut from {
-                coordinates.extend(
-                    self.start(*form, None, (&clean.points, Grid::Dense), smooth)?
-                        .coordinates,
-                );
+                let criterion = self.of_response(*form, &clean.points, &self.prior, smooth);
+                let found = criterion.minima(&self.search, Grid::Dense).into_iter().next();
+                coordinates.push(found.ok_or(IdentError::NoFiniteLoss)?.coordinates);
             }
         }
         let mut search = |prediction: &Prediction<'_>, from: &[Starts]| {
@@ -481,39 +485,85 @@ impl FamilyEstimator {
         Ok(())
     }
 
-    /// Returns the fit of a form at the lines and the starting coordinates of its searches.
+    /// Returns the criterion for the measured response of a form.
+    fn of_response<'p>(
+        &self,
+        form: Form,
+        points: &'p [MeasuredResponse],
+        prior: &OperatorPrior,
+        prediction: &Prediction<'_>,
+    ) -> ResponseCriterion<'p> {
+        ResponseCriterion::new(
+            form,
+            self.neuromuscular,
+            points,
+            prior,
+            prediction.delay_range_s,
+            (prediction.sample_time, prediction.intersample),
+        )
+    }
+
+    /// Returns the fit of a form at the lines and the starting coordinates of its searches: those of the fit at the
+    /// lines, and of the minima for the response of the ARX model those with the smallest prediction error. The errors
+    /// of that response are correlated between frequencies, so that the smallest chi^2 may belong to another minimum.
+    /// With a prior the search passes minima far from people, and without one it reaches a person far from them.
     fn start(
         &self,
         form: Form,
         lines: Option<&LineData<'_>>,
-        (response, grid): (&[MeasuredResponse], Grid),
+        response: &[MeasuredResponse],
         prediction: &Prediction<'_>,
+        workspace: &mut Workspace,
     ) -> Result<Start, IdentError> {
-        let of = |points| {
-            ResponseCriterion::new(
-                form,
-                self.neuromuscular,
-                points,
-                &self.prior,
-                prediction.delay_range_s,
-                (prediction.sample_time, prediction.intersample),
-            )
-        };
         let mut start = Start {
             form,
             lines: None,
             coordinates: Vec::new(),
         };
         if let Some(lines) = lines {
-            let (fit, found) = line_fit(lines, &of(&lines.points), &self.search)?;
+            let criterion = self.of_response(form, &lines.points, &self.prior, prediction);
+            let (fit, found) = line_fit(lines, &criterion, &self.search)?;
             start.coordinates.push(found.coordinates);
             start.lines = Some(fit);
         }
         if !response.is_empty() {
-            let found = of(response).fit_from_grid(&self.search, grid)?;
-            start.coordinates.push(found.coordinates);
+            let criterion = self.of_response(form, response, &self.prior, prediction);
+            let other = match self.prior.entries() {
+                [] => OperatorPrior::population(),
+                _ => OperatorPrior::none(),
+            };
+            let other = self.of_response(form, response, &other, prediction);
+            let minima = [&criterion, &other].map(|c| c.minima(&self.search, Grid::Default));
+            let minima: Vec<Vec<f64>> = minima.into_iter().flatten().map(|found| found.coordinates).collect();
+            let cost = |found: &[f64], workspace: &mut Workspace| {
+                let error = self.whitened(prediction, form, found, FIRST_NOISE_ORDER, workspace)?;
+                let prior: f64 = criterion.penalty.iter().map(|penalty| penalty.at(found)).sum();
+                Some(prediction.samples() as f64 * error.loss.ln() + prior)
+            };
+            let mut minima: Vec<(f64, Vec<f64>)> = minima
+                .into_iter()
+                .map(|found| (cost(&found, workspace).unwrap_or(f64::INFINITY), found))
+                .collect();
+            minima.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let keep: usize = std::env::var("KEEP").map_or(SEARCHES, |t| t.parse().unwrap());
+            start
+                .coordinates
+                .extend(minima.into_iter().take(keep).map(|(_, found)| found));
         }
         Ok(start)
+    }
+
+    /// Returns the autoregression, of this order at most, of the part of u that an operator does not explain.
+    fn whitened(
+        &self,
+        prediction: &Prediction<'_>,
+        form: Form,
+        coordinates: &[f64],
+        order: usize,
+        workspace: &mut Workspace,
+    ) -> Option<Autoregression> {
+        let series = prediction.unexplained((form, self.neuromuscular), coordinates, workspace);
+        NoiseProducts::new(&series.ok()?, order).fit_up_to(order)
     }
 
     /// Returns the index of the form with a start whose residual is smallest after whitening by an autoregression of
@@ -528,11 +578,7 @@ impl FamilyEstimator {
         let mut least: Option<(f64, usize)> = None;
         for (i, start) in starts.iter().enumerate() {
             for coordinates in &start.coordinates {
-                let form = (start.form, self.neuromuscular);
-                let Ok(series) = prediction.unexplained(form, coordinates, workspace) else {
-                    continue;
-                };
-                if let Some(found) = NoiseProducts::new(&series, order).fit_up_to(order)
+                if let Some(found) = self.whitened(prediction, start.form, coordinates, order, workspace)
                     && least.is_none_or(|(loss, _)| found.loss < loss)
                 {
                     least = Some((found.loss, i));

@@ -29,11 +29,10 @@ use crate::{
     optimize::{Linearisation, Minimum, Objective, minimise},
 };
 
-/// Number of starts from which the search runs to completion.
-const SEARCHES: usize = 6;
-/// Number of completed searches for a response that is known exactly, whose criterion has more minima with small
-/// values.
+/// Number of searches for a response that is known exactly, whose criterion has more minima with small values.
 const SEARCHES_OF_EXACT: usize = 30;
+/// Relative difference of chi^2 up to which two searches have ended in the same minimum.
+const SAME_MINIMUM: f64 = 1e-4;
 
 /// A measured response at one frequency, with its variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -103,42 +102,44 @@ impl<'p> ResponseCriterion<'p> {
         }
     }
 
-    /// Searches from the best points of a grid and returns the best result.
+    /// Returns the best of the [`minima`](Self::minima) from the default grid.
     ///
     /// # Errors
     /// [`IdentError::NoFiniteLoss`].
     pub fn fit(&self, search: &SearchOptions) -> Result<ResponseMinimum, IdentError> {
-        self.fit_from_grid(search, Grid::Default)
+        let found = self.minima(search, Grid::Default);
+        found.into_iter().next().ok_or(IdentError::NoFiniteLoss)
     }
 
-    /// As [`Self::fit`], with the grid of the given density.
-    ///
-    /// # Errors
-    /// [`IdentError::NoFiniteLoss`].
-    pub fn fit_from_grid(&self, search: &SearchOptions, grid: Grid) -> Result<ResponseMinimum, IdentError> {
-        let searches = if grid == Grid::Dense {
-            SEARCHES_OF_EXACT
-        } else {
-            SEARCHES
-        };
-        let grid = coordinates::start_grid(self.form, self.neuromuscular, &self.limits, grid);
-        let mut starts: Vec<(f64, Vec<f64>)> = grid
-            .into_iter()
-            .filter_map(|mut start| Some((self.best_gain(&mut start)?, start)))
-            .collect();
+    /// Returns the different minima in which searches from the points of a grid end, best first; empty if all searches
+    /// fail. chi^2 has local minima in delay and poles, so that the search runs from the best point of each delay, with
+    /// its best gain.
+    pub fn minima(&self, search: &SearchOptions, grid: Grid) -> Vec<ResponseMinimum> {
+        let mut starts: Vec<(f64, Vec<f64>)> =
+            coordinates::start_grid(self.form, self.neuromuscular, &self.limits, grid)
+                .into_iter()
+                .filter_map(|mut start| Some((self.best_gain(&mut start)?, start)))
+                .collect();
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut best: Option<Minimum> = None;
-        // chi^2 has local minima in delay and poles. The searches therefore start from the best points of a grid, each
-        // with its best gain.
-        for (_, start) in starts.into_iter().take(searches) {
-            let known = best.as_ref().map(|b| b.at.sum_of_squares);
-            if let Some(found) = minimise(self, start, search, None, &mut Workspace::default())
-                && known.is_none_or(|known| found.at.sum_of_squares < known)
-            {
-                best = Some(found);
+        match grid {
+            Grid::Default => {
+                let mut delays = Vec::new();
+                starts.retain(|(_, start)| {
+                    let delay = start.last().copied();
+                    let is_first = !delays.contains(&delay);
+                    delays.push(delay);
+                    is_first
+                });
             }
+            Grid::Dense => starts.truncate(SEARCHES_OF_EXACT),
         }
-        best.map(|minimum| self.result(minimum)).ok_or(IdentError::NoFiniteLoss)
+        let mut found: Vec<Minimum> = starts
+            .into_iter()
+            .filter_map(|(_, start)| minimise(self, start, search, None, &mut Workspace::default()))
+            .collect();
+        found.sort_by(|a, b| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares));
+        found.dedup_by(|a, b| a.at.sum_of_squares - b.at.sum_of_squares <= SAME_MINIMUM * b.at.sum_of_squares);
+        found.into_iter().map(|minimum| self.result(minimum)).collect()
     }
 
     /// Searches from one starting point; `None` if the search fails.
