@@ -112,7 +112,11 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
                 lengths.get(ninth).map_or(0, |length| length.saturating_mul(10))
             } else {
                 let alone = runs(held.iter().zip(&all).map(|(held, all)| *held && !all));
-                alone.iter().map(Range::len).max().map_or(0, |longest| longest.saturating_mul(2))
+                alone
+                    .iter()
+                    .map(Range::len)
+                    .max()
+                    .map_or(0, |longest| longest.saturating_mul(2))
             }
         };
         // A channel printed with few digits holds at a peak, and may by chance do so together with a quantised channel,
