@@ -54,6 +54,7 @@ pub struct Window<const N: usize, M> {
 }
 
 impl<const N: usize, M: AsMut<[f64]>> crate::state::State for Window<N, M> {
+    /// The restored numbers may come from any source: the next sample is stored within the memory.
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         let parts: &mut [&mut dyn crate::state::State] = &mut [
             &mut self.memory.as_mut(),
@@ -65,6 +66,8 @@ impl<const N: usize, M: AsMut<[f64]>> crate::state::State for Window<N, M> {
             &mut self.undetermined,
         ];
         crate::state::visit_all(parts, each);
+        self.filled = self.filled.min(self.length);
+        self.next = self.next.min(self.length - 1);
     }
 }
 

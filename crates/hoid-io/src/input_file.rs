@@ -38,7 +38,9 @@ pub(crate) fn settings_text(path: &Path) -> io::Result<String> {
     let kind = if is_json { Settings::Json } else { Settings::Toml };
     let longest = kind.longest();
     let mut text = String::new();
-    fs::File::open(path)?.take(longest + 1).read_to_string(&mut text)?;
+    fs::File::open(path)?
+        .take(longest.saturating_add(1))
+        .read_to_string(&mut text)?;
     if text.len() as u64 <= longest {
         return Ok(text);
     }

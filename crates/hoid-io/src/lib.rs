@@ -39,6 +39,9 @@
 //! | `wording` | formatting of numbers and names in messages |
 //! | `error` | [`IoError`] |
 
+// Numbers from a file are checked before they serve as an index, a length or a summand.
+#![cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
+
 mod data_quality;
 mod error;
 pub mod fmu;
@@ -46,14 +49,11 @@ mod formats;
 mod input_file;
 mod output;
 mod preparation;
-#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod record;
 mod results;
 mod scenario;
 mod survey;
-#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod table;
-#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod time;
 mod wording;
 

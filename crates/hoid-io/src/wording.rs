@@ -127,7 +127,7 @@ pub(crate) fn list(names: &[&str]) -> String {
     let mut text = shown.join(", ");
     match known.len() {
         0 => text.push_str("no named columns"),
-        n if n > SHOWN => text.push_str(&format!(" and {} more", n - SHOWN)),
+        n if n > SHOWN => text.push_str(&format!(" and {} more", n.saturating_sub(SHOWN))),
         _ => {}
     }
     text

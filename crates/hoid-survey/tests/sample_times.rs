@@ -79,6 +79,20 @@ fn a_start_from_a_span_and_a_plan_say_so_too() {
     }
 }
 
+/// The memory of a tracker would hold billions of samples.
+#[test]
+fn every_method_refuses_sample_times_below_a_microsecond() {
+    for method in hoid_survey::methods() {
+        for ts in [9e-7, 1e-12, f64::MIN_POSITIVE] {
+            let sample_time = SampleTime::new(ts).unwrap();
+            for options in starts(&TrackOptions::without_prior(method.clone(), sample_time)) {
+                let error = Tracker::new(&options, None, sample_time).unwrap_err().to_string();
+                assert!(error.contains("sample time of a tracker"), "{method}: {error}");
+            }
+        }
+    }
+}
+
 #[test]
 fn adaptive_by_default_takes_every_sample_time_of_recordings() {
     for ts in [0.001, 0.01, 1.0 / 60.0, 0.1] {

@@ -9,7 +9,7 @@ use hoid_model::{
     scenario::{Condition, Scenario},
 };
 use hoid_sim::{RunSeed, Simulator};
-use hoid_track::{Method, Sample, Stage, TrackOptions, Tracker, WarmUp};
+use hoid_track::{Method, Sample, Stage, TrackOptions, Tracker, WarmUp, opened, sealed};
 use proptest::{collection::vec, prelude::*, sample::Index, test_runner::RngSeed};
 
 /// Options with the numbers of a tracker that has run, method by method; and those of a warm-up.
@@ -129,6 +129,25 @@ fn same(a: &[f64], b: &[f64]) -> bool {
         && a.iter()
             .zip(b)
             .all(|(a, b)| a.to_bits() == b.to_bits() || both_nan(a, b))
+}
+
+/// Changes each number in turn and seals the numbers again: no index, length or difference of counters ends the process.
+#[test]
+fn each_number_may_be_anything() {
+    let (saved, record) = (saved(), record());
+    for (options, numbers) in &saved.trackers {
+        let numbers = opened(numbers).unwrap();
+        for (at, number) in (0..numbers.len()).flat_map(|at| [(at, 0.0), (at, 1e18)]) {
+            let mut changed = numbers.to_vec();
+            changed[at] = number;
+            let restored = Tracker::restored(options, saved.sample_time, &sealed(changed));
+            let Ok(mut tracker) = restored else { continue };
+            for k in 2300..2340 {
+                tracker.step(record.input()[k], record.output()[k]);
+            }
+            let _ = (tracker.covariance(), tracker.operator(), tracker.response(1.0));
+        }
+    }
 }
 
 proptest! {

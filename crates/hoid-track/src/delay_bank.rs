@@ -22,7 +22,7 @@
 //! delay.
 
 use hoid_core::state::{State, visit_all};
-use hoid_model::{Orders, SampleTime, uncertainty::Estimate};
+use hoid_model::{MAX_DELAY, Orders, SampleTime, uncertainty::Estimate};
 
 use hoid_ident::IdentError;
 
@@ -82,11 +82,19 @@ impl DelayBank {
         build: impl Fn(&Setup) -> Result<Box<dyn Recursion>, IdentError>,
     ) -> Result<Self, IdentError> {
         let (first_nk, last_nk) = (sample_time.nk(low_s), sample_time.nk(high_s));
-        if last_nk - first_nk >= MOST {
+        let count = last_nk.saturating_sub(first_nk).saturating_add(1);
+        if count > MOST {
             return Err(bad(
                 "the range of the delay",
-                format!("{low_s} to {high_s} s, {} samples", last_nk - first_nk + 1),
+                format!("{low_s} to {high_s} s, {count} samples"),
                 &format!("at most {MOST} samples; narrow the range, or sample more slowly"),
+            ));
+        }
+        if last_nk > MAX_DELAY {
+            return Err(bad(
+                "the range of the delay",
+                format!("{low_s} to {high_s} s, {last_nk} samples"),
+                &format!("delays of at most {MAX_DELAY} samples"),
             ));
         }
         let of = |nk: usize| {
@@ -97,9 +105,8 @@ impl DelayBank {
             })
         };
         let members = (first_nk..=last_nk).map(of).collect::<Result<Vec<_>, _>>()?;
-        let count = members.len();
         // The delay of the start fit, limited to the range.
-        let best = setup.orders.nk.clamp(first_nk, last_nk) - first_nk;
+        let best = setup.orders.nk.clamp(first_nk, last_nk).saturating_sub(first_nk);
         let before = |k: usize| -0.5 * ((k as f64 - best as f64) * sample_time.s() / BEFORE_S).powi(2);
         Ok(Self {
             members,
@@ -113,6 +120,10 @@ impl DelayBank {
     }
 
     /// Returns the recursion whose estimate is reported.
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "`best` is the index of a member, also after a restore"
+    )]
     fn reported(&self) -> &dyn Recursion {
         &*self.members[self.best]
     }
@@ -131,7 +142,7 @@ impl DelayBank {
             most = most.max(*evidence);
         }
         self.evidence.iter_mut().for_each(|evidence| *evidence -= most);
-        if self.evidence[self.best] < -LEAD {
+        if self.evidence.get(self.best).is_some_and(|evidence| *evidence < -LEAD) {
             let leads = |(_, evidence): &(usize, &f64)| **evidence >= 0.0;
             self.best = self
                 .evidence
@@ -149,9 +160,9 @@ impl Recursion for DelayBank {
             innovation: 0.0,
             shortened: false,
         };
-        for (k, member) in self.members.iter_mut().enumerate() {
+        for (k, (member, innovation)) in self.members.iter_mut().zip(&mut self.innovations).enumerate() {
             let of = member.step(sample);
-            self.innovations[k] = of.innovation;
+            *innovation = of.innovation;
             if k == self.best {
                 outcome = of;
             }
@@ -207,7 +218,7 @@ impl Recursion for DelayBank {
         // A zero-order hold adds a delay of one sample.
         let tau_s = (self.first_nk as f64 - 1.0 + mean) * ts;
         Some(Delay {
-            nk: self.first_nk + self.best,
+            nk: self.first_nk.saturating_add(self.best),
             tau_e_s: Estimate::with_variance(tau_s, variance * ts * ts),
         })
     }

@@ -27,6 +27,8 @@ const EARLY_FORGETTING: f64 = 0.01;
 const EARLY_SHARE: f64 = 0.9993;
 /// Smallest factor of variable forgetting: a memory of ten samples.
 const SMALLEST_FACTOR: f64 = 0.9;
+/// Longest sliding window, samples; each of them takes as many numbers as there are parameters, and one more.
+const LONGEST_WINDOW: f64 = 1e7;
 /// Memory length of the innovation variance, as a multiple of the shortest memory of a parameter.
 const LEVEL_MEMORIES: f64 = 4.0;
 
@@ -89,11 +91,14 @@ impl<const N: usize> Gain<N> {
             }
             ForgettingRule::Window => {
                 let samples = (1.0 / (1.0 - shortest)).round();
-                if !samples.is_finite() {
+                if samples.is_nan() || samples > LONGEST_WINDOW {
                     return Err(IdentError::BadOption {
                         option: "the sliding window".to_owned(),
-                        found: "an infinite memory".to_owned(),
-                        expected: "a memory in samples or seconds".to_owned(),
+                        found: match shortest < 1.0 {
+                            true => format!("{samples} samples"),
+                            false => "an infinite memory".to_owned(),
+                        },
+                        expected: "a memory in samples or seconds, of at most 10 million samples".to_owned(),
                     });
                 }
                 let memory = vec![0.0; Window::<N, Vec<f64>>::memory_length(samples as usize)];

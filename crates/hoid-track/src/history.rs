@@ -30,7 +30,7 @@ impl History {
     /// A history of n zeros.
     pub fn new(n: usize) -> Self {
         Self {
-            values: vec![0.0; 2 * n],
+            values: vec![0.0; n.saturating_mul(2)],
             n,
             at: 0,
         }
@@ -38,18 +38,19 @@ impl History {
 
     /// Adds the next value and drops the oldest one.
     pub fn push(&mut self, x: f64) {
-        if self.n == 0 {
-            return;
+        let Some(last) = self.n.checked_sub(1) else { return };
+        self.at = self.at.checked_sub(1).unwrap_or(last);
+        for at in [self.at, self.at.saturating_add(self.n)] {
+            if let Some(place) = self.values.get_mut(at) {
+                *place = bounded(x);
+            }
         }
-        self.at = if self.at == 0 { self.n } else { self.at } - 1;
-        let x = bounded(x);
-        self.values[self.at] = x;
-        self.values[self.at + self.n] = x;
     }
 
     /// Returns `[x(t), x(t-1), ..., x(t-n+1)]`, where x(t) is the latest value.
     pub fn newest(&self) -> &[f64] {
-        &self.values[self.at..self.at + self.n]
+        let from = self.values.get(self.at..).unwrap_or_default();
+        from.get(..self.n).unwrap_or_default()
     }
 }
 

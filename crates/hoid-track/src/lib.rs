@@ -62,6 +62,7 @@
 pub mod building;
 mod change;
 mod columns;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod delay_bank;
 mod determined;
 mod diagnostics;
@@ -70,6 +71,7 @@ mod forgetting;
 mod further_input;
 mod gain;
 mod guard;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod history;
 mod idle;
 mod kernel;
@@ -99,9 +101,11 @@ mod shared_options;
 mod stage;
 mod start;
 mod start_noise;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod stationary;
 mod summary;
 mod trace;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod tracker;
 mod two_sided;
 mod validation;

@@ -321,6 +321,34 @@ mod tests {
         }
     }
 
+    /// Changes each number of the decimator in turn and seals the numbers again: no index or counter ends the process.
+    #[test]
+    fn a_decimator_takes_any_numbers() {
+        let record = fast(1.0);
+        let all: Vec<Sample> = samples(&record).collect();
+        for before in [100, 600] {
+            let mut first = live(&TrackRequest::default());
+            for sample in &all[..before] {
+                first.update(*sample, true, &choose);
+            }
+            let (orders, numbers) = first.saved();
+            let (of_stage, numbers) = opened(&numbers).unwrap().split_last().unwrap();
+            for at in *of_stage as usize..numbers.len() {
+                for number in [0.0, 1e300, -1e300] {
+                    let mut changed = numbers.to_vec();
+                    changed[at] = number;
+                    changed.push(*of_stage);
+                    let mut restored = live(&TrackRequest::default());
+                    if restored.restore(orders, &sealed(changed)).is_ok() {
+                        for sample in &all[before..before + 300] {
+                            restored.update(*sample, true, &choose);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
     #[test]
     fn requests_that_cannot_be_live_are_refused() {
         let ts = SampleTime::new(0.01).unwrap();

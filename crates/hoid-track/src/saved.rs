@@ -134,11 +134,11 @@ mod tests {
 
     /// Changes each number in turn and seals the numbers again: no index, length or difference of counters ends the
     /// process.
-    fn each_number_may_be_anything(with: &[(&str, &str)], saved_at: usize, to: usize) {
+    fn each_number_may_be_anything(method: Method, with: &[(&str, &str)], saved_at: usize, to: usize) {
         let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();
         let span = record.span(0.0, 20.0).unwrap();
-        let options = TrackOptions::default_for(Method::rpem(), 29).with(with).unwrap();
+        let options = TrackOptions::default_for(method, 29).with(with).unwrap();
         let mut tracker = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();
         // A gap in the samples, within which the tracker is saved.
         let step = |tracker: &mut Tracker, k: usize| {
@@ -165,11 +165,17 @@ mod tests {
 
     #[test]
     fn a_guard_takes_any_numbers() {
-        each_number_may_be_anything(&[("guard", "yes")], 2350, 2600);
+        each_number_may_be_anything(Method::rpem(), &[("guard", "yes")], 2350, 2600);
     }
 
     #[test]
     fn a_bank_of_delays_takes_any_numbers() {
-        each_number_may_be_anything(&[("track_delay", "0.28..0.3")], 2050, 2060);
+        each_number_may_be_anything(Method::rpem(), &[("track_delay", "0.28..0.3")], 2050, 2060);
+    }
+
+    #[test]
+    fn a_window_takes_any_numbers() {
+        let with = [("forgetting", "window"), ("memory", "40")];
+        each_number_may_be_anything(Method::rpem(), &with, 2030, 2100);
     }
 }

@@ -31,16 +31,28 @@ const FASTEST_SHARE: f64 = 0.5;
 const DAMPING: [f64; 2] = [0.02, 5.0];
 /// Longest sample time of a tracker, s: with a longer one, the upper bound of omega_nm would be below the lower bound.
 const LONGEST_SAMPLE_TIME_S: f64 = FASTEST_SHARE * std::f64::consts::PI / SLOWEST_OMEGA;
+/// Shortest sample time of a tracker, s: with a shorter one, the samples that a tracker stores would not fit in memory.
+const SHORTEST_SAMPLE_TIME_S: f64 = 1e-6;
 /// Factor by which the roots of an unstable noise model are moved inwards until it is stable.
 const ROOT_SHRINK_FACTOR: f64 = 0.99;
 
-/// Checks that the upper bound of omega_nm at the sample time is above the lower bound; the limit is the same for all
-/// methods.
+/// Checks that the upper bound of omega_nm at the sample time is above the lower bound, and that a few seconds are not
+/// too many samples; the limits are the same for all methods.
 ///
 /// # Errors
-/// [`IdentError::BadOption`] above [`LONGEST_SAMPLE_TIME_S`].
+/// [`IdentError::BadOption`] from [`LONGEST_SAMPLE_TIME_S`] on, and below [`SHORTEST_SAMPLE_TIME_S`].
 pub(crate) fn check_sample_time(sample_time: SampleTime) -> Result<(), IdentError> {
     let ts = sample_time.s();
+    if ts < SHORTEST_SAMPLE_TIME_S {
+        return Err(IdentError::BadOption {
+            option: "the sample time of a tracker".to_owned(),
+            found: format!("{ts:e} s"),
+            expected: format!(
+                "at least {SHORTEST_SAMPLE_TIME_S:e} s; a person needs some thousands of samples per second at most, so \
+                 check the unit of the time, or decimate"
+            ),
+        });
+    }
     if ts < LONGEST_SAMPLE_TIME_S {
         return Ok(());
     }
@@ -480,4 +492,40 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<FittedStart, IdentErr
         }
     }
     Ok(FittedStart::of(fit, eta, covariance, variance))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::{Method, TrackOptions, Tracker};
+
+    fn refused(method: Method, with: &[(&str, &str)], ts_s: f64) -> String {
+        let options = TrackOptions::default_for(method, 29).with(with).unwrap();
+        let start = StartAt::Theta(vec![0.0; options.parameter_names().len()]);
+        let options = TrackOptions { start, ..options }.with(&[("covariance", "1")]).unwrap();
+        let made = Tracker::new(&options, None, SampleTime::new(ts_s).unwrap());
+        made.unwrap_err().to_string()
+    }
+
+    #[test]
+    fn what_does_not_fit_in_memory_is_refused() {
+        for ts_s in [1e-7, 1e-12, f64::MIN_POSITIVE] {
+            for guard in ["yes", "no"] {
+                let error = refused(Method::rpem(), &[("guard", guard)], ts_s);
+                assert!(error.contains("at least 1e-6 s"), "{error}");
+            }
+            let options = TrackOptions::default_for(Method::adaptive(), 29);
+            let made = Tracker::new(&options, None, SampleTime::new(ts_s).unwrap());
+            assert!(made.is_err(), "{ts_s}");
+        }
+        for range in ["1e5..1e5", "1e15..1e15", "1e300..1e300"] {
+            let error = refused(Method::rpem(), &[("track_delay", range)], 0.01);
+            assert!(error.contains("at most 1000000 samples"), "{error}");
+        }
+        for memory in ["1e9", "inf"] {
+            let error = refused(Method::rpem(), &[("forgetting", "window"), ("memory", memory)], 0.01);
+            assert!(error.contains("at most 10 million samples"), "{error}");
+        }
+    }
 }

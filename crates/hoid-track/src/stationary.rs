@@ -141,12 +141,12 @@ impl Channel {
         let step = (x - self.last).abs();
         let jumped = step > self.steps[0].max(self.steps[1]);
         if !missing && step == 0.0 {
-            self.same += 1;
+            self.same = self.same.saturating_add(1);
         } else {
             (self.same, self.jumped[1]) = (0, jumped);
         }
         if !missing && (x - self.value).abs() <= self.tolerance {
-            self.stationary_samples += 1;
+            self.stationary_samples = self.stationary_samples.saturating_add(1);
         } else {
             (self.value, self.stationary_samples, self.jumped[0]) = (x, 0, jumped);
         }
@@ -159,7 +159,7 @@ impl Channel {
     /// at its start, so that the sample before it must also be undone. `least` is the shortest span without
     /// information; if the last value was repeated for three quarters of this length, only its repetitions are counted.
     fn samples_to_undo(&self, least: u64) -> (u64, bool) {
-        if 4 * self.same >= 3 * least {
+        if self.same.saturating_mul(4) >= least.saturating_mul(3) {
             (self.same, self.jumped[1])
         } else {
             (self.stationary_samples, self.jumped[0])
@@ -218,8 +218,8 @@ impl State for StationaryWatch {
             ],
             each,
         );
-        self.ring
-            .resize(length.min(2 * self.one as usize), BufferedSample::default());
+        let longest = (self.one as usize).saturating_mul(2);
+        self.ring.resize(length.min(longest), BufferedSample::default());
         self.since = self.since.min(self.ring.len());
         visit_all(
             &mut [
@@ -230,7 +230,7 @@ impl State for StationaryWatch {
             ],
             each,
         );
-        self.channel = self.channel.min(GuardChannel::ALL.len() - 1);
+        self.channel = self.channel.min(GuardChannel::ALL.len().saturating_sub(1));
     }
 }
 
@@ -264,7 +264,7 @@ impl StationaryWatch {
         for (channel, x) in self.channels.iter_mut().zip(x) {
             channel.take(x, act == Act::Bridge);
         }
-        self.samples += 1;
+        self.samples = self.samples.saturating_add(1);
         if self.samples.is_multiple_of(self.block) {
             for (channel, x) in self.channels.iter_mut().zip(x) {
                 channel.end_block(x);
@@ -273,7 +273,7 @@ impl StationaryWatch {
         if self.paused > 0 {
             return self.pause(recursion, sample, act);
         }
-        if self.ring.is_empty() || self.ring.len() - self.since >= self.one as usize {
+        if self.ring.is_empty() || self.ring.len().saturating_sub(self.since) >= self.one as usize {
             self.keep(recursion);
         }
         self.ring.push(BufferedSample {
@@ -295,17 +295,17 @@ impl StationaryWatch {
     /// Returns the channel whose stationary span carries no information, and the number of samples that must be undone.
     #[inline]
     fn stationary_channel(&self) -> Option<(GuardChannel, u64)> {
-        let [e, u] = self.channels.map(|channel| channel.stationary_samples);
-        let stood = |c: usize, least: u64| self.channels[c].samples_to_undo(least);
-        let all = |(repeats, jumped): (u64, bool)| repeats + u64::from(jumped);
+        let [input, output] = &self.channels;
+        let (e, u) = (input.stationary_samples, output.stationary_samples);
+        let all = |(repeats, jumped): (u64, bool)| repeats.saturating_add(u64::from(jumped));
         if e.min(u) >= self.both {
-            let (e, u) = (stood(0, self.both), stood(1, self.both));
+            let (e, u) = (input.samples_to_undo(self.both), output.samples_to_undo(self.both));
             let shorter = if e.0 == u.0 { (e.0, e.1 || u.1) } else { e.min(u) };
             Some((GuardChannel::Both, all(shorter)))
         } else if e >= self.one {
-            Some((GuardChannel::Input, all(stood(0, self.one))))
+            Some((GuardChannel::Input, all(input.samples_to_undo(self.one))))
         } else if u >= self.one {
-            Some((GuardChannel::Output, all(stood(1, self.one))))
+            Some((GuardChannel::Output, all(output.samples_to_undo(self.one))))
         } else {
             None
         }
@@ -332,16 +332,19 @@ impl StationaryWatch {
         stood: u64,
         sample: Sample,
     ) -> Guarded {
-        let last = self.ring.len() - 1;
+        let last = self.ring.len().saturating_sub(1);
         let begin = last.checked_sub(stood.saturating_sub(1) as usize);
         // If the span starts before the stored samples, nothing is undone, because the earlier samples did not change
         // the estimate.
         if let Some(begin) = begin {
-            let newer = usize::from(begin >= self.since);
-            self.kept[newer].restore(recursion);
-            let first = if newer == 1 { self.since } else { 0 };
+            let [older, newer] = &self.kept;
+            let (kept, first) = match begin >= self.since {
+                true => (newer, self.since),
+                false => (older, 0),
+            };
+            kept.restore(recursion);
             for (at, taken) in self.ring.iter().enumerate().take(last).skip(first) {
-                let act = match Act::ALL[taken.act.min(Act::ALL.len() - 1)] {
+                let act = match Act::ALL.get(taken.act).copied().unwrap_or(Act::Bridge) {
                     Act::Step if at >= begin => Act::Follow,
                     act => act,
                 };
@@ -362,8 +365,11 @@ impl StationaryWatch {
     fn pause(&mut self, recursion: &mut dyn Recursion, sample: Sample, act: Act) -> Guarded {
         let act = if act == Act::Bridge { act } else { Act::Follow };
         let outcome = act.on(recursion, sample);
-        self.paused += 1;
-        self.moving = if self.stationary_soon() { 0 } else { self.moving + 1 };
+        self.paused = self.paused.saturating_add(1);
+        self.moving = match self.stationary_soon() {
+            true => 0,
+            false => self.moving.saturating_add(1),
+        };
         if self.moving >= self.settle {
             self.tell(GuardAction::Resumed);
             self.paused = 0;
@@ -373,12 +379,17 @@ impl StationaryWatch {
 
     /// True while one or both signals have been stationary for half of the time after which they carry no information.
     fn stationary_soon(&self) -> bool {
-        let [e, u] = self.channels.map(|channel| channel.stationary_samples);
-        2 * e.min(u) >= self.both || 2 * e >= self.one || 2 * u >= self.one
+        let [e, u] = self
+            .channels
+            .map(|channel| channel.stationary_samples.saturating_mul(2));
+        e.min(u) >= self.both || e >= self.one || u >= self.one
     }
 
     fn tell(&mut self, action: GuardAction) {
-        let channel = GuardChannel::ALL[self.channel];
+        let channel = GuardChannel::ALL
+            .get(self.channel)
+            .copied()
+            .unwrap_or(GuardChannel::Both);
         self.event = Some(GuardEvent {
             kind: match channel {
                 GuardChannel::Both => GuardKind::Idle,

@@ -104,7 +104,7 @@ impl Tracker {
 
     /// Takes a sample, with the external signal if it is known. If `moves` is false, only the filters are updated.
     pub fn update(&mut self, sample: Sample, moves: bool) -> Outcome {
-        self.counts.samples += 1;
+        self.counts.samples = self.counts.samples.saturating_add(1);
         let sound = |v: f64| v.abs() <= self.options.largest;
         let (e_sound, u_sound) = (sound(sample.e), sound(sample.u));
         if let Some(guard) = &mut self.guard {
@@ -115,7 +115,10 @@ impl Tracker {
             };
             let before = guard.restarts();
             let guarded = guard.take(&mut *self.recursion, sample, moves);
-            self.counts.restarts += guard.restarts() - before;
+            self.counts.restarts = self
+                .counts
+                .restarts
+                .saturating_add(guard.restarts().saturating_sub(before));
             return self.guarded(guarded, !(e_sound && u_sound));
         }
         let sample = Sample {
@@ -140,9 +143,9 @@ impl Tracker {
         self.moved = act == Act::Step && !held;
         let taken = outcome.filter(|_| !skipped && !held);
         let shortened = outcome.is_some_and(|outcome| outcome.shortened);
-        self.counts.skipped += u64::from(skipped);
-        self.counts.held += u64::from(held && !skipped);
-        self.counts.shortened += u64::from(shortened);
+        self.counts.skipped = self.counts.skipped.saturating_add(u64::from(skipped));
+        self.counts.held = self.counts.held.saturating_add(u64::from(held && !skipped));
+        self.counts.shortened = self.counts.shortened.saturating_add(u64::from(shortened));
         Outcome {
             innovation: taken.map(|taken| taken.innovation),
             skipped,
@@ -158,9 +161,9 @@ impl Tracker {
         let taken = guarded.outcome.filter(|_| !guarded.held);
         let shortened = taken.is_some_and(|taken| taken.shortened);
         self.moved = taken.is_some();
-        self.counts.skipped += u64::from(skipped);
-        self.counts.held += u64::from(guarded.held && !skipped);
-        self.counts.shortened += u64::from(shortened);
+        self.counts.skipped = self.counts.skipped.saturating_add(u64::from(skipped));
+        self.counts.held = self.counts.held.saturating_add(u64::from(guarded.held && !skipped));
+        self.counts.shortened = self.counts.shortened.saturating_add(u64::from(shortened));
         Outcome {
             innovation: taken.map(|taken| taken.innovation),
             skipped,
@@ -203,19 +206,21 @@ impl Tracker {
     /// Returns the covariance of theta by rows; `None` while there is none.
     pub fn covariance(&self) -> Option<Vec<f64>> {
         let p = self.theta().len();
-        let mut covariance = vec![0.0; p * p];
+        let mut covariance = vec![0.0; p.saturating_mul(p)];
         self.recursion.covariance(&mut covariance).then_some(covariance)
     }
 
     /// Returns each coefficient with its standard error.
     pub fn parameters(&self) -> Vec<Estimate> {
-        let p = self.theta().len();
-        let covariance = self.covariance();
-        let of = |(i, &value): (usize, &f64)| match &covariance {
-            Some(c) => Estimate::with_variance(value, c[i * p + i]),
-            None => Estimate::fixed(value),
+        let theta = self.theta();
+        let Some(covariance) = self.covariance() else {
+            return theta.iter().copied().map(Estimate::fixed).collect();
         };
-        self.theta().iter().enumerate().map(of).collect()
+        let variances = covariance.iter().step_by(theta.len().saturating_add(1));
+        let pairs = theta.iter().zip(variances);
+        pairs
+            .map(|(value, variance)| Estimate::with_variance(*value, *variance))
+            .collect()
     }
 
     /// Returns the operator with standard errors.

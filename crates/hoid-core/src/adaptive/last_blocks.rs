@@ -29,9 +29,14 @@ pub(super) struct LastBlocks {
     closed: bool,
 }
 
-crate::state!([] LastBlocks { open, blocks, count, gap, to_skip, fresh, closed });
+crate::state!([] LastBlocks { open, blocks, count, gap, to_skip, fresh, closed }, bounded);
 
 impl LastBlocks {
+    /// Limits the restored number of blocks.
+    fn bounded(&mut self) {
+        self.count = self.count.min(BLOCKS);
+    }
+
     /// Returns an empty list of blocks, with the sample time in s.
     pub fn new(ts: f64) -> Self {
         Self {
@@ -112,7 +117,7 @@ impl LastBlocks {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::adaptive::sizes::STATES;
+    use crate::{adaptive::sizes::STATES, state::State};
 
     const ROW: Row = Row {
         x: [1.0; STATES],
@@ -130,6 +135,17 @@ mod tests {
             closed += usize::from(last.closed());
         }
         assert_eq!((closed, last.all().len()), (BLOCKS + 3, BLOCKS));
+    }
+
+    /// The blocks remain within the list after it was restored from numbers that were altered.
+    #[test]
+    fn restored_blocks_are_within() {
+        let mut last = LastBlocks::new(0.1);
+        last.visit(&mut |number| *number = 1e18);
+        (0..20).for_each(|_| last.take(&ROW));
+        (last.to_skip, last.open) = (0, EMPTY);
+        (0..20).for_each(|_| last.take(&ROW));
+        assert_eq!(last.all().len(), BLOCKS);
     }
 
     #[test]

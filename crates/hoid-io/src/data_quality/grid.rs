@@ -54,16 +54,13 @@ impl Grid {
         // In nearly every recording the time advances in all rows; the times are then not copied.
         let times: Cow<'_, [f64]> = match rows.len() == t.len() {
             true => Cow::Borrowed(t),
-            false => rows.iter().map(|row| t[*row]).collect(),
+            false => rows.iter().filter_map(|row| t.get(*row).copied()).collect(),
         };
         // The median of single steps is exact if there is no jitter; the median over spans of sixteen steps averages
         // out jitter, if few rows are missing.
         let median = |length: usize| {
-            let mut spans: Vec<f64> = times
-                .windows(length + 1)
-                .step_by(every(times.len()))
-                .map(|w| (w[length] - w[0]) / length as f64)
-                .collect();
+            let spans = times.iter().zip(times.iter().skip(length)).step_by(every(times.len()));
+            let mut spans: Vec<f64> = spans.map(|(from, to)| (to - from) / length as f64).collect();
             let middle = spans.len() / 2;
             (!spans.is_empty()).then(|| *spans.select_nth_unstable_by(middle, f64::total_cmp).1)
         };
@@ -96,15 +93,22 @@ impl Grid {
         }
     }
 
-    /// Returns each gap: the index in `rows` of the row before the gap, and the number of missing rows.
-    pub(crate) fn gaps(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        (1..self.steps.len())
-            .filter(|i| self.steps[*i] > 1.5)
-            .map(|i| (i - 1, self.steps[i] - 1.0))
+    /// Returns each gap: the rows before and after it, and the number of missing rows.
+    pub(crate) fn gaps(&self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
+        let after = self.rows.iter().zip(&self.steps).skip(1);
+        let steps = self.rows.iter().zip(after);
+        steps
+            .filter(|(_, (_, step))| **step > 1.5)
+            .map(|(before, (after, step))| (*before, *after, step - 1.0))
     }
 
     /// Returns the deviation of the times from lines fitted to parts without a gap: its RMS value, the largest
     /// deviation and the row of the largest deviation; `None` if no part is long enough.
+    #[expect(
+        clippy::indexing_slicing,
+        clippy::arithmetic_side_effects,
+        reason = "`rows` and `steps` are equally long, and `rows` are rows of t"
+    )]
     pub(crate) fn jitter(&self, t: &[f64]) -> Option<(f64, f64, usize)> {
         let (mut squares, mut freedom) = (0.0, 0);
         let mut worst = (0.0, 0);
@@ -139,11 +143,17 @@ impl Grid {
 
 /// True if no row is missing and each time is near its grid point.
 fn is_even(times: &[f64], steps: &[f64], ts: f64) -> bool {
-    let near = |(i, t): (usize, &f64)| (t - times[0] - i as f64 * ts).abs() < 0.25 * ts;
+    let begin = times.first().copied().unwrap_or(f64::NAN);
+    let near = |(i, t): (usize, &f64)| (t - begin - i as f64 * ts).abs() < 0.25 * ts;
     steps.iter().all(|step| *step == 1.0) && times.iter().enumerate().all(near)
 }
 
 /// Computes for each time the grid step from the time before it.
+#[expect(
+    clippy::indexing_slicing,
+    clippy::arithmetic_side_effects,
+    reason = "`times` and `steps` are equally long, and all indices are below their length"
+)]
 fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
     steps.fill(1.0);
     let mut owed: Option<usize> = None;

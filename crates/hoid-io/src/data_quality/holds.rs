@@ -11,26 +11,25 @@ use std::ops::Range;
 
 use super::grid::Grid;
 use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
-use super::signals::{Signal, Signals};
+use super::signals::{Signal, Signals, one_row};
 use super::values::Levels;
 use crate::wording::{counted, short};
 
 /// Finds the rows whose time does not advance: rows that equal the row before, and rows with other values.
 pub(super) fn without_advance(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     let same = |row: &usize| {
-        *row > 0
-            && signals
-                .columns
-                .iter()
-                .all(|signal| signal.values[*row] == signal.values[row - 1] || signal.values[*row].is_nan())
+        let repeats = |signal: &Signal<'_>| {
+            let step = signal.step_to(*row);
+            step.is_some_and(|(before, value)| value == before || value.is_nan())
+        };
+        *row > 0 && signals.columns.iter().all(repeats)
     };
     let (repeated, others): (Vec<usize>, Vec<usize>) = grid.repeated_times.iter().copied().partition(same);
     // After the time was set back, many rows are earlier than the latest time; only those that are not later than the
     // row before are reported.
     let falls = |row: &usize| {
-        signals
-            .time
-            .is_none_or(|time| *row == 0 || time.values[*row] <= time.values[row - 1])
+        let step = signals.time.and_then(|time| time.step_to(*row));
+        step.is_none_or(|(before, time)| time <= before)
     };
     let mut others: Vec<usize> = others
         .into_iter()
@@ -41,7 +40,7 @@ pub(super) fn without_advance(signals: &Signals<'_>, grid: &Grid, found: &mut Ve
         (QualityIssueKind::Repeated, repeated),
         (QualityIssueKind::Unordered, others),
     ] {
-        let places: Vec<RowSpan> = rows.iter().map(|row| signals.place(&(*row..row + 1))).collect();
+        let places: Vec<RowSpan> = rows.iter().map(|row| signals.place(&one_row(*row))).collect();
         let Some(first) = places.first() else { continue };
         let what = if kind == QualityIssueKind::Repeated {
             "duplicated, including the time"
@@ -67,14 +66,12 @@ pub(super) fn without_advance(signals: &Signals<'_>, grid: &Grid, found: &mut Ve
 }
 
 /// Returns all ranges of consecutive true values.
-fn runs(holds: impl Iterator<Item = bool>) -> Vec<Range<usize>> {
+pub(super) fn runs(holds: impl Iterator<Item = bool>) -> Vec<Range<usize>> {
     let mut runs: Vec<Range<usize>> = Vec::new();
-    for (row, hold) in holds.enumerate() {
-        if hold {
-            match runs.last_mut() {
-                Some(run) if run.end == row => run.end = row + 1,
-                _ => runs.push(row..row + 1),
-            }
+    for (row, _) in holds.enumerate().filter(|(_, hold)| *hold) {
+        match runs.last_mut() {
+            Some(run) if run.end == row => run.end = one_row(row).end,
+            _ => runs.push(one_row(row)),
         }
     }
     runs
@@ -95,13 +92,12 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
     let advances = |row: usize| grid.is_none_or(|grid| grid.repeated_times.binary_search(&row).is_err());
     let holds: Vec<Vec<bool>> = moving
         .iter()
-        .map(|(signal, _)| {
-            (0..rows)
-                .map(|row| row > 0 && advances(row) && signal.values[row] == signal.values[row - 1])
-                .collect()
-        })
+        .map(|(signal, _)| (0..rows).map(|row| advances(row) && signal.repeats(row)).collect())
         .collect();
-    let all: Vec<bool> = (0..rows).map(|row| holds.iter().all(|held| held[row])).collect();
+    let mut all = vec![true; rows];
+    for held in &holds {
+        all.iter_mut().zip(held).for_each(|(all, held)| *all &= held);
+    }
     let limit = if let [(_, levels)] = moving.as_slice() {
         if levels.is_quantised() {
             return;
@@ -112,10 +108,15 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
             if levels.is_quantised() {
                 let mut lengths: Vec<usize> = runs(held.iter().copied()).iter().map(Range::len).collect();
                 lengths.sort_unstable();
-                lengths.get(lengths.len() * 9 / 10).map_or(0, |length| 10 * length)
+                let ninth = lengths.len().saturating_mul(9) / 10;
+                lengths.get(ninth).map_or(0, |length| length.saturating_mul(10))
             } else {
-                let alone = runs((0..rows).map(|row| held[row] && !all[row]));
-                2 * alone.iter().map(Range::len).max().unwrap_or(0)
+                let alone = runs(held.iter().zip(&all).map(|(held, all)| *held && !all));
+                alone
+                    .iter()
+                    .map(Range::len)
+                    .max()
+                    .map_or(0, |longest| longest.saturating_mul(2))
             }
         };
         // A channel printed with few digits holds at a peak, and may by chance do so together with a quantised channel,

@@ -8,7 +8,7 @@ use super::search::{issues_of, names_a_clock};
 use super::signals::{Signal, Signals};
 use crate::IoError;
 use crate::record::ReadOptions;
-use crate::table::{Table, column_expression};
+use crate::table::{Column, Table, column_expression};
 
 /// Returns the problems with the requested columns within the requested span, and the rows of this span.
 ///
@@ -46,7 +46,7 @@ pub(crate) fn issues_of_signals(
     let nominal_hz = options.sampling_hz.filter(|_| !options.repair.resample);
     let mut found = of_columns(table, &used, time, nominal_hz, span_rows(table, time, options));
     // One term of a difference may be constant, such as a zero reference, without being a problem.
-    let names = |one: &QualityIssue, column: usize| table.columns[column].name == one.channel;
+    let names = |one: &QualityIssue, at: usize| table.columns.get(at).is_some_and(|column| column.name == one.channel);
     let constant: Vec<QualityIssue> = found
         .iter()
         .filter(|one| one.kind == QualityIssueKind::Constant)
@@ -70,7 +70,7 @@ pub(crate) fn issues_of_signals(
 /// Returns the rows of the requested span, as far as the time in the file determines them.
 fn span_rows(table: &Table<'_>, time: Option<usize>, options: &ReadOptions) -> Range<usize> {
     let at = |row: usize| match (time, options.sampling_hz) {
-        (Some(time), _) => table.columns[time].values[row],
+        (Some(time), _) => table.value(time, row),
         (None, Some(hz)) => row as f64 / hz,
         (None, None) => f64::NAN,
     };
@@ -83,8 +83,8 @@ fn span_rows(table: &Table<'_>, time: Option<usize>, options: &ReadOptions) -> R
 }
 
 /// Returns the problems with some columns of a table.
-fn of_columns(
-    table: &Table<'_>,
+fn of_columns<'a>(
+    table: &'a Table<'_>,
     used: &[usize],
     time: Option<usize>,
     nominal_hz: Option<f64>,
@@ -92,26 +92,29 @@ fn of_columns(
 ) -> Vec<QualityIssue> {
     // In a column filled in by --sparse, neither the filled-in values nor the originally missing ones are faults of the
     // recording.
-    let own: Vec<(usize, Cow<'_, [f64]>)> = (used.iter())
-        .map(|column| (*column, table.columns[*column].own_values(rows.clone())))
+    let own: Vec<(&Column, Cow<'_, [f64]>)> = (used.iter())
+        .filter_map(|at| table.columns.get(*at))
+        .map(|column| (column, column.own_values(rows.clone())))
         .collect();
-    let signal = |column: usize| Signal {
-        name: &table.columns[column].name,
-        values: &table.columns[column].values[rows.clone()],
+    let signal = |column: &'a Column| Signal {
+        name: &column.name,
+        values: column.values.get(rows.clone()).unwrap_or_default(),
     };
-    let is_clock = |column: &usize| Some(*column) != time && names_a_clock(&table.columns[*column].name);
+    let is_clock = |(at, column): &(usize, &Column)| Some(*at) != time && names_a_clock(&column.name);
+    let clocks = table.columns.iter().enumerate().filter(is_clock);
+    let time = time.and_then(|time| table.columns.get(time));
     let mut found = issues_of(&Signals {
         columns: own
             .iter()
             .map(|(column, values)| Signal {
+                name: &column.name,
                 values,
-                ..signal(*column)
             })
             .collect(),
         time: time.map(signal),
-        precision: time.map(|time| table.columns[time].precision).unwrap_or_default(),
+        precision: time.map(|time| time.precision).unwrap_or_default(),
         nominal_hz: nominal_hz.or(table.sample_time_s.map(|ts| 1.0 / ts)),
-        clocks: (0..table.columns.len()).filter(is_clock).map(signal).collect(),
+        clocks: clocks.map(|(_, column)| signal(column)).collect(),
         before: rows.start,
     });
     let is_sparse = |name: &str| {

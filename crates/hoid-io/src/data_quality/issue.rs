@@ -150,7 +150,7 @@ impl Serialize for QualityIssue {
             text: &self.text,
             remedy: self.kind.remedy(),
             place_count: self.places.len(),
-            places: &self.places[..self.places.len().min(PLACES_WRITTEN)],
+            places: self.places.get(..PLACES_WRITTEN).unwrap_or(&self.places),
         }
         .serialize(serializer)
     }

@@ -12,6 +12,18 @@ pub(crate) struct Signal<'a> {
     pub(crate) values: &'a [f64],
 }
 
+impl Signal<'_> {
+    /// Returns the values in the row before a row and in the row; `None` for the first row.
+    pub(super) fn step_to(&self, row: usize) -> Option<(f64, f64)> {
+        Some((*self.values.get(row.checked_sub(1)?)?, *self.values.get(row)?))
+    }
+
+    /// True if the value of a row equals the value of the row before.
+    pub(super) fn repeats(&self, row: usize) -> bool {
+        self.step_to(row).is_some_and(|(before, value)| value == before)
+    }
+}
+
 /// Columns of equal length, and the known properties of their time.
 #[derive(Default)]
 pub(crate) struct Signals<'a> {
@@ -25,6 +37,11 @@ pub(crate) struct Signals<'a> {
     pub(crate) clocks: Vec<Signal<'a>>,
     /// Number of rows before the first examined row.
     pub(crate) before: usize,
+}
+
+/// Returns a row as a range.
+pub(super) fn one_row(row: usize) -> Range<usize> {
+    row..row.saturating_add(1)
 }
 
 impl Signals<'_> {
@@ -45,7 +62,7 @@ impl Signals<'_> {
 
     pub(super) fn place(&self, rows: &Range<usize>) -> RowSpan {
         RowSpan {
-            row: self.before + rows.start + 1,
+            row: self.before.saturating_add(rows.start).saturating_add(1),
             rows: rows.len(),
             from_s: self.at_s(rows.start),
             to_s: self.at_s(rows.end).or_else(|| self.at_s(rows.end.saturating_sub(1))),

@@ -260,3 +260,14 @@ fn nothing_panics() {
     assert_eq!(look(&[], &[], &[]), []);
     assert_eq!(look(&[0.0], &[1.0], &[1.0]), []);
 }
+
+/// In a recording of hours, all values are sorted only if the first rows repeat theirs. A later value of another order
+/// of magnitude may leave fewer than eight levels.
+#[test]
+fn an_outlier_after_a_million_rows() {
+    let mut u: Vec<f64> = (0..(1 << 20) + 1000).map(|k| (0.37 * f64::from(k)).sin()).collect();
+    u[(1 << 20) + 500] = 1e30;
+    let channel = hoid_model::Channel::new("u", "", u);
+    let record = hoid_model::Record::of_output(hoid_model::SampleTime::HUNDREDTH, channel).unwrap();
+    assert!(quality_of_record(&record).is_empty());
+}

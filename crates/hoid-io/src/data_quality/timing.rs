@@ -2,7 +2,7 @@
 
 use super::grid::{Grid, slope};
 use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
-use super::signals::Signals;
+use super::signals::{Signals, one_row};
 use crate::table::Precision;
 use crate::wording::{counted, decimal, short};
 
@@ -46,7 +46,7 @@ pub(super) fn find(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIs
     let unit = rounding(t, signals.precision).min(ts);
     let jitter = grid.jitter(t);
     if let Some((rms, worst, row)) = jitter.filter(|(_, worst, _)| *worst > (JITTER * ts).max(unit * (1.0 + 1e-6))) {
-        let place = signals.place(&(row..row + 1));
+        let place = signals.place(&one_row(row));
         found.push(QualityIssue {
             kind: QualityIssueKind::Jitter,
             channel: String::new(),
@@ -74,11 +74,11 @@ pub(super) fn find(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIs
 fn gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     let places: Vec<RowSpan> = grid
         .gaps()
-        .map(|(i, missing)| RowSpan {
-            row: signals.before + grid.rows[i] + 1,
+        .map(|(before, after, missing)| RowSpan {
             rows: missing as usize,
-            from_s: signals.at_s(grid.rows[i]),
-            to_s: signals.at_s(grid.rows[i + 1]),
+            from_s: signals.at_s(before),
+            to_s: signals.at_s(after),
+            ..signals.place(&one_row(before))
         })
         .collect();
     let Some(first) = places.first() else { return };
@@ -164,13 +164,11 @@ fn drift(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Ve
         return;
     }
     let of = |from: usize| {
-        let times: Vec<f64> = grid.rows[from..from + third]
-            .iter()
-            .map(|row| time.values[*row])
-            .collect();
-        slope(&times, &grid.steps[from..from + third])
+        let times = grid.rows.iter().skip(from).take(third);
+        let times: Vec<f64> = times.filter_map(|row| time.values.get(*row).copied()).collect();
+        slope(&times, grid.steps.get(from..).unwrap_or_default())
     };
-    let (first, last) = (of(0), of(grid.rows.len() - third));
+    let (first, last) = (of(0), of(grid.rows.len().saturating_sub(third)));
     let change = last / first - 1.0;
     let n = third as f64;
     let uncertain = 8.0 * (rms * 12_f64.sqrt() / n.powf(1.5)).max(unit / n / 4.0) / grid.sample_time_s;
@@ -201,10 +199,10 @@ fn second_clocks(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssu
         let pairs: Vec<(f64, f64)> = grid
             .rows
             .iter()
-            .filter_map(|row| Some((time.values[*row], *clock.values.get(*row)?)))
+            .filter_map(|row| Some((*time.values.get(*row)?, *clock.values.get(*row)?)))
             .filter(|(_, c)| c.is_finite())
             .collect();
-        let (&[first, .., last], true) = (pairs.as_slice(), pairs.windows(2).all(|p| p[1].1 >= p[0].1)) else {
+        let (&[first, .., last], true) = (pairs.as_slice(), pairs.is_sorted_by(|a, b| b.1 >= a.1)) else {
             continue;
         };
         let ratio = (last.1 - first.1) / (last.0 - first.0);

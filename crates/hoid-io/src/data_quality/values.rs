@@ -12,8 +12,10 @@
 
 use std::ops::Range;
 
+use super::holds::runs;
 use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
 use super::signals::{Signal, Signals};
+use crate::time::sampling::steps;
 use crate::wording::{counted, short};
 
 /// Smallest reported quantisation step, relative to the standard deviation: the quantisation noise has 1e-5 of the
@@ -69,9 +71,9 @@ impl Levels {
     fn examined(values: &[f64], most: usize) -> Self {
         let rows = values.len();
         let finite = values.iter().filter(|v| v.is_finite()).count();
-        if rows > most {
-            let first = distinct(&values[..most]);
-            if 2 * first.len() > most && first.len() > 2 * Self::END {
+        if let Some((start, [_, ..])) = values.split_at_checked(most) {
+            let first = distinct(start);
+            if first.len() > most / 2 && first.len() > 2 * Self::END {
                 return Self {
                     count: rows,
                     rows,
@@ -82,8 +84,8 @@ impl Levels {
         }
         let mut levels = distinct(values);
         let count = levels.len();
-        if 2 * count > rows && count > 2 * Self::END {
-            levels.drain(Self::END..count - Self::END);
+        if count > rows / 2 {
+            keep_ends(&mut levels);
             levels.shrink_to_fit();
         }
         Self {
@@ -96,26 +98,23 @@ impl Levels {
 
     /// True if there are at most half as many levels as rows.
     pub(super) fn is_quantised(&self) -> bool {
-        2 * self.count <= self.rows
+        self.count <= self.rows / 2
     }
 
     /// Returns the step of the grid on which all values lie, except possibly the smallest and the largest, and the
     /// number of levels; `None` if there is no such grid.
     pub(crate) fn quantum(&self) -> Option<(f64, usize)> {
-        if self.count < 2 || 2 * self.count > self.finite {
+        if self.count < 2 || self.count > self.finite / 2 {
             return None;
         }
-        let inner = if self.count > 4 {
-            &self.kept[1..self.count - 1]
-        } else {
-            &self.kept[..]
+        let inner = match self.kept.as_slice() {
+            [_, inner @ .., _] if self.count > 4 => inner,
+            all => all,
         };
-        let step = inner
-            .windows(2)
-            .map(|pair| pair[1] - pair[0])
-            .fold(f64::INFINITY, f64::min);
+        let first = inner.first()?;
+        let step = steps(inner).fold(f64::INFINITY, f64::min);
         let off = |level: &f64| {
-            let steps = (level - inner[0]) / step;
+            let steps = (level - first) / step;
             (steps - steps.round()).abs()
         };
         (step > 0.0 && step.is_finite() && inner.iter().all(|level| off(level) < 1e-3)).then_some((step, self.count))
@@ -144,11 +143,21 @@ fn distinct(values: &[f64]) -> Vec<f64> {
 /// Returns the levels at both ends of all values. Only values at or beyond the end levels of `first`, the distinct
 /// values of the first rows, are sorted.
 fn ends(values: &[f64], first: &[f64]) -> Vec<f64> {
-    let (lower, upper) = (first[Levels::END - 1], first[first.len() - Levels::END]);
-    let outer: Vec<f64> = values.iter().copied().filter(|v| *v <= lower || *v >= upper).collect();
+    let (lower, upper) = (first.get(Levels::END - 1), first.iter().nth_back(Levels::END - 1));
+    let is_outer = |v: &f64| lower.is_some_and(|lower| v <= lower) || upper.is_some_and(|upper| v >= upper);
+    let outer: Vec<f64> = values.iter().copied().filter(is_outer).collect();
+    // Beside a later value of another order of magnitude the end levels of `first` may be a single level.
     let mut levels = distinct(&outer);
-    levels.drain(Levels::END..levels.len() - Levels::END);
+    keep_ends(&mut levels);
     levels
+}
+
+/// Removes all levels but those at both ends.
+fn keep_ends(levels: &mut Vec<f64>) {
+    let upper = levels.len().saturating_sub(Levels::END);
+    if upper > Levels::END {
+        levels.drain(Levels::END..upper);
+    }
 }
 
 /// Returns the saturation limits of a channel, the lower one first.
@@ -160,20 +169,13 @@ pub(crate) fn rails(values: &[f64], levels: &Levels) -> Vec<SaturationLimit> {
     let (coarse, levels) = (levels.is_quantised(), &levels.kept);
     let count = |level: f64| values.iter().filter(|v| **v == level).count();
     let rail = |is_upper: bool| {
-        let (extreme, next) = if is_upper {
-            (levels[levels.len() - 1], &levels[levels.len() - 4..levels.len() - 1])
-        } else {
-            (levels[0], &levels[1..4])
+        let (extreme, next) = match (levels.as_slice(), is_upper) {
+            ([.., a, b, c, extreme], true) | ([extreme, a, b, c, ..], false) => (*extreme, [*a, *b, *c]),
+            _ => return None,
         };
-        let mut stays: Vec<Range<usize>> = Vec::new();
-        for (row, _) in values.iter().enumerate().filter(|(_, v)| **v == extreme) {
-            match stays.last_mut() {
-                Some(stay) if stay.end == row => stay.end = row + 1,
-                _ => stays.push(row..row + 1),
-            }
-        }
+        let stays = runs(values.iter().map(|v| *v == extreme));
         let rows: usize = stays.iter().map(Range::len).sum();
-        let beside: usize = next.iter().map(|level| count(*level)).sum();
+        let beside: usize = next.into_iter().map(count).sum();
         // A stay at the start or end of the record does not count: the signal may have settled there.
         let inner = || {
             stays
@@ -184,7 +186,7 @@ pub(crate) fn rails(values: &[f64], levels: &Levels) -> Vec<SaturationLimit> {
         let longest = inner().max().unwrap_or(0);
         let stayed = inner().filter(|length| *length >= SATURATED_ROWS.0).count();
         let is_rail = if coarse {
-            longest >= SATURATED_ROWS.1 && 3 * rows >= PEAK * beside && stayed > 1
+            longest >= SATURATED_ROWS.1 && rows.saturating_mul(3) >= PEAK.saturating_mul(beside) && stayed > 1
         } else {
             longest >= SATURATED_ROWS.0
         };
@@ -263,13 +265,7 @@ fn missing(
     signal: Signal<'_>,
     tell: &mut impl FnMut(QualityIssueKind, usize, f64, &str, Vec<RowSpan>, String),
 ) {
-    let mut gone: Vec<Range<usize>> = Vec::new();
-    for (row, _) in signal.values.iter().enumerate().filter(|(_, v)| !v.is_finite()) {
-        match gone.last_mut() {
-            Some(run) if run.end == row => run.end = row + 1,
-            _ => gone.push(row..row + 1),
-        }
-    }
+    let gone = runs(signal.values.iter().map(|v| !v.is_finite()));
     let places: Vec<RowSpan> = gone.iter().map(|run| signals.place(run)).collect();
     let Some(first) = places.first() else { return };
     let rows: usize = gone.iter().map(Range::len).sum();
@@ -286,6 +282,17 @@ fn missing(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// An outlier of another order of magnitude behind the first rows: beside it the lowest levels are a single level.
+    #[test]
+    fn an_outlier_in_a_long_channel() {
+        for outlier in [1e30, -1e30, 1e308] {
+            let mut values: Vec<f64> = (0..200).map(|k| (0.37 * f64::from(k)).sin()).collect();
+            (values[150], values[151]) = (outlier, -0.5 * outlier);
+            let quick = Levels::examined(&values, 64);
+            assert!(quick.kept.len() < 4 && rails(&values, &quick).is_empty());
+        }
+    }
 
     #[test]
     fn a_long_channel_in_full_precision_is_known_by_its_first_rows() {

@@ -80,9 +80,7 @@ const FUNCTIONS: [&str; 3] = ["hoid_abi_version", "fmi2Instantiate", "fmi3Instan
 
 fn exports(bytes: &[u8], function: &str) -> bool {
     let name = [function.as_bytes(), &[0]].concat();
-    let first = name[0];
-    let starts = bytes.iter().enumerate().filter(|(_, byte)| **byte == first);
-    starts.into_iter().any(|(at, _)| bytes[at..].starts_with(&name))
+    bytes.windows(name.len()).any(|part| part == name)
 }
 
 fn two_bytes(bytes: &[u8], at: usize) -> Option<u16> {
@@ -107,8 +105,9 @@ impl Platform {
             return MAC.into_iter().find(|(known, _)| *known == machine).map(|(_, p)| p);
         }
         let head = four_bytes(bytes, 0x3c).filter(|_| bytes.starts_with(b"MZ"))? as usize;
-        let is_one = bytes.get(head..head.checked_add(4)?)? == b"PE\0\0";
-        (is_one && two_bytes(bytes, head + 4)? == MACHINE_OF_WINDOWS).then_some(WINDOWS)
+        let behind = head.checked_add(4)?;
+        let is_one = bytes.get(head..behind)? == b"PE\0\0";
+        (is_one && two_bytes(bytes, behind)? == MACHINE_OF_WINDOWS).then_some(WINDOWS)
     }
 }
 

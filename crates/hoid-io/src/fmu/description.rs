@@ -100,7 +100,8 @@ pub(super) fn description(version: FmiVersion, kind: FmuKind, variables: &[FmuVa
                 let _ = writeln!(xml, "    {open}");
                 for reference in outputs() {
                     // Indices in the description start at one.
-                    let _ = writeln!(xml, "      <Unknown index=\"{}\" dependencies=\"\"/>", reference + 1);
+                    let index = reference.saturating_add(1);
+                    let _ = writeln!(xml, "      <Unknown index=\"{index}\" dependencies=\"\"/>");
                 }
                 let _ = writeln!(xml, "    {close}");
             }

@@ -96,7 +96,8 @@ impl Settings {
             Self::Json => 10 << 20,
             Self::Toml => 2 << 20,
         };
-        raised().map_or(typical, |raised| typical.max(raised / self.share()))
+        let most = raised().and_then(|raised| raised.checked_div(self.share()));
+        most.map_or(typical, |most| typical.max(most))
     }
 }
 

@@ -167,7 +167,10 @@ pub(crate) fn format_to_write(path: &Path) -> Result<&'static Format, IoError> {
     };
     Err(IoError::UnknownFormat {
         file: path.display().to_string(),
-        found: format!(".{} cannot be written ({what})", format.extensions[0]),
+        found: format!(
+            ".{} cannot be written ({what})",
+            format.extensions.first().copied().unwrap_or_default()
+        ),
         expected: writable_endings(),
         remedy: String::new(),
     })

@@ -17,26 +17,17 @@
 //! | `budget` | limit of the memory that a file may take |
 //! | `guarded` | conversion of panics in third-party readers to errors |
 
-// Numbers from a file are checked before they serve as an index, a length or a summand.
-#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 pub(crate) mod arrays;
-#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod bids;
 mod budget;
-#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod csv;
 mod format;
 mod guarded;
 mod lookup;
-#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod mat;
-#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod npz;
-#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod packed;
-#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod parquet;
-#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod xdf;
 
 pub(crate) use budget::Settings;

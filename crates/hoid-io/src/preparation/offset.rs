@@ -52,6 +52,7 @@ struct Shift {
 }
 
 impl RecordParts {
+    #[expect(clippy::indexing_slicing, reason = "`find` returns indices of channels")]
     pub(super) fn offset(&mut self, offset: &std::collections::BTreeMap<String, Offset>) -> Result<(), IoError> {
         const STEP: &str = "offset";
         let ts = self.sample_time.s();
@@ -108,8 +109,8 @@ impl RecordParts {
             ));
         }
         let (from, to) = (from as usize, to as usize);
-        let rows = from..to + 1;
-        let cut = (rows.start, self.len() - rows.end);
+        let rows = from..to.saturating_add(1);
+        let cut = (rows.start, self.len().saturating_sub(rows.end));
         let moved: Vec<(usize, Vec<f64>)> = shifts
             .iter()
             .map(|(channel, shift)| {
@@ -118,7 +119,7 @@ impl RecordParts {
                 let values = if shift.interpolated {
                     kernel.values(values, first, 1.0, rows.len())
                 } else {
-                    values[first as usize..first as usize + rows.len()].to_vec()
+                    values.iter().skip(first as usize).take(rows.len()).copied().collect()
                 };
                 (*channel, values)
             })

@@ -106,9 +106,9 @@ impl RecordParts {
         if first > end {
             return Err(too_long(self));
         }
-        let n = (end - first) as usize + 1;
+        let n = (end - first) as usize;
         for channel in &mut self.channels {
-            channel.values = kernel.values(&channel.values, first * factor, factor, n);
+            channel.values = kernel.values(&channel.values, first * factor, factor, n.saturating_add(1));
         }
         let cut_s = (first * new.s(), last * old.s() - end * new.s());
         self.start_s += cut_s.0;
@@ -121,7 +121,7 @@ impl RecordParts {
             pass_hz: PASS * nyquist_hz,
             stop_hz: (factor > 1.0).then_some(nyquist_hz),
             stop_db: STOP_DB,
-            taps: 2 * kernel.half() + 1,
+            taps: kernel.half().saturating_mul(2).saturating_add(1),
             cut_s,
             delay_s: 0.5 * (new.s() - old.s()),
             input_lead_s: 0.0,

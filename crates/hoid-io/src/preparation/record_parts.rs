@@ -33,7 +33,7 @@ impl RecordParts {
 
     /// Returns the number of samples of each channel.
     pub(super) fn len(&self) -> usize {
-        self.channels[0].values.len()
+        self.channels.first().map_or(0, |channel| channel.values.len())
     }
 
     pub(super) fn error(&self, step: &'static str, found: impl Into<String>, expected: impl Into<String>) -> IoError {
@@ -68,7 +68,7 @@ impl RecordParts {
                 ));
             };
             if found.iter().any(|(known, _)| *known == channel) {
-                let name = &self.channels[channel].name;
+                let name = self.channels.get(channel).map_or(&name, |channel| &channel.name);
                 return Err(self.error(step, format!("\"{name}\" is named twice"), "each channel once"));
             }
             found.push((channel, value));

@@ -157,6 +157,7 @@ fn refused(found: &str, expected: &str) -> IoError {
 
 impl RecordParts {
     /// Sets the units declared for channels; a declared unit that contradicts the file is an error.
+    #[expect(clippy::indexing_slicing, reason = "`find` returns indices of channels")]
     pub(super) fn declare_units(&mut self, units: &std::collections::BTreeMap<String, String>) -> Result<(), IoError> {
         const STEP: &str = "unit";
         let named = units.iter().map(|(name, unit)| (name.clone(), unit.as_str()));
@@ -176,6 +177,7 @@ impl RecordParts {
         Ok(())
     }
 
+    #[expect(clippy::indexing_slicing, reason = "`find` returns indices of channels")]
     pub(super) fn scale(&mut self, scale: &std::collections::BTreeMap<String, Scaling>) -> Result<(), IoError> {
         const STEP: &str = "scale";
         let named = scale.iter().map(|(name, scaling)| (name.clone(), scaling));

@@ -167,12 +167,12 @@ impl TableSchema {
                     reason,
                 });
             }
-            if let Some(first) = self.columns[..second].iter().position(|other| other.name == *name) {
+            if let Some(first) = self.columns.iter().take(second).position(|other| other.name == *name) {
                 return Err(IoError::DuplicateColumn {
                     file: file.to_owned(),
                     name: name.clone(),
-                    first: first + 1,
-                    second: second + 1,
+                    first: first.saturating_add(1),
+                    second: second.saturating_add(1),
                 });
             }
         }
@@ -203,9 +203,9 @@ impl Values<'_> {
 
     pub(crate) fn part(&self, rows: Range<usize>) -> Self {
         match self {
-            Self::Real(values) => Self::Real(&values[rows]),
-            Self::Whole(values) => Self::Whole(&values[rows]),
-            Self::Text(values) => Self::Text(&values[rows]),
+            Self::Real(values) => Self::Real(values.get(rows).unwrap_or_default()),
+            Self::Whole(values) => Self::Whole(values.get(rows).unwrap_or_default()),
+            Self::Text(values) => Self::Text(values.get(rows).unwrap_or_default()),
         }
     }
 }

@@ -72,7 +72,7 @@ pub(crate) fn write_values(path: &Path, schema: TableSchema, values: &[Values<'_
     write_atomically(path, |file| {
         let mut sink = Sink::start(format, file, schema)?;
         for start in (0..rows).step_by(GROUP) {
-            let end = rows.min(start + GROUP);
+            let end = rows.min(start.saturating_add(GROUP));
             let group: Vec<Values<'_>> = values.iter().map(|values| values.part(start..end)).collect();
             sink.group(file, &group)?;
         }
@@ -142,12 +142,12 @@ impl TableWriter {
         let values = table.values();
         let mut start = 0;
         while start < rows {
-            let room = GROUP - self.waiting.first().map_or(0, ColumnValues::len);
-            let end = rows.min(start + room);
+            let room = GROUP.saturating_sub(self.waiting.first().map_or(0, ColumnValues::len));
+            let end = rows.min(start.saturating_add(room));
             for (waiting, values) in self.waiting.iter_mut().zip(&values) {
                 extend(waiting, values.part(start..end));
             }
-            if end - start == room {
+            if end.saturating_sub(start) == room {
                 self.group()?;
             }
             start = end;

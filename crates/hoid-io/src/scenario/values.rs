@@ -73,7 +73,8 @@ fn in_short(value: f64) -> String {
 
 /// Returns the line, counted from 1, of a byte offset in a text.
 pub(super) fn line_of(text: &str, offset: usize) -> usize {
-    1 + text.bytes().take(offset).filter(|b| *b == b'\n').count()
+    let before = text.bytes().take(offset);
+    before.filter(|b| *b == b'\n').count().saturating_add(1)
 }
 
 /// The text of a scenario file, in which the lines of values are located.

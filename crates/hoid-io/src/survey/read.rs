@@ -63,7 +63,7 @@ fn unusable(table: &Table<'_>) -> Vec<String> {
     let first = |(at, column): (usize, &Column)| {
         let numbers = column.values.iter().any(|value| value.is_finite());
         let row = (0..table.rows)
-            .find(|row| column.values[*row].is_infinite() || column.texts.binary_search(row).is_ok())
+            .find(|row| table.value(at, *row).is_infinite() || column.texts.binary_search(row).is_ok())
             .filter(|row| numbers && !(*row == 0 && table.has_no_number_in(0)))?;
         let comma = has_decimal_comma(&table.source.cell(row, at));
         (!comma).then(|| table.bad_value(at, row, 0..table.rows).to_string())

@@ -2,6 +2,7 @@
 
 use super::read::RawColumn;
 use crate::data_quality::Grid;
+use crate::time::sampling::pairs;
 
 /// Sampling of columns that share a time.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,13 +49,9 @@ pub(super) fn sampling(time: &RawColumn, columns: &[RawColumn]) -> Option<Sampli
         .iter()
         .filter(|column| column.parent == time.parent && column.rows == time.rows && column.path != time.path)
         .filter_map(|column| column.values.as_ref())
-        .filter(|values| {
-            values
-                .windows(2)
-                .any(|pair| pair[0] != pair[1] && !pair[0].is_nan() && !pair[1].is_nan())
-        })
+        .filter(|values| pairs(values).any(|(value, next)| value != next && !value.is_nan() && !next.is_nan()))
         .collect();
-    let repeats = |row: &usize| beside.iter().all(|values| values[*row] == values[row - 1]);
+    let repeats = |(before, row): &(usize, usize)| beside.iter().all(|values| values.get(*before) == values.get(*row));
     Some(SamplingSurvey {
         path: time.path.clone(),
         rows: time.rows,
@@ -64,14 +61,14 @@ pub(super) fn sampling(time: &RawColumn, columns: &[RawColumn]) -> Option<Sampli
         gaps: grid.gaps().count(),
         missing: grid
             .gaps()
-            .map(|(_, missing)| missing as u64)
+            .map(|(.., missing)| missing as u64)
             .fold(0, u64::saturating_add),
-        first_gap_s: grid.gaps().next().map(|(i, _)| all[grid.rows[i]]),
-        not_increasing: t.windows(2).filter(|pair| pair[1] <= pair[0]).count(),
+        first_gap_s: grid.gaps().next().and_then(|(before, ..)| all.get(before).copied()),
+        not_increasing: pairs(&t).filter(|(time, next)| next <= time).count(),
         repeated: if beside.is_empty() {
             0
         } else {
-            (1..time.rows).filter(repeats).count()
+            (0..).zip(1..time.rows).filter(repeats).count()
         },
     })
 }

@@ -57,7 +57,7 @@ pub(super) fn values(all: &[f64]) -> Option<ValueSurvey> {
     };
     let (low, high) = (at_rail(false), at_rail(true));
     Some(ValueSurvey {
-        missing: all.len() - finite.len(),
+        missing: all.len().saturating_sub(finite.len()),
         min,
         max,
         mean,
@@ -71,6 +71,11 @@ pub(super) fn values(all: &[f64]) -> Option<ValueSurvey> {
 }
 
 /// Draws the mean of each of several equally long parts as a bar; a part without finite values is blank.
+#[expect(
+    clippy::indexing_slicing,
+    clippy::arithmetic_side_effects,
+    reason = "the number of a part is at most 32, and its ends are at most the number of values"
+)]
 fn sketch(all: &[f64], min: f64, max: f64) -> String {
     let parts = SKETCH.min(all.len());
     let bar = |part: usize| {

@@ -170,10 +170,11 @@ impl DecimatedChannel {
 
     /// Extends the past by the reflection of the start in the first sample.
     fn reflect(&mut self, half: usize) {
-        let begin = self.past[0];
+        let begin = self.past.front().copied().unwrap_or(self.last);
         for k in 1..=half {
-            // The k - 1 values inserted so far have shifted sample k to position 2 k - 1.
-            let value = 2.0 * begin - self.past[2 * k - 1];
+            // The k - 1 values inserted so far have shifted sample k to position 2 k - 1. It is missing only after
+            // altered numbers were restored.
+            let value = 2.0 * begin - self.past.get(2 * k - 1).unwrap_or(&begin);
             self.past.push_front(value);
         }
         self.first = -(half as i64);
@@ -205,17 +206,17 @@ impl DecimatedChannel {
 }
 
 impl<const C: usize> State for Decimator<C> {
+    /// The restored numbers may come from any source: counts and indices are limited to values that a stream can reach.
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
-        let most = 2 * self.kernel.half() + 4 * self.done.factor + 4;
-        for count in [&mut self.input_count, &mut self.output_count] {
-            let mut number = *count as f64;
-            each(&mut number);
-            *count = number.max(0.0) as u64;
-        }
+        let (half, factor) = (self.kernel.half(), self.done.factor);
+        let most = 2 * half + 4 * factor + 4;
+        self.input_count.visit(each);
+        self.output_count.visit(each);
+        self.output_count = self.output_count.min(self.input_count / factor as u64 + 1);
         for lane in &mut self.lanes {
             let mut numbers = [lane.first as f64, lane.last, f64::from(u8::from(lane.seen))];
             numbers.iter_mut().for_each(&mut *each);
-            lane.first = numbers[0] as i64;
+            lane.first = (numbers[0] as i64).clamp(-(half as i64), self.input_count as i64);
             lane.last = numbers[1];
             lane.seen = numbers[2] != 0.0;
             let mut length = lane.past.len() as f64;

@@ -76,7 +76,7 @@ impl Reference {
 
     /// Ends a block; returns true if the estimate has diverged.
     pub fn end_block(&mut self, block: &Block, length: u32) -> bool {
-        self.over += 1;
+        self.over = self.over.saturating_add(1);
         // Blocks with held-back samples carry no information.
         let counts = self.over > SETTLING && self.over <= self.compared && block.innovations == length;
         let astray = if counts {

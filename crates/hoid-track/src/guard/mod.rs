@@ -42,6 +42,7 @@
 //! | `event`, `options` | events for reports; the option of the guard |
 
 mod blocks;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod compared;
 mod event;
 mod holding;

@@ -54,6 +54,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             }
             return;
         }
+        // There are more samples than the memory holds only after altered numbers were restored.
+        let first = n.saturating_sub(self.history.capacity() as u64);
         let mut best: Option<(f64, Candidate)> = None;
         for start in self.prior.starts {
             let Some(mut candidate) = self.candidate(start, &self.prior_noise, 1.0) else {
@@ -64,7 +66,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
                 &self.saturation,
                 &self.prior.changes,
                 &mut candidate,
-                0..n,
+                first..n,
             ) {
                 continue;
             }

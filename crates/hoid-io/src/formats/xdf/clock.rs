@@ -13,7 +13,10 @@
 //! late and catch up count as jitter. Without this rule a loss of one second would be spread over the recording and
 //! appear as a lower rate without a gap.
 
+use std::ops::Range;
+
 use super::chunks::Stream;
+use crate::time::sampling::{pairs, steps};
 use crate::wording::shown;
 
 /// Unit of the offsets in the fit, s; the loss is linear for deviations above one unit.
@@ -82,36 +85,35 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
 /// Converts time stamps to the clock of the recorder; returns the number of fitted lines.
 fn synchronise(times: &mut [f64], offsets: &[(f64, f64)]) -> usize {
     let parts = resets(offsets);
-    let mut from = 0;
-    for &(first, last) in &parts {
-        let (b0, b1) = line(&offsets[first..=last]);
+    let mut rest = times;
+    for part in &parts {
+        let of_part = offsets.get(part.clone()).unwrap_or_default();
+        let (b0, b1) = line(of_part);
         // A part ends before the first time stamp that is closer to the offsets of the next part.
-        let to = match offsets.get(last + 1) {
-            Some((next, _)) => {
-                let end = offsets[last].0;
-                let later = times[from..].iter().position(|t| (t - end).abs() >= (t - next).abs());
-                later.map_or(times.len(), |later| from + later)
-            }
-            None => times.len(),
+        let end = match (of_part.last(), offsets.get(part.end)) {
+            (Some((end, _)), Some((next, _))) => rest.iter().position(|t| (t - end).abs() >= (t - next).abs()),
+            _ => None,
         };
-        times[from..to].iter_mut().for_each(|t| *t += b0 + b1 * *t);
-        from = to;
+        let (now, later) = rest.split_at_mut(end.unwrap_or(rest.len()));
+        now.iter_mut().for_each(|t| *t += b0 + b1 * *t);
+        rest = later;
     }
     parts.len()
 }
 
-/// Returns for each part between resets of the clock the indices of its first and last offset.
-fn resets(offsets: &[(f64, f64)]) -> Vec<(usize, usize)> {
+/// Returns for each part between resets of the clock the range of its offsets.
+fn resets(offsets: &[(f64, f64)]) -> Vec<Range<usize>> {
     if offsets.is_empty() {
         return Vec::new();
     }
-    let step = |of: fn(&(f64, f64)) -> f64| -> Vec<f64> {
-        offsets.windows(2).map(|pair| of(&pair[1]) - of(&pair[0])).collect()
-    };
-    let (times, values) = (step(|o| o.0), step(|o| o.1));
-    let (time, value) = (glitches(&times, RESET_TIME), glitches(&values, RESET_VALUE));
-    let breaks = (0..times.len()).filter(|k| times[*k] < 0.0 || time[*k] && value[*k]);
-    parts(breaks, offsets.len())
+    let (times, values): (Vec<f64>, Vec<f64>) = offsets.iter().copied().unzip();
+    let [times, values] = [times, values].map(|of| steps(&of).collect::<Vec<f64>>());
+    let glitches = glitches(&times, RESET_TIME)
+        .into_iter()
+        .zip(glitches(&values, RESET_VALUE));
+    let each = (1..).zip(times.iter().zip(glitches));
+    let breaks = each.filter(|(_, (step, (time, value)))| **step < 0.0 || *time && *value);
+    parts(breaks.map(|(at, _)| at), offsets.len())
 }
 
 /// True for each step that differs from the median by more than `deviations` median absolute deviations and by more
@@ -128,23 +130,19 @@ fn glitches(steps: &[f64], (deviations, least): (f64, f64)) -> Vec<bool> {
 fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
-    match (sorted.len() / 2, sorted.len() % 2) {
-        (0, 0) => f64::NAN,
-        (half, 0) => f64::midpoint(sorted[half - 1], sorted[half]),
-        (half, _) => sorted[half],
+    let (lower, upper) = sorted.split_at(sorted.len() / 2);
+    match (lower.last(), upper.first()) {
+        (Some(below), Some(middle)) if lower.len() == upper.len() => f64::midpoint(*below, *middle),
+        (_, Some(middle)) => *middle,
+        (_, None) => f64::NAN,
     }
 }
 
-/// Divides `count` items into parts at the breaks; returns the first and the last index of each part.
-fn parts(breaks: impl Iterator<Item = usize>, count: usize) -> Vec<(usize, usize)> {
-    let mut parts = Vec::new();
+/// Divides `count` items into parts; each break is the index of the first item of the next part.
+fn parts(breaks: impl Iterator<Item = usize>, count: usize) -> Vec<Range<usize>> {
     let mut first = 0;
-    for at in breaks {
-        parts.push((first, at));
-        first = at + 1;
-    }
-    parts.push((first, count.saturating_sub(1)));
-    parts
+    let ends = breaks.chain([count]);
+    ends.map(|end| std::mem::replace(&mut first, end)..end).collect()
 }
 
 /// Fits the line `b_0 + b_1 c` to offsets with Huber's loss; returns zeros if the offsets do not determine a line.
@@ -165,20 +163,20 @@ fn line(offsets: &[(f64, f64)]) -> (f64, f64) {
     let mut x = (0.0, 0.0);
     for _ in 0..ITERATIONS {
         let (mut right, mut right_c) = (0.0, 0.0);
-        for k in 0..c.len() {
-            let target = y[k] + z[k] - w[k];
+        for (((c, y), z), w) in c.iter().zip(&y).zip(&z).zip(&w) {
+            let target = y + z - w;
             right += target;
-            right_c += c[k] * target;
+            right_c += c * target;
         }
         x = (
             (squares * right - sum * right_c) / determinant,
             (n * right_c - sum * right) / determinant,
         );
-        for k in 0..c.len() {
-            let d = x.0 + x.1 * c[k] - y[k] + w[k];
+        for (((c, y), z), w) in c.iter().zip(&y).zip(&mut z).zip(&mut w) {
+            let d = x.0 + x.1 * c - y + *w;
             let shrunk = if d == 0.0 { 1.0 } else { (1.0 - 2.0 / d.abs()).max(0.0) };
-            z[k] = 0.5 * d + 0.5 * shrunk * d;
-            w[k] = d - z[k];
+            *z = 0.5 * d + 0.5 * shrunk * d;
+            *w = d - *z;
         }
     }
     (UNIT_S * (x.0 - x.1 * start), x.1)
@@ -186,37 +184,37 @@ fn line(offsets: &[(f64, f64)]) -> (f64, f64) {
 
 /// True if samples were lost before the k-th sample: after a long step the time stamps remain late.
 fn lost(times: &[f64], k: usize, nominal_s: f64) -> bool {
-    let late_s = times[k] - times[k - 1] - nominal_s;
+    let Some([before, now]) = times.get(k.saturating_sub(1)..=k) else {
+        return false;
+    };
+    let late_s = now - before - nominal_s;
     if nominal_s.is_nan() || nominal_s <= 0.0 || late_s.is_nan() || late_s <= LOST_SAMPLES * nominal_s {
         return false;
     }
-    let lateness = |from: usize, to: usize| {
-        let of: Vec<f64> = (from..to)
-            .map(|j| times[j] - (j as f64 - k as f64) * nominal_s)
-            .collect();
-        median(&of)
+    let lateness = |rows: Range<usize>| {
+        let of = rows.filter_map(|j| Some(times.get(j)? - (j as f64 - k as f64) * nominal_s));
+        median(&of.collect::<Vec<f64>>())
     };
     // Samples that would have arrived late together are skipped after the step.
     let come = k.saturating_add((late_s / nominal_s).ceil() as usize);
     let from = come.min(times.len().saturating_sub(SAMPLES_PER_SIDE)).max(k);
     let shift_s =
-        lateness(from, (from + SAMPLES_PER_SIDE).min(times.len())) - lateness(k.saturating_sub(SAMPLES_PER_SIDE), k);
+        lateness(from..from.saturating_add(SAMPLES_PER_SIDE)) - lateness(k.saturating_sub(SAMPLES_PER_SIDE)..k);
     shift_s > LOST_SAMPLES * nominal_s && shift_s > 0.5 * late_s
 }
 
 /// Replaces the time stamps between two breaks by their least-squares line; returns the number of parts and the mean
 /// rate in Hz.
 fn straighten(times: &mut [f64], longest_s: f64, nominal_s: f64) -> (usize, Option<f64>) {
-    let breaks: Vec<usize> = (1..times.len())
-        .filter(|k| (times[*k] - times[k - 1]).abs() > longest_s || lost(times, *k, nominal_s))
-        .map(|k| k - 1)
-        .collect();
-    let parts = parts(breaks.into_iter(), times.len());
-    let (mut steps, mut duration_s) = (0_usize, 0.0);
-    for &(first, last) in &parts {
-        let part = &mut times[first..=last];
+    let breaks = (1..)
+        .zip(pairs(times))
+        .filter(|(k, (before, t))| (t - before).abs() > longest_s || lost(times, *k, nominal_s));
+    let parts = parts(breaks.map(|(k, _)| k), times.len());
+    let (mut steps, mut duration_s) = (0.0, 0.0);
+    for part in &parts {
+        let part = times.get_mut(part.clone()).unwrap_or_default();
         // Indices relative to the middle keep the numbers small and the sums uncorrelated.
-        let middle = (part.len() - 1) as f64 / 2.0;
+        let middle = (part.len() as f64 - 1.0) / 2.0;
         let mean = part.iter().sum::<f64>() / part.len() as f64;
         let (mut products, mut squares) = (0.0, 0.0);
         for (k, t) in part.iter().enumerate() {
@@ -228,10 +226,12 @@ fn straighten(times: &mut [f64], longest_s: f64, nominal_s: f64) -> (usize, Opti
         for (k, t) in part.iter_mut().enumerate() {
             *t = mean + slope * (k as f64 - middle);
         }
-        steps += last - first;
-        duration_s += times[last] - times[first];
+        if let [first, .., last] = &*part {
+            steps += part.len() as f64 - 1.0;
+            duration_s += last - first;
+        }
     }
-    (parts.len(), (duration_s > 0.0).then(|| steps as f64 / duration_s))
+    (parts.len(), (duration_s > 0.0).then(|| steps / duration_s))
 }
 
 #[cfg(test)]
@@ -265,7 +265,7 @@ mod tests {
     fn a_clock_that_is_set_anew() {
         let mut offsets: Vec<(f64, f64)> = (0..10).map(|k| (5.0 * f64::from(k), 1.0)).collect();
         offsets.extend((0..10).map(|k| (5.0 * f64::from(k), 100.0)));
-        assert_eq!(resets(&offsets), [(0, 9), (10, 19)]);
+        assert_eq!(resets(&offsets), [0..10, 10..20]);
         let mut times: Vec<f64> = (0..50).map(f64::from).chain((0..50).map(f64::from)).collect();
         assert_eq!(synchronise(&mut times, &offsets[..10]), 1);
         assert_eq!((times[0], times[49]), (1.0, 50.0));

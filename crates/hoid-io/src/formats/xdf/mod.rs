@@ -11,8 +11,6 @@
 //! from the first sample of the file.
 
 mod chunks;
-// The lint is off because this module computes a regression over times whose number it has checked.
-#[allow(clippy::indexing_slicing, clippy::arithmetic_side_effects)]
 mod clock;
 mod header;
 mod streams;
