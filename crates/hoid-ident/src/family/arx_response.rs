@@ -7,7 +7,8 @@
 //!
 //! **B must cover the delay.** At 200 Hz the highest number of coefficients covers 0.3 s, and a smooth error, such as a
 //! sum of a few sinusoids, determines fewer coefficients than there are samples in the response of a person. The rate is
-//! then lowered ([`Record::decimated`]), so that fewer coefficients span the same time.
+//! then lowered ([`Record::decimated`]), so that fewer coefficients span the same time. Not earlier than necessary: in a
+//! closed loop the filter of the decimation, which needs later samples, makes e depend on later noise.
 
 use hoid_model::{Channel, Complex64, Orders, Record, SampleTime, Structure, resampling::PASS};
 
@@ -35,6 +36,8 @@ const BAND_RAD_S: (f64, f64) = (0.5, 20.0);
 const POINTS: usize = 24;
 /// Duration of the impulse response that B can describe, s.
 const RESPONSE_S: f64 = 0.7;
+/// Shortest duration of B, s: that of a typical delay.
+const SHORTEST_RESPONSE_S: f64 = 0.2;
 
 /// A frequency response without an assumption on the form of the operator.
 #[derive(Debug, Clone)]
@@ -46,9 +49,10 @@ pub(super) struct ArxResponse {
 }
 
 impl ArxResponse {
-    /// Estimates the response from all records together. The sampling frequency is halved while B would still have
-    /// [`MOST_GAINS`] coefficients, and then until the records determine the coefficients, down to the lowest one that
-    /// leaves the band of the response. If they still do not, the orders are halved.
+    /// Estimates the response from all records together. The orders are halved until the records determine the
+    /// coefficients; a smooth record determines fewer of them. The sampling frequency is halved while B would still
+    /// have [`MOST_GAINS`] coefficients, and if B became shorter than [`SHORTEST_RESPONSE_S`], down to the lowest
+    /// frequency that leaves the band of the response.
     ///
     /// # Errors
     /// The errors of the regression with the lowest orders.
@@ -57,23 +61,18 @@ impl ArxResponse {
         let mut lead_s = 0.0;
         loop {
             let records = slower.as_deref().unwrap_or(records);
-            let (na, nb) = first_orders(records, 1, MOST_GAINS);
-            let mut orders = Structure::Arx.operator_orders(1);
-            (orders.na, orders.nb) = (na, nb);
             let is_too_fast = gains(records) >= 2 * MOST_GAINS;
-            let found = (!is_too_fast).then(|| Estimator::new(Structure::Arx, orders).fit(records));
-            let singular = matches!(found, Some(Err(IdentError::SingularRegressors { .. })));
-            if (is_too_fast || singular)
+            let found = regressed(records, false, MOST_GAINS);
+            let covers = |orders: &Orders| orders.nb as f64 * records[0].sample_time().s() >= SHORTEST_RESPONSE_S;
+            let is_short = found.as_ref().is_ok_and(|(_, orders)| !covers(orders));
+            if (is_too_fast || is_short)
                 && let Some((next, lead)) = at_half_rate(records)
             {
                 lead_s += lead;
                 slower = Some(next);
                 continue;
             }
-            let found = match found {
-                Some(Ok(fit)) => Self::of_fit(records, &fit),
-                _ => regressed(records, false, MOST_GAINS)?.0,
-            };
+            let (found, _) = found?;
             return Ok(found.without_lead(lead_s));
         }
     }
