@@ -10,9 +10,12 @@
 //! covariance `sigma^2 L L'`. They equal `L z`, where z has the covariance `sigma^2 I` and counts as additional
 //! residuals. The columns of G for these states, G_n, are then replaced by `[I; G_n L]`.
 //!
-//! A level of u, the constant that is not a response to e, also enters linearly, through `-(D/C) 1`, and is eliminated
-//! together with the states. The response to the level does not decay, so that its basis vector is as long as the
-//! record.
+//! A level of u, the constant that is not a response to e, also enters linearly and is eliminated together with the
+//! states. Any constant is the response of `1/F` to another constant plus a free response of `1/F`, so that the column
+//! of the level is `-(D/C) (1/F) 1`, and w contains the level. With a pole close to one (an integration), `(1/F) 1` is a
+//! ramp: the response to a mean that was removed from e. In terms of a constant and of free responses this ramp would be
+//! a difference of numbers that are larger by the inverse of `1 - pole`, and `psi' psi` would lose all digits. The
+//! response to the level does not decay, so that its basis vector is as long as the record.
 
 use hoid_core::filter::{SecondOrder, divide_in_place};
 
@@ -35,8 +38,8 @@ pub(crate) struct InitialStateResponses {
     /// For each state of a filter `1/F`: the index of the input, and the index of the state within the filter. In G
     /// these states come first, before those of the noise model.
     of_inputs: Vec<(usize, usize)>,
-    /// Index of the level among the columns of G.
-    level: Option<usize>,
+    /// Index of the level among the columns of G, and its response `(1/F) 1`.
+    level: Option<(usize, Vec<f64>)>,
     prior_rows: usize,
 }
 
@@ -102,15 +105,19 @@ impl InitialStateResponses {
                 Some(noise) => columns.extend((0..unknown).map(|j| noise.response(&responses, j))),
             }
         }
-        if past.level {
-            let mut level = vec![-1.0; rows + lead];
-            let ones = vec![-1.0; rows + lead];
+        let level = past.level.then(|| {
+            let mut response = vec![1.0; rows + lead];
+            divide_in_place(f.first().copied().unwrap_or_default(), &mut response);
+            (columns.len(), response)
+        });
+        if let Some((_, response)) = &level {
+            let mut column: Vec<f64> = response.iter().map(|x| -x).collect();
             for (i, di) in d.iter().enumerate() {
-                add_scaled(level.get_mut(i + 1..).unwrap_or_default(), *di, &ones);
+                add_scaled(column.get_mut(i + 1..).unwrap_or_default(), -*di, response);
             }
-            level.drain(..lead);
-            divide_in_place(c, &mut level);
-            columns.push(level);
+            column.drain(..lead);
+            divide_in_place(c, &mut column);
+            columns.push(column);
         }
         if let Some(weights) = past.weights {
             for column in &mut columns {
@@ -120,7 +127,7 @@ impl InitialStateResponses {
         let mut free = Self {
             h: responses_of_inputs,
             of_inputs,
-            level: past.level.then(|| columns.len() - 1),
+            level,
             prior_rows,
             ..Self::default()
         };
@@ -185,10 +192,13 @@ impl InitialStateResponses {
                 states[l] -= self.r[k][l] * states[k];
             }
         }
-        // The level changes v but not w; the states of the noise model change neither.
+        // The states of the noise model change neither w nor v.
         for (&index, &x) in self.kept.iter().zip(&states) {
-            if Some(index) == self.level {
-                v.iter_mut().for_each(|v| *v -= x);
+            if let Some((_, response)) = self.level.as_ref().filter(|(place, _)| *place == index) {
+                if let Some(w) = w.first_mut() {
+                    add_scaled(w, x, response);
+                }
+                add_scaled(v, -x, response);
             } else if let Some(&(input, late)) = self.of_inputs.get(index)
                 && late < v.len()
             {

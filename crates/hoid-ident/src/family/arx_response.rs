@@ -4,8 +4,13 @@
 //! the loop (L. Ljung, *System Identification*, 1999, section 13.4). A high-order ARX model is flexible enough and
 //! requires only one linear regression. If no periodic excitation was recorded, the response of this model replaces the
 //! describing function as the source of starts for all forms.
+//!
+//! **B must cover the delay.** At 200 Hz the highest number of coefficients covers 0.3 s, and a smooth error, such as a
+//! sum of a few sinusoids, determines fewer coefficients than there are samples in the response of a person. The rate is
+//! then lowered ([`Record::decimated`]), so that fewer coefficients span the same time. Not earlier than necessary: in a
+//! closed loop the filter of the decimation, which needs later samples, makes e depend on later noise.
 
-use hoid_model::{Complex64, Orders, Record, SampleTime, Structure};
+use hoid_model::{Channel, Complex64, Orders, Record, SampleTime, Structure, resampling::PASS};
 
 use super::{prediction::NONE, response_fit::MeasuredResponse};
 use crate::{Estimator, Fit, IdentError, ResponsePoint};
@@ -31,6 +36,8 @@ const BAND_RAD_S: (f64, f64) = (0.5, 20.0);
 const POINTS: usize = 24;
 /// Duration of the impulse response that B can describe, s.
 const RESPONSE_S: f64 = 0.7;
+/// Shortest duration of B, s: that of a typical delay.
+const SHORTEST_RESPONSE_S: f64 = 0.2;
 
 /// A frequency response without an assumption on the form of the operator.
 #[derive(Debug, Clone)]
@@ -43,12 +50,39 @@ pub(super) struct ArxResponse {
 
 impl ArxResponse {
     /// Estimates the response from all records together. The orders are halved until the records determine the
-    /// coefficients; a smooth record determines fewer of them.
+    /// coefficients; a smooth record determines fewer of them. The sampling frequency is halved while B would still
+    /// have [`MOST_GAINS`] coefficients, and if B became shorter than [`SHORTEST_RESPONSE_S`], down to the lowest
+    /// frequency that leaves the band of the response.
     ///
     /// # Errors
     /// The errors of the regression with the lowest orders.
     pub fn of(records: &[Record]) -> Result<Self, IdentError> {
-        regressed(records, false, MOST_GAINS).map(|(found, _)| found)
+        let mut slower: Option<Vec<Record>> = None;
+        let mut lead_s = 0.0;
+        loop {
+            let records = slower.as_deref().unwrap_or(records);
+            let is_too_fast = gains(records) >= 2 * MOST_GAINS;
+            let found = regressed(records, false, MOST_GAINS);
+            let covers = |orders: &Orders| orders.nb as f64 * records[0].sample_time().s() >= SHORTEST_RESPONSE_S;
+            let is_short = found.as_ref().is_ok_and(|(_, orders)| !covers(orders));
+            if (is_too_fast || is_short)
+                && let Some((next, lead)) = at_half_rate(records)
+            {
+                lead_s += lead;
+                slower = Some(next);
+                continue;
+            }
+            let (found, _) = found?;
+            return Ok(found.without_lead(lead_s));
+        }
+    }
+
+    /// Returns the response of u to e, from that to an error that is ahead by this time.
+    fn without_lead(mut self, lead_s: f64) -> Self {
+        for point in &mut self.points {
+            point.response *= Complex64::from_polar(1.0, point.omega_rad_s * lead_s);
+        }
+        self
     }
 
     /// Estimates the response from records with almost no noise; `None` if there is more noise. A high-order model has
@@ -128,6 +162,28 @@ fn with_level(orders: Orders) -> Estimator {
     }
 }
 
+/// Returns the records at half the sampling frequency, and the time in s by which e is then ahead. `None` if the pass
+/// band would not contain the band of the response, or if a record is too short.
+fn at_half_rate(records: &[Record]) -> Option<(Vec<Record>, f64)> {
+    if 0.5 * PASS * records[0].sample_time().nyquist_rad_s() < BAND_RAD_S.1 {
+        return None;
+    }
+    let mut lead_s = 0.0;
+    let halved = records.iter().map(|record| {
+        let (input, output) = (record.input().to_vec(), record.output().to_vec());
+        let both = Record::new(
+            record.sample_time(),
+            Channel::new("e", "", input),
+            Channel::new("u", "", output),
+        );
+        let (halved, done) = both.ok()?.decimated(2).ok()?;
+        lead_s = done.lead_s;
+        Some(halved)
+    });
+    let halved: Option<Vec<Record>> = halved.collect();
+    Some((halved?, lead_s))
+}
+
 /// Returns the number of B coefficients that cover a response with the duration [`RESPONSE_S`].
 fn gains(records: &[Record]) -> usize {
     (RESPONSE_S / records[0].sample_time().s()).ceil() as usize
@@ -168,5 +224,60 @@ pub(super) fn measured(point: &ResponsePoint) -> MeasuredResponse {
         response: Complex64::from_polar(gain, point.phase_deg.value.to_radians()),
         // The relative error is set to at least 1e-3, because an exact fit has no variance.
         variance: gain * gain * (relative * relative + turn * turn).max(1e-6),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::{FamilyOperator, Form};
+
+    use super::*;
+    use crate::family::Intersample;
+
+    /// 60 s of a person with a long delay and an error that is a sum of twelve sinusoids, with a tenth of noise.
+    fn record(truth: &FamilyOperator, ts: SampleTime) -> Record {
+        let model = truth.zoh(ts).unwrap();
+        let n = (60.0 / ts.s()) as usize;
+        let mut state = 7_u64;
+        let mut uniform = move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let lines: Vec<(f64, f64)> = (0..12)
+            .map(|i| (0.3 * 40f64.powf(f64::from(i) / 11.0), 6.0 * uniform()))
+            .collect();
+        let sum = |t: f64| -> f64 { lines.iter().map(|(w, p)| (w * t + p).sin() / (1.0 + 0.2 * w)).sum() };
+        let e: Vec<f64> = (0..n).map(|k| sum(k as f64 * ts.s())).collect();
+        let mut w = vec![0.0; n];
+        for k in model.nk + model.b.len()..n {
+            let input: f64 = (model.b.iter().enumerate()).map(|(i, b)| b * e[k - model.nk - i]).sum();
+            let past: f64 = (model.f.iter().enumerate()).map(|(i, f)| f * w[k - 1 - i]).sum();
+            w[k] = input - past;
+        }
+        let (pole, mut noise) = ((-ts.s() / 0.1).exp(), 0.0);
+        let u = w.iter().map(|w| {
+            noise = pole * noise + (1.0 - pole * pole).sqrt() * uniform();
+            w + 2.0 * noise
+        });
+        let u: Vec<f64> = u.collect();
+        Record::new(ts, Channel::new("e", "", e), Channel::new("u", "", u)).unwrap()
+    }
+
+    #[test]
+    fn the_response_to_a_few_sinusoids_contains_the_delay_at_every_rate() {
+        let truth = FamilyOperator::new(Form::Lead, true, &[2.0, 0.5, 2.3, -1.2, 0.35]).unwrap();
+        for rate_hz in [20.0, 50.0, 100.0, 200.0] {
+            let ts = SampleTime::new(1.0 / rate_hz).unwrap();
+            let found = ArxResponse::of(&[record(&truth, ts)]).unwrap();
+            let inside = found.points.iter().filter(|p| (0.7..8.0).contains(&p.omega_rad_s));
+            for point in inside {
+                let omega = point.omega_rad_s;
+                let expected = truth.response(omega) * Intersample::Zoh.response(omega, ts);
+                let off = (point.response / expected - 1.0).norm();
+                assert!(off < 0.4, "{rate_hz} {omega} {off}");
+            }
+        }
     }
 }

@@ -54,13 +54,17 @@ impl Comparison {
     ) -> Self {
         let counted = |criteria: &[Option<f64>]| {
             let mut counting = criteria.to_vec();
+            let noise_free = prediction.noise_free().is_some();
+            if noise_free {
+                keep_best_fits(&mut counting, tried, prediction.equal());
+            }
             // If a form lacks a lag that the person has, the neuromuscular poles replace this lag.
             retain(&mut counting, |i| !neuromuscular_poles_are_lags(&tried[i]));
             retain(&mut counting, |i| {
                 tried[i].fit.as_ref().is_ok_and(|fit| !is_undetermined(fit))
             });
-            if prediction.noise_free().is_some() {
-                keep_simplest(&mut counting, tried, prediction.equal());
+            if noise_free {
+                keep_simplest(&mut counting, tried);
             }
             count_once(&mut counting, tried);
             counting
@@ -94,16 +98,23 @@ fn count_once(counting: &mut [Option<f64>], tried: &[Tried<'_>]) {
     }
 }
 
-/// Keeps only the simplest of the forms that fit equally well. Without noise, the residual of a wrong form is many
-/// times larger than that of the right form. Sums of squares below `equal` count as equal.
-fn keep_simplest(counting: &mut [Option<f64>], tried: &[Tried<'_>], equal: f64) {
-    let fit = |i: usize| tried[i].fit.as_ref().ok();
-    let squares = |i: usize| fit(i).map_or(f64::INFINITY, |fit| (fit.loss * fit.residuals as f64).max(equal));
-    let size = |i: usize| fit(i).map_or(usize::MAX, |fit| fit.layout().operator_elements());
-    let those = |counting: &[Option<f64>]| (0..tried.len()).filter(|i| counting[*i].is_some()).collect::<Vec<_>>();
-    let least = those(counting).into_iter().map(squares).fold(f64::INFINITY, f64::min);
+/// Keeps only the forms that fit equally well. Without noise, the residual of a wrong form is many times larger than
+/// that of the right form, whatever the wrong form determines. Sums of squares below `equal` count as equal.
+fn keep_best_fits(counting: &mut [Option<f64>], tried: &[Tried<'_>], equal: f64) {
+    let squares = |i: usize| {
+        let fit = tried[i].fit.as_ref().ok();
+        fit.map_or(f64::INFINITY, |fit| (fit.loss * fit.residuals as f64).max(equal))
+    };
+    let those = (0..tried.len()).filter(|i| counting[*i].is_some());
+    let least = those.map(squares).fold(f64::INFINITY, f64::min);
     retain(counting, |i| squares(i) <= EQUAL_FIT_RATIO * least);
-    let fewest = those(counting).into_iter().map(size).min();
+}
+
+/// Keeps only the forms with the fewest parameters.
+fn keep_simplest(counting: &mut [Option<f64>], tried: &[Tried<'_>]) {
+    let fit = |i: usize| tried[i].fit.as_ref().ok();
+    let size = |i: usize| fit(i).map_or(usize::MAX, |fit| fit.layout().operator_elements());
+    let fewest = (0..tried.len()).filter(|i| counting[*i].is_some()).map(size).min();
     retain(counting, |i| Some(size(i)) == fewest);
 }
 

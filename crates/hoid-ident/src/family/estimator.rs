@@ -359,6 +359,7 @@ impl FamilyEstimator {
             sample_time,
             intersample,
             course_is_known: intersample != Intersample::Auto,
+            other_course: Vec::new(),
             little_noise: None,
             initial: self.initial_state,
             first,
@@ -405,12 +406,13 @@ impl FamilyEstimator {
         found.move_to_ends(&mut from, 0.0);
         if self.intersample == Intersample::Auto {
             let held = with_level(Intersample::Zoh)?;
-            if let Some(other) = search(&held, &from) {
+            if let Some(mut other) = search(&held, &from) {
                 let (course, is_known) = LittleNoise::course(&found, &other);
                 match course {
                     Intersample::Auto => {}
                     Intersample::Zoh => {
-                        (prediction, found) = (held, other);
+                        std::mem::swap(&mut found, &mut other);
+                        prediction = held;
                         found.move_to_ends(&mut from, 0.0);
                     }
                     Intersample::Foh => {
@@ -419,6 +421,9 @@ impl FamilyEstimator {
                     }
                 }
                 prediction.course_is_known = is_known;
+                if !is_known {
+                    prediction.other_course = other.coordinates(&forms);
+                }
             }
         }
         for (start, (_, coordinates)) in starts.iter_mut().zip(from) {

@@ -480,6 +480,7 @@ mod tests {
             sample_time: SampleTime::SIXTIETH,
             intersample: Intersample::Auto,
             course_is_known: false,
+            other_course: Vec::new(),
             little_noise: None,
             initial: estimator.initial_state,
             first: first.unwrap(),

@@ -9,7 +9,8 @@
 //! with `x = omega Ts/2` (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, 1997, sections 3.2 and 3.4).
 //! `foh` and `auto` are the same model with two definitions of its delay, so that no data can distinguish them. `zoh`
 //! differs from both by the factor `sin(x)/x`, which is 0.5 % below one at 20 rad/s and 60 Hz; only a recording without
-//! noise can show this ([`super::low_noise`]).
+//! noise can show this ([`super::low_noise`]). If it does not, the difference between the two fits is part of the error
+//! bars ([`super::sensitivity`]).
 
 use hoid_model::{Complex64, FamilyOperator, ModelError, SampleTime, named_choice, operator_family::HeldFamily};
 

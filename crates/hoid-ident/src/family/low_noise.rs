@@ -141,6 +141,13 @@ impl LittleNoise {
         }
     }
 
+    /// Returns the result of each form whose searches did not fail, given the forms of the searches.
+    pub fn coordinates(&self, forms: &[Form]) -> Vec<(Form, Vec<f64>)> {
+        let ends = forms.iter().zip(&self.ends);
+        ends.filter_map(|(form, end)| Some((*form, end.as_ref()?.coordinates.clone())))
+            .collect()
+    }
+
     /// Returns the intersample behaviour that fits better, given the searches with a smooth and with a held error, and
     /// whether the difference is decisive.
     pub fn course(smooth: &Self, held: &Self) -> (Intersample, bool) {
@@ -252,9 +259,14 @@ mod tests {
         FamilyOperator::new(Form::Lead, true, &X).unwrap()
     }
 
-    /// 25 s at 40 Hz of an error that is not zero in the mean, with this much white noise, started away from rest and
-    /// with a level of u.
+    /// 25 s at 40 Hz of [`record_of`].
     fn record(model: &HeldFamily, noise: f64) -> Record {
+        record_of(model, SampleTime::new(0.025).unwrap(), (200, 1000), noise)
+    }
+
+    /// An error that is not zero in the mean, with this much white noise of u, started away from rest, `before` samples
+    /// before the record of `n`, and with a level of u.
+    fn record_of(model: &HeldFamily, ts: SampleTime, (before, n): (usize, usize), noise: f64) -> Record {
         let mut state = 7_u64;
         let mut uniform = move || {
             state = state
@@ -262,9 +274,9 @@ mod tests {
                 .wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         };
-        let (before, n) = (200, 1000);
         let e: Vec<f64> = (0..before + n)
-            .map(|t| 0.2 + (0.012 * f64::from(t)).sin() + 0.6 * (0.07 * f64::from(t)).cos() + 0.2 * uniform())
+            .map(|t| t as f64 * ts.s() / 0.025)
+            .map(|t| 0.2 + (0.012 * t).sin() + 0.6 * (0.07 * t).cos() + 0.2 * uniform())
             .collect();
         let mut w = vec![0.0; e.len()];
         for k in model.nk + model.b.len()..e.len() {
@@ -272,10 +284,10 @@ mod tests {
             let past: f64 = (model.f.iter().enumerate()).map(|(i, f)| f * w[k - 1 - i]).sum();
             w[k] = input - past;
         }
-        let u = w[200..].iter().map(|w| w + 0.7 + noise * uniform()).collect();
+        let u = w[before..].iter().map(|w| w + 0.7 + noise * uniform()).collect();
         Record::new(
-            SampleTime::new(0.025).unwrap(),
-            Channel::new("e", "", e[200..].to_vec()),
+            ts,
+            Channel::new("e", "", e[before..].to_vec()),
             Channel::new("u", "", u),
         )
         .unwrap()
@@ -332,6 +344,32 @@ mod tests {
         assert!(fit.noise_free.is_none() && fit.run_to_run > 0.0);
     }
 
+    /// A lead makes up for the hold: its two values differ by more than the noise allows for each.
+    #[test]
+    fn both_courses_of_the_error_are_within_the_errors_if_both_fit() {
+        let ts = SampleTime::new(0.025).unwrap();
+        let record = record(&truth().zoh(ts).unwrap(), 3e-3);
+        let of = |intersample| {
+            let estimator = FamilyEstimator {
+                forms: vec![Form::Lead],
+                intersample,
+                ..FamilyEstimator::default()
+            };
+            estimator.fit(std::slice::from_ref(&record)).unwrap()
+        };
+        let lead = |fit: &FamilyFit| fit.operator(0).operator.coordinates()[1];
+        let (held, straight, both) = (of(Intersample::Zoh), of(Intersample::Foh), of(Intersample::Auto));
+        assert!(both.little_noise && !both.course_is_known);
+        let error = |fit: &FamilyFit| fit.operator(0).covariance.as_ref().unwrap()[6].sqrt();
+        let between = (lead(&held) - lead(&straight)).abs();
+        assert!(
+            error(&both) > 0.99 * between && between > 3.0 * error(&held),
+            "{between} {} {}",
+            error(&both),
+            error(&held)
+        );
+    }
+
     #[test]
     fn the_noise_of_a_person_is_not_little() {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
@@ -363,5 +401,26 @@ mod tests {
             LittleNoise::course(&of(0.0, 0.0), &of(1e-9, 9.0)),
             (Intersample::Foh, true)
         );
+    }
+
+    /// The mean of e that is removed becomes a ramp in u, as large as u itself.
+    #[test]
+    fn an_integration_of_an_error_with_a_mean_is_found() {
+        let ts = SampleTime::new(0.005).unwrap();
+        let x = [3.4, 0.72, 0.333, 2.13, -0.775, 0.398];
+        let truth = FamilyOperator::new(Form::QuadraticIntegral, true, &x).unwrap();
+        for (course, expected) in [(Intersample::Zoh, x[5]), (Intersample::Auto, x[5] + 0.0025)] {
+            let record = record_of(&course.discrete(&truth, None, ts).unwrap(), ts, (200, 6000), 0.0);
+            let estimator = FamilyEstimator {
+                forms: vec![Form::Lead2Lag, Form::QuadraticIntegral],
+                ..FamilyEstimator::default()
+            };
+            let fit = estimator.fit(&[record]).unwrap();
+            assert_eq!(fit.form, Form::QuadraticIntegral, "{course}");
+            let expected = [&x[..5], &[expected]].concat();
+            for (found, x) in fit.operator(0).operator.coordinates().iter().zip(expected) {
+                assert!((found - x).abs() < 1e-7, "{course} {found} {x}");
+            }
+        }
     }
 }

@@ -54,6 +54,8 @@ pub(super) struct Prediction<'a> {
     pub intersample: Intersample,
     /// True if the intersample behaviour was given by the user or determined from the data.
     pub course_is_known: bool,
+    /// Coordinates of the forms for the other intersample behaviour, if there is little noise and both behaviours fit.
+    pub other_course: Vec<(Form, Vec<f64>)>,
     /// Residual power of an output error fit relative to the power of u, if there is little noise.
     pub little_noise: Option<f64>,
     pub initial: InitialState,

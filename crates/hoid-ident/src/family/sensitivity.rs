@@ -11,6 +11,10 @@
 //! The differences from them then enlarge the errors of single elements only, since the lines determine the response in
 //! the band of manual control, and thus crossover and margin.
 //!
+//! With little noise, both intersample behaviours of the error may fit. They differ by `sin(x)/x`, which a lead can
+//! replace, so that the parameters differ by more than their errors. If the records do not show the behaviour, the fit
+//! with the other one counts in the same way.
+//!
 //! **Without lines** the differences do not show the whole bias: above the band of the forcing function, e consists
 //! mainly of remnant, and all noise models share most of the bias. The squared differences are therefore multiplied by
 //! 1.5, and the neuromuscular system has an additional variance. Both numbers, and the largest prior share with lines,
@@ -40,8 +44,8 @@ pub(super) const UNSEEN_WITHOUT_LINES: [(Coordinate, f64); 2] =
 /// only the size of the difference is used.
 const SEARCH: (usize, f64) = (25, 1e-6);
 
-/// Returns the elements of eta before the noise model for fits of the same form with other noise models; empty if there
-/// is no noise.
+/// Returns the elements of eta before the noise model for fits of the same form with other noise models, and with the
+/// other intersample behaviour if both fit; empty if there is no noise.
 pub(super) fn rivals(
     prediction: &Prediction<'_>,
     fit: &PredictionFit<'_>,
@@ -73,5 +77,7 @@ pub(super) fn rivals(
             others.push(found[..elements].to_vec());
         }
     }
+    let of_course = prediction.other_course.iter().find(|(form, _)| *form == layout.form);
+    others.extend(of_course.map(|(_, coordinates)| layout.spread(coordinates, &[])));
     others
 }
