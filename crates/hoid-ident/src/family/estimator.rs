@@ -35,8 +35,11 @@ use crate::{
 /// Maximum number of pairs (nc, nd) that are compared if nc is searched.
 const MOST_NOISE_PAIRS: usize = 60;
 
-/// Number of minima for the response from which the prediction error search runs.
-const SEARCHES: usize = 3;
+/// Number of minima for the response from which the prediction error search of a form runs; twice as many without a
+/// prior.
+const SEARCHES: usize = 2;
+/// Relative difference of the responses of two minima below which only one of them is a start.
+const SAME_RESPONSE: f64 = 0.1;
 /// Order of the autoregression with which the minima for the response are compared.
 const FIRST_NOISE_ORDER: usize = 8;
 
@@ -509,9 +512,10 @@ impl FamilyEstimator {
     }
 
     /// Returns the fit of a form at the lines and the starting coordinates of its searches: those of the fit at the
-    /// lines, and of the minima for the response of the ARX model those with the smallest prediction error. The errors
-    /// of that response are correlated between frequencies, so that the smallest chi^2 may belong to another minimum.
-    /// With a prior the search passes minima far from people, and without one it reaches a person far from them.
+    /// lines, and the minima for the response of the ARX model that have the smallest prediction errors. The errors of
+    /// that response are correlated between frequencies, so that the smallest chi^2 may belong to another minimum than
+    /// the smallest prediction error. The response is fitted with a prior, which avoids minima far from people, and
+    /// without one, which finds a person far from them.
     fn start(
         &self,
         form: Form,
@@ -533,9 +537,9 @@ impl FamilyEstimator {
         }
         if !response.is_empty() {
             let criterion = self.of_response(form, response, &self.prior, prediction);
-            let other = match self.prior.entries() {
-                [] => OperatorPrior::population(),
-                _ => OperatorPrior::none(),
+            let (other, searches) = match self.prior.entries() {
+                [] => (OperatorPrior::population(), 2 * SEARCHES),
+                _ => (OperatorPrior::none(), SEARCHES),
             };
             let other = self.of_response(form, response, &other, prediction);
             let minima = [&criterion, &other].map(|c| c.minima(&self.search, Grid::Default));
@@ -550,10 +554,17 @@ impl FamilyEstimator {
                 .map(|found| (cost(&found, workspace).unwrap_or(f64::INFINITY), found))
                 .collect();
             minima.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let keep: usize = std::env::var("KEEP").map_or(SEARCHES, |t| t.parse().unwrap());
-            start
-                .coordinates
-                .extend(minima.into_iter().take(keep).map(|(_, found)| found));
+            let mut chosen: Vec<Vec<f64>> = Vec::new();
+            for (_, found) in minima {
+                if !chosen
+                    .iter()
+                    .any(|known| criterion.distance(known, &found) < SAME_RESPONSE)
+                {
+                    chosen.push(found);
+                }
+            }
+            chosen.truncate(searches);
+            start.coordinates.extend(chosen);
         }
         Ok(start)
     }

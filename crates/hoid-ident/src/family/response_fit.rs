@@ -195,6 +195,20 @@ impl<'p> ResponseCriterion<'p> {
         operator.response(omega_rad_s) * self.intersample.response(omega_rad_s, self.sample_time)
     }
 
+    /// Returns the root mean square, over the points, of the relative difference between the responses at two places;
+    /// infinite if one of them is no operator.
+    pub fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
+        let of = |x: &[f64]| FamilyOperator::new(self.form, self.neuromuscular, x);
+        let (Ok(a), Ok(b)) = (of(a), of(b)) else {
+            return f64::INFINITY;
+        };
+        let of = |point: &MeasuredResponse| {
+            let (a, b) = (a.response(point.omega_rad_s), b.response(point.omega_rad_s));
+            (a - b).norm_sqr() / (a.norm() * b.norm())
+        };
+        (self.points.iter().map(of).sum::<f64>() / self.points.len() as f64).sqrt()
+    }
+
     /// Returns chi^2 at these coordinates, without the prior.
     pub fn chi_squared(&self, x: &[f64]) -> Option<f64> {
         let operator = FamilyOperator::new(self.form, self.neuromuscular, x).ok()?;
