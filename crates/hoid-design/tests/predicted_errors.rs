@@ -19,6 +19,7 @@ fn the_scatter_is_what_was_predicted() {
                 "{}: {} {:.3}, predicted {:.4}, {:.3} of it, off by {:.2}",
                 case.name, q.name, q.value, q.predicted, q.ratio, q.off
             );
+            assert_eq!(q.experiments as u64, EXPERIMENTS, "{}: {}", case.name, q.name);
             assert!((q.ratio - 1.0).abs() < 0.15, "{}: {} {}", case.name, q.name, q.ratio);
         }
     }

@@ -92,7 +92,12 @@ fn record(operator: &FamilyOperator, random: &mut Uniform) -> Record {
         noise = pole * noise + (1.0 - pole * pole).sqrt() * random.normal();
         *u += deviation * noise;
     }
-    Record::new(ts, Channel::new("e", "", e[RUN_IN..].to_vec()), Channel::new("u", "", u)).unwrap()
+    Record::new(
+        ts,
+        Channel::new("e", "", e[RUN_IN..].to_vec()),
+        Channel::new("u", "", u),
+    )
+    .unwrap()
 }
 
 /// Returns `n ln V + 2 nd` of the search in one form.

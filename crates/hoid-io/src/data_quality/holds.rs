@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use super::grid::Grid;
 use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
-use super::signals::{Signal, Signals, one_row};
+use super::signals::{Signal, Signals, one_row, runs};
 use super::values::Levels;
 use crate::wording::{counted, short};
 
@@ -63,18 +63,6 @@ pub(super) fn without_advance(signals: &Signals<'_>, grid: &Grid, found: &mut Ve
             places,
         });
     }
-}
-
-/// Returns all ranges of consecutive true values.
-pub(super) fn runs(holds: impl Iterator<Item = bool>) -> Vec<Range<usize>> {
-    let mut runs: Vec<Range<usize>> = Vec::new();
-    for (row, _) in holds.enumerate().filter(|(_, hold)| *hold) {
-        match runs.last_mut() {
-            Some(run) if run.end == row => run.end = one_row(row).end,
-            _ => runs.push(one_row(row)),
-        }
-    }
-    runs
 }
 
 pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Grid>, found: &mut Vec<QualityIssue>) {

@@ -44,6 +44,18 @@ pub(super) fn one_row(row: usize) -> Range<usize> {
     row..row.saturating_add(1)
 }
 
+/// Returns all ranges of consecutive true values.
+pub(super) fn runs(holds: impl Iterator<Item = bool>) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for (row, _) in holds.enumerate().filter(|(_, hold)| *hold) {
+        match runs.last_mut() {
+            Some(run) if run.end == row => run.end = one_row(row).end,
+            _ => runs.push(one_row(row)),
+        }
+    }
+    runs
+}
+
 impl Signals<'_> {
     /// Returns the number of rows.
     pub(super) fn rows(&self) -> usize {

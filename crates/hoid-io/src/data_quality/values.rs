@@ -12,9 +12,8 @@
 
 use std::ops::Range;
 
-use super::holds::runs;
 use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
-use super::signals::{Signal, Signals};
+use super::signals::{Signal, Signals, runs};
 use crate::time::sampling::steps;
 use crate::wording::{counted, short};
 
