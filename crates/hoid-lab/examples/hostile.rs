@@ -12,6 +12,8 @@ mod draw;
 mod hostile;
 #[path = "../tests/common/person.rs"]
 mod person;
+#[path = "../../hoid-io/tests/common/mutations/spent.rs"]
+mod spent;
 #[path = "../tests/common/texts.rs"]
 mod texts;
 
@@ -24,8 +26,9 @@ use std::{
 };
 
 use hostile::Hostile;
+use spent::Spent;
 
-/// Time limit of one case.
+/// Limit of the processor time of one case.
 const LIMIT: Duration = Duration::from_secs(2);
 /// Number of panics, including those that are caught.
 static PANICS: AtomicUsize = AtomicUsize::new(0);
@@ -44,7 +47,7 @@ fn main() -> ExitCode {
         let mut hostile = Hostile::new();
         let mut slowest = (Duration::ZERO, 0);
         for number in (first..first + cases).filter(|number| number / 4 % jobs == job) {
-            let start = Instant::now();
+            let start = Spent::now();
             if panic::catch_unwind(AssertUnwindSafe(|| hostile.case(seed, number))).is_err() {
                 println!("case {number}: a panic");
                 hostile = Hostile::new();

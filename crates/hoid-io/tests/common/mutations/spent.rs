@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Processor time if the system reports it, otherwise elapsed time.
+/// Processor time of this thread if the system reports it, otherwise elapsed time.
 pub struct Spent {
     on_processor: Option<Duration>,
     by_clock: Instant,
@@ -13,7 +13,7 @@ pub struct Spent {
 
 impl Spent {
     pub fn now() -> Self {
-        let text = fs::read_to_string("/proc/self/schedstat").ok();
+        let text = fs::read_to_string("/proc/thread-self/schedstat").ok();
         let nanoseconds = text.and_then(|text| text.split(' ').next()?.parse().ok());
         Self {
             on_processor: nanoseconds.map(Duration::from_nanos),
