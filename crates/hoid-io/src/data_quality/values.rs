@@ -145,7 +145,7 @@ fn ends(values: &[f64], first: &[f64]) -> Vec<f64> {
     let (lower, upper) = (first.get(Levels::END - 1), first.iter().nth_back(Levels::END - 1));
     let is_outer = |v: &f64| lower.is_some_and(|lower| v <= lower) || upper.is_some_and(|upper| v >= upper);
     let outer: Vec<f64> = values.iter().copied().filter(is_outer).collect();
-    // Beside a later value of another order of magnitude the end levels of `first` may be a single level.
+    // Compared with a later value of another order of magnitude, the end levels of `first` may be a single level.
     let mut levels = distinct(&outer);
     keep_ends(&mut levels);
     levels
@@ -282,7 +282,8 @@ fn missing(
 mod tests {
     use super::*;
 
-    /// An outlier of another order of magnitude behind the first rows: beside it the lowest levels are a single level.
+    /// An outlier of another order of magnitude after the first rows, compared with which the lowest levels are a single
+    /// level.
     #[test]
     fn an_outlier_in_a_long_channel() {
         for outlier in [1e30, -1e30, 1e308] {
