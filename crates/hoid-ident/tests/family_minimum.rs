@@ -6,14 +6,15 @@
 //! ended in another one in 4 of these 45 records without a prior, and in 1 with it.
 #![allow(clippy::unwrap_used)]
 
+#[path = "common/simulated_operator.rs"]
+mod simulated_operator;
+
 use std::f64::consts::TAU;
 
 use hoid_ident::family::{FamilyEstimator, OperatorPrior};
-use hoid_model::{
-    Channel, FamilyOperator, Form, Record, SampleTime,
-    operator_family::{Coordinate, HeldFamily},
-};
+use hoid_model::{Channel, FamilyOperator, Form, Record, SampleTime, operator_family::Coordinate};
 use rayon::prelude::*;
+use simulated_operator::{Uniform, response_to};
 
 const OPERATORS: u64 = 45;
 const SAMPLES: usize = 3500;
@@ -24,27 +25,6 @@ const NOISE: f64 = 0.3;
 const NOISE_S: f64 = 0.1;
 /// Difference of `n ln V` above which the minimum is another one.
 const ANOTHER: f64 = 50.0;
-
-/// Uniform numbers from a linear congruence.
-struct Uniform(u64);
-
-impl Uniform {
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        low + (high - low) * (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn log_between(&mut self, low: f64, high: f64) -> f64 {
-        self.between(low.ln(), high.ln()).exp()
-    }
-
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.between(0.0, 1.0)).sum::<f64>() - 6.0
-    }
-}
 
 fn operator(form: Form, random: &mut Uniform) -> FamilyOperator {
     let of = |coordinate: &Coordinate| match coordinate {
@@ -62,16 +42,6 @@ fn operator(form: Form, random: &mut Uniform) -> FamilyOperator {
     FamilyOperator::new(form, true, &coordinates).unwrap()
 }
 
-fn passed(model: &HeldFamily, e: &[f64]) -> Vec<f64> {
-    let mut u = vec![0.0; e.len()];
-    for k in 0..e.len() {
-        let input = (model.b.iter().enumerate()).map(|(i, b)| k.checked_sub(model.nk + i).map_or(0.0, |at| b * e[at]));
-        let past = (model.f.iter().enumerate()).map(|(i, f)| k.checked_sub(1 + i).map_or(0.0, |at| -f * u[at]));
-        u[k] = input.sum::<f64>() + past.sum::<f64>();
-    }
-    u
-}
-
 /// A run of 70 s at 50 Hz: twelve sinusoids, and noise of first order.
 fn record(operator: &FamilyOperator, random: &mut Uniform) -> Record {
     let ts = SampleTime::new(0.02).unwrap();
@@ -83,7 +53,7 @@ fn record(operator: &FamilyOperator, random: &mut Uniform) -> Record {
         lines.iter().map(line).sum()
     };
     let e: Vec<f64> = (0..RUN_IN + SAMPLES).map(of).collect();
-    let mut u = passed(&operator.zoh(ts).unwrap(), &e).split_off(RUN_IN);
+    let mut u = response_to(&operator.zoh(ts).unwrap(), &e).split_off(RUN_IN);
     let power = u.iter().map(|u| u * u).sum::<f64>() / u.len() as f64;
     let deviation = (NOISE / (1.0 - NOISE) * power).sqrt();
     let pole = (-ts.s() / NOISE_S).exp();

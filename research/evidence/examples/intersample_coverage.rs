@@ -15,42 +15,21 @@
 
 #![allow(clippy::print_stdout)]
 
+#[allow(dead_code)]
+#[path = "../../../crates/hoid-ident/tests/common/simulated_operator.rs"]
+mod simulated_operator;
+
 use std::{env, error::Error, f64::consts::TAU};
 
 use hoid_ident::family::FamilyEstimator;
-use hoid_model::{Channel, FamilyOperator, Form, Record, SampleTime, operator_family::HeldFamily};
+use hoid_model::{Channel, FamilyOperator, Form, Record, SampleTime};
+use simulated_operator::{Uniform, response_to};
 
 const RATES_HZ: [usize; 6] = [20, 50, 100, 200, 500, 1000];
 const FINE_HZ: usize = 2000;
 const LENGTH_S: usize = 60;
 /// Run-in before the record, s.
 const RUN_IN_S: usize = 5;
-
-struct Uniform(u64);
-
-impl Uniform {
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        low + (high - low) * (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.between(0.0, 1.0)).sum::<f64>() - 6.0
-    }
-}
-
-fn passed(model: &HeldFamily, e: &[f64]) -> Vec<f64> {
-    let mut u = vec![0.0; e.len()];
-    for k in 0..e.len() {
-        let input = (model.b.iter().enumerate()).map(|(i, b)| k.checked_sub(model.nk + i).map_or(0.0, |at| b * e[at]));
-        let past = (model.f.iter().enumerate()).map(|(i, f)| k.checked_sub(1 + i).map_or(0.0, |at| -f * u[at]));
-        u[k] = input.sum::<f64>() + past.sum::<f64>();
-    }
-    u
-}
 
 /// A person's record at this rate, and the lead of its input.
 fn record(
@@ -71,7 +50,7 @@ fn record(
                 .sum()
         })
         .collect();
-    let u = passed(&operator.zoh(ts)?, &e);
+    let u = response_to(&operator.zoh(ts)?, &e);
     let logged = |x: &[f64]| -> Vec<f64> {
         x[RUN_IN_S * made_hz..]
             .iter()

@@ -14,6 +14,10 @@
 
 #![allow(clippy::print_stdout)]
 
+#[allow(dead_code)]
+#[path = "../../../crates/hoid-ident/tests/common/simulated_operator.rs"]
+mod simulated_operator;
+
 use std::{env, error::Error, f64::consts::TAU};
 
 use hoid_ident::family::{FamilyEstimator, Intersample};
@@ -21,36 +25,12 @@ use hoid_model::{
     Channel, Complex64, FamilyOperator, Form, Record, SampleTime,
     operator_family::{Coordinate, HeldFamily},
 };
+use simulated_operator::{Uniform, response_to};
 
 const SHARES: [f64; 5] = [0.0, 1e-12, 1e-9, 1e-6, 1e-3];
 
 /// Frequencies at which a response is evaluated, rad/s.
 const OMEGA_RAD_S: [f64; 5] = [0.5, 1.0, 2.0, 5.0, 10.0];
-
-/// Uniform numbers in [0, 1) from a linear congruence.
-struct Uniform(u64);
-
-impl Uniform {
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
-    }
-
-    fn log_between(&mut self, low: f64, high: f64) -> f64 {
-        self.between(low.ln(), high.ln()).exp()
-    }
-
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.next()).sum::<f64>() - 6.0
-    }
-}
 
 fn operator(form: Form, random: &mut Uniform) -> Result<FamilyOperator, Box<dyn Error>> {
     let of = |coordinate: &Coordinate| match coordinate {
@@ -85,7 +65,7 @@ fn record(model: &HeldFamily, ts: SampleTime, share: f64, random: &mut Uniform) 
     let lines: Vec<(f64, f64, f64)> = (0..12)
         .map(|i| {
             let omega = 0.2 * 75f64.powf(f64::from(i) / 11.0);
-            (omega, 1.0 / (1.0 + 0.2 * omega), TAU * random.next())
+            (omega, 1.0 / (1.0 + 0.2 * omega), TAU * random.between(0.0, 1.0))
         })
         .collect();
     let e: Vec<f64> = (0..n)
@@ -95,12 +75,7 @@ fn record(model: &HeldFamily, ts: SampleTime, share: f64, random: &mut Uniform) 
             sines + 0.1 * random.normal()
         })
         .collect();
-    let mut u = vec![0.0; n];
-    for k in 0..n {
-        let input = (model.b.iter().enumerate()).map(|(i, b)| k.checked_sub(model.nk + i).map_or(0.0, |at| b * e[at]));
-        let past = (model.f.iter().enumerate()).map(|(i, f)| k.checked_sub(1 + i).map_or(0.0, |at| -f * u[at]));
-        u[k] = input.sum::<f64>() + past.sum::<f64>();
-    }
+    let mut u = response_to(model, &e);
     let power = u.iter().map(|u| u * u).sum::<f64>() / n as f64;
     u.iter_mut()
         .for_each(|u| *u += (share * power).sqrt() * random.normal());
@@ -123,7 +98,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 Intersample::Foh
             };
             let truth = operator(form, &mut random)?;
-            let rate = [20.0, 50.0, 100.0, 200.0][(random.next() * 4.0) as usize];
+            let rate = [20.0, 50.0, 100.0, 200.0][(random.between(0.0, 1.0) * 4.0) as usize];
             let ts = SampleTime::new(1.0 / rate)?;
             let record = record(&discrete(&truth, course, ts)?, ts, share, &mut random)?;
             let what = format!(

@@ -232,30 +232,23 @@ mod tests {
     use hoid_model::{FamilyOperator, Form};
 
     use super::*;
-    use crate::family::Intersample;
+    use crate::family::{
+        Intersample,
+        simulated_operator::{Uniform, response_to},
+    };
 
     /// 60 s of a person with a long delay and an error that is a sum of twelve sinusoids, with a tenth of noise.
     fn record(truth: &FamilyOperator, ts: SampleTime) -> Record {
         let model = truth.zoh(ts).unwrap();
         let n = (60.0 / ts.s()) as usize;
-        let mut state = 7_u64;
-        let mut uniform = move || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        };
+        let mut random = Uniform(7);
+        let mut uniform = || random.between(-0.5, 0.5);
         let lines: Vec<(f64, f64)> = (0..12)
             .map(|i| (0.3 * 40f64.powf(f64::from(i) / 11.0), 6.0 * uniform()))
             .collect();
         let sum = |t: f64| -> f64 { lines.iter().map(|(w, p)| (w * t + p).sin() / (1.0 + 0.2 * w)).sum() };
         let e: Vec<f64> = (0..n).map(|k| sum(k as f64 * ts.s())).collect();
-        let mut w = vec![0.0; n];
-        for k in model.nk + model.b.len()..n {
-            let input: f64 = (model.b.iter().enumerate()).map(|(i, b)| b * e[k - model.nk - i]).sum();
-            let past: f64 = (model.f.iter().enumerate()).map(|(i, f)| f * w[k - 1 - i]).sum();
-            w[k] = input - past;
-        }
+        let w = response_to(&model, &e);
         let (pole, mut noise) = ((-ts.s() / 0.1).exp(), 0.0);
         let u = w.iter().map(|w| {
             noise = pole * noise + (1.0 - pole * pole).sqrt() * uniform();

@@ -249,7 +249,10 @@ mod tests {
     use hoid_model::{Channel, Detrend, FamilyOperator, Record, SampleTime, operator_family::HeldFamily};
     use hoid_sim::{RunSeed, Simulator};
 
-    use crate::family::{FamilyEstimator, FamilyFit};
+    use crate::family::{
+        FamilyEstimator, FamilyFit,
+        simulated_operator::{Uniform, response_to},
+    };
 
     use super::*;
 
@@ -267,23 +270,13 @@ mod tests {
     /// An error that is not zero in the mean, with this much white noise of u, started away from rest, `before` samples
     /// before the record of `n`, and with a level of u.
     fn record_of(model: &HeldFamily, ts: SampleTime, (before, n): (usize, usize), noise: f64) -> Record {
-        let mut state = 7_u64;
-        let mut uniform = move || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        };
+        let mut random = Uniform(7);
+        let mut uniform = || random.between(-0.5, 0.5);
         let e: Vec<f64> = (0..before + n)
             .map(|t| t as f64 * ts.s() / 0.025)
             .map(|t| 0.2 + (0.012 * t).sin() + 0.6 * (0.07 * t).cos() + 0.2 * uniform())
             .collect();
-        let mut w = vec![0.0; e.len()];
-        for k in model.nk + model.b.len()..e.len() {
-            let input: f64 = (model.b.iter().enumerate()).map(|(i, b)| b * e[k - model.nk - i]).sum();
-            let past: f64 = (model.f.iter().enumerate()).map(|(i, f)| f * w[k - 1 - i]).sum();
-            w[k] = input - past;
-        }
+        let w = response_to(model, &e);
         let u = w[before..].iter().map(|w| w + 0.7 + noise * uniform()).collect();
         Record::new(
             ts,

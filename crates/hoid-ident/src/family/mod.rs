@@ -7,8 +7,8 @@
 //! determine are reported as undetermined.
 //!
 //! 1. If a periodic excitation was recorded, the describing function is computed at its lines ([`crate::frequency`]),
-//!    and each form is fitted to it ([`LineFit`]). Without an excitation, the response of a high-order ARX model
-//!    supplies the starts.
+//!    and each form is fitted to it ([`LineFit`]). Together with the response of a high-order ARX model this supplies
+//!    the starts.
 //! 2. Each form is fitted by prediction error, with an autoregressive (or ARMA) noise model whose order is selected by
 //!    Akaike's criterion, and with a weak prior on parameters that a short tracking record does not determine
 //!    ([`OperatorPrior`]).
@@ -24,6 +24,7 @@
 //! |---|---|
 //! | `options` | [`FamilyEstimator`]: options as fields and by name |
 //! | `estimator` | the searches of all forms |
+//! | `starts` | the starts of these searches, and the orders of the noise model |
 //! | `channel` | a further input: request, form, results |
 //! | `channels` | inputs of a person in addition to the error; `choice`: selection of their forms |
 //! | `channel_lines` | the responses to all inputs at the lines |
@@ -94,6 +95,11 @@ mod profile;
 mod response_fit;
 mod result;
 mod sensitivity;
+#[cfg(test)]
+#[allow(dead_code)]
+#[path = "../../tests/common/simulated_operator.rs"]
+mod simulated_operator;
+mod starts;
 
 pub use agreement::{Agreement, AgreementMethod, AgreementPair, AgreementRow};
 pub use channel::{ChannelFit, ChannelForm, ChannelResponse, ChannelRole, SeenChannel};

@@ -106,9 +106,9 @@ impl RecordParts {
         if first > end {
             return Err(too_long(self));
         }
-        let n = (end - first) as usize;
+        let n = ((end - first) as usize).saturating_add(1);
         for channel in &mut self.channels {
-            channel.values = kernel.values(&channel.values, first * factor, factor, n.saturating_add(1));
+            channel.values = kernel.values(&channel.values, first * factor, factor, n);
         }
         let cut_s = (first * new.s(), last * old.s() - end * new.s());
         self.start_s += cut_s.0;

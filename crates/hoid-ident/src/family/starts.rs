@@ -1,0 +1,209 @@
+//! Starts of the searches for the operator, and the orders of its noise model.
+//!
+//! The loss of the prediction error has local minima in delay, leads, lags and poles, so that a search finds the operator
+//! only from a start in its valley. Each form has these starts:
+//!
+//! 1. **At the lines**, if there are lines: the form fitted to the describing function.
+//! 2. **From the response of a high-order ARX model** ([`super::arx_response`]): minima of
+//!    `chi^2 = sum_j 2 |H_j - Y(j omega_j)|^2 / v_j`, searched from the best grid point of each delay, with a prior and
+//!    without one. With a prior the search avoids minima far from people; without one it finds a person far from them.
+//!    The errors of H are correlated between frequencies, which chi^2 ignores, so that its least minimum need not belong
+//!    to the operator. The minima are therefore ranked by their prediction error
+//!    `n ln V + sum_i (g_i - m_i)^2/s_i^2`, where V is the innovation variance of an autoregression of `u - Y e`, and
+//!    the best of them that differ in their responses are starts.
+//!
+//! The orders of the noise model are those of the start with the least prediction error.
+
+use hoid_model::Form;
+
+use super::{
+    coordinates::Grid,
+    line_fit::{LineFit, line_fit},
+    lines::LineData,
+    noise::{Autoregression, NoiseProducts, Penalty},
+    options::FamilyEstimator,
+    prediction::{NoiseOrders, Prediction},
+    prior::OperatorPrior,
+    response_fit::{MeasuredResponse, ResponseCriterion},
+};
+use crate::{IdentError, criterion::Workspace};
+
+/// Number of minima for the response from which the prediction error search of a form runs; twice as many without a
+/// prior.
+const SEARCHES: usize = 2;
+/// Relative difference of the responses of two minima below which only one of them is a start.
+const SAME_RESPONSE: f64 = 0.1;
+/// Order of the autoregression with which the minima for the response are compared.
+const FIRST_NOISE_ORDER: usize = 8;
+
+/// Starts of the searches for one form.
+pub(super) struct Start {
+    pub form: Form,
+    /// Fit at the lines, if there are lines.
+    pub lines: Option<LineFit>,
+    /// Starting coordinates, one set per search.
+    pub coordinates: Vec<Vec<f64>>,
+}
+
+impl FamilyEstimator {
+    /// Returns the criterion for the measured response of a form.
+    pub(super) fn of_response<'p>(
+        &self,
+        form: Form,
+        points: &'p [MeasuredResponse],
+        prior: &OperatorPrior,
+        prediction: &Prediction<'_>,
+    ) -> ResponseCriterion<'p> {
+        ResponseCriterion::new(
+            form,
+            self.neuromuscular,
+            points,
+            prior,
+            prediction.delay_range_s,
+            (prediction.sample_time, prediction.intersample),
+        )
+    }
+
+    /// Returns the fit of a form at the lines and the starting coordinates of its searches: those of the fit at the
+    /// lines, and the minima for the response of the ARX model that have the smallest prediction errors.
+    pub(super) fn start(
+        &self,
+        form: Form,
+        lines: Option<&LineData<'_>>,
+        response: &[MeasuredResponse],
+        prediction: &Prediction<'_>,
+        workspace: &mut Workspace,
+    ) -> Result<Start, IdentError> {
+        let mut start = Start {
+            form,
+            lines: None,
+            coordinates: Vec::new(),
+        };
+        if let Some(lines) = lines {
+            let criterion = self.of_response(form, &lines.points, &self.prior, prediction);
+            let (fit, found) = line_fit(lines, &criterion, &self.search)?;
+            start.coordinates.push(found.coordinates);
+            start.lines = Some(fit);
+        }
+        if !response.is_empty() {
+            let criterion = self.of_response(form, response, &self.prior, prediction);
+            let (other, searches) = match self.prior.entries() {
+                [] => (OperatorPrior::population(), 2 * SEARCHES),
+                _ => (OperatorPrior::none(), SEARCHES),
+            };
+            let other = self.of_response(form, response, &other, prediction);
+            let minima = [&criterion, &other].map(|c| c.minima(&self.search, Grid::Default));
+            let minima: Vec<Vec<f64>> = minima.into_iter().flatten().map(|found| found.coordinates).collect();
+            let cost = |found: &[f64], workspace: &mut Workspace| {
+                let error = self.whitened(prediction, form, found, FIRST_NOISE_ORDER, workspace)?;
+                let prior: f64 = criterion.penalty.iter().map(|penalty| penalty.at(found)).sum();
+                Some(prediction.samples() as f64 * error.loss.ln() + prior)
+            };
+            let mut minima: Vec<(f64, Vec<f64>)> = minima
+                .into_iter()
+                .map(|found| (cost(&found, workspace).unwrap_or(f64::INFINITY), found))
+                .collect();
+            minima.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let mut chosen: Vec<Vec<f64>> = Vec::new();
+            for (_, found) in minima {
+                if !chosen
+                    .iter()
+                    .any(|known| criterion.distance(known, &found) < SAME_RESPONSE)
+                {
+                    chosen.push(found);
+                }
+            }
+            chosen.truncate(searches);
+            start.coordinates.extend(chosen);
+        }
+        Ok(start)
+    }
+
+    /// Returns the autoregression, of this order at most, of the part of u that an operator does not explain.
+    fn whitened(
+        &self,
+        prediction: &Prediction<'_>,
+        form: Form,
+        coordinates: &[f64],
+        order: usize,
+        workspace: &mut Workspace,
+    ) -> Option<Autoregression> {
+        let series = prediction.unexplained((form, self.neuromuscular), coordinates, workspace);
+        NoiseProducts::new(&series.ok()?, order).fit_up_to(order)
+    }
+
+    /// Returns the index of the form with a start whose residual is smallest after whitening by an autoregression of
+    /// this order.
+    pub(super) fn least_left(
+        &self,
+        prediction: &Prediction<'_>,
+        starts: &[Start],
+        order: usize,
+        workspace: &mut Workspace,
+    ) -> Result<usize, IdentError> {
+        let mut least: Option<(f64, usize)> = None;
+        for (i, start) in starts.iter().enumerate() {
+            for coordinates in &start.coordinates {
+                if let Some(found) = self.whitened(prediction, start.form, coordinates, order, workspace)
+                    && least.is_none_or(|(loss, _)| found.loss < loss)
+                {
+                    least = Some((found.loss, i));
+                }
+            }
+        }
+        least.map(|(_, i)| i).ok_or(IdentError::NoFiniteLoss)
+    }
+
+    /// Selects the orders of the noise model by Akaike's criterion, for the form with the smallest residual.
+    pub(super) fn noise_orders(
+        &self,
+        prediction: &Prediction<'_>,
+        starts: &[Start],
+        workspace: &mut Workspace,
+    ) -> Result<NoiseOrders, IdentError> {
+        let highest = *self.nd.end();
+        let mut left: Vec<(Form, &Vec<f64>, NoiseProducts)> = Vec::new();
+        for &Start {
+            form, ref coordinates, ..
+        } in starts
+        {
+            for start in coordinates {
+                if let Ok(series) = prediction.unexplained((form, self.neuromuscular), start, workspace) {
+                    left.push((form, start, NoiseProducts::new(&series, highest)));
+                }
+            }
+        }
+        let losses = |fit: fn(&NoiseProducts, usize) -> Option<Autoregression>| {
+            let of = |(i, (_, _, products)): (usize, &(Form, &Vec<f64>, NoiseProducts))| {
+                Some((fit(products, highest)?.loss, i))
+            };
+            left.iter()
+                .enumerate()
+                .filter_map(of)
+                .min_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let (_, least) = losses(NoiseProducts::fit)
+            .or_else(|| losses(NoiseProducts::fit_up_to))
+            .ok_or(IdentError::NoFiniteLoss)?;
+        let (form, start, products) = left.swap_remove(least);
+        let autoregression = products
+            .best_order(self.nd.clone(), Penalty::Akaike)
+            .ok_or(IdentError::NoFiniteLoss)?;
+        if *self.nc.end() == 0 {
+            return Ok((0, autoregression));
+        }
+        let mut least: Option<(f64, NoiseOrders)> = None;
+        for nc in self.nc.clone() {
+            for nd in self.nd.clone() {
+                let Ok(fit) = prediction.fit((form, self.neuromuscular), (nc, nd), start, workspace) else {
+                    continue;
+                };
+                let value = fit.residuals as f64 * fit.loss.ln() + 2.0 * (nc + nd) as f64;
+                if least.is_none_or(|(known, _)| value < known) {
+                    least = Some((value, (nc, nd)));
+                }
+            }
+        }
+        least.map(|(_, orders)| orders).ok_or(IdentError::NoFiniteLoss)
+    }
+}
