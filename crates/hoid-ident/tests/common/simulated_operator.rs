@@ -18,7 +18,7 @@ impl Uniform {
         self.between(low.ln(), high.ln()).exp()
     }
 
-    /// A sum of twelve: normal but for its tails, variance one.
+    /// A sum of twelve: normal except for its tails, variance one.
     pub fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.between(0.0, 1.0)).sum::<f64>() - 6.0
     }
