@@ -9,8 +9,8 @@ use hoid_model::Orders;
 
 use super::further_input::{FurtherInput, FurtherSignals};
 
-/// Signals of one record for one theta. Each signal is preceded by `pad` zeros, so that shifts need no special case at
-/// the start.
+/// Signals of one record for one theta. Each signal is preceded by `pad` zeros, so shifts need no special case at the
+/// start.
 #[derive(Debug, Default)]
 pub(crate) struct Workspace {
     pub(super) pad: usize,

@@ -223,7 +223,7 @@ impl<'a> Chosen<'_, 'a> {
         with_lines(self.prediction, fit, (lines?, &data), workspace)
     }
 
-    /// As [`have_separate_lines`].
+    /// Same as [`have_separate_lines`].
     fn have_separate_lines(&self) -> bool {
         let asked = self
             .channels

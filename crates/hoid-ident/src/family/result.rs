@@ -199,7 +199,7 @@ impl FamilyFit {
         LoopMeasures::averaged(&each.into_iter().flatten().collect::<Vec<_>>(), self.clusters)
     }
 
-    /// As [`Self::loop_measures`], for the best form only.
+    /// Like [`Self::loop_measures`], for the best form only.
     pub fn loop_measures_in_front(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let of = self.operator(record);
         self.measured(&of.operator, of.covariance.as_deref(), element)

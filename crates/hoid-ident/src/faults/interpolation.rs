@@ -8,7 +8,7 @@
 //! `G delta = -g`, `G_ij = sum_t a(t-s-i) a(t-s-j)`, `g_i = sum_t a(t-s-i) eps(t)`
 //!
 //! With the Cholesky factor L of G and `y = L^-1 g`, the sum of squares falls by `|y|^2`. L and y for fewer samples are
-//! the first rows of L and y for more samples, so that one pass gives the decrease for every m.
+//! the first rows of L and y for more samples, so one pass gives the decrease for every m.
 
 use super::autoregression::Autoregression;
 

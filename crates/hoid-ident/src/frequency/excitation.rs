@@ -275,8 +275,7 @@ mod tests {
             let refused = Excitation::found_in(&reference(samples, 0.0), "e", &search);
             assert!(matches!(refused, Err(IdentError::NotWholePeriods { .. })));
         }
-        // The lines of two periods taken for those of one of twice the length would be harmonics
-        // too; the other way round not.
+        // With twice the period, the lines would also be harmonics; this is refused.
         let wrong = LineSearch {
             period_s: Some(40.96),
             ..LineSearch::default()

@@ -65,7 +65,7 @@ impl Start {
     }
 
     /// Updates the next unknown polynomial from the linearisation at theta. The residual is affine in B and in D, so
-    /// that one least-squares step computes either polynomial while the others are fixed.
+    /// one least-squares step computes either polynomial while the others are fixed.
     pub fn update(&mut self, o: &Orders, there: &Linearisation) {
         let Some(block) = self.left.pop() else { return };
         let (p, place) = (self.theta.len(), block.place(o));

@@ -145,7 +145,7 @@ impl ThetaEstimate<'_> {
             .map(|(parameter, gradient)| {
                 let (mut whole, beside) = of(&gradient);
                 let mut value = parameter.value;
-                // omega_nm and zeta_nm are elements of theta, so that no logarithm is involved.
+                // omega_nm and zeta_nm are elements of theta, so no logarithm is involved.
                 let own = match (parameter.coordinate, self.layout.neuromuscular_indices) {
                     (Some(Coordinate::LogOmega), Some([omega, _])) => Some(omega),
                     (Some(Coordinate::LogZeta), Some([_, zeta])) => Some(zeta),
