@@ -116,7 +116,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         }
     }
 
-    /// As [`Rpem::step`], but the estimate stays constant and only the filters are advanced.
+    /// Like [`Rpem::step`], but the estimate stays constant and only the filters are advanced.
     pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         let theta = self.theta;
         let (psi, innovation) = self.predictor.predict(&theta, x, u);
@@ -129,7 +129,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         }
     }
 
-    /// As [`Rpem::step_without_update`], for a sample without u; the one-step prediction replaces the missing output.
+    /// Like [`Rpem::step_without_update`], for a sample without u; the one-step prediction replaces the missing output.
     pub fn bridge(&mut self, x: f64) {
         let theta = self.theta;
         (self.psi, _) = self.predictor.predict(&theta, x, 0.0);

@@ -1,4 +1,4 @@
-//! Saving and restoring the numbers that change while a recursion runs, so that it can be continued elsewhere.
+//! Saving and restoring the numbers that change while a recursion runs, so it can be continued elsewhere.
 //!
 //! One function visits these numbers for both purposes: reading the numbers saves the recursion, and writing them
 //! restores it, so the two orders cannot differ. A restored recursion continues with bit-identical results. Counters

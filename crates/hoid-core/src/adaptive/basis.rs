@@ -24,7 +24,7 @@
 //! exact for a piecewise linear error and any delay. Apart from aliasing, the response to a sampled sine is the
 //! operator's response multiplied by that of the hold, `(sin(omega Ts/2)/(omega Ts/2))^2`.
 //!
-//! Each r_i is divided by its gain at [`REFERENCE`], so that all gains of the numerator are in units of |Y| at that
+//! Each r_i is divided by its gain at [`REFERENCE`], so all gains of the numerator are in units of |Y| at that
 //! frequency.
 
 use super::{

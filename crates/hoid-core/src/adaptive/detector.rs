@@ -52,8 +52,8 @@ const LEAST_AFTER_GAP: usize = 4;
 const PRIOR_BLOCKS: f64 = 60.0;
 /// Maximum number of blocks, in addition to the prior, in the mean that estimates the level of a statistic.
 const LEVEL_MEMORY: f64 = 240.0;
-/// Largest amount by which the logarithm of a statistic may exceed its mean level in the update of that level, so that
-/// a change does not count as normal variation.
+/// Largest amount by which the logarithm of a statistic may exceed its mean level in the update of that level, so a
+/// change does not count as normal variation.
 const LARGEST_LOG_STEP: f64 = 3.0;
 
 /// Settings of the change detector.
@@ -98,7 +98,7 @@ impl Statistic {
     }
 
     fn take(&mut self, t: f64) {
-        // The test uses the level estimated before this block, so that a change does not reduce its own significance.
+        // The test uses the level estimated before this block, so a change does not reduce its own significance.
         self.log_significance = log_significance(t / libm::sqrt(self.scale()), PAIRS);
         self.levels = (self.levels + 1.0).min(PRIOR_BLOCKS + LEVEL_MEMORY);
         let log = libm::log(t.max(0.05)).min(self.level + LARGEST_LOG_STEP);

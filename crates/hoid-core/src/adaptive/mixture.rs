@@ -206,14 +206,14 @@ impl Mixture {
             }
         }
         // A newborn hypothesis skips its early samples. It is charged the residual energy that the best hypothesis has
-        // at these samples, so that skipping gives it neither an advantage nor a disadvantage.
+        // at these samples, so skipping gives it neither an advantage nor a disadvantage.
         let of_early = early.energy(basis, &best);
         for (_, left) in self.all().iter().zip(&mut left).filter(|(h, _)| newborn(h)) {
             left.passed = [early.samples, of_early];
             left.energy += of_early;
             common = common.min(left.energy);
         }
-        // The memory of the variance is half the time since the start, so that the large residuals of the start are
+        // The memory of the variance is half the time since the start, so the large residuals of the start are
         // forgotten.
         let [longest, shortest] = prior.variance.map(|seconds| seconds / scales.sample_time);
         let memory = longest.min((0.5 * blocks as f64 * moments.samples).max(shortest));
@@ -522,11 +522,11 @@ mod tests {
     use super::*;
     use crate::adaptive::{basis::Point, defaults::DefaultOperator, sizes::SIGNALS};
 
-    /// The sample of the change: two before the end of block 56.
+    /// Sample of the change: two samples before the end of block 56.
     const CHANGE: usize = 32 * 56 - 2;
 
-    /// How far the gains are after a given number of blocks from those of an operator that has changed, over the
-    /// change, with a remnant of four poles; of each block so many samples are its first.
+    /// Returns the distance of the gains from those of the changed operator after a given number of blocks, relative to
+    /// the change. The remnant has four poles; `first` is the number of early samples of each block.
     fn off(first: usize, blocks: usize) -> f64 {
         let point = Point {
             tau: 0.2,
@@ -597,7 +597,7 @@ mod tests {
 
     #[test]
     fn blocks_shorter_than_the_whitening_filter_do_no_harm() {
-        // None of the first block of a child is taken, and its variance is that of the next ones.
+        // A child then skips its whole first block, and its variance is that of the next blocks.
         let all = off(32, 63);
         assert!(all < 0.2, "{all}");
     }

@@ -1,6 +1,6 @@
 //! Last signals of a basis, the newest first, stored so that no signal is moved when a sample is added.
 //!
-//! The ring is stored twice in succession, so that its signals are contiguous from any start.
+//! The ring is stored twice in succession, so its signals are contiguous from any start.
 
 use super::{
     f64x2::F64x2,

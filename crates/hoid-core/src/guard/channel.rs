@@ -381,7 +381,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// Comparison: a polynomial of degree j-1 through the last j samples, by Lagrange's formula.
+    /// Reference: a polynomial of degree j-1 through the last j samples, by Lagrange's formula.
     #[test]
     fn errors_are_those_of_the_extrapolated_polynomials() {
         let signal = |t: f64| libm::sin(0.31 * t) + 0.2 * libm::cos(1.7 * t);
@@ -414,8 +414,8 @@ mod tests {
         })
     }
 
-    /// The 99 % quantile of a Gaussian first difference of a random walk is 2.576; its standard
-    /// error by this approximation is about sqrt(g p/2)/(q f(q)/...) = 8 %.
+    /// The 99 % quantile of a Gaussian first difference of a random walk is 2.576; this approximation has a standard
+    /// error of about 8 %.
     #[test]
     fn quantiles_are_found_from_far_off_and_one_outlier_hardly_moves_them() {
         let (mut state, mut x) = (1, 0.0);
@@ -467,8 +467,8 @@ mod tests {
         }
     }
 
-    /// Weibull's law has m = 4^(1/k): twice the quantile for k = 2, seven times for k = .7; the largest of 1e5 samples
-    /// is within the limit, a spike is not. Rests change nothing.
+    /// Weibull's distribution gives m = 4^(1/k): twice the quantile for k = 2, seven times for k = .7; the largest of
+    /// 1e5 samples is within the limit, a spike is not. Rests have no effect.
     #[test]
     fn who_moves_in_bursts_has_a_higher_limit_and_a_spike_is_still_one() {
         for (shape, least, most) in [(2.0, 2.4, 2.6), (1.0, 3.0, 5.5), (0.7, 5.0, 10.5)] {
@@ -483,7 +483,7 @@ mod tests {
             channel.set_quantiles([1.0; ORDERS]);
             let (mut beyond, mut factor, mut x) = (0, 0.0, 0.0);
             for t in 0..100_000 {
-                // Moves for half a second, and rests as long.
+                // Moves for half a second and rests for half a second.
                 if t / 50 % 2 == 0 {
                     let size = libm::pow(-libm::log(uniform()), 1.0 / shape);
                     x += if uniform() < 0.5 { size } else { -size };
@@ -558,7 +558,7 @@ mod tests {
         assert!(!channel.is_outlier(&channel.errors(1e9)));
         assert!(channel.is_outlier(&channel.errors(f64::NAN)));
         assert!(channel.hold(f64::NAN).is_finite() && channel.held() == 1);
-        // A signal that never moves has no scale, and outliers only by its floor.
+        // A signal that never moves has no scale, and only its floor detects outliers.
         channel.restart([3.0; 9].into_iter());
         channel.set_quantiles([1e-300; ORDERS]);
         channel.set_floor(0.1);

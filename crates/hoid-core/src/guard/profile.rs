@@ -3,8 +3,8 @@
 //! For each block of one second, the following mean magnitudes are computed: those of e and u about their long-run
 //! means, `m_c` for channel c; those of their backward differences of order j = 1 to 4, `a_cj`; and that of the
 //! innovations of the recursion, `a_eps`. The long-run values M_c and A_cj follow with a time constant of 60 blocks.
-//! The values of a block are limited to between half and twice the long-run values, so that no block changes these by
-//! more than 1/60. Blocks in which a fault is found are not used.
+//! The values of a block are limited to between half and twice the long-run values, so no block changes these by more
+//! than 1/60. Blocks in which a fault is found are not used.
 //!
 //! | finding | rule | reason |
 //! |---|---|---|
@@ -450,7 +450,7 @@ mod tests {
         profile
     }
 
-    /// Squares that underflow: infinite innovations are not a long-run value, and nothing panics after them.
+    /// Squares that underflow: infinite innovations do not become a long-run value, and nothing panics afterwards.
     #[test]
     fn numbers_without_a_size_are_not_learnt() {
         let mut profile = known();
@@ -495,8 +495,8 @@ mod tests {
         }
     }
 
-    /// A trouble only if e is constant too, or the control during the rest is not predicted: u is constant at its rest
-    /// position and e continues.
+    /// A constant u at its rest position is a fault only if e is constant too, or if the innovations during the rest
+    /// are too large.
     #[test]
     fn a_rest_is_not_frozen_but_a_rest_that_does_not_fit_is() {
         let still = block([0.02, 0.0], [0.1, 1.1]);
@@ -513,7 +513,7 @@ mod tests {
         assert_eq!(after(true, &quiet(0.19, 0.02)), None);
         assert_eq!(after(true, &quiet(0.21, 0.02)), Some((3, Fault::FrozenOutput)));
         assert_eq!(after(true, &quiet(0.0, 0.0)), Some((1, Fault::FrozenInput)));
-        // A channel that was trusted for long has had the trouble for as long.
+        // The duration of a fault includes the blocks in which it was accepted as a rest.
         let mut profile = known();
         (0..9).for_each(|_| assert_eq!(profile.find_fault(&quiet(0.0, 0.02), true), None));
         let told = profile.find_fault(&quiet(0.0, 0.02), false);

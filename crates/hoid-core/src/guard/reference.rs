@@ -164,7 +164,7 @@ mod tests {
         };
         assert_eq!(blocks(1.15, 1000), None);
         assert_eq!(blocks(0.5, 1000), None);
-        // 100 (log 1.4 - .2) = 13.6 a block.
+        // 100 (log 1.4 - .2) = 13.6 per block.
         assert_eq!(blocks(1.4, 1000), Some(2));
         assert_eq!(blocks(1e9, 1000), Some(2));
         assert_eq!(blocks(f64::NAN, 10), None);
