@@ -1,7 +1,7 @@
 //! The parameters of an operator that the data determine.
 //!
 //! A parameter is determined if it is more than two standard errors from zero and, if the method has a prior for the
-//! parameter, the data have at least halved the prior variance. Otherwise the value is mainly that of the prior.
+//! parameter, the data have at least halved the prior variance. Otherwise the value comes mainly from the prior.
 
 use hoid_model::uncertainty::OperatorEstimate;
 

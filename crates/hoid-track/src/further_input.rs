@@ -19,7 +19,7 @@ use crate::response::Response;
 /// A further input of a tracked model.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TrackedInput {
-    /// Name of the channel in the record.
+    /// Role of the input in the task of the person.
     pub channel: String,
     /// Its role in the task of the person.
     pub role: ChannelRole,
@@ -66,7 +66,7 @@ impl TrackedInput {
     }
 
     /// Returns the response to this input at a frequency in rad/s; `orders` are those of the model of e, and
-    /// `covariance` is that of the whole theta, by rows.
+    /// `covariance` is the covariance of the whole theta by rows.
     pub(crate) fn response(
         &self,
         orders: &Orders,

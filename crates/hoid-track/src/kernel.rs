@@ -116,7 +116,7 @@ impl<'a> Plan<'a> {
     /// Returns the gain of the recursion ([`Gain::new`]).
     ///
     /// # Errors
-    /// As [`Gain::new`].
+    /// Same as [`Gain::new`].
     pub fn gain<const N: usize>(&self, growing: bool) -> Result<Gain<N>, IdentError> {
         Gain::new(self.setup, self.from, self.sample_time, growing)
     }
@@ -124,7 +124,7 @@ impl<'a> Plan<'a> {
     /// Returns the error bars at the start ([`gain::error_bars`]).
     ///
     /// # Errors
-    /// As [`gain::error_bars`].
+    /// Same as [`gain::error_bars`].
     pub fn bars<const N: usize, const K: usize>(&self) -> Result<ErrorBars<N, K>, IdentError> {
         gain::error_bars(self.setup, self.from, self.sample_time)
     }

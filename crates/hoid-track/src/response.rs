@@ -55,7 +55,8 @@ impl Response {
         Estimate::with_variance(degrees * im.atan2(re), degrees * degrees * self.along([-im, re]))
     }
 
-    /// Returns the variance of the response along the direction `[a, b]`, a vector as long as H, divided by |H|^4.
+    /// Returns the variance of the response along the direction `[a, b]`, a vector with the magnitude of H, divided
+    /// by |H|^4.
     fn along(&self, [a, b]: [f64; 2]) -> f64 {
         let c = &self.covariance;
         let square = self.value[0] * self.value[0] + self.value[1] * self.value[1];

@@ -301,7 +301,7 @@ struct FittedStart {
     covariance: Option<Vec<f64>>,
     fit: Option<Fit>,
     variance: f64,
-    /// Number of residuals without the number of estimated values.
+    /// Number of residuals minus the number of estimated values.
     residuals: usize,
 }
 

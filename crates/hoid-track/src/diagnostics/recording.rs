@@ -101,9 +101,8 @@ impl Trace {
     pub(super) fn not_followed(&self, record: &Record) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self.operator(row).ok()?;
-        // If gain and lead approximate another form, their response differs from that of the estimate, so that they are
-        // not compared.
-        // The batch fits of the last seconds have one input.
+        // If gain and lead approximate another form, their response differs from that of the estimate, so they are not
+        // compared. The batch fits of the last seconds have one input.
         if self.options().further.is_some() {
             return None;
         }
