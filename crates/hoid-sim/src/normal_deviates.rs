@@ -64,7 +64,7 @@ fn edges() -> [f64; LAYERS + 1] {
     edges
 }
 
-/// Generator whose first number is that for the middle of a layer; all further numbers are the largest possible number.
+/// Generator whose first number belongs to the middle of a layer; all further numbers are the largest possible number.
 struct Middle(u64);
 
 impl TryRng for Middle {
@@ -187,7 +187,7 @@ mod tests {
     fn deviates_are_those_of_the_library() {
         let edges = edges();
         assert!(edges.windows(2).all(|pair| pair[0] > pair[1]), "{edges:?}");
-        // Many thousand of them are not accepted directly, some hundred are in the tail.
+        // Many thousands of the deviates are not accepted directly, and some hundreds are in the tail.
         let mut found = vec![0.0; 1_000_003];
         normal_deviates(ChaCha8Rng::from_seed([3; 32]), &mut found);
         let mut alone = ChaCha8Rng::from_seed([3; 32]);
