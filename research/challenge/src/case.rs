@@ -226,7 +226,7 @@ impl Case {
         times
     }
 
-    /// True if every change takes at most two seconds, so that the changes have definite times.
+    /// True if every change takes at most two seconds, so the changes have definite times.
     pub fn changes_at_once(&self) -> bool {
         self.operator_changes.iter().all(|shift| shift.takes_s <= 2.0)
     }

@@ -130,8 +130,8 @@ mod tests {
         assert!(large > CERTAIN && small < CERTAIN && large > small, "{large} {small}");
     }
 
-    /// The mean of the logarithm is the divergence, half the power of the whitened difference over
-    /// the variance; over runs it scatters by the root of twice that.
+    /// The mean of the log ratio is the divergence: half the power of the whitened difference divided by the variance.
+    /// Its standard deviation over runs is the square root of twice the divergence.
     #[test]
     fn the_evidence_of_a_normal_remnant_is_half_the_power_of_the_difference() {
         let case = cases().into_iter().find(|case| case.name == "change-omega-30").unwrap();

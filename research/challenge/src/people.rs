@@ -2,11 +2,11 @@
 //!
 //! Trials of one person, each with 40 s after a ramp and sampled at 60 Hz, are joined. A trial on `1/s` joined to one
 //! on `1/(s(s+1))`, or vice versa, gives a change of the plant and hence of the operator at 40 s; two trials on the
-//! same plant give a seam without a change. The second trial has its own ramp as history ([`Seam`]), so that no filter
+//! same plant give a seam without a change. The second trial has its own ramp as history ([`Seam`]), so no filter
 //! jumps. Single trials contain no change. The true response is the average describing function of the person over
 //! their other trials on that plant, at the seven lowest lines of the disturbance: `sum U conj(D) / sum E conj(D)` over
 //! trials of two whole periods. The delay is not given. The control output of a row was read one sample before it was
-//! written, so that e(k) is aligned with u(k+1).
+//! written, so e(k) is aligned with u(k+1).
 //!
 //! The recordings are not part of the project.
 
@@ -306,8 +306,8 @@ impl EvaluationRun {
 mod tests {
     use super::*;
 
-    /// A trial whose control is its error after a delay of one sample and a gain: the describing
-    /// function is that gain, the sample is the shift of the recorder.
+    /// The control of the trial is the error, delayed by one sample and multiplied by a gain: the describing function
+    /// is this gain, and the sample is the shift of the recorder.
     #[test]
     fn the_describing_function_of_a_gain_is_the_gain() {
         let n = 2702;

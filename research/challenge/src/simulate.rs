@@ -344,8 +344,8 @@ mod tests {
         number: 0,
     };
 
-    /// U/E at the lines of the excitation over whole periods of 20 s, without a remnant, equals the
-    /// true response: held and continuous, a whole delay and a fractional one.
+    /// Without a remnant, U/E at the lines of the excitation over whole periods of 20 s equals the true response, for
+    /// held and continuous errors and for whole and fractional delays.
     #[test]
     fn the_loop_has_the_response_that_is_called_true() {
         for (name, within) in [("none-lag-1", 1e-3), ("delay-half-60", 1e-3), ("continuous-60", 4e-3)] {
@@ -357,7 +357,7 @@ mod tests {
             };
             let run = simulate(&quiet, RUN).unwrap();
             let per_second = quiet.rate_hz as usize;
-            // Late enough for the initial transient to have decayed.
+            // The span starts after the initial transient has decayed.
             let span = 60 * per_second..80 * per_second;
             for multiple in [2.0, 3.0, 5.0, 11.0, 19.0] {
                 let omega = multiple * TAU / 20.0;

@@ -1,5 +1,5 @@
-//! Upper bound of the available information: the likelihood ratio of the operator after a change against that before
-//! it, if both operators are known.
+//! Upper bound of the available information: the likelihood ratio of the operators after and before a change, if both
+//! are known.
 //!
 //! The gains s of each operator are estimated from all trials with that element (except the examined trial), in the
 //! basis of the default operator. After the whitening filter of the first trial's remnant, whose variance is sigma^2,
