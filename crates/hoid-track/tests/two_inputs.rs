@@ -136,7 +136,7 @@ fn without_forgetting_rls_ends_at_the_batch_fit() {
         let [found, expected] = [found, *expected].map(|e| e.standard_error.unwrap());
         assert!((found / expected - 1.0).abs() < 0.01, "{name}: {found} {expected}");
     }
-    // The response to r is B/A of its own coefficients.
+    // The response to r is B_r/A with its own coefficients.
     let response = trace.further_response(last, 2.0).unwrap();
     let of_fit = &fit.frequency_response(1, &[2.0])[0];
     assert!((response.gain_db().value - of_fit.magnitude_db.value).abs() < 1e-4);
@@ -204,7 +204,7 @@ fn db(b: &[f64], nk: usize) -> f64 {
     20.0 * (b_re.hypot(b_im) / (1.0 + f_re).hypot(f_im)).log10()
 }
 
-/// Gain of the response to r before the change, and of the response to e, at 2 rad/s.
+/// Gain in dB of the response to r before the change, and of the response to e, at 2 rad/s.
 fn level_db() -> f64 {
     db(&[0.03], NK_R)
 }
@@ -262,7 +262,7 @@ fn samples_without_the_further_input_change_nothing() {
             _ => {}
         }
     }
-    // Without the samples the estimate stays as good.
+    // The samples without r do not degrade the estimate.
     let found = (tracker.parameter_names().into_iter().zip(tracker.parameters())).find(|(name, _)| name == "b0[r]");
     let found = found.unwrap().1;
     let away = (found.value - 0.03).abs() / found.standard_error.unwrap();
