@@ -21,8 +21,8 @@
 //! Ljung and T. Söderström, *Theory and Practice of Recursive Identification*, 1983, eq. 4.136), for a forgetting
 //! matrix, a shortened step, or a gradient step. Without forgetting, `Sigma` becomes P. The default error bars use
 //! `h = psi` and K = 0, so no filter errors are stored. They give the same result if the estimate hardly changes within
-//! the memory of the filters. If the memory of the estimate is not much longer than that of 1/F, the variances of the
-//! default are up to a third too small, but a step costs half as much.
+//! the memory of the filters. If the memory of the estimate is not much longer than the memory of 1/F, the variances of
+//! the default are up to a third too small, but a step costs half as much.
 //!
 //! **Outliers.** An innovation beyond a limit of a few sigma changes the estimate as if it were at that limit (P. J.
 //! Huber, *Robust Statistics*, 1981, section 7.3); the gain in the equations above is then the reduced gain that was

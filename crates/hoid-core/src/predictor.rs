@@ -14,8 +14,8 @@
 //! | `d_j` | `-(1/C) v(t-j)` |
 //! | `f_j` | `-(D/(C F)) w(t-j)` |
 //!
-//! Each filter uses the coefficients of the current estimate; for a constant theta, eps and psi are those of the batch
-//! criterion started at rest. `D/(C F)` is **one filter in direct form**,
+//! Each filter uses the coefficients of the current estimate; for a constant theta, eps and psi equal those of the
+//! batch criterion started at rest. `D/(C F)` is **one filter in direct form**,
 //! `y(t) = x(t) + sum d_j x(t-j) - sum g_j y(t-j)` with `G = C F`. A cascade of `1/F` followed by `D/C` is the same
 //! filter only for a constant theta, since time-varying filters do not commute. Its inner signal `x/F` depends on the F
 //! of earlier estimates until the poles of F have forgotten them, and the current D no longer cancels these poles. Near

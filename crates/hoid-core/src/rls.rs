@@ -115,7 +115,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
             psi[na] = x;
         }
         let w = dot(&theta[na..na + nb], &psi[na..]);
-        // The result is bit-identical to that of the predictor of the general model, which stores u itself.
+        // The result is bit-identical to the predictor of the general model, which stores u itself.
         (psi, u - dot(&theta[..na], &psi) - w)
     }
 

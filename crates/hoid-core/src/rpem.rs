@@ -4,7 +4,7 @@
 //! The estimate is updated by `theta <- theta + g eps`, with psi and eps from [`crate::predictor`] and the gain of an
 //! [`Adaptation`] (eq. 31, 5.54; L. Ljung and T. Söderström, *Theory and Practice of Recursive Identification*, 1983,
 //! section 3.7). A step that would make C or F unstable is halved until both are stable. Without C, D and F the results
-//! are bit-identical to those of recursive least squares, [`crate::rls`].
+//! are bit-identical to recursive least squares, [`crate::rls`].
 
 use crate::{
     adaptation::Adaptation,

@@ -67,7 +67,7 @@
 //! | [`progress`] | progress of a fit, reported to the caller |
 //! | [`linalg`] | sums of products, least squares by QR, the inverse of an information matrix |
 //!
-//! Internal modules, each of which uses the modules above it:
+//! Internal modules; each uses the modules above it:
 //!
 //! | module | contents |
 //! |---|---|

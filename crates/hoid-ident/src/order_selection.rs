@@ -36,7 +36,7 @@ pub struct OrderRanges {
 /// Range of each order by its name: na, nb, nc, nd, nf or nk.
 pub type NamedOrders = BTreeMap<String, RangeInclusive<usize>>;
 
-/// Returns an error if the name is not that of an order, or if the range exceeds the largest possible order or delay.
+/// Returns an error if no order has this name, or if the range exceeds the largest possible order or delay.
 ///
 /// # Errors
 /// [`IdentError::BadOption`].

@@ -11,9 +11,9 @@
 //! `var tau = sigma^2/(d'd - d' psi G^-1 psi' d) + Ts^2/12`. The first term is sigma^2 times the diagonal element for
 //! tau of the inverse information matrix of theta and tau together (L. Ljung, *System Identification*, 1999, section
 //! 9.4). The second term is due to the integer nk (W. F. Sheppard, *Proc. London Math. Soc.* 29 (1898) 353-380). The
-//! variance is limited to that of a uniform distribution over the searched range. The covariance of theta becomes
-//! `P + s s' var tau`, and a quantity with the gradient g with respect to theta and the derivative h with respect to
-//! the delay has the variance
+//! variance is limited to the variance of a uniform distribution over the searched range. The covariance of theta
+//! becomes `P + s s' var tau`, and a quantity with the gradient g with respect to theta and the derivative h with
+//! respect to the delay has the variance
 //!
 //! `g' P g + (g' s + h)^2 var tau`.
 //!

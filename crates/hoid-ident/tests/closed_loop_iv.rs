@@ -3,8 +3,8 @@
 //!
 //! The operator at 60 Hz is `Y = K (T_L s + 1)/(T_I s + 1) e^(-tau s)` with a lag of several seconds and a lightly
 //! damped neuromuscular pair; the controlled element is 1/s; the disturbance is a sum of eleven sines at the output of
-//! the operator. The remnant is an autoregression of order 8 with a spectrum as broad as that of people; it is added at
-//! the output of the operator, so it enters the loop and e.
+//! the operator. The remnant is an autoregression of order 8 with a spectrum as broad as for people; it is added at the
+//! output of the operator, so it enters the loop and e.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid_ident::{Fit, InstrumentalVariable, Instruments, IvMethod};

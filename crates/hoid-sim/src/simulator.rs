@@ -13,9 +13,9 @@
 //! parts of the response are repeated; if it decreases, parts are skipped.
 //!
 //! Operator and controlled element are in controllable canonical form (the states are the output of `1/den` and the
-//! rate of this output). The gains of the operator are in its output matrix; those of the controlled element are placed
-//! according to [`Realisation`]. For changing parameters, the matrices at each sample are those of the continuous model
-//! with the parameter values at that sample.
+//! rate of this output). The gains of the operator are in its output matrix; the gains of the controlled element are
+//! placed according to [`Realisation`]. For changing parameters, the matrices at each sample follow from the continuous
+//! model with the parameter values at that sample.
 
 use std::ops::Range;
 
@@ -207,8 +207,7 @@ impl Simulator {
     }
 
     /// Returns the signals of several runs, each driven by its own white noise and computed in its own lane of vector
-    /// registers. With every instruction set, the results are bit-identical to those of [`Simulator::signals`] for each
-    /// run.
+    /// registers. With every instruction set, the results are bit-identical to [`Simulator::signals`] for each run.
     ///
     /// # Errors
     /// Like [`Simulator::signals`], for the first run with an error; [`SimError::NoSuchInstructionSet`] if this

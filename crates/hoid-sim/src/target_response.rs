@@ -23,7 +23,7 @@ pub(crate) struct TargetResponse {
 }
 
 impl TargetResponse {
-    /// Prepares the response; `at` returns the operator at a sample, of which there are as many as `instants`.
+    /// Prepares the response; `at` returns the operator at each of the `instants` samples.
     pub fn new(
         feedforward: &Feedforward,
         instants: usize,

@@ -12,8 +12,8 @@
 //! recursion has been running all the time, so the estimate need not restart. The weights `p_k` are proportional to
 //! `exp(L_k/3)`, because neighbouring innovations of a wrong model repeat the same information. (For a constant delay,
 //! 95 % bands contain the delay in 82 % of cases without the factor 3, and in 95 % with it.) tau_e is reported as the
-//! weighted mean of the delays; its variance is the weighted variance of the delays plus that of a delay uniformly
-//! distributed between two samples, `Ts^2/12`.
+//! weighted mean of the delays; its variance is the weighted variance of the delays plus the variance of a delay
+//! uniformly distributed between two samples, `Ts^2/12`.
 //!
 //! Before there is any evidence, the delay is distributed about the delay of the start,
 //! `L_k = -(tau_k - tau_start)^2/(2 s^2)` with s = 0.03 s; this prior fades like all evidence. Innovations count with

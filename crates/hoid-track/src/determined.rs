@@ -88,7 +88,7 @@ mod tests {
             zeta_nm: e(0.25, 0.05),
             tau_e_s: Estimate::fixed(0.2),
         };
-        // Before the first sample the standard deviation of omega is 3.3 rad/s, that of zeta .125.
+        // Before the first sample the standard deviations are 3.3 rad/s for omega and .125 for zeta.
         let found = determined(&Method::adaptive(), &operator);
         let expected = [
             ("K_e", false),

@@ -66,8 +66,8 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Builds a recursion of the kernel with the smallest capacity that is sufficient for its parameters. If the orders
-    /// are those of the operator, the recursion is compiled for these orders.
+    /// Builds a recursion of the kernel with the smallest capacity that is sufficient for its parameters. For the
+    /// orders of the operator there is a recursion compiled for these orders.
     ///
     /// # Errors
     /// [`IdentError`] for options that contradict each other, or a start that the recursion cannot use.

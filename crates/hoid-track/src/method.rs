@@ -269,7 +269,7 @@ pub fn bad(option: &str, found: String, expected: &str) -> IdentError {
     }
 }
 
-/// Checks that the orders are those of a Box-Jenkins model of the operator.
+/// Checks that the orders belong to a Box-Jenkins model of the operator.
 ///
 /// # Errors
 /// [`IdentError::BadOption`].

@@ -105,8 +105,8 @@ impl Response {
         over(times(b, [cos, sin]), times(a, f))
     }
 
-    /// Returns the response of polynomials with the coefficients theta and these orders; `covariance` is that of theta,
-    /// by rows.
+    /// Returns the response of polynomials with the coefficients theta and these orders; `covariance` is the covariance
+    /// of theta by rows.
     pub(crate) fn of_polynomials(
         orders: &Orders,
         theta: &[f64],

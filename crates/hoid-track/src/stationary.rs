@@ -20,7 +20,7 @@
 //!   covariance and innovation variance keep their values of that time for the whole span.
 //! - The estimate is updated again once both signals move and the filters have settled ([`crate::guard`]).
 //!
-//! Without stationary spans, the results are identical to those without this watch. At sample times below 40 us, there
+//! Without stationary spans, the results are the same with and without this watch. At sample times below 40 us, there
 //! is no watch.
 
 use hoid_core::state::{State, visit_all};

@@ -30,11 +30,11 @@ pub struct Trace {
     pub(crate) operator: Vec<OperatorEstimate>,
     /// Delay of each row, if it is tracked.
     pub(crate) delays: Vec<Delay>,
-    /// Responses of each row at the frequencies of the options, for methods whose response is not that of the
-    /// polynomials.
+    /// Responses of each row at the frequencies of the options, for methods whose response differs from the response of
+    /// the polynomials.
     pub(crate) responses: Vec<f64>,
-    /// Crossover and margin of each row, for methods whose response is not that of the polynomials, and the reason in
-    /// rows without a crossover.
+    /// Crossover and margin of each row, for methods whose response differs from the response of the polynomials, and
+    /// the reason in rows without a crossover.
     pub(crate) open_loops: Vec<f64>,
     pub(crate) no_crossover: Vec<Option<NoCrossover>>,
     pub(crate) innovation: Vec<f64>,

@@ -178,7 +178,7 @@ pub struct Case {
     pub spectrum: Spectrum,
     /// Time course of the remnant's strength.
     pub course: Course,
-    /// Standard deviation of the remnant, relative to that of u without remnant.
+    /// Standard deviation of the remnant, relative to the standard deviation of u without remnant.
     pub ratio: f64,
     /// Imperfection of the stick or the recorder.
     pub imperfection: Imperfection,

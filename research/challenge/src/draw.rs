@@ -172,7 +172,7 @@ fn drawn(case: &Case, ts: SampleTime, draw: &[f64]) -> Result<Option<Operator>, 
         states.push(before.times(shift.parameter, shift.factor.sqrt()));
         states.push(before.times(shift.parameter, shift.factor));
     }
-    // There are two holds, each of which adds half a sample of delay.
+    // There are two holds; each adds half a sample of delay.
     let late = if case.sampling == Sampling::Held { ts.s() } else { 0.0 };
     for state in states {
         let state = Operator {

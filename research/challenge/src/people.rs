@@ -32,7 +32,7 @@ const PERIOD_S: f64 = 20.0;
 /// Frequencies of the lines as multiples of 1/period.
 const MULTIPLES: [f64; 7] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0];
 const RATE_HZ: f64 = 60.0;
-/// Start span of joined trials, s; `SINGLE_START_S` is that of single trials.
+/// Start span of joined trials, s; `SINGLE_START_S` is the start span of single trials.
 const START_S: (f64, f64) = (5.0, 30.0);
 const SINGLE_START_S: (f64, f64) = (5.0, 20.0);
 

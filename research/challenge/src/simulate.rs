@@ -74,7 +74,8 @@ impl Truth {
         }
     }
 
-    /// Returns the delay in samples of `q^-nk`, including that of the hold; `None` if it is not given to the methods.
+    /// Returns the delay in samples of `q^-nk`, including the delay of the hold; `None` if it is not given to the
+    /// methods.
     pub fn given_nk(&self) -> Option<usize> {
         let samples = self.first.tau_e_s / self.sample_time.s();
         match self.case.delay {
@@ -214,7 +215,7 @@ fn of_person(case: &Case, run: RunOf, operator: Operator, sample_time: SampleTim
     for k in 0..total {
         let t = time(k);
         if changes.contains(&k) {
-            // The parameters are those of the previous sample; this sample is the first at which they may differ.
+            // The parameters are still those of the previous sample; this sample is the first at which they may differ.
             shadows.push((truth.operator(t - ts), world.operator));
             hidden.before.push((k, Vec::new()));
         }

@@ -31,7 +31,7 @@ fn with_output(record: &Record, output: Vec<f64>) -> Record {
     Record::new(record.sample_time(), e, Channel::new("u", "", output)).unwrap()
 }
 
-/// Replaces the last third of a record by that of another run.
+/// Replaces the last third of a record by the last third of another run.
 fn joined(record: &Record, other: &Record) -> Record {
     let from = 2 * record.len() / 3;
     let of = |a: &[f64], b: &[f64]| [&a[..from], &b[from..]].concat();

@@ -2,8 +2,9 @@
 //!
 //! `cargo run --release -p hoid-evidence --example evidence -- coverage|efficiency|starts|delay [RUNS]`
 //!
-//! `cargo run --release -p hoid-evidence --example evidence -- speed [RUNS] [PYTHON]` compares the time of the
-//! Box-Jenkins fit with that of SciPy; PYTHON is an interpreter that has numpy and scipy, `python3` by default.
+//! `cargo run --release -p hoid-evidence --example evidence -- speed [RUNS] [PYTHON]` compares the times of the
+//! Box-Jenkins fit and of the same fit in SciPy; PYTHON is an interpreter that has numpy and scipy, `python3` by
+//! default.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../../../crates/hoid/tests/common/textbook.rs"]

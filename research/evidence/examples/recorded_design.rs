@@ -99,8 +99,8 @@ impl Cell {
         }
     }
 
-    /// Prints ratios of scatter to prediction, and returns those of all quantities, without and with the variation from run
-    /// to run.
+    /// Prints ratios of scatter to prediction, and returns the ratios of all quantities, without and with the variation
+    /// from run to run.
     fn ratios(&self) -> Vec<[f64; 2]> {
         let fitted: Vec<Option<FamilyOperator>> = self.runs.iter().map(|run| run.operator(self.form)).collect();
         let values: Vec<Option<[f64; 4]>> = fitted

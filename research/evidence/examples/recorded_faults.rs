@@ -3,8 +3,8 @@
 //! `HOID_PILOT_DATA=DIR cargo run --release -p hoid-evidence --example recorded_faults --
 //! [RUNS|all] [METHOD]`
 //!
-//! The folder is that of the example `pilots_evidence`. For the unmodified recordings, the first line counts the
-//! reported events by kind. Each fault of the study `tracker-faults` that is short enough for a recording, and also
+//! The folder is the same as for the example `pilots_evidence`. For the unmodified recordings, the first line counts
+//! the reported events by kind. Each fault of the study `tracker-faults` that is short enough for a recording, and also
 //! steps and ramps of a target, is inserted at two places. The column *told* counts the faults with an event between
 //! their first sample and 3 s after their last sample that the unmodified recording does not have there.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]

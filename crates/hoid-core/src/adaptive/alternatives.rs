@@ -56,8 +56,8 @@ impl Alternatives {
         }
     }
 
-    /// Returns the weighted scatter of the alternatives about an operator. `samples` is the current number of samples,
-    /// of which the last `window` are replayed.
+    /// Returns the weighted scatter of the alternatives about an operator. `samples` is the current number of samples;
+    /// the last `window` of them are replayed.
     pub fn scatter(&self, about: &[f64; PARAMETERS], samples: u64, window: u64) -> [[f64; PARAMETERS]; PARAMETERS] {
         let mut scatter = [[0.0; PARAMETERS]; PARAMETERS];
         let mut weights = 1.0;

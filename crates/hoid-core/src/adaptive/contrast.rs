@@ -98,8 +98,8 @@ impl Contrast {
         })
     }
 
-    /// Returns the mean ratio of this covariance to that of another contrast, `tr(C_other^-1 C)/N`, or `None` if the
-    /// covariance of the other contrast is not positive definite.
+    /// Returns the mean ratio of this covariance to the covariance of another contrast, `tr(C_other^-1 C)/N`, or `None`
+    /// if the latter is not positive definite.
     pub(super) fn dispersion(&self, other: &Self) -> Option<f64> {
         let mut factor = other.covariance;
         if !cholesky::factor(&mut factor, STATES) {

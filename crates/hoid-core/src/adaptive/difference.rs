@@ -9,8 +9,8 @@
 //! `d_S = (W_SS)^-1 (W d)_S`, with the covariance `(W_SS)^-1`,
 //!
 //! and `chi_S^2 = d' W d - d_S' (W d)_S` is the statistic of the hypothesis that the other components did not change.
-//! The set with the smallest `chi_S^2 + 4 |S|` is reported. The penalty of 4 per parameter lies between that of Akaike,
-//! 2, and that of Schwarz, the logarithm of the number of samples (*Annals of Statistics* 6 (1978) 461-464).
+//! The set with the smallest `chi_S^2 + 4 |S|` is reported. The penalty of 4 per parameter is between Akaike's penalty,
+//! 2, and Schwarz's penalty, the logarithm of the number of samples (*Annals of Statistics* 6 (1978) 461-464).
 
 use hoid_numerics::{cholesky, products::dot};
 

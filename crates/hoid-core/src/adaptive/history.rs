@@ -4,7 +4,7 @@
 
 use crate::state::State;
 
-/// Index of the ring of errors; the constants below are those of the other rings.
+/// Index of the ring of errors; the constants below are the indices of the other rings.
 const ERRORS: usize = 0;
 const OUTPUTS: usize = 1;
 const USES: usize = 2;

@@ -10,7 +10,7 @@
 //!
 //! (Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001,
 //! section 7.2, information form). `(I + P A/sigma^2)^-1 P` needs no inverse of P, which is singular if the three gains
-//! are restricted to those of a gain with a lead.
+//! are restricted to a gain with a lead.
 //!
 //! Each hypothesis has its own innovation variance, so a change of the remnant can be part of a change. Since this
 //! variance is estimated, the part of the block energy common to all hypotheses has a Student density with the degrees
@@ -131,8 +131,8 @@ impl Hypothesis {
             })
         });
         (0..STATES).for_each(|i| matrix[i][i] += 1.0);
-        // Solving (I + P A/sigma^2) P+ = P also gives the determinant of I + P A/sigma^2, which equals that of
-        // S/sigma^2.
+        // Solving (I + P A/sigma^2) P+ = P also gives the determinant of I + P A/sigma^2, which equals the determinant
+        // of S/sigma^2.
         let mut after = self.covariance;
         let log_determinant = elimination::solve_any(&mut matrix, &mut after);
         // Rounding makes P+ slightly asymmetric, and without this correction the asymmetry would grow from block to

@@ -1,13 +1,13 @@
 //! Mixture of hypotheses about the time of the last change of the operator.
 //!
 //! After each block the likeliest hypothesis of each class has a child, which assumes that the operator changed in this
-//! block. The child has the estimate of its parent before the block, with the covariance of a jump added to that of the
-//! gains (A. S. Willsky and H. L. Jones, *IEEE Trans. Automatic Control* 21 (1976) 108-112). The initial probability of
-//! the child is that of the class times the hazard, the prior probability of a change since the last birth; it is then
-//! weighted by its likelihood like all other hypotheses (R. P. Adams and D. J. C. MacKay, *Bayesian online changepoint
-//! detection*, 2007, algorithm 1; P. Andersson, *International Journal of Control* 42 (1985) 1175-1193). If there is no
-//! free slot, the least likely of the hypotheses that are old enough is pruned. Between changes the estimate therefore
-//! uses all data since the last change.
+//! block. The child has the estimate of its parent before the block, with the covariance of a jump added to the
+//! covariance of the gains (A. S. Willsky and H. L. Jones, *IEEE Trans. Automatic Control* 21 (1976) 108-112). The
+//! child starts with the probability of the class times the hazard, the prior probability of a change since the last
+//! birth; it is then weighted by its likelihood like all other hypotheses (R. P. Adams and D. J. C. MacKay, *Bayesian
+//! online changepoint detection*, 2007, algorithm 1; P. Andersson, *International Journal of Control* 42 (1985)
+//! 1175-1193). If there is no free slot, the least likely of the hypotheses that are old enough is pruned. Between
+//! changes the estimate therefore uses all data since the last change.
 //!
 //! **Samples that a child skips.** For up to p samples after a change, a whitening filter D of order p contains
 //! responses with the gains before and after the change: it computes `D (theta r)`, whereas the model computes theta
@@ -408,8 +408,8 @@ impl Mixture {
         segments
     }
 
-    /// Replaces the prior of the corrections. The old prior is normal with mean zero and variances `was`, the new one,
-    /// that of people, is normal with `mean` and variances `is`: `P' = (I + P D)^-1 P`, `D = 1/is - 1/was`,
+    /// Replaces the prior of the corrections. The old prior is normal with mean zero and variances `was`, the new
+    /// prior, for people, is normal with `mean` and variances `is`: `P' = (I + P D)^-1 P`, `D = 1/is - 1/was`,
     /// `x' = x + P' (mean/is - D x)`. In information form this subtracts the old prior and adds the new one.
     pub fn replace_prior(&mut self, was: [f64; DYNAMICS], is: [f64; DYNAMICS], mean: [f64; DYNAMICS]) {
         for h in self.all_mut() {

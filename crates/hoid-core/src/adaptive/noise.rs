@@ -8,8 +8,8 @@
 //!
 //! The prior of the coefficients is normal. Its mean is the model of a typical remnant, and its standard deviation is
 //! `PRIOR_DEVIATION`. This prior adds `sigma^2/PRIOR_DEVIATION^2` to the diagonal of the sums (a ridge), where sigma^2
-//! is the variance of eps. The ridge scales with the variance of eps and not with that of v: the spectrum of a remnant
-//! with more than two poles falls to a very small fraction of its power, and D has to follow it there.
+//! is the variance of eps. The ridge scales with the variance of eps and not with the variance of v: the spectrum of a
+//! remnant with more than two poles falls to a very small fraction of its power, and D has to follow it there.
 //!
 //! D is used only as an FIR filter, so its inverse need not be stable.
 

@@ -39,7 +39,7 @@ impl SignalHistory {
             .map_or(&[], |past| past)
     }
 
-    /// Stores the signals of a new sample in place of those of the oldest sample.
+    /// Stores the signals of a new sample in place of the signals of the oldest sample.
     #[inline(always)]
     pub fn push(&mut self, signals: &[f64; SIGNALS]) {
         self.newest = self.newest.checked_sub(1).unwrap_or(LARGEST_ORDER - 1);

@@ -22,11 +22,11 @@
 //!
 //! averaged over about the last 20 s, since the ratio of two tracked quantiles is noisy. In a tail of the form
 //! `P(|r| > x) = exp(-(x/s)^k)` (W. Weibull, *Journal of Applied Mechanics* 18 (1951) 293-297), the value exceeded with
-//! probability P is `s (-log P)^(1/k)`. The values for P = .1 and .01 differ by the factor `2^(1/k)`, those for 1e-2
-//! and 1e-8 by its square, `4^(1/k)`. The limit `m q` is therefore exceeded by one of 1e8 samples, both for a steady
-//! hand (k = 2: m = 2; a Gaussian tail gives 2.45) and for a hand that moves in bursts (k = 1: m = 4; k = .7: m = 7).
-//! With m = 2.5, Gaussian errors are held back above 6.4 standard deviations, which is one of 8e9 samples. The floor is
-//! a fraction of the mean magnitude of the signal; a smaller outlier has no effect.
+//! probability P is `s (-log P)^(1/k)`. The values for P = .1 and .01 differ by the factor `2^(1/k)`, and the values
+//! for 1e-2 and 1e-8 by its square, `4^(1/k)`. The limit `m q` is therefore exceeded by one of 1e8 samples, both for a
+//! steady hand (k = 2: m = 2; a Gaussian tail gives 2.45) and for a hand that moves in bursts (k = 1: m = 4; k = .7:
+//! m = 7). With m = 2.5, Gaussian errors are held back above 6.4 standard deviations, which is one of 8e9 samples. The
+//! floor is a fraction of the mean magnitude of the signal; a smaller outlier has no effect.
 //!
 //! **Held-back samples.** While samples are held back, the signal is continued with its last slope, damped with the
 //! time constant [`SLOPE_S`], if the order is 2 or more, and otherwise with its last value. After h samples, the signal
@@ -163,7 +163,7 @@ impl ChannelGuard {
     }
 
     /// True if consecutive samples, the first of them after a jump, move like the signal: the mean magnitude of the
-    /// prediction errors, of the order in use, is below that of a signal about three times as large.
+    /// prediction errors, of the order in use, is below the value for a signal about three times as large.
     pub fn moves_typically(&self, samples: impl Iterator<Item = f64>) -> bool {
         let (mut past, mut count, mut sum) = ([0.0; ORDERS], 0, 0.0);
         for x in samples {
@@ -287,7 +287,8 @@ impl ChannelGuard {
         for ((tail_ratio, q), p) in self.tail_ratio.iter_mut().zip(&self.quantiles).zip(&self.inner) {
             let quotient = q / p;
             // Unknown quantiles give 0/0; the limit of a signal with such quantiles is the lower bound `LIMIT`, which
-            // is about that of a Gaussian tail. `clamp` would return NaN, which would stay in the average for ever.
+            // is about the limit for a Gaussian tail. `clamp` would return NaN, which would stay in the average for
+            // ever.
             let square = match quotient.is_nan() {
                 true => LIMIT,
                 false => (quotient * quotient).clamp(LIMIT, LARGEST_TAIL_RATIO),

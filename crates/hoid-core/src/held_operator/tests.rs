@@ -215,8 +215,8 @@ fn continuous_in_the_fraction() {
         let p = [0.09, 0.036, omega, zeta];
         let at = |k: usize| held_operator_delayed(p, TS * k as f64 / STEPS as f64, TS);
         let step = TS / STEPS as f64;
-        // The third derivative of R is omega^2 times the divided difference of z^3 e^{zt}, at most
-        // (3 + |z| t) |z|^2 |e^{zt}|; that of A is smaller by |z|.
+        // The third derivative of R is omega^2 times the divided difference of z^3 e^{zt}, at most (3 + |z|
+        // t) |z|^2 |e^{zt}|; for A it is smaller by |z|.
         let fastest = size_of_poles(omega, zeta, TS) / TS;
         let growth = (-2.0 * zeta * omega * TS).exp().max(1.0);
         let third = omega * omega * (3.0 + fastest * TS) * fastest * (p[0] + p[1] * fastest) * growth;

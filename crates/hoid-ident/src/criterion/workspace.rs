@@ -35,7 +35,7 @@ thread_local! {
 pub(crate) struct Borrowed(Workspace);
 
 impl Workspace {
-    /// Returns the workspace of this thread, or a new workspace if that of the thread is in use.
+    /// Returns the workspace of this thread, or a new one if it is in use.
     pub fn of_thread() -> Borrowed {
         Borrowed(LAST_WORKSPACE.take().unwrap_or_default())
     }

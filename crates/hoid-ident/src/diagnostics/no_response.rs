@@ -47,7 +47,7 @@ const COLUMNS: usize = 3;
 pub struct Response {
     /// T: share of the power of the whitened output that the response explains.
     pub share: f64,
-    /// Number of surrogates with a share at least as large as that of the records.
+    /// Number of surrogates whose share is at least as large as the share of the records.
     pub reached_by: usize,
     /// Number of surrogates.
     pub surrogates: usize,
@@ -59,8 +59,8 @@ impl Response {
         (self.reached_by + 1) as f64 / (self.surrogates + 1) as f64
     }
 
-    /// Returns the finding that no response can be distinguished from chance; `None` if no surrogate has a share as
-    /// large as that of the records.
+    /// Returns the finding that no response can be distinguished from chance; `None` if no surrogate has as large a
+    /// share as the records.
     pub fn finding(&self) -> Option<Finding> {
         (self.reached_by > 0).then(|| {
             Finding::undetermined(

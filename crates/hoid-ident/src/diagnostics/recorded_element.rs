@@ -54,8 +54,8 @@ pub struct RecordedElement {
     pub delay_s: f64,
     /// Share of the power that the element does not explain, expressed as a disturbance at u.
     pub unexplained: f64,
-    /// Frequency in rad/s at which the response of the element differs most from that of the given element, apart from
-    /// the delay, and the ratio of the two responses at this frequency.
+    /// Frequency in rad/s at which the response of the element differs most from the given element, apart from the
+    /// delay, and the ratio of the two responses at this frequency.
     pub difference: (f64, Complex64),
     /// Largest delay for which e and u count as aligned, s.
     aligned_s: f64,

@@ -6,7 +6,7 @@
 //! | components slower than 20 s or, for a slow system, than ten periods of its slowest pole ([`crate::faults::without_slow`]) | a drift or a step of a sensor, which the person does not follow | `slow` |
 //!
 //! Two fits differ if a parameter, the crossover or the phase margin differs by more than three standard errors. The
-//! standard error is that of the first fit or, if larger, that of the information lost in the second fit,
+//! standard error is the one from the first fit or, if larger, the one from the information lost in the second fit,
 //! `sqrt(se'^2 - se^2)`. If nothing is removed, there is no second fit, because it would be identical to the first.
 
 use std::f64::consts::TAU;

@@ -134,8 +134,8 @@ impl Side {
     pub fn of(method: AgreementMethod, operator: &FamilyOperator, covariance: &[f64], reported: &[f64]) -> Self {
         let p = operator.coordinates().len();
         let gradient = level(operator).1;
-        // The covariance is transformed by a matrix whose first row is the gradient of the level; its other rows are
-        // those of the identity matrix.
+        // The covariance is transformed by a matrix whose first row is the gradient of the level; the other rows are
+        // rows of the identity matrix.
         let times = |c: &[f64], i: usize, j: usize| -> f64 {
             match i {
                 0 => (0..p).map(|k| gradient[k] * c[k * p + j]).sum(),

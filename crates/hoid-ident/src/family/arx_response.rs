@@ -95,7 +95,7 @@ impl ArxResponse {
         if high.innovations > NEARLY_NOISE_FREE {
             return None;
         }
-        // If there is noise, models whose regressors are a subset of those of the high-order model are skipped, since
+        // If there is noise, models that use only a subset of the regressors of the high-order model are skipped, since
         // their innovation variance cannot be smaller.
         let is_noise = high.innovations > SAFETY_FACTOR * NONE;
         let contained = |orders: &Orders| {

@@ -270,7 +270,8 @@ impl<'a> Chosen<'_, 'a> {
         figures.collect()
     }
 
-    /// Returns the operators of a form other than the best one, with errors computed like those of the best form.
+    /// Returns the operators of a form other than the best one, with errors computed in the same way as for the best
+    /// form.
     fn weighed(
         &self,
         of: &OtherForm<'a>,

@@ -268,7 +268,7 @@ pub(super) struct ChannelCriterion {
 /// The operator and its channels at the minimum of the criterion.
 #[derive(Debug, Clone)]
 pub(super) struct ChannelMinimum {
-    /// Coordinates of the operator, followed by those of the channels.
+    /// Coordinates of the operator, followed by the coordinates of the channels.
     pub coordinates: Vec<f64>,
     pub chi_squared: f64,
     /// Number of real equations, two per line.

@@ -97,8 +97,8 @@ fn count_once(counting: &mut [Option<f64>], tried: &[Tried<'_>]) {
     }
 }
 
-/// Keeps only the forms that fit equally well. Without noise, the residual of a wrong form is many times larger than
-/// that of the right form, whatever the wrong form determines. Sums of squares below `equal` count as equal.
+/// Keeps only the forms that fit equally well. Without noise, a wrong form has a residual many times larger than the
+/// right form, whichever parameters it determines. Sums of squares below `equal` count as equal.
 fn keep_best_fits(counting: &mut [Option<f64>], tried: &[Tried<'_>], equal: f64) {
     let squares = |i: usize| {
         let fit = tried[i].fit.as_ref().ok();

@@ -20,7 +20,7 @@ use crate::{Termination, diagnostics::residuals::ResidualMeasures};
 const LARGEST_REDUCED_CHI_SQUARED: f64 = 3.0;
 /// Significance level of two tests: agreement between methods, and the form against a free model.
 const LEVEL: f64 = 0.01;
-/// Relative excess of the loss over that of a free model above which a rejected form is reported.
+/// Relative excess of the loss over the loss of a free model above which a rejected form is reported.
 const LARGEST_EXCESS_LOSS: f64 = 0.01;
 /// Relative error of the response, at the frequency with the smallest error, above which the response counts as
 /// unknown.

@@ -361,7 +361,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         let p = x.len();
         let scale = variance * self.fit.inflation;
         let inner = |i: usize| self.limits()[i].0 < x[i] && x[i] < self.limits()[i].1;
-        // A coordinate at a bound is held: its row and column of A are those of the identity matrix.
+        // A coordinate at a bound is held: its row and column of A are replaced by those of the identity matrix.
         let held = DMatrix::from_fn(p, p, |i, j| match (inner(i) && inner(j), i == j) {
             (true, _) => a[(i, j)],
             (false, same) => f64::from(u8::from(same)),

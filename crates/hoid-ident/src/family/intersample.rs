@@ -117,7 +117,7 @@ mod tests {
                     let found = polynomial::value(&model.b, backward) / polynomial::value(&f, backward)
                         * backward.powi(model.nk as i32);
                     let expected = operator.response(omega) * course.response(omega, ts);
-                    // Aliases of a hold are proportional to omega Ts, those of linear interpolation to its square.
+                    // The aliases are proportional to omega Ts for a hold, and to its square for linear interpolation.
                     let aliases = match course {
                         Intersample::Zoh => 0.2 * omega * ts.s(),
                         Intersample::Auto | Intersample::Foh => 2.0 * (omega * ts.s()).powi(2),

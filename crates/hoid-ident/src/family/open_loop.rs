@@ -82,7 +82,7 @@ impl LoopMeasures {
         }
     }
 
-    /// Returns the measures with the standard errors and intervals for the person instead of those for these runs.
+    /// Returns the measures with the standard errors and intervals for the person instead of for these runs.
     #[must_use]
     pub fn as_of_person(self) -> Self {
         let [crossover, margin] = self.of_person;

@@ -1,8 +1,8 @@
 //! A reported parameter: its interval, its prior share, and whether the data determine it.
 //!
 //! Estimates are nearly normally distributed in the coordinates of the family, but not in the parameters: for a long
-//! lag, the error of `1/T_I` is symmetric, but that of T_I is not. Intervals are therefore computed in the coordinates
-//! and then transformed. If an interval of `1/T_I` includes zero, the intervals of T_I and K have no upper limit.
+//! lag, `1/T_I` has a symmetric error, but T_I does not. Intervals are therefore computed in the coordinates and then
+//! transformed. If an interval of `1/T_I` includes zero, the intervals of T_I and K have no upper limit.
 //!
 //! **Determined** means determined by the data. The posterior variance must be at most half of the prior variance
 //! ([`Parameter::prior_share`]), the parameter must not be at a bound of the search range, and its interval must
@@ -62,7 +62,7 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// Returns the parameter with the standard error and interval for the person instead of those for these runs.
+    /// Returns the parameter with the standard error and interval for the person instead of for these runs.
     #[must_use]
     pub fn as_of_person(&self) -> Self {
         let (estimate, interval) = widened(self.estimate(), self.interval, self.standard_error_person);
@@ -141,7 +141,7 @@ impl Parameter {
             standard_error_person: Mixture::of(&of_person, clusters)?.estimate.standard_error,
             interval,
             prior_share: share(&|p| p.prior_share),
-            // The parameter is not determined if the forms without it are more likely than those with it.
+            // The parameter is not determined if the forms without it are more likely than the forms with it.
             determined: total > LEAST_WEIGHT && share(&|p| f64::from(p.determined)) > 0.5 && one_sign && known,
             averaged_over: each.iter().map(|(form, ..)| *form).collect(),
             ..front.clone()

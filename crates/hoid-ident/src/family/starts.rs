@@ -12,7 +12,7 @@
 //!    where V is the innovation variance of an autoregression of `u - Y e`, and the best of them that differ in their
 //!    responses are starts.
 //!
-//! The orders of the noise model are those of the start with the least prediction error.
+//! The noise model has the orders of the start with the least prediction error.
 
 use hoid_model::Form;
 
@@ -64,8 +64,8 @@ impl FamilyEstimator {
         )
     }
 
-    /// Returns the fit of a form at the lines and the starting coordinates of its searches: those of the fit at the
-    /// lines, and the minima for the response of the ARX model that have the smallest prediction errors.
+    /// Returns the fit of a form at the lines and the starting coordinates of its searches: the coordinates of the fit
+    /// at the lines, and the minima for the response of the ARX model that have the smallest prediction errors.
     pub(super) fn start(
         &self,
         form: Form,

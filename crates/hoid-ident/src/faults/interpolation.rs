@@ -119,7 +119,7 @@ mod tests {
             };
             let least = at(&delta);
             assert!((before - least - found.fall(m)).abs() < 1e-9 * before, "{start} {m}");
-            // The innovations are those of the changed channel.
+            // The innovations equal the innovations of the changed channel.
             let mut changed = x.clone();
             delta.iter().enumerate().for_each(|(i, d)| changed[start + i] += d);
             assert!((squares(&ar.residuals(&changed)) - least).abs() < 1e-9 * before);

@@ -32,7 +32,7 @@ pub struct Excitation {
 /// Criteria for finding the lines of a channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineSearch {
-    /// Period T in s; if `None`, the shortest period of which all found lines are harmonics.
+    /// Period T in s; if `None`, the shortest period that has all found lines as harmonics.
     pub period_s: Option<f64>,
     /// Minimum amplitude of a line relative to the largest line. Default 0.01.
     pub least_amplitude: f64,

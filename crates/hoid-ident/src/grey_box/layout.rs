@@ -70,7 +70,7 @@ pub(crate) struct Polynomials {
     pub jacobian: Vec<[f64; SLOTS]>,
 }
 
-/// Returns the orders of the Box-Jenkins model of which the grey box is a special case.
+/// Returns the orders of the Box-Jenkins model that contains the grey box as a special case.
 pub(crate) fn orders(order: usize, nk: usize) -> Orders {
     Orders {
         na: 0,

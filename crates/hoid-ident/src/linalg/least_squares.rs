@@ -156,8 +156,8 @@ impl LeastSquares {
         x
     }
 
-    /// Returns a description of the linearly dependent columns by name, each with the columns of which it is a
-    /// combination.
+    /// Returns a description of the linearly dependent columns by name, each with the columns that it is a combination
+    /// of.
     pub fn describe_dependence(&self, names: &[String]) -> String {
         let p = self.columns();
         let sentences: Vec<String> = (self.rank..p)

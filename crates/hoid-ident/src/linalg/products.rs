@@ -309,8 +309,8 @@ impl ResidualProducts {
         }
     }
 
-    /// Adds the sums for the residuals `y - sum_k factors_k x_k`, of which only one stretch at a time is in memory. The
-    /// first column is y.
+    /// Adds the sums for the residuals `y - sum_k factors_k x_k`; only one stretch of the residuals is in memory at a
+    /// time. The first column is y.
     pub fn add(&mut self, columns: &[Lagged<'_>], factors: &[f64]) {
         with_four_lanes(Residuals {
             columns,

@@ -29,7 +29,8 @@ pub struct NamedEstimate {
 pub struct ChangedOperator {
     /// The operator itself, without standard errors.
     pub operator: FamilyOperator,
-    /// Parameters of the operator: those of the numerator, products such as K_e T_L, and those that do not change.
+    /// Parameters of the operator: the parameters of the numerator, products such as K_e T_L, and the parameters that
+    /// do not change.
     pub parameters: Vec<NamedEstimate>,
 }
 

@@ -116,7 +116,7 @@ impl System {
         }
     }
 
-    /// Returns a random start: poles and noise of the same kind as those of the system, and B by least squares.
+    /// Returns a random start: poles and noise of the same kind as in the system, and B by least squares.
     pub fn random_start(&mut self) -> Vec<f64> {
         let o = self.orders;
         let f = self.draw.slow_or_pair();

@@ -3,10 +3,10 @@
 //!
 //! The statistic is `T = d' (C_now + C_before)^-1 d` with `d = H_now - H_before`; whitened residuals are limited to 3.5
 //! standard deviations of the fit to the earlier data. Without a change T would be chi-square distributed with two
-//! degrees of freedom if the remnant were white after the filter from the start span and the basis were that of the
+//! degrees of freedom if the remnant were white after the filter from the start span and the basis contained the
 //! operator. Since neither condition holds, T is divided by its average level, computed from the mean of its logarithm
-//! (for a chi-square variable `ln 2 - gamma`), and compared with [`THRESHOLD`]. After an alarm all data except those of
-//! the last 3 s are discarded. The reported response is estimated from the remaining data, at most 40 s.
+//! (for a chi-square variable `ln 2 - gamma`), and compared with [`THRESHOLD`]. After an alarm all data except the last
+//! 3 s are discarded. The reported response is estimated from the remaining data, at most 40 s.
 
 use std::collections::VecDeque;
 

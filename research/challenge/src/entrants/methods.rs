@@ -1,7 +1,7 @@
 //! The methods of `hoid_track` with their default options.
 //!
 //! If the delay is given, it is used; otherwise it is selected on the start span over the default range of hoid, with
-//! the other orders unchanged. The response H is that of a row of the trace or of the tracker.
+//! the other orders unchanged. The response H comes from a row of the trace or from the tracker.
 
 use hoid_ident::{
     OrderRanges,

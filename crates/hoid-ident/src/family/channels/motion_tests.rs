@@ -125,8 +125,8 @@ fn without_motion_there_is_no_response_to_it() {
     }
 }
 
-/// Without a remnant and from rest, the parameters are those of the simulation. If the record starts later, the state
-/// of the canals at its start is unknown, and the error of their gain is 1 %.
+/// Without a remnant and from rest, the parameters equal the simulated ones. If the record starts later, the state of
+/// the canals at its start is unknown, and the error of their gain is 1 %.
 #[test]
 fn without_noise_the_response_to_motion_is_exact() {
     let mut scenario = task(Some(operator(Form::Canals, &[GAIN], 0.18)), 0.0);

@@ -211,7 +211,7 @@ fn remnant(fit: &FittedOperator, sample_time: SampleTime) -> Option<Lags> {
 struct Nearest {
     /// Responses of the operator, after a zero-order hold, at each frequency.
     responses: Vec<hoid_model::operator_family::FamilyResponse>,
-    /// Responses of the basis at each frequency, divided by that of the operator.
+    /// Responses of the basis at each frequency, divided by the response of the operator.
     basis: Vec<[Complex64; GAINS]>,
 }
 
