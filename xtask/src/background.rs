@@ -9,8 +9,8 @@ use std::{
 
 use crate::process::target_directory;
 
-/// A task of this program in a separate process. Its output is stored until the task has ended, so that it does not mix
-/// with the output of other tasks.
+/// A task of this program in a separate process. Its output is stored until the task has ended, so it does not mix with
+/// the output of other tasks.
 pub struct Background {
     name: &'static str,
     child: Child,

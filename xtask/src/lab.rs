@@ -62,7 +62,7 @@ fn page_alone(profile: &str, config: Option<&Path>, out: &Path) -> Result<Option
     let Some(kernel) = webassembly(profile)? else {
         return Ok(None);
     };
-    // The features are those of the tests, so that nothing is compiled again.
+    // The features are those of the tests, so nothing is compiled again.
     cargo(&["build", "--workspace", "--example", "tables"], &[])?;
     let program = target_directory().join("debug/examples");
     let told = output(Command::new(program.join(format!("tables{}", env::consts::EXE_SUFFIX))).args(config))?;

@@ -52,7 +52,7 @@ pub fn output(command: &mut Command) -> Result<String, String> {
 /// Profile of the shipped programs, libraries and wheels.
 pub const SHIPPED: &str = "shipped";
 
-/// Arguments of the builds for tasks other than tests: the same features as for the tests, so that nothing is compiled
+/// Arguments of the builds for tasks other than tests: the same features as for the tests, so nothing is compiled
 /// twice. `--lib` is not included, because maturin compiles the Python module with its own settings. Building the test
 /// `symbols` also builds the libraries for C, in the folder `deps`.
 pub const AS_TESTS: [&str; 6] = ["build", "--workspace", "--bins", "--examples", "--test", "symbols"];

@@ -1,6 +1,6 @@
 //! Tests of the Python package: a new virtual environment, the wheel, and pytest.
 //!
-//! The wheel is built with the profile and in the target folder of the tests, so that nothing is compiled twice; the
+//! The wheel is built with the profile and in the target folder of the tests, so nothing is compiled twice; the
 //! requirements of the tests are installed from PyPI. `HOID_PYTHON` gives an interpreter other than `python3`.
 //!
 //! `cargo xtask test` runs the first two steps in parallel with the tests of Rust (module `background`), because they

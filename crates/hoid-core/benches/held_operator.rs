@@ -1,5 +1,5 @@
-//! Time of the exact hold with its Jacobian: the reference operator at 100 Hz and 1 kHz, fast and
-//! overdamped ones.
+//! Time of the exact hold with its Jacobian, for the reference operator at 100 Hz and 1 kHz and for fast and overdamped
+//! operators.
 //!
 //! `cargo bench -p hoid-core`. Machines are shared and noisy: compare ratios within one run only.
 #![allow(missing_docs)]

@@ -1,5 +1,5 @@
-//! Cost of a step of each recursion with its history kept: 8192 samples, divide by 8192 for a
-//! sample. Run with `cargo bench -p hoid-core`.
+//! Time of 8192 steps of each recursion, with the history stored; divide by 8192 for the time of a step. Run with
+//! `cargo bench -p hoid-core`.
 
 #![allow(missing_docs, clippy::unwrap_used)]
 
@@ -26,8 +26,7 @@ use hoid_core::{
 
 const SAMPLES: usize = 8192;
 
-/// Input and output of a Box-Jenkins model with the poles of the operator, and noise of a fixed
-/// generator.
+/// Returns input and output of a Box-Jenkins model with the poles of the operator, and noise from a fixed generator.
 fn data() -> Vec<(f64, f64)> {
     let mut state = 1u64;
     let mut noise = move || {
@@ -112,7 +111,8 @@ fn rpem<S: Shape, const N: usize, const K: usize>(
     }
 }
 
-/// As used without error bars, for the comparison with peers that have none: no guard, no limit on outliers.
+/// Recursive least squares without error bars, for comparison with libraries that have none: no guard, and no limit on
+/// outliers.
 fn bare_rls(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
     history.clear();
     let adaptation = Covariance::new(UdCovariance::diagonal([0.1; 4]), scalar(), [f64::INFINITY; 4]);
@@ -141,8 +141,7 @@ fn bare_rpem(data: &[(f64, f64)], history: &mut Vec<[f64; 5]>) {
     }
 }
 
-/// The yardstick: recursive least squares with one triangle of a plain covariance and nothing else,
-/// no guard, no error bars.
+/// Baseline: recursive least squares with one triangle of a plain covariance, without a guard or error bars.
 fn plain(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
     history.clear();
     let (mut theta, mut psi) = ([0.0; 4], [0.0; 4]);
@@ -172,14 +171,15 @@ fn plain(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
     }
 }
 
-/// A person in the basis that people share, at its default settings.
+/// Returns the adaptive filter with the default settings for a person.
 fn person() -> AdaptiveFilter<Vec<f64>> {
     let (default_operator, ts) = (DefaultOperator::with_delay(0.285), 0.01);
     let memory = vec![0.0; memory_needed(ts, REPLAYED_S)];
     AdaptiveFilter::new(default_operator.prior(ts), memory).unwrap()
 }
 
-/// Continues with a person: from the start, where replays are short, or from where they are long.
+/// Continues with an adaptive filter, either from the start, when replays are short, or from a time when replays are
+/// long.
 fn follow(mut person: AdaptiveFilter<Vec<f64>>, data: &[(f64, f64)], history: &mut Vec<f64>) {
     history.clear();
     for &(x, u) in data {

@@ -1,5 +1,5 @@
-//! Time of one step of the default tracker: the mean, and the longest step. The same run is tracked again and again, and
-//! of each step the shortest time counts: what other programs on the machine take is not in it.
+//! Time of one step of the default tracker: the mean, and the longest step. The same run is tracked repeatedly, and the
+//! shortest time of each step counts, which excludes the time that other programs take.
 //!
 //! `cargo xtask slow step-time [REPETITIONS]`
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
@@ -27,7 +27,7 @@ fn main() {
     }
 }
 
-/// Shortest time of each step in several runs, us.
+/// Returns the shortest time of each step in several runs, us.
 fn shortest_us(run: &[(f64, f64)], ts_s: f64, replay_s: f64, repetitions: u32) -> Vec<f64> {
     let memory = if replay_s > 0.0 {
         memory_needed(ts_s, replay_s)
@@ -47,7 +47,8 @@ fn shortest_us(run: &[(f64, f64)], ts_s: f64, replay_s: f64, repetitions: u32) -
     shortest
 }
 
-/// An operator with a gain that doubles after a minute, muscles of 11 rad/s, a delay of 0.2 s, and noise.
+/// Simulates an operator with a gain that doubles after a minute, a neuromuscular system of 11 rad/s, a delay of 0.2 s,
+/// and noise.
 fn simulated(ts_s: f64) -> Vec<(f64, f64)> {
     let late = (0.2 / ts_s).round() as usize;
     let (mut u, mut rate, mut draw, mut errors) = (0.0, 0.0, 1_u32, vec![0.0; late]);

@@ -1,7 +1,7 @@
 //! Step of a recursive estimate, computed from the gradient and the innovation.
 //!
-//! A recursion with the negative gradient psi and the innovation eps changes its estimate by `g eps`. The gain is that
-//! of the prediction-error method, `g = P psi/(1 + psi' P psi)`, `P <- P - g psi' P` (eq. 5.26, 31; L. Ljung and T.
+//! A recursion with the negative gradient psi and the innovation eps changes its estimate by `g eps`. The gain of the
+//! prediction-error method is `g = P psi/(1 + psi' P psi)`, `P <- P - g psi' P` (eq. 5.26, 31; L. Ljung and T.
 //! Söderström, *Theory and Practice of Recursive Identification*, 1983, section 3.4), with P in units of the innovation
 //! variance. Before this update, forgetting increases P:
 //!

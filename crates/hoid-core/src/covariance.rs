@@ -120,7 +120,7 @@ impl<const N: usize> Covariance<N> {
 
     /// Makes the memory grow from a short initial length, for a recursion that starts far from the true parameters.
     /// Before sample t = 0, 1, ... P is additionally multiplied by `1/(1 - early decay^t)` (Ljung and Söderström, eq.
-    /// 5.77), so that the inaccurate gradients of the first estimates are forgotten.
+    /// 5.77), so the inaccurate gradients of the first estimates are forgotten.
     #[must_use]
     pub fn with_growing_memory(mut self, early: f64, decay: f64) -> Self {
         self.early = early;

@@ -237,9 +237,8 @@ mod tests {
         ]
     }
 
-    /// Scale of rounding errors: the values themselves; where they pass zero, which they do among
-    /// fast complex poles, the amplitudes of sine and cosine; for those that are sums of others,
-    /// the sum of the magnitudes.
+    /// Returns the scale of the rounding error of each value: the value itself; near a zero crossing, as for fast
+    /// complex poles, the amplitude of sine and cosine; for a sum, the sum of the magnitudes.
     fn scales(s: f64, q: f64, values: &[f64; 8]) -> [f64; 8] {
         let [mut mean, mut phi1, phi2, mut phi2_slope, ..] = values.map(f64::abs);
         let x = s * s / 4.0 - q;
@@ -285,15 +284,15 @@ mod tests {
             let number: Vec<f64> = line.split(',').map(|v| v.parse().unwrap()).collect();
             let (s, q) = (number[0], number[1]);
             let expected = core::array::from_fn(|i| number[i + 2]);
-            // An ulp each from exponential, root, sine and quotient, and |z|/2 more from their
-            // argument, |z| up to 6 for complex poles. The largest are 2.1 for |z| < 1.4, 2.9 for
-            // all but phi2, 8.7 for phi2 at |z| = 6, a difference of its terms.
+            // One ulp each from exponential, root, sine and quotient, and |z|/2 more from their argument, with |z| up
+            // to 6 for complex poles. The largest errors are 2.1 for |z| < 1.4, 2.9 for all values except phi2, and 8.7
+            // for phi2, a difference, at |z| = 6.
             assert_close(s, q, &values(&DividedDifferences::at(s, q)), &expected, 16.0);
         }
     }
 
-    /// A pair of every kind whose size is that of the threshold: complex, double, real, one pole at
-    /// the origin, on both sides.
+    /// Returns pairs of every kind with this size: complex, double and real poles, and one pole at the origin, with
+    /// both signs.
     fn pairs_of_size(size: f64) -> Vec<(f64, f64)> {
         let mut all = Vec::new();
         for sign in [-1.0, 1.0] {
@@ -315,7 +314,7 @@ mod tests {
     fn the_ways_of_evaluation_agree_where_they_meet() {
         let meet = |size: f64, one: fn(f64, f64) -> DividedDifferences, other: fn(f64, f64) -> DividedDifferences| {
             for (s, q) in pairs_of_size(size) {
-                // Each within 16 eps of the truth.
+                // Each value is within 16 eps of the exact value.
                 assert_close(s, q, &values(&one(s, q)), &values(&other(s, q)), 32.0);
             }
         };
@@ -344,7 +343,7 @@ mod tests {
                 meets_its_neighbours(2.0 * h, h * h - x);
             }
         }
-        // The nearer pole at -0.5 and 0.5.
+        // The pole nearer to the origin is at -0.5 and at 0.5.
         meets_its_neighbours(-3.5, 1.5);
         meets_its_neighbours(3.5, 1.5);
     }
@@ -352,7 +351,7 @@ mod tests {
     fn meets_its_neighbours(s: f64, q: f64) {
         let at = |q: f64| values(&DividedDifferences::at(s, q));
         for neighbour in [q.next_down(), q.next_up()] {
-            // Each within 16 eps of the truth, which itself moves by less than one.
+            // Each value is within 16 eps of the exact value, which itself changes by less than one eps.
             assert_close(s, q, &at(neighbour), &at(q), 33.0);
         }
     }
@@ -379,8 +378,8 @@ mod tests {
             );
             for (value, slope) in [(1, 5), (2, 3), (6, 7)] {
                 let difference = (up[value] - down[value]) / (2.0 * h);
-                // Rounding eps/h = 2e-11 of the value; truncation h^2/6 of the third derivative,
-                // less.
+                // Rounding error eps/h = 2e-11 of the value; the truncation error, h^2/6 of the third derivative, is
+                // smaller.
                 assert!(
                     (exact[slope] - difference).abs() < 2e-10 * exact[value].abs(),
                     "{} at s = {s}, q = {q}: {} and {difference}",

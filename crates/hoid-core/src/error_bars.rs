@@ -20,13 +20,13 @@
 //! The error bars are valid for a scalar forgetting factor, for which they tend to `P/(1 + lambda)` in the ARX case (L.
 //! Ljung and T. Söderström, *Theory and Practice of Recursive Identification*, 1983, eq. 4.136), for a forgetting
 //! matrix, a shortened step, or a gradient step. Without forgetting, `Sigma` becomes P. The default error bars use
-//! `h = psi` and K = 0, so that no filter errors are stored. They give the same result if the estimate hardly changes
-//! within the memory of the filters. If the memory of the estimate is not much longer than that of 1/F, the variances
-//! of the default are up to a third too small, but a step costs half as much.
+//! `h = psi` and K = 0, so no filter errors are stored. They give the same result if the estimate hardly changes within
+//! the memory of the filters. If the memory of the estimate is not much longer than the memory of 1/F, the variances of
+//! the default are up to a third too small, but a step costs half as much.
 //!
 //! **Outliers.** An innovation beyond a limit of a few sigma changes the estimate as if it were at that limit (P. J.
 //! Huber, *Robust Statistics*, 1981, section 7.3); the gain in the equations above is then the reduced gain that was
-//! applied. The innovation variance uses the unclipped innovation, so that it follows a lasting change of the noise.
+//! applied. The innovation variance uses the unclipped innovation, so it follows a lasting change of the noise.
 //!
 //! The innovation variance sigma^2 is the mean of `eps^2/(1 + h' Sigma h)`, whose terms each have the expected value
 //! sigma^2.

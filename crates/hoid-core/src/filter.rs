@@ -22,7 +22,7 @@ pub fn divide_in_place(d: &[f64], x: &mut [f64]) {
     divide_from(d, x, 0);
 }
 
-/// As [`divide_in_place`], but starting at index `from`. The values before that index are past outputs of the filter;
+/// Like [`divide_in_place`], but starting at index `from`. The values before that index are past outputs of the filter;
 /// outputs before the start of the slice are zero.
 pub fn divide_from(d: &[f64], x: &mut [f64], from: usize) {
     let before = |lag: usize, x: &[f64]| from.checked_sub(lag).map_or(0.0, |t| x[t]);
@@ -102,7 +102,7 @@ impl SecondOrder {
     #[inline(always)]
     pub fn four(&mut self, [x0, x1, x2, x3]: [f64; 4]) -> [f64; 4] {
         let Self { h, g, y1, y2 } = *self;
-        // The input terms come first, so that only the last two sums wait for the previous block.
+        // The input terms come first, so only the last two sums wait for the previous block.
         let y = [
             (x0 + g[0] * y2) + h[0] * y1,
             ((x1 + h[0] * x0) + g[1] * y2) + h[1] * y1,
@@ -239,7 +239,7 @@ mod tests {
         for n in 0..=d.len() {
             let mut whole = wave(200);
             divide_in_place(&d[..n], &mut whole);
-            // Also for a cut after one sample: the missing input of the filter is zero.
+            // Also for a cut after one sample: the missing past output of the filter is zero.
             for cut in [1, 3, 64] {
                 let mut parts = wave(200);
                 divide_in_place(&d[..n], &mut parts[..cut]);

@@ -2,9 +2,9 @@
 //!
 //! A model with several inputs is `A u = (B/F) q^-nk e + sum_i (B_i/F_i) q^-nk_i x_i + (C/D) eps` (L. Ljung, *System
 //! Identification*, 1999, section 4.2, eq. 4.35). A further input adds its response `w_i = B_i x_i - (F_i - 1) w_i` to
-//! that of the first input, and its coefficients add `(D/(C F_i)) x_i(t-j)` for B_i and `-(D/(C F_i)) w_i(t-j)` for F_i
-//! to psi, by the same filters as in the [`crate::predictor`]. In theta the coefficients of a further input follow those
-//! of `[a, b, c, d, f]`: first B_i, then F_i.
+//! the response of the first input, and its coefficients add `(D/(C F_i)) x_i(t-j)` for B_i and `-(D/(C F_i)) w_i(t-j)`
+//! for F_i to psi, by the same filters as in the [`crate::predictor`]. In theta the coefficients of a further input
+//! follow those of `[a, b, c, d, f]`: first B_i, then F_i.
 
 use hoid_numerics::products::dot;
 

@@ -1,7 +1,7 @@
 //! Variance of the innovations, estimated with an exponential memory.
 //!
 //! `sigma^2 = sum_k lambda^{t-k} s_k/sum_k lambda^{t-k}`. Here s_k is the square of an innovation divided by the ratio
-//! of its variance to sigma^2, so that each s_k has the expected value sigma^2.
+//! of its variance to sigma^2, so each s_k has the expected value sigma^2.
 
 /// Weighted mean of the s_k. The sum of the weights is the number of residuals from which the variance is estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -14,8 +14,8 @@
 //! | `d_j` | `-(1/C) v(t-j)` |
 //! | `f_j` | `-(D/(C F)) w(t-j)` |
 //!
-//! Each filter uses the coefficients of the current estimate; for a constant theta, eps and psi are those of the batch
-//! criterion started at rest. `D/(C F)` is **one filter in direct form**,
+//! Each filter uses the coefficients of the current estimate; for a constant theta, eps and psi equal those of the
+//! batch criterion started at rest. `D/(C F)` is **one filter in direct form**,
 //! `y(t) = x(t) + sum d_j x(t-j) - sum g_j y(t-j)` with `G = C F`. A cascade of `1/F` followed by `D/C` is the same
 //! filter only for a constant theta, since time-varying filters do not commute. Its inner signal `x/F` depends on the F
 //! of earlier estimates until the poles of F have forgotten them, and the current D no longer cancels these poles. Near
@@ -27,8 +27,8 @@
 //!
 //! Further inputs I add their responses to w and their coefficients to the end of theta ([`crate::further_input`]).
 //!
-//! The last L samples of the input are stored, so that B can start at any `offset` within them, and a delay can be
-//! changed without a transient. N is the capacity for parameters.
+//! The last L samples of the input are stored, so B can start at any `offset` within them, and a delay can be changed
+//! without a transient. N is the capacity for parameters.
 
 use core::hint::black_box;
 
@@ -332,7 +332,7 @@ impl<S: Shape, const N: usize, const L: usize, I: FurtherInputs<N>> Predictor<S,
 /// Product of coefficients and a history whose numbers were stored one by one just before.
 ///
 /// Each number is read separately. A wide load right after several narrow stores would wait until all stores have
-/// reached the memory, so that successive samples could not overlap. The compiler tends to generate such loads.
+/// reached the memory, so successive samples could not overlap. The compiler tends to generate such loads.
 #[inline(always)]
 fn dot_of_fresh(coefficients: &[f64], history: &[f64]) -> f64 {
     let mut pairs = coefficients.iter().zip(history);

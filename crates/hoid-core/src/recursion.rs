@@ -18,7 +18,7 @@ pub enum Stable {
     /// C and F.
     #[default]
     Predictor,
-    /// C, D and F, so that the noise model is stationary, as in the thesis.
+    /// C, D and F, so the noise model is stationary, as in the thesis.
     PredictorAndNoise,
 }
 
@@ -63,7 +63,7 @@ pub fn backtrack<const N: usize>(
     halved(&theta, &step, allowed)
 }
 
-/// As [`backtrack`], for a full step that is not allowed.
+/// Like [`backtrack`], for a full step that is not allowed.
 #[cold]
 #[inline(never)]
 fn halved<const N: usize>(theta: &[f64; N], step: &[f64; N], allowed: impl Fn(&[f64; N]) -> bool) -> (f64, [f64; N]) {

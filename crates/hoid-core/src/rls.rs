@@ -84,7 +84,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         }
     }
 
-    /// As [`Rls::step`], but the estimate stays constant and only the regressor is advanced.
+    /// Like [`Rls::step`], but the estimate stays constant and only the regressor is advanced.
     pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         let (psi, innovation) = self.innovation(&self.theta, x, u);
         self.shift(psi, u);
@@ -94,7 +94,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         }
     }
 
-    /// As [`Rls::step_without_update`], for a sample without u; the one-step prediction replaces the missing output.
+    /// Like [`Rls::step_without_update`], for a sample without u; the one-step prediction replaces the missing output.
     pub fn bridge(&mut self, x: f64) {
         let (psi, innovation) = self.innovation(&self.theta, x, 0.0);
         // With u = 0 the innovation is minus the one-step prediction, which replaces the missing output.
@@ -115,7 +115,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
             psi[na] = x;
         }
         let w = dot(&theta[na..na + nb], &psi[na..]);
-        // The result is bit-identical to that of the predictor of the general model, which stores u itself.
+        // The result is bit-identical to the predictor of the general model, which stores u itself.
         (psi, u - dot(&theta[..na], &psi) - w)
     }
 

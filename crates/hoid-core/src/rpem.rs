@@ -4,7 +4,7 @@
 //! The estimate is updated by `theta <- theta + g eps`, with psi and eps from [`crate::predictor`] and the gain of an
 //! [`Adaptation`] (eq. 31, 5.54; L. Ljung and T. Söderström, *Theory and Practice of Recursive Identification*, 1983,
 //! section 3.7). A step that would make C or F unstable is halved until both are stable. Without C, D and F the results
-//! are bit-identical to those of recursive least squares, [`crate::rls`].
+//! are bit-identical to recursive least squares, [`crate::rls`].
 
 use crate::{
     adaptation::Adaptation,
@@ -116,7 +116,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         }
     }
 
-    /// As [`Rpem::step`], but the estimate stays constant and only the filters are advanced.
+    /// Like [`Rpem::step`], but the estimate stays constant and only the filters are advanced.
     pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         let theta = self.theta;
         let (psi, innovation) = self.predictor.predict(&theta, x, u);
@@ -129,7 +129,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         }
     }
 
-    /// As [`Rpem::step_without_update`], for a sample without u; the one-step prediction replaces the missing output.
+    /// Like [`Rpem::step_without_update`], for a sample without u; the one-step prediction replaces the missing output.
     pub fn bridge(&mut self, x: f64) {
         let theta = self.theta;
         (self.psi, _) = self.predictor.predict(&theta, x, 0.0);

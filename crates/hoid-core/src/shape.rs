@@ -5,8 +5,8 @@
 
 /// Numbers of coefficients of A, B, C, D and F.
 ///
-/// [`AnyShape`] stores these numbers as values. [`FixedShape`] has them in its type, so that the compiler unrolls every
-/// loop over coefficients: the operations and their order are the same, but take half the time.
+/// [`AnyShape`] stores these numbers as values. [`FixedShape`] has them in its type, so the compiler unrolls every loop
+/// over coefficients: the operations and their order are the same, but take half the time.
 pub trait Shape: Copy {
     /// Number of coefficients `a_1 ...`.
     fn na(&self) -> usize;

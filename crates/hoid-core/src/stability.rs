@@ -11,8 +11,8 @@ pub const MAX_ORDER: usize = 64;
 
 /// True if all roots of `z^n + d_1 z^{n-1} + ... + d_n` lie strictly inside the circle of the given radius.
 ///
-/// Returns `false` for coefficients that are not finite and for an order above [`MAX_ORDER`], so that stability is
-/// never reported without proof.
+/// Returns `false` for coefficients that are not finite and for an order above [`MAX_ORDER`], so stability is never
+/// reported without proof.
 #[inline]
 pub fn roots_inside(d: &[f64], radius: f64) -> bool {
     // Most polynomials of an operator have a low order, and a recursion tests them at every sample.

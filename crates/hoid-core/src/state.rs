@@ -1,4 +1,4 @@
-//! Saving and restoring the numbers that change while a recursion runs, so that it can be continued elsewhere.
+//! Saving and restoring the numbers that change while a recursion runs, so it can be continued elsewhere.
 //!
 //! One function visits these numbers for both purposes: reading the numbers saves the recursion, and writing them
 //! restores it, so the two orders cannot differ. A restored recursion continues with bit-identical results. Counters
@@ -32,8 +32,8 @@ impl State for bool {
     }
 }
 
-/// Upper limit of restored 64-bit counters; `MOST_OF_32` is that of 32-bit counters. No run reaches them, so counting
-/// never overflows even after invalid numbers were restored.
+/// Upper limit of restored 64-bit counters; `MOST_OF_32` is the limit for 32-bit counters. No run reaches them, so
+/// counting never overflows even after invalid numbers were restored.
 const MOST: f64 = 9_007_199_254_740_992.0;
 const MOST_OF_32: f64 = 2_147_483_648.0;
 const MOST_OF_USIZE: f64 = if usize::BITS > 32 { MOST } else { MOST_OF_32 };

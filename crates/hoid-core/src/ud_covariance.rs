@@ -21,8 +21,8 @@
 #[repr(align(64))]
 pub struct UdCovariance<const N: usize> {
     /// Column j holds `U_ij`, i < j, and `d_j` in place of the unit diagonal element; the other elements are not used.
-    /// The d_j are not contiguous, so that no compiler loads them as a vector, in which the first element would wait
-    /// for the last.
+    /// The d_j are not contiguous, so no compiler loads them as a vector, in which the first element would wait for the
+    /// last.
     u: [[f64; N]; N],
 }
 
@@ -94,8 +94,8 @@ impl<const N: usize> UdCovariance<N> {
     /// Performs the measurement with the given d_j (in `grown`) and projections f and v.
     #[inline(always)]
     fn update_projected_by(&mut self, grown: [f64; N], f: [f64; N], v: [f64; N], variance: f64) -> [f64; N] {
-        // Bierman's recursion: alpha_j = R + sum_{i<=j} f_i v_i. All d_j are multiplied by positive ratios, so that P
-        // stays positive regardless of rounding. `gain` accumulates P psi.
+        // Bierman's recursion: alpha_j = R + sum_{i<=j} f_i v_i. All d_j are multiplied by positive ratios, so P stays
+        // positive regardless of rounding. `gain` accumulates P psi.
         let mut gain = [0.0; N];
         let (mut before, mut inverse_before) = (variance, 1.0 / variance);
         for j in 0..N {

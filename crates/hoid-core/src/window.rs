@@ -54,7 +54,7 @@ pub struct Window<const N: usize, M> {
 }
 
 impl<const N: usize, M: AsMut<[f64]>> crate::state::State for Window<N, M> {
-    /// The restored numbers may come from any source: the next sample is stored within the memory.
+    /// The restored numbers may come from any source, so the index of the next sample is limited to the memory.
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         let parts: &mut [&mut dyn crate::state::State] = &mut [
             &mut self.memory.as_mut(),
@@ -112,7 +112,7 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Window<N, M> {
         })
     }
 
-    /// Returns the number of samples at which the window did not determine theta, so that theta stayed constant.
+    /// Returns the number of samples at which the window did not determine theta, so theta stayed constant.
     pub fn undetermined(&self) -> u64 {
         self.undetermined
     }

@@ -1,4 +1,4 @@
-//! The recursion in the basis that people share, on signals whose truth is known.
+//! Tests of the adaptive recursion on signals with known true parameters.
 #![allow(clippy::expect_used)]
 
 use hoid_core::{
@@ -50,7 +50,7 @@ fn filter(threshold: f64) -> AdaptiveFilter<Vec<f64>> {
     AdaptiveFilter::new(prior(threshold), memory).expect("a sound prior")
 }
 
-/// Nearly normal numbers of a fixed stream: sums of twelve uniform ones.
+/// Nearly normal random numbers from a fixed stream: sums of twelve uniform numbers.
 struct Stream(u64);
 
 impl Stream {
@@ -67,14 +67,14 @@ impl Stream {
     }
 }
 
-/// Someone with the gains of a basis and an autoregressive remnant of order 2.
+/// A person with gains in a basis and an autoregressive remnant of order 2.
 struct Person {
     stream: Stream,
     basis: Basis,
     past: Vec<f64>,
     e: f64,
     v: [f64; 2],
-    /// The response to the error of the last sample.
+    /// Response to the error of the last sample.
     w: f64,
 }
 
@@ -95,7 +95,7 @@ impl Person {
         }
     }
 
-    /// e and u of a sample, with these gains and this level of the remnant.
+    /// Returns e and u of a sample, for these gains and this level of the remnant.
     fn sample(&mut self, gains: [f64; GAINS], remnant: f64) -> [f64; 2] {
         self.e = 0.97 * self.e + 0.24 * self.stream.normal();
         self.past.rotate_right(1);
@@ -117,7 +117,7 @@ fn response(basis: &Basis, gains: [f64; GAINS], omega: f64) -> [f64; 2] {
     [0, 1].map(|part| (0..GAINS).map(|i| gains[i] * h[i][part]).sum())
 }
 
-/// The estimate at a frequency, real and imaginary part, with their variances.
+/// Returns the real and imaginary part of the estimate at a frequency, with their variances.
 fn estimate(filter: &AdaptiveFilter<Vec<f64>>, omega: f64) -> ([f64; 2], [f64; 2]) {
     let (value, by) = filter.response_with_derivatives(omega);
     let c = filter.state_covariance();
@@ -155,16 +155,16 @@ fn bands_cover_and_precision_grows() {
             }
         }
     }
-    // Of 192, not independent: a standard error of 3 to 4 %.
+    // A share of 192 dependent values has a standard error of 3 to 4 %.
     let share = inside / all;
     assert!((0.87..=1.0).contains(&share), "{share}");
-    // After 100 s against 10 s: ten times the data.
+    // The errors after 100 s are compared with those after 10 s, i.e. with ten times the data.
     let ratio = (squares[1] / squares[0]).sqrt();
     assert!(ratio < 0.5, "{ratio}");
 }
 
-/// A remnant of a given number of poles at -1/.06 s, of the power .04: its samples, and the variance of its
-/// innovations.
+/// Returns the samples of a remnant with the power .04 and a given number of poles at -1/.06 per second, and the
+/// variance of its innovations.
 fn steep(poles: usize, samples: usize, seed: u64) -> (Vec<f64>, f64) {
     let (pole, mut stream, mut state) = ((-TS / 0.06).exp(), Stream(seed), vec![0.0; poles]);
     let mut sample = || {
@@ -190,7 +190,8 @@ fn a_steep_remnant_is_no_harder_than_a_flat_one() {
             let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.0);
             filter.step(e, u + v);
             if k == 1000 {
-                // Innovations of .1 to 60 thousandths of the power of u: the scale is that of the data, at once.
+                // The innovations have .1 to 60 thousandths of the power of u; their scale is found immediately from
+                // the data.
                 let ratio = filter.variance() / variance;
                 assert!((0.7..1.5).contains(&ratio), "{poles} poles: {ratio}");
             }
@@ -203,13 +204,13 @@ fn a_steep_remnant_is_no_harder_than_a_flat_one() {
         }
         precision.push((variance[0] + variance[1]).sqrt());
     }
-    // For the same power, with less of it where the response is.
+    // The same power, with less of it in the band of the response.
     assert!(precision[1] < 2.0 * precision[0], "{precision:?}");
 }
 
 #[test]
 fn neuromuscular_system_and_delay_are_found() {
-    // So far from the default that the basis has to move.
+    // The operator is so far from the default that the basis must change.
     let point = Point {
         tau: 0.22,
         omega: 13.0,
@@ -231,8 +232,8 @@ fn neuromuscular_system_and_delay_are_found() {
 
 #[test]
 fn one_who_is_far_from_what_is_usual_is_found() {
-    // A delay 100 ms later than the prior, and a system of 16 rad/s that acts 60 ms earlier: from the default person
-    // the corrections end elsewhere.
+    // A delay 100 ms longer than the prior, and a system of 16 rad/s with a delay that is 60 ms shorter: from the
+    // default person alone, the corrections converge to another minimum.
     for (point, seed) in [
         (
             Point {
@@ -280,7 +281,7 @@ fn a_change_of_the_delay_is_found_and_told_from_one_of_the_gains() {
             let l = other.delay();
             let z = other.step([past[l], past[l + 1], past[l + 2]]);
             let answers = |x: [f64; GAINS]| -> f64 { GAINS_OF_A_PERSON.iter().zip(x).map(|(g, x)| g * x).sum() };
-            // Within half a second.
+            // The change takes half a second.
             let part = ((f64::from(k) - 1500.0) / 25.0).clamp(0.0, 1.0);
             let u = u + part * (answers(other.regressors(&z).x) - person.w);
             filter.step(e, u);
@@ -316,7 +317,7 @@ fn a_change_is_found_and_followed_and_a_louder_remnant_is_no_change() {
         errors += (value[0] - truth[0]).hypot(value[1] - truth[1]) / truth[0].hypot(truth[1]) / 4.0;
     }
     assert!(found >= 3, "{found} of 4");
-    // 30 s after the change; one of them has a standard error of .13 to .19.
+    // The errors 30 s after the change; one of them has a standard error of .13 to .19.
     assert!(errors < 0.15, "{errors}");
 
     let mut alarms = 0;
@@ -343,7 +344,7 @@ fn what_stands_still_is_no_change_and_one_behind_it_is_found() {
                 GAINS_OF_A_PERSON.map(|g| 0.5 * g)
             };
             let [e, u] = person.sample(gains, 0.03);
-            // The recording holds zeros for three seconds, then once more while they change.
+            // The recording contains zeros for three seconds, and once more while the gains change.
             let stands = (1500..1650).contains(&k) || (2400..2550).contains(&k);
             let [e, u] = if stands { [0.0; 2] } else { [e, u] };
             filter.step(e, u);
@@ -387,7 +388,7 @@ fn what_says_nothing_does_no_harm() {
         assert_eq!(silent.step(0.0, 0.0).innovation, 0.0);
     }
     assert!(!silent.has_started());
-    // No error ever, an output that moves: nothing to start with.
+    // The error is always zero and the output moves: the estimate cannot start.
     let mut stream = Stream(3);
     for _ in 0..500 {
         silent.step(0.0, stream.normal());
@@ -405,7 +406,7 @@ fn what_says_nothing_does_no_harm() {
             _ => assert!(filter.step(e, u).innovation.is_finite()),
         }
     }
-    // A still person: the estimate stays finite, and bands do too.
+    // A person who does not move: the estimate and its error bands stay finite.
     for _ in 0..3000 {
         filter.step(0.0, 0.0);
     }
@@ -517,7 +518,7 @@ fn what_is_known_stands_at_the_beginning() {
         row[i] = 1e-3;
     }
     let (pole, other_pole) = (0.9_f64, 0.7_f64);
-    // v = 1.6 v(k-1) - .63 v(k-2) + eps, of the poles .9 and .7.
+    // v = 1.6 v(k-1) - .63 v(k-2) + eps, with the poles .9 and .7.
     let lags: Lags = std::array::from_fn(|k| {
         let of = |a: f64, b: f64| a.powi(k as i32 + 1) / ((a - b) * (1.0 - a * b) * (1.0 - a * a));
         of(pole, other_pole) + of(other_pole, pole)
@@ -589,7 +590,7 @@ fn a_stick_that_ends_does_not_make_the_person_answer_less() {
             let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
             let stick = u.clamp(-end, end);
             knows.step(e, stick);
-            // No two samples alike: nothing shows that the stick is stationary.
+            // No two consecutive samples are equal, so the limit of the stick is not recognised.
             does_not.step(e, stick * (1.0 + 1e-9 * f64::from(k % 2)));
         }
         let (of, _) = estimate(&free, 2.0);

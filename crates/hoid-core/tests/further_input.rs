@@ -1,5 +1,5 @@
-//! The recursive prediction-error method with further inputs against models with one input, its gradient against
-//! differences, and its estimate against least squares of the whole record.
+//! The recursive prediction-error method with further inputs compared with models with one input, its gradient with
+//! finite differences, and its estimate with least squares over the whole record.
 
 #![allow(clippy::unwrap_used)]
 
@@ -19,7 +19,7 @@ use hoid_core::{
 
 const WHOLE: Forgetting<7> = Forgetting::Exponential { lambda: [0.998; 7] };
 
-/// Sample of the error, of a target and of the output `u = (B/F) e + (B_1/F_1) r + n`.
+/// Returns samples of the error, of a target and of the output `u = (B/F) e + (B_1/F_1) r + n`.
 fn two_inputs(samples: usize, seed: u64) -> Vec<[f64; 3]> {
     let mut noise = Noise(seed + 100);
     let (mut w, mut slow) = (0.0, 0.0);
@@ -226,7 +226,7 @@ fn after_an_overflow_the_filters_of_all_inputs_are_at_rest() {
     assert_eq!(predictor.further().parameters(), 2);
 }
 
-/// Solves a system of five equations by Gaussian elimination with pivots.
+/// Solves a system of five equations by Gaussian elimination with pivoting.
 fn solve(mut a: [[f64; 5]; 5], mut b: [f64; 5]) -> [f64; 5] {
     for k in 0..5 {
         let pivot = (k..5).max_by(|&i, &j| a[i][k].abs().total_cmp(&a[j][k].abs())).unwrap();

@@ -1,4 +1,4 @@
-//! psi of the predictor against finite differences.
+//! psi of the predictor compared with finite differences.
 
 #![allow(clippy::unwrap_used)]
 

@@ -1,4 +1,4 @@
-//! Each recursion against its twin.
+//! Each recursion compared with a reference implementation.
 
 #![allow(clippy::unwrap_used)]
 
@@ -74,15 +74,14 @@ fn factors_are_the_plain_covariance_for_every_way_of_forgetting() {
             let gain = plain.update(&forgetting, recursion.psi(), limited, variance);
             if !step.shortened {
                 for i in 0..5 {
-                    // In units of the standard error, so that a parameter of any size counts the
-                    // same.
+                    // In units of the standard error, so parameters of any size have the same weight.
                     let difference = recursion.theta()[i] - before[i] - gain[i] * limited;
                     worst_gain = worst_gain.max(difference.abs() / plain.p[i][i].sqrt());
                 }
             }
             worst = worst.max(relative_difference(&plain.p, &recursion.adaptation().matrix()));
         }
-        // Rounding of the plain form: 20 000 samples of a matrix with a condition number of 1e6.
+        // Rounding error of the plain form: 20 000 samples of a matrix with a condition number of 1e6.
         assert!(worst < 1e-9, "{forgetting:?}: {worst:e}");
         assert!(worst_gain < 1e-9, "{forgetting:?}: {worst_gain:e}");
     }
@@ -148,7 +147,7 @@ fn without_error_bars_the_estimate_is_the_same_to_the_last_bit() {
             let (regressor, stable) = (Regressor::Gradient, Stable::Predictor);
             Rpem::<_, 5, 0, _, _>::new(bj, regressor, stable, start(&bj), adaptation, NoErrorBars)
         };
-        // What needs the innovation variance is refused, and not given another one.
+        // A rule that needs the innovation variance is refused if it is not estimated.
         assert_eq!(rpem(adaptation()).is_none(), needs_innovation_variance);
         assert_eq!(
             Rls::new(arx, start(&arx), adaptation(), NoErrorBars).is_none(),
@@ -220,7 +219,7 @@ fn a_forgetting_matrix_with_equal_entries_is_the_scalar_factor() {
         .unwrap()
     };
     let mut scalar = make([LAMBDA; 5]);
-    // One entry is another number in its last bit, so that the path of the matrix is taken.
+    // One entry differs in its last bit, so the path for a matrix is taken.
     let mut matrix = make([LAMBDA, LAMBDA, LAMBDA, LAMBDA, LAMBDA.next_up()]);
     for &(x, u) in &data {
         scalar.step(x, u);
@@ -236,7 +235,7 @@ fn a_forgetting_matrix_with_equal_entries_is_the_scalar_factor() {
 #[test]
 fn a_window_is_least_squares_over_its_samples() {
     const W: usize = 300;
-    // Large samples first: their rounding errors must be gone after two windows.
+    // Large samples come first: their rounding errors must be gone after two windows.
     let mut data = box_jenkins(2000, 4, 0.02);
     for (x, u) in &mut data[..700] {
         *x *= 1e6;
@@ -259,15 +258,14 @@ fn a_window_is_least_squares_over_its_samples() {
         if t % 37 != 0 || t < 20 || (640..1210).contains(&t) {
             continue;
         }
-        // Householder-free twin: modified Gram-Schmidt on the window.
+        // Reference: modified Gram-Schmidt on the window.
         let rows: Vec<([f64; 4], f64)> = ((t + 1).saturating_sub(W)..=t)
             .map(|s| (regressor(s), data[s].1))
             .collect();
         let theta = gram_schmidt(&rows);
         for i in 0..4 {
             let difference = (rls.theta()[i] - theta[i]).abs();
-            // Normal equations: the condition number of the regressors squared (1e4 squared) times
-            // rounding.
+            // Normal equations: the squared condition number of the regressors (1e4 squared) times rounding.
             assert!(
                 difference < 1e-8 * (1.0 + theta[i].abs()),
                 "{t}: {} and {}",
@@ -278,7 +276,7 @@ fn a_window_is_least_squares_over_its_samples() {
     }
 }
 
-/// Least squares by modified Gram-Schmidt.
+/// Returns the least-squares solution by modified Gram-Schmidt.
 fn gram_schmidt(rows: &[([f64; 4], f64)]) -> [f64; 4] {
     let mut columns: Vec<Vec<f64>> = (0..4).map(|j| rows.iter().map(|r| r.0[j]).collect()).collect();
     let mut y: Vec<f64> = rows.iter().map(|r| r.1).collect();
@@ -333,8 +331,7 @@ fn the_guard_holds_every_variance_within_its_bound() {
     const BOUND: f64 = 50.0;
     let mut noise = Noise(10);
     for forgetting in ways::<5>().into_iter().skip(1) {
-        // What is forgotten in one round of the guard: e^{1/4}, or five samples with the smallest
-        // variable factor.
+        // Forgetting during one round of the guard: e^{1/4}, or five samples with the smallest variable factor.
         let slack = if matches!(forgetting, Forgetting::Variable { .. }) {
             0.9_f64.powi(-5)
         } else {
@@ -344,7 +341,7 @@ fn the_guard_holds_every_variance_within_its_bound() {
         let mut bars: ErrorBars<5, 0> =
             ErrorBars::new(&diagonal::<5>(1.0), InnovationVariance::new(1.0, 100.0, 0.99), 5.0);
         for t in 0..200_000 {
-            // One direction is excited, then none, then all.
+            // First one direction is excited, then none, then all.
             let psi: [f64; 5] = match t % 60_000 {
                 0..20_000 => [1.0, -2.0, 0.5, 0.0, 1.0].map(|v| v * noise.next()),
                 20_000..50_000 => [0.0; 5],
@@ -386,7 +383,7 @@ fn pseudo_linear_regression_finds_a_model_with_coloured_noise() {
         nc: 2,
         ..AnyShape::default()
     };
-    // ARMAX data: the noise shares the poles.
+    // ARMAX data: system and noise share the poles.
     let mut noise = Noise(12);
     let (mut past, mut eps1, mut x1) = ([0.0; 2], 0.0, 0.0);
     let armax: Vec<(f64, f64)> = data

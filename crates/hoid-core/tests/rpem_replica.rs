@@ -1,5 +1,5 @@
 //! The recursive prediction-error method compared with its plain implementation in Python
-//! (`fixtures/recursive/make.py`), while theta moves: only then does the order of filters matter.
+//! (`fixtures/recursive/make.py`), while theta changes: only then does the order of the filters matter.
 
 #![allow(clippy::unwrap_used)]
 
@@ -75,7 +75,8 @@ fn recursion(shape: AnyShape, regressor: Regressor) -> Rpem<AnyShape, N, 8, Cova
     Rpem::new(shape, regressor, Stable::Predictor, theta, covariance, bars).unwrap()
 }
 
-/// Largest difference of theta from the twin, relative to the largest parameter, for each shape.
+/// Returns, for each shape, the largest difference of theta from the Python implementation, relative to the largest
+/// parameter.
 fn differences(regressor: Regressor) -> Vec<(String, f64)> {
     let mut found: Vec<(String, f64)> = Vec::new();
     let mut running = None;
@@ -107,7 +108,8 @@ fn the_gradient_is_one_filter_in_direct_form_while_theta_moves() {
     }
 }
 
-/// The test can fail: a cascade of 1/F and D/C is another recursion wherever F is next to C or D.
+/// Shows that the test can fail: a cascade of 1/F and D/C is a different recursion if the model has F together with C
+/// or D.
 #[test]
 fn a_cascade_is_another_recursion() {
     for (name, difference) in differences(Regressor::Cascade) {
@@ -116,7 +118,7 @@ fn a_cascade_is_another_recursion() {
     }
 }
 
-/// Effect of the order of the two filters while theta moves, from the page on recursive identification: with one pole
+/// Effect of the order of the two filters while theta changes, from the page on recursive identification: with one pole
 /// and one zero the difference of the cascade and the direct form is
 /// `Delta(t) = -f(t) Delta(t-1) + [f(t) d(t-1) - d(t) f(t-1)] z(t-2)`, `z = x/F`.
 #[test]
@@ -129,7 +131,7 @@ fn the_order_of_two_filters_differs_by_the_moves_of_theta() {
     for t in 0..400 {
         let time = f64::from(t);
         let (x, u) = ((0.3 * time).sin() + (0.7 * time).cos(), (0.2 * time).sin());
-        // d stays for the first half, and so does f.
+        // d is constant in the first half, and so is f.
         let moving = (time - 200.0).max(0.0);
         let (d, f) = (-0.8 + 0.1 * (0.3 * moving).sin(), -0.95 + 0.04 * (0.3 * moving).sin());
         let theta = [0.1, d, f];

@@ -71,7 +71,8 @@ impl Fit {
     }
 }
 
-/// Returns for each of the p parameters whether it is fixed or at a bound, which means that its index is not in `free`.
+/// Returns, for each of the p parameters, whether it is fixed or at a bound, i.e. whether its index is missing from
+/// `free`.
 pub(crate) fn is_fixed_or_bounded(free: &[usize], p: usize) -> Vec<bool> {
     (0..p).map(|i| !free.contains(&i)).collect()
 }

@@ -214,7 +214,7 @@ mod tests {
         90.0 / (s * (s + 6.0))
     }
 
-    /// Covariance with one parameter uncertain: the standard error is then the derivative.
+    /// Covariance in which only this parameter is uncertain; the standard error is then the derivative.
     fn only(i: usize) -> Vec<f64> {
         let mut covariance = vec![0.0; 49];
         covariance[i * 7 + i] = 1.0;
@@ -235,7 +235,7 @@ mod tests {
                 let slope = (a.value - b.value) / (2.0 * h);
                 // A root that does not depend on this parameter has no error.
                 let (re, im) = root.standard_error.unwrap_or((0.0, 0.0));
-                // The pair of poles lies close together: second differences of the root are 1e3.
+                // The two poles are close together: second differences of the root are about 1e3.
                 assert!((slope.re.abs() - re).abs() < 1e-5 * (1.0 + re), "{i} {root:?} {slope}");
                 assert!((slope.im.abs() - im).abs() < 1e-5 * (1.0 + im), "{i} {root:?} {slope}");
             }

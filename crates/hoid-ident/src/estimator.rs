@@ -55,7 +55,7 @@ pub struct Estimator {
     /// True if u of each record contains a constant that is not a response to e; the constant is estimated like the
     /// initial states ([`crate::level`]). Ignored with initial states of zero. Default false.
     pub level: bool,
-    /// True if A is constrained to be stable too, so that the model from e to u is stable; C and F are always stable.
+    /// True if A is constrained to be stable too, so the model from e to u is stable; C and F are always stable.
     /// Default false.
     pub stable: bool,
 }
@@ -166,15 +166,15 @@ impl Estimator {
         self.fit_from(records, 0)
     }
 
-    /// As [`Estimator::fit`], but residuals count only from sample `first` of each record, or later if the orders
-    /// require it, so that models of different orders can be compared on the same samples.
+    /// Like [`Estimator::fit`], but residuals count only from sample `first` of each record, or later if the orders
+    /// require it, so models of different orders can be compared on the same samples.
     ///
     /// # Errors
-    /// As [`Estimator::fit`].
+    /// Same as [`Estimator::fit`].
     pub fn fit_from(&self, records: &[Record], first: usize) -> Result<Fit, IdentError> {
         self.check()?;
         // Outlying samples of e and u are limited first, since the robust loss bounds the effect of large residuals but
-        // not that of faulty samples in the regressors.
+        // not the effect of faulty samples in the regressors.
         let held = match self.loss {
             Loss::Huber { .. } => held(records),
             Loss::Quadratic => None,
@@ -208,8 +208,8 @@ impl Estimator {
         })
     }
 
-    /// True if the fit minimises the simulation error and this differs from the prediction error, as for every
-    /// structure except output error.
+    /// True if the fit minimises a simulation error that differs from the prediction error, as for every structure
+    /// except output error.
     fn simulates(&self) -> bool {
         self.focus == Focus::Simulation && self.structure != Structure::OutputError
     }

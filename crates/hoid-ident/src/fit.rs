@@ -298,17 +298,17 @@ impl Fit {
     /// Returns the one-step-ahead prediction of the output.
     ///
     /// # Errors
-    /// As [`Fit::residuals`].
+    /// Same as [`Fit::residuals`].
     pub fn predict(&self, record: &Record) -> Result<Series, IdentError> {
         Ok(output_less(record, self.residuals(record)?))
     }
 
     /// Returns the simulated output: the response of `B/(A F)` to the input alone, without the noise model. If the fit
-    /// estimated initial states, those of the simulation are also estimated, by least squares of the simulation error.
-    /// For a model without an input the simulated output is zero.
+    /// estimated initial states, the initial states of the simulation are also estimated, by least squares of the
+    /// simulation error. For a model without an input the simulated output is zero.
     ///
     /// # Errors
-    /// As [`Fit::residuals`].
+    /// Same as [`Fit::residuals`].
     pub fn simulate(&self, record: &Record) -> Result<Series, IdentError> {
         if !self.model.structure().has_input() {
             return Ok(Series {

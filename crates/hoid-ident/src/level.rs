@@ -118,7 +118,7 @@ mod tests {
 
     #[test]
     fn an_offset_of_u_is_found_and_biases_nothing() {
-        // Mean squared error of c in its standard errors, over runs.
+        // Sum over the runs of the squared errors of c, in standard errors.
         let (mut squares, runs) = (0.0, 12);
         for k in 0..runs {
             let record = simulated(k);
@@ -130,13 +130,13 @@ mod tests {
             assert!((after.value - before.value - (0.01 - 0.02 * gain)).abs() < 1e-9);
             squares += (before.value / before.standard_error.unwrap()).powi(2);
         }
-        // chi-square of 12: 3.1 to 28.3 at 0.5 % on each side.
+        // Chi-square with 12 degrees of freedom is between 3.1 and 28.3, except for 0.5 % on each side.
         assert!((3.1..28.3).contains(&squares), "{squares}");
     }
 
     #[test]
     fn it_is_the_constant_of_the_regression() {
-        // Twin: ARX is linear, with a column of ones next to the regressors.
+        // Reference: ARX is linear, so a column of ones is added to the regressors.
         let record = moved(&simulated(40), 0.0, 0.03);
         let fit = fitted(Structure::Arx, &record);
         let (e, u) = (record.input(), record.output());
@@ -152,14 +152,14 @@ mod tests {
         let theta = solve_symmetric(&gram, &right).unwrap();
         let twin = theta[4] / (1.0 + theta[0] + theta[1]);
         let level = fit.level(&record).unwrap();
-        // The ends of the record are a part of 30/8192 of it.
+        // The end effects are limited to about 30 of the 8192 samples.
         assert!(
             (level.value - twin).abs() < 0.1 * level.standard_error.unwrap(),
             "{level} and {twin}"
         );
     }
 
-    /// `u(t) = level + y(t)`, `y(t) + a y(t-1) = b e(t-3)` after a rest.
+    /// Returns a record with `u(t) = level + y(t)` and `y(t) = 0.9 y(t-1) + 0.2 e(t-3)`, started from rest.
     fn after_a_rest(e: &[f64], level: f64) -> Record {
         let mut y = vec![0.0; e.len()];
         for t in 3..e.len() {
@@ -196,20 +196,20 @@ mod tests {
                 ..Estimator::new(structure, orders)
             };
             let Ok(fit) = estimator.fit(&without) else {
-                // With one pole too many exact data carry no information about the second.
+                // Exact data carry no information about a superfluous second pole.
                 assert_eq!(orders.na, 2);
                 continue;
             };
             let gain = fit.model().response(0.0).re;
             assert!((gain - 2.0).abs() < 1e-9, "{structure} {gain}");
             for (record, level) in without.iter().zip([13.5, -2.0]) {
-                // The means took out mean(u), of which mean(e) explains a part.
+                // Removing the means subtracts mean(u), a part of which mean(e) explains.
                 let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
                 let taken = mean(two[0].output()) - 13.5 + level - gain * mean(&step);
                 let found = fit.constant_of(record).unwrap().unwrap();
                 assert!((found + taken - level).abs() < 1e-8, "{structure} {found} {taken}");
             }
-            // The means alone miss it, where a lag answers a step.
+            // If a lag responds to a step, removing the means alone biases the static gain.
             let beside = Estimator::new(structure, orders).fit(&without).unwrap();
             let missed = (beside.model().response(0.0).re - 2.0).abs();
             assert!(structure != Structure::Arx || missed > 1e-4, "{structure} {missed}");

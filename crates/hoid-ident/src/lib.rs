@@ -9,7 +9,7 @@
 //! `A(q) u(t) = (B(q)/F(q)) q^-nk e(t) + (C(q)/D(q)) eps(t)`
 //!
 //! with polynomials in the backward shift `q^-1`, `A = 1 + a1 q^-1 + ..`, `B = b0 + b1 q^-1 + ..`, and white
-//! innovations eps with the variance sigma^2. B/(A F) with nk is the operator with its delay, and C/(A D) shapes the
+//! innovations eps with the variance sigma^2. B/(A F) and the delay nk describe the operator, and C/(A D) shapes the
 //! remnant. Polynomials that a structure does not have are equal to one (ARX has A and B; Box-Jenkins has B, C, D and
 //! F).
 //!
@@ -67,7 +67,7 @@
 //! | [`progress`] | progress of a fit, reported to the caller |
 //! | [`linalg`] | sums of products, least squares by QR, the inverse of an information matrix |
 //!
-//! Internal modules, each of which uses the modules above it:
+//! Internal modules; each uses the modules above it:
 //!
 //! | module | contents |
 //! |---|---|

@@ -36,7 +36,7 @@ pub struct OrderRanges {
 /// Range of each order by its name: na, nb, nc, nd, nf or nk.
 pub type NamedOrders = BTreeMap<String, RangeInclusive<usize>>;
 
-/// Returns an error if the name is not that of an order, or if the range exceeds the largest possible order or delay.
+/// Returns an error if no order has this name, or if the range exceeds the largest possible order or delay.
 ///
 /// # Errors
 /// [`IdentError::BadOption`].
@@ -161,7 +161,7 @@ impl OrderRanges {
     /// Returns all combinations, with the delay varying fastest.
     ///
     /// # Errors
-    /// As [`OrderRanges::candidates`].
+    /// Same as [`OrderRanges::candidates`].
     pub fn combinations(&self) -> Result<Vec<Orders>, IdentError> {
         self.candidates()?;
         let mut all = vec![Orders::default()];
@@ -325,11 +325,11 @@ pub fn choose_orders(
     choose_orders_with(template, ranges, criterion, records, &|| {})
 }
 
-/// As [`choose_orders`], and calls `each` after every candidate, possibly from other threads, to report the progress of
-/// a long search.
+/// Like [`choose_orders`], and calls `each` after every candidate, possibly from other threads, to report the progress
+/// of a long search.
 ///
 /// # Errors
-/// As [`choose_orders`].
+/// Same as [`choose_orders`].
 pub fn choose_orders_with(
     template: &Estimator,
     ranges: &OrderRanges,
@@ -359,7 +359,7 @@ pub fn choose_orders_with(
     };
     // Candidates that differ only in the delay are fitted in blocks of consecutive delays: each fit starts from the
     // result for the previous delay in the block. The blocks do not depend on the number of threads and the results are
-    // collected by index, so that the table does not depend on the number of threads either.
+    // collected by index, so the table does not depend on the number of threads either.
     let delays = ranges.nk.clone().count();
     let blocks: Vec<&[Orders]> = combinations
         .chunks(delays)

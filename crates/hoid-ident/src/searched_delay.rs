@@ -11,9 +11,9 @@
 //! `var tau = sigma^2/(d'd - d' psi G^-1 psi' d) + Ts^2/12`. The first term is sigma^2 times the diagonal element for
 //! tau of the inverse information matrix of theta and tau together (L. Ljung, *System Identification*, 1999, section
 //! 9.4). The second term is due to the integer nk (W. F. Sheppard, *Proc. London Math. Soc.* 29 (1898) 353-380). The
-//! variance is limited to that of a uniform distribution over the searched range. The covariance of theta becomes
-//! `P + s s' var tau`, and a quantity with the gradient g with respect to theta and the derivative h with respect to
-//! the delay has the variance
+//! variance is limited to the variance of a uniform distribution over the searched range. The covariance of theta
+//! becomes `P + s s' var tau`, and a quantity with the gradient g with respect to theta and the derivative h with
+//! respect to the delay has the variance
 //!
 //! `g' P g + (g' s + h)^2 var tau`.
 //!
@@ -150,7 +150,7 @@ mod tests {
 
     #[test]
     fn theta_moves_with_the_delay_as_its_slope_says() {
-        // Twin: the fits one sample to either side, a chord of 20 ms.
+        // Reference: the fits with one sample less and one sample more of delay, a chord of 20 ms.
         let record = run(0);
         let fit = searched(&record).fit;
         let slope = &fit.searched_delay.as_ref().unwrap().slope;
@@ -169,7 +169,7 @@ mod tests {
         let b = fit.model().b()[0];
         for (i, slope) in slope.iter().enumerate() {
             let chord = (next[i] - before[i]) / (2.0 * record.sample_time().s());
-            // Within a fifth of the largest.
+            // The tolerance is a fifth of the largest value.
             assert!(
                 (slope - chord).abs() < 0.2 * chord.abs().max(0.2 * b / 0.01),
                 "{i}: {slope} and {chord}"
@@ -203,7 +203,7 @@ mod tests {
             let phase = fit.frequency_response(&[omega])[0].phase_deg;
             let off = (Complex64::from_polar(1.0, phase.value.to_radians()) / response).arg();
             z2[2] += z(off.to_degrees(), 0.0, phase.standard_error);
-            // As if nk were known: the part of the delay taken out again.
+            // The standard error for a known nk: the contribution of the delay is removed.
             let delay = fit.searched_delay.clone().unwrap();
             let p = delay.slope.len();
             let mut bare = fit.clone();
@@ -216,7 +216,7 @@ mod tests {
             without += z(bare.value, truth.omega_nm_rad_s, bare.standard_error);
         }
         let n = runs as f64;
-        // Mean squares of 40 standard normals are 1 ± .22.
+        // The mean squares of 40 standard normal numbers are 1 ± .22.
         assert!(z2.iter().all(|s| (0.4..1.6).contains(&(s / n))), "{z2:?}");
         assert!(without / n > 1.5, "{without}");
     }
@@ -241,7 +241,7 @@ mod tests {
 
     #[test]
     fn no_delay_is_less_certain_than_its_range() {
-        // e alone, far from u: the delay carries no information.
+        // u does not depend on e: the delay carries no information.
         let record = run(2);
         let delays = 3;
         let fit = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29))

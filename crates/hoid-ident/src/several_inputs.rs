@@ -132,7 +132,7 @@ impl SeveralInputs {
         })
     }
 
-    /// Returns the orders of A, C and D and those of the first input.
+    /// Returns the orders of A, C and D, and the orders of the first input.
     fn orders(&self) -> Orders {
         let first = self
             .inputs

@@ -66,7 +66,7 @@ mod tests {
 
     use crate::Estimator;
 
-    /// First-order response to a square wave with a small deterministic disturbance.
+    /// First-order response to a square wave, with a small deterministic disturbance.
     fn record() -> Record {
         let e: Vec<f64> = (0..400).map(|t| if t / 7 % 2 == 0 { 1.0 } else { -1.0 }).collect();
         let mut u = vec![0.0];

@@ -1,10 +1,10 @@
-//! Refined instrumental variables in the closed loop of a lead-lag operator with a rich remnant: the
-//! estimate agrees with the truth within its standard errors.
+//! Refined instrumental variables in the closed loop of a lead-lag operator with a broad-band remnant: the estimate
+//! agrees with the truth within its standard errors.
 //!
-//! Operator, 60 Hz: `Y = K (T_L s + 1)/(T_I s + 1) e^(-tau s)` with a lag of several seconds and a
-//! lightly damped neuromuscular pair, plant 1/s, disturbance of eleven sines at the output of the
-//! operator. The remnant is an autoregression of order 8, as broad as that of people, at the output
-//! of the operator, and so it is in the loop and in e.
+//! The operator at 60 Hz is `Y = K (T_L s + 1)/(T_I s + 1) e^(-tau s)` with a lag of several seconds and a lightly
+//! damped neuromuscular pair; the controlled element is 1/s; the disturbance is a sum of eleven sines at the output of
+//! the operator. The remnant is an autoregression of order 8 with a spectrum as broad as for people; it is added at the
+//! output of the operator, so it enters the loop and e.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid_ident::{Fit, InstrumentalVariable, Instruments, IvMethod};
@@ -19,7 +19,7 @@ const NK: usize = 8;
 /// Frequencies of the comparison, rad/s.
 const OMEGA: [f64; 3] = [1.0, 2.5, 6.0];
 
-/// B and F of the operator: gain 4 below 1/T_I, T_L = 0.6 s, T_I = 4 s, 13 rad/s, damping 0.3.
+/// B and F of the operator: gain 4 below 1/T_I, T_L = 0.6 s, T_I = 4 s, omega_nm = 13 rad/s, zeta_nm = 0.3.
 fn operator() -> (Vec<f64>, Vec<f64>) {
     let pair = (Complex64::new(-0.3, (1.0_f64 - 0.09).sqrt()) * 13.0 * TS).exp();
     let f = polynomial::from_roots(&[Complex64::new((-TS / 4.0).exp(), 0.0), pair, pair.conj()]);
@@ -29,7 +29,7 @@ fn operator() -> (Vec<f64>, Vec<f64>) {
     (vec![gain, gain * (0.3 - zero), -0.3 * gain * zero], f[1..].to_vec())
 }
 
-/// D of the remnant: slow, two broad peaks, and fast decay.
+/// D of the remnant: a slow component, two broad peaks, and fast decay.
 fn remnant() -> Vec<f64> {
     let at = |radius: f64, angle: f64| Complex64::from_polar(radius, angle);
     let roots = [(0.95, 0.05), (0.9, 0.35), (0.7, 1.0), (0.5, 2.2)];
@@ -91,7 +91,7 @@ fn fit(replication: u64, trials: u64) -> Fit {
     .unwrap()
 }
 
-/// Runs that converged; standardised errors of gain and phase at the frequencies.
+/// Returns the number of runs that converged, and the errors of gain and phase at the frequencies, in standard errors.
 fn study(runs: u64, trials: u64) -> (usize, Vec<[f64; 6]>) {
     let (b, f) = operator();
     let truth = |omega: f64| {
@@ -138,15 +138,15 @@ fn standard_errors_cover_the_truth() {
         );
     }
     println!("{converged} of {runs} converged, {:.1} % covered", 100.0 * covered);
-    // One standard error of the coverage is .6 %, more for correlated quantities.
+    // The standard error of the coverage is .6 %, or more for correlated quantities.
     assert!(converged as f64 >= 0.99 * runs as f64 && (covered - 0.95).abs() < 0.03);
 }
 
 #[test]
 fn converges_near_the_truth_in_a_closed_loop_with_a_rich_remnant() {
     let (converged, errors) = study(4, 3);
-    // 24 numbers, correlated within a run: fewer than 15 beyond 1.96 except for one case in 1e6,
-    // and none beyond six.
+    // 24 numbers, correlated within a run: fewer than 15 are beyond 1.96, except with probability 1e-6, and none is
+    // beyond six.
     assert!(converged == 4 && covered(&errors) > 0.5, "{converged}: {errors:?}");
     assert!(errors.iter().flatten().all(|z| z.abs() < 6.0), "{errors:?}");
 }

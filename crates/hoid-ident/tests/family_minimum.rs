@@ -1,9 +1,11 @@
-//! The searches of the operator reach its minimum: random operators of all default forms, one run each.
+//! Tests that the searches for the operator reach the global minimum: random operators of all default forms, one run
+//! each.
 //!
-//! The reference is the least loss of searches in which the delay is known within 30 ms, with and without the prior. A
-//! search has ended in another minimum if `n ln V` is more than 50 above it; the same minimum differs by a few units,
-//! because the first sample that counts depends on the range of delays. Searches from the minimum of the response alone
-//! ended in another one in 4 of these 45 records without a prior, and in 1 with it.
+//! The reference is the smallest loss of searches in which the delay is known to within 30 ms, with and without the
+//! prior. A search has ended in another minimum if its `n ln V` exceeds the reference by more than 50; for the same
+//! minimum the values differ by a few units, because the first sample that counts depends on the range of delays.
+//! Searches from the minimum for the response alone ended in another minimum for 4 of these 45 records without a prior,
+//! and for 1 with it.
 #![allow(clippy::unwrap_used)]
 
 #[path = "common/simulated_operator.rs"]
@@ -23,7 +25,7 @@ const RUN_IN: usize = 500;
 const NOISE: f64 = 0.3;
 /// Time constant of the noise, s.
 const NOISE_S: f64 = 0.1;
-/// Difference of `n ln V` above which the minimum is another one.
+/// Difference of `n ln V` above which the search has ended in another minimum.
 const ANOTHER: f64 = 50.0;
 
 fn operator(form: Form, random: &mut Uniform) -> FamilyOperator {
@@ -42,7 +44,7 @@ fn operator(form: Form, random: &mut Uniform) -> FamilyOperator {
     FamilyOperator::new(form, true, &coordinates).unwrap()
 }
 
-/// A run of 70 s at 50 Hz: twelve sinusoids, and noise of first order.
+/// Returns a run of 70 s at 50 Hz: twelve sinusoids and first-order noise.
 fn record(operator: &FamilyOperator, random: &mut Uniform) -> Record {
     let ts = SampleTime::new(0.02).unwrap();
     let lines: Vec<(f64, f64)> = (0..12)

@@ -1,4 +1,4 @@
-//! Polynomials with two inputs against NumPy (`fixtures/several_inputs/make.py`).
+//! Polynomials with two inputs compared with NumPy (`fixtures/several_inputs/make.py`).
 #![allow(clippy::unwrap_used)]
 
 use hoid_ident::several_inputs::{InputOrders, SeveralInputs};

@@ -1,5 +1,5 @@
-//! An operator of the family whose numerator changes once: recovery without noise, errors over
-//! simulated runs, and the report where there is nothing to see.
+//! An operator of the family whose numerator changes once: recovery without noise, errors over simulated runs, and the
+//! report if there is no change.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::collections::BTreeMap;
@@ -16,16 +16,17 @@ use hoid_sim::{FamilySimulator, RunSeed, Simulator};
 
 const T_M: f64 = 30.0;
 const G: f64 = 2.0;
-/// Before and after the change: K/T_I and T_L of a lead-lag.
+/// K/T_I and T_L of a lead-lag operator before and after the change.
 const ENDS: [[f64; 2]; 2] = [[4.0, 0.3], [2.0, 1.0]];
-/// T_I, omega_nm, zeta_nm, tau_e: nine samples of 1/60 s.
+/// T_I, omega_nm, zeta_nm and tau_e, which is nine samples of 1/60 s.
 const STILL: [f64; 4] = [5.0, 12.0, 0.4, 0.15];
 
 fn element(text: &str) -> ContinuousTransferFunction {
     text.parse().unwrap()
 }
 
-/// A person with a lag on an integrator, who learns to lead; without a lead on a gain.
+/// Returns the scenario of a person with a lag who controls an integrator and changes their lead; the form without a
+/// lead controls a gain.
 fn scenario(form: Form, share: f64) -> FamilyScenario {
     let state = |[gain, lead]: [f64; 2]| {
         let [t_i, omega, zeta, tau] = STILL;
@@ -104,7 +105,7 @@ fn a_change_without_noise_is_recovered() {
     }
     assert_eq!(fit.termination().reason, Reason::ExactFit);
     assert!(fit.change_found() && fit.covariance().is_none());
-    // The operator before and after, by the names of people.
+    // The operator before and after the change, by the parameter names of the family.
     let (before, after) = (fit.initial_operator(), fit.last_operator());
     for (operator, [gain, lead]) in [(before, ENDS[0]), (after, ENDS[1])] {
         for (name, expected) in [("K", 5.0 * gain), ("K_over_T_I", gain), ("T_L", lead), ("T_I", 5.0)] {
@@ -120,7 +121,7 @@ fn a_change_without_noise_is_recovered() {
 
 #[test]
 fn the_square_of_a_lead_is_recovered_over_its_kinks() {
-    // With a direct part: the square of a lead has the degree of its poles.
+    // With a direct part: the squared lead has as many zeros as there are poles.
     let mut with = scenario(Form::Lag, 0.0);
     for (state, [gain, lead]) in [(&mut with.initial, [0.9, 0.1]), (&mut with.last, [0.5, 0.2])] {
         let [_, omega, zeta, tau] = STILL;
@@ -145,7 +146,7 @@ fn the_square_of_a_lead_is_recovered_over_its_kinks() {
 
 #[test]
 fn a_level_of_u_is_found_and_moves_nothing() {
-    // Mean square of the level over its standard error, without one and with one in u.
+    // Mean square of the level in standard errors, for records without a level and with a level in u.
     let (runs, level) = (6, 0.7);
     let with_level = SigmoidChange {
         level: true,
@@ -165,7 +166,7 @@ fn a_level_of_u_is_found_and_moves_nothing() {
         let moved = Record::new(record.sample_time(), e, channel("u", record.output(), level)).unwrap();
         let clean = with_level.fit(std::slice::from_ref(&record)).unwrap();
         let fit = with_level.fit(std::slice::from_ref(&moved)).unwrap();
-        // To the range that the searches leave open.
+        // Equal within the tolerance of the searches.
         for (a, b) in clean.parameters().iter().zip(fit.parameters()) {
             let (a, b) = (a.estimate, b.estimate);
             let error = a.standard_error.unwrap_or(f64::INFINITY);
@@ -185,19 +186,19 @@ fn a_level_of_u_is_found_and_moves_nothing() {
         let bare = estimator(Form::Lead).fit(std::slice::from_ref(&record)).unwrap();
         assert!(bare.level(&record).is_none());
     }
-    // chi-square of 6: 0.68 to 18.5 at 0.5 % on each side.
+    // Chi-square with 6 degrees of freedom is between 0.68 and 18.5, except for 0.5 % on each side.
     assert!((0.68..18.5).contains(&squares), "{squares}");
 }
 
-/// The errors of `runs` fits over their standard errors; t_M and G where those are normal.
+/// Returns the errors of `runs` fits in standard errors; t_M and G are included if their errors are normal.
 fn study(runs: u64) -> Vec<(String, Vec<f64>)> {
-    // So little remnant that errors are normal in a minute.
+    // The remnant is so small that the errors are normal after one minute.
     let scenario = scenario(Form::LeadLag, 0.02);
     let mut all: Vec<(String, Vec<f64>)> = truth().iter().map(|(name, _)| ((*name).to_owned(), vec![])).collect();
     for replication in 0..runs {
         let record = run(&scenario, replication);
         let records = std::slice::from_ref(&record);
-        // As people are fitted.
+        // With the prior used for people.
         let estimator = SigmoidChange {
             prior: OperatorPrior::population(),
             ..estimator(Form::LeadLag)
@@ -214,7 +215,7 @@ fn study(runs: u64) -> Vec<(String, Vec<f64>)> {
             let Some(error) = parameter.estimate.standard_error else {
                 panic!("{name}: {:?} from {}", parameter.remark, fit.start());
             };
-            // The lag is judged where its errors are normal.
+            // The lag is judged in 1/T_I, whose errors are normal.
             let z = if name == "T_I" {
                 (1.0 / parameter.estimate.value - 1.0 / expected) * parameter.estimate.value.powi(2) / error
             } else {
@@ -237,10 +238,10 @@ fn errors_hold_over_simulated_runs() {
         println!("{name}: {n} errors, mean {mean:.2}, mean square {square:.2}");
         inside += errors.iter().filter(|z| z.abs() < 1.96).count();
         count += errors.len();
-        // The mean of n has a standard error of 1/sqrt n: three and a half of them.
+        // The mean of n values has a standard error of 1/sqrt n; three and a half of them are allowed.
         assert!(n >= 5.0 && mean.abs() < 3.5 / n.sqrt(), "{name}: {errors:?}");
     }
-    // Some 100 intervals of 95 %: a standard error of 2.2 % where they do not depend on each other.
+    // About 100 intervals of 95 %: if they were independent, the standard error of the share would be 2.2 %.
     assert!(inside * 100 >= 85 * count, "{inside} of {count}");
 }
 
@@ -252,7 +253,7 @@ fn a_fit_with_noise_is_trustworthy_and_a_prior_alone_is_named() {
     let verdict = fit.verdict(records).unwrap();
     assert_eq!(verdict.level, VerdictLevel::Trustworthy, "{verdict}");
     assert!(fit.has_neuromuscular() && fit.form() == Form::LeadLag);
-    // A prior that knows far more than the data, and one that knows far less.
+    // One prior carries much more information than the data, the other much less.
     let tight = SigmoidChange {
         prior: "zeta_nm=0.4:0.001,T_L=0.5:10".parse().unwrap(),
         ..estimator(Form::LeadLag)
@@ -328,7 +329,7 @@ fn nothing_to_see_is_said() {
     let verdict = fit.verdict(records).unwrap();
     assert!(verdict.findings().iter().any(|f| f.kind == "no-change"), "{verdict}");
 
-    // No excitation, too short, no meaning.
+    // No excitation, a record that is too short, and an invalid option.
     let still = Channel::new("e", "deg", vec![0.0; record.len()]);
     let still = Record::new(record.sample_time(), still, record.output_channel().clone()).unwrap();
     let silent = estimator(Form::LeadLag).fit(&[still]);

@@ -3,8 +3,8 @@
 //! **Positive definite matrices**, one right-hand side ([`solve`]). With rows `u_k` and pivots `p_k = u_kk`,
 //! `A = sum_k u_k' u_k/p_k` (C. F. Gauss, *Disquisitio de elementis ellipticis Palladis*, 1810). The right-hand side is
 //! eliminated together with A. In the back substitution, the term of each unknown is subtracted from all preceding
-//! equations as soon as the unknown is known, so that no step waits for a complete sum. If the factor itself is needed,
-//! use [`crate::cholesky`].
+//! equations as soon as the unknown is known, so no step waits for a complete sum. If the factor itself is needed, use
+//! [`crate::cholesky`].
 //!
 //! **General matrices**, several right-hand sides ([`solve_any`]), with row pivoting (G. H. Golub and C. F. Van Loan,
 //! *Matrix Computations*, 2013, section 3.4).

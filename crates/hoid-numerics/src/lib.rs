@@ -8,8 +8,8 @@
 //! | [`elimination`] | small positive definite or general systems by elimination, without a stored factor |
 //!
 //! The order of operations of each function is part of its specification: sums run from the first to the last term,
-//! nothing is contracted, and square roots are those of `libm`, so that results are bit-identical on every machine. If
-//! two functions differ only in rounding, their documentation mentions it.
+//! nothing is contracted, and square roots come from `libm`, so results are bit-identical on every machine. If two
+//! functions differ only in rounding, their documentation mentions it.
 //!
 //! The crate is `no_std` and allocates no memory; the feature `alloc` adds the statistics that sort their values.
 //! Matrices whose size is known only at run time use nalgebra, and sums over records use `hoid-lanes`.

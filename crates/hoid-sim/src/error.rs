@@ -48,7 +48,7 @@ pub enum SimError {
         /// Number of draws.
         draws: usize,
     },
-    /// The length of the noise differs from that of the run.
+    /// The noise and the run have different lengths.
     #[error("the noise has {found} samples, but the run needs {expected} (run-in and measurement)")]
     NoiseLength {
         /// Number of samples of the given noise.

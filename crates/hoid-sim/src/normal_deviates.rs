@@ -1,11 +1,11 @@
 //! Standard normal deviates from a generator of random bits.
 //!
-//! The deviates are those of `rand_distr`, by the ziggurat method. The area below the density is divided into 256
+//! The deviates are the same as in `rand_distr`, by the ziggurat method. The area below the density is divided into 256
 //! layers of equal area. A random layer i and a random position in it give a deviate directly if the position is within
 //! the next, narrower layer, which happens 99 times out of 100 (G. Marsaglia and W. W. Tsang, *J. Statistical Software*
 //! 5 (2000) 8; J. A. Doornik, *An Improved Ziggurat Method to Generate Normal Random Samples*, 2005). Such deviates are
 //! computed here, many at a time; the other deviates are computed by `rand_distr` from the same random numbers. The
-//! results are therefore the same as those of `rand_distr` and take less time.
+//! results are therefore the same as with `rand_distr`, but take less time.
 
 use std::{convert::Infallible, sync::OnceLock};
 
@@ -64,7 +64,7 @@ fn edges() -> [f64; LAYERS + 1] {
     edges
 }
 
-/// Generator whose first number is that for the middle of a layer; all further numbers are the largest possible number.
+/// Generator whose first number belongs to the middle of a layer; all further numbers are the largest possible number.
 struct Middle(u64);
 
 impl TryRng for Middle {
@@ -187,7 +187,7 @@ mod tests {
     fn deviates_are_those_of_the_library() {
         let edges = edges();
         assert!(edges.windows(2).all(|pair| pair[0] > pair[1]), "{edges:?}");
-        // Many thousand of them are not accepted directly, some hundred are in the tail.
+        // Many thousands of the deviates are not accepted directly, and some hundreds are in the tail.
         let mut found = vec![0.0; 1_000_003];
         normal_deviates(ChaCha8Rng::from_seed([3; 32]), &mut found);
         let mut alone = ChaCha8Rng::from_seed([3; 32]);

@@ -86,8 +86,8 @@ impl OperatorRun {
         numbers
     }
 
-    /// Restores the state that [`OperatorRun::saved`] returned for an operator with the same scenario and run, so that
-    /// it continues with bit-identical results. Returns false, without any change, if the numbers belong to another
+    /// Restores the state that [`OperatorRun::saved`] returned for an operator with the same scenario and run, so it
+    /// continues with bit-identical results. Returns false, without any change, if the numbers belong to another
     /// operator.
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let Some(([k], rest)) = numbers.split_first_chunk::<1>() else {
@@ -143,8 +143,8 @@ mod tests {
 
     use super::*;
 
-    /// For the error of a run from its run-in on, the operator gives the control of the run to the last bit, at every
-    /// order of the remnant and through a change of the task.
+    /// For the error of a run from its run-in on, the control of the operator is bit-identical to the control of the
+    /// run, for every order of the remnant and through a change of the task.
     #[test]
     fn the_operator_of_a_run_gives_its_control() {
         for (condition, order) in [
@@ -175,7 +175,7 @@ mod tests {
         }
     }
 
-    /// An operator continues in another one, also after the end of its scenario.
+    /// A saved operator continues in another operator, also after the end of its scenario.
     #[test]
     fn a_saved_operator_goes_on_with_the_same_digits() {
         let mut scenario = Scenario::condition(Condition::C4);
@@ -218,11 +218,11 @@ mod tests {
         });
         for k in 0..samples {
             let e = (0.1 * k as f64).sin();
-            // The task changes long after both.
+            // The task changes long after both start times.
             assert!((of[0].control() - of[1].control()).abs() < 1e-3, "{k}");
             of.iter_mut().for_each(|operator| operator.take(e));
         }
-        // A start before the run-in is a start at the run-in.
+        // A start time before the run-in is treated as the start of the run-in.
         let simulator = Simulator::new(&scenario).unwrap();
         assert_eq!(OperatorRun::new(simulator, seed, -1e9).k, 0);
     }

@@ -100,7 +100,7 @@ mod tests {
             for b in &all[..i] {
                 let n = a.len() as f64;
                 let correlation: f64 = a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>() / n;
-                // Four standard errors of 1/sqrt(n).
+                // The tolerance is four standard errors of 1/sqrt(n).
                 assert!(correlation.abs() < 4.0 / n.sqrt(), "{correlation}");
             }
         }
@@ -111,7 +111,8 @@ mod tests {
         let x = noise(7, 0, 0);
         let n = x.len() as f64;
         let moment = |k: i32| x.iter().map(|v| v.powi(k)).sum::<f64>() / n;
-        // Standard errors of the moments: 1, sqrt 2, sqrt 15, sqrt 96 over sqrt n; four of each.
+        // The standard errors of the moments are 1, sqrt 2, sqrt 15 and sqrt 96, each divided by sqrt n; the tolerance
+        // is four of these.
         assert!(moment(1).abs() < 4.0 / n.sqrt());
         assert!((moment(2) - 1.0).abs() < 4.0 * 2f64.sqrt() / n.sqrt());
         assert!(moment(3).abs() < 4.0 * 15f64.sqrt() / n.sqrt());

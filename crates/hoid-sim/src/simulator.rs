@@ -4,18 +4,18 @@
 //!
 //! `e = f_t - x`, `u = y(k - tau_e/Ts) + r + n`, `n = K_n z`,
 //!
-//! where y is the response of the operator without delay, r the response to a displayed target ([`TargetResponse`]; zero
-//! if only the error is displayed), x the output of the controlled element for the input u + d with a disturbance d, and z the output of
-//! the remnant cascade for unit variance. Operator, controlled element and cascade are then each advanced exactly by
-//! one sample, for a held input: the operator is driven by e, the controlled element by u, and the cascade by one
-//! normal deviate. The hold delays the response by one more sample, so that `nk = tau_e/Ts + 1`. The remnant is not
-//! delayed. A changing delay has its value at the sample at which the response arrives: if the delay increases, parts
-//! of the response are repeated; if it decreases, parts are skipped.
+//! where y is the response of the operator without delay, r the response to a displayed target ([`TargetResponse`];
+//! zero if only the error is displayed), x the output of the controlled element for the input u + d with a disturbance
+//! d, and z the output of the remnant cascade for unit variance. Operator, controlled element and cascade are then each
+//! advanced exactly by one sample, for a held input: the operator is driven by e, the controlled element by u, and the
+//! cascade by one normal deviate. The hold delays the response by one more sample, so `nk = tau_e/Ts + 1`. The remnant
+//! is not delayed. A changing delay has its value at the sample at which the response arrives: if the delay increases,
+//! parts of the response are repeated; if it decreases, parts are skipped.
 //!
 //! Operator and controlled element are in controllable canonical form (the states are the output of `1/den` and the
-//! rate of this output). The gains of the operator are in its output matrix; those of the controlled element are placed
-//! according to [`Realisation`]. For changing parameters, the matrices at each sample are those of the continuous model
-//! with the parameter values at that sample.
+//! rate of this output). The gains of the operator are in its output matrix; the gains of the controlled element are
+//! placed according to [`Realisation`]. For changing parameters, the matrices at each sample follow from the continuous
+//! model with the parameter values at that sample.
 
 use std::ops::Range;
 
@@ -207,12 +207,11 @@ impl Simulator {
     }
 
     /// Returns the signals of several runs, each driven by its own white noise and computed in its own lane of vector
-    /// registers. With every instruction set, the results are bit-identical to those of [`Simulator::signals`] for each
-    /// run.
+    /// registers. With every instruction set, the results are bit-identical to [`Simulator::signals`] for each run.
     ///
     /// # Errors
-    /// As [`Simulator::signals`], for the first run with an error; [`SimError::NoSuchInstructionSet`] if this processor
-    /// does not support the instruction set.
+    /// Like [`Simulator::signals`], for the first run with an error; [`SimError::NoSuchInstructionSet`] if this
+    /// processor does not support the instruction set.
     pub fn batched_signals(&self, noises: &[Vec<f64>], instructions: InstructionSet) -> Result<Vec<Signals>, SimError> {
         let mut all = Vec::new();
         self.batched_signals_into(noises, instructions, &mut all)?;
@@ -222,7 +221,7 @@ impl Simulator {
     /// Writes [`Simulator::batched_signals`] into existing memory; allocating new memory costs more time than the runs.
     ///
     /// # Errors
-    /// As [`Simulator::batched_signals`].
+    /// Same as [`Simulator::batched_signals`].
     pub fn batched_signals_into(
         &self,
         noises: &[Vec<f64>],
@@ -291,8 +290,8 @@ impl Simulator {
         }
     }
 
-    /// As [`Simulator::pass`], compiled separately for constant and for changing parameters, so that constant matrices
-    /// stay in registers, and for loops with and without given signals.
+    /// As [`Simulator::pass`], compiled separately for constant and for changing parameters, so constant matrices stay
+    /// in registers, and for loops with and without given signals.
     #[inline(always)]
     fn pass_through<R: Number, const M: usize, const CHANGES: bool, const GIVEN: bool>(
         &self,
@@ -516,7 +515,7 @@ impl LaneTask for BatchedRuns<'_> {
         let mut finite = true;
         for (noises, into) in self.noises.chunks(width).zip(self.into.chunks_mut(width)) {
             let mut state = LoopState::at_rest(zero, self.simulator.longest_delay());
-            // The noise is set to zero, so that unused lanes run without remnant.
+            // The noise is set to zero, so unused lanes run without remnant.
             noise.fill(0.0);
             for begin in (0..samples).step_by(BLOCK) {
                 let range = begin..(begin + BLOCK).min(samples);

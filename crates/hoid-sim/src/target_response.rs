@@ -23,7 +23,7 @@ pub(crate) struct TargetResponse {
 }
 
 impl TargetResponse {
-    /// Prepares the response; `at` returns the operator at a sample, of which there are as many as `instants`.
+    /// Prepares the response; `at` returns the operator at each of the `instants` samples.
     pub fn new(
         feedforward: &Feedforward,
         instants: usize,
@@ -132,8 +132,8 @@ mod tests {
             .collect()
     }
 
-    /// The recursion of a constant operator and the operator advanced sample by sample are the same, for every form and
-    /// for delays of whole samples and of a fraction of a sample.
+    /// The recursion of a constant operator and the operator advanced sample by sample give the same response, for
+    /// every form and for delays of a whole number of samples and of a fraction of a sample.
     #[test]
     fn both_computations_give_the_same_response() {
         let ts = SampleTime::SIXTIETH;
@@ -157,7 +157,8 @@ mod tests {
         }
     }
 
-    /// Before and after a step of all parameters the response is that of the constant operators; in between it is not.
+    /// Long before and after a step of all parameters, the response equals that of the constant operators; in between
+    /// it does not.
     #[test]
     fn a_change_leads_from_one_response_to_the_other() {
         let ts = SampleTime::HUNDREDTH;
@@ -185,7 +186,7 @@ mod tests {
         for k in (500..1900).step_by(50) {
             assert!((all[k] - before[k]).abs() < 1e-9, "{k}");
         }
-        // The slowest mode decays with 3.3 1/s.
+        // The slowest mode decays at a rate of 3.3 1/s.
         for k in (3000..4000).step_by(50) {
             assert!((all[k] - after[k]).abs() < 1e-9, "{k} {} {}", all[k], after[k]);
         }

@@ -26,7 +26,7 @@ fn silent_run(scenario: &Scenario) -> (Simulator, Signals) {
     (simulator, signals)
 }
 
-/// White noise for the first runs of a simulator.
+/// Returns white noise for the first runs of a simulator.
 fn noises(simulator: &Simulator, runs: u64) -> Vec<Vec<f64>> {
     let of = |replication| {
         let run_seed = RunSeed {
@@ -38,8 +38,8 @@ fn noises(simulator: &Simulator, runs: u64) -> Vec<Vec<f64>> {
     (0..runs).map(of).collect()
 }
 
-/// The loop in continuous time, without any hold: fourth-order Runge-Kutta, `steps` to a sample,
-/// the delay by a buffer (its value at half steps by the mean of its neighbours). Returns u and e
+/// Simulates the loop in continuous time, without any hold, by fourth-order Runge-Kutta integration with `steps` steps
+/// per sample; the delay is a buffer, whose value at half steps is the mean of the neighbouring values. Returns u and e
 /// at the samples.
 fn continuous_loop(scenario: &Scenario, steps: usize) -> (Vec<f64>, Vec<f64>) {
     let (o, c) = (scenario.initial.operator, scenario.initial.controlled_element);
@@ -72,7 +72,7 @@ fn continuous_loop(scenario: &Scenario, steps: usize) -> (Vec<f64>, Vec<f64>) {
             u.push(now);
             e.push(scenario.forcing.value(t) - state[2]);
         }
-        // The delay is longer than a step: its value at the end of this one is known already.
+        // The delay is longer than a step, so the delayed value at the end of this step is already known.
         let next = if step + 1 >= lag { past[past.len() - lag] } else { 0.0 };
         let middle = 0.5 * (now + next);
         let k1 = slope(t, &state, now);
@@ -90,8 +90,8 @@ fn relative_error(ours: &[f64], theirs: &[f64]) -> f64 {
     (distance / size).sqrt()
 }
 
-/// Relative errors of u and e in a noise-free run at Ts = 0.02, 0.01, 0.005 s against the
-/// continuous loop with `extra` samples more delay.
+/// Returns the relative errors of u and e in a noise-free run at Ts = 0.02, 0.01, 0.005 s, compared with the continuous
+/// loop with `extra` additional samples of delay.
 fn errors_against_continuous(condition: Condition, extra: f64) -> Vec<[f64; 2]> {
     [0.02, 0.01, 0.005]
         .into_iter()
@@ -112,21 +112,20 @@ fn errors_against_continuous(condition: Condition, extra: f64) -> Vec<[f64; 2]> 
 
 #[test]
 fn the_noise_free_loop_tends_to_the_continuous_one() {
-    // Bounds at Ts = 0.01 s: measured 0.036 and 0.088. The phase margin of s2 is 23 deg, so that it is more sensitive
-    // to the holds.
+    // Bounds at Ts = 0.01 s; the measured errors are 0.036 and 0.088. The phase margin of s2 is 23 deg, so C2 is more
+    // sensitive to the holds.
     for (condition, bound) in [(Condition::C1, 0.04), (Condition::C2, 0.1)] {
         let errors = errors_against_continuous(condition, 0.0);
         println!("{condition}: relative error of u and e at Ts = 0.02, 0.01, 0.005 s: {errors:.5?}");
         assert!(errors[1][0] < bound, "{errors:?}");
-        // The two holds delay the loop by half a sample each: the error falls in proportion to Ts.
+        // The two holds delay the loop by half a sample each, so the error decreases in proportion to Ts.
         for pair in errors.windows(2) {
             assert!(
                 (1.9..2.1).contains(&(pair[0][0] / pair[1][0])),
                 "{condition}: {errors:?}"
             );
         }
-        // With that sample of delay in the continuous loop as well, the error of e falls with the
-        // square of Ts.
+        // With one sample of additional delay in the continuous loop, the error of e decreases with the square of Ts.
         let errors = errors_against_continuous(condition, 1.0);
         println!("{condition}: with one sample more delay in the continuous loop: {errors:.6?}");
         for pair in errors.windows(2) {
@@ -150,7 +149,7 @@ fn the_noise_free_response_obeys_the_discrete_model() {
         for t in 30..s.u.len() {
             let left = s.u[t] + f[0] * s.u[t - 1] + f[1] * s.u[t - 2];
             let right = b[0] * s.e[t - 29] + b[1] * s.e[t - 30];
-            // The expected coefficients have ten decimals, the signals a size of a few degrees.
+            // The expected coefficients have ten decimals, and the signals have a size of a few degrees.
             assert!((left - right).abs() < 2e-9, "{condition} at {t}: {left} {right}");
         }
     }
@@ -173,8 +172,8 @@ fn realisations_agree_while_nothing_changes_and_differ_at_the_jump() {
     );
     let before = 1000 + 4000;
     assert!(relative_error(&input.x[..before], &output.x[..before]) < 1e-9);
-    // K_c falls to a third within 0.1 s: with the gain at the output x falls with it, with the gain
-    // at the input it cannot.
+    // K_c falls to a third within 0.1 s: with the gain at the output, x falls with it; with the gain at the input, x
+    // cannot.
     let largest_step = |x: &[f64]| {
         x[5000..5200]
             .windows(2)
@@ -184,8 +183,8 @@ fn realisations_agree_while_nothing_changes_and_differ_at_the_jump() {
     assert!(largest_step(&output.x) > 5.0 * largest_step(&input.x));
 }
 
-/// With a controlled element of zero the error is the target, and the response at each sample is that of the delay of
-/// this sample.
+/// With a controlled element of zero the error equals the target, and the response at each sample has the delay of this
+/// sample.
 #[test]
 fn a_delay_that_changes_is_that_of_the_sample_at_which_the_response_arrives() {
     let with = |before: f64, after: f64| {
@@ -217,7 +216,7 @@ fn a_delay_that_changes_is_that_of_the_sample_at_which_the_response_arrives() {
         };
         assert_eq!(seen, on_its_way);
     }
-    // Many at a time have the same bits.
+    // Batched runs are bit-identical.
     let simulator = Simulator::new(&with(0.28, 0.34)).unwrap();
     let noises = noises(&simulator, 3);
     for (many, noise) in simulator
@@ -255,7 +254,7 @@ fn the_obtained_noise_level_is_the_demanded_one() {
                         }
                         .white_noise(simulator.samples());
                         let s = simulator.signals(&noise).unwrap();
-                        // As section A.4 obtains it: the power that the remnant adds to u.
+                        // As in section A.4: the power that the remnant adds to u.
                         let above = match definition {
                             NoiseDefinition::Response => power(&s.u[first..]) - power(&quiet.u[first..]),
                             NoiseDefinition::Remnant => power(&s.n[first..]),
@@ -266,15 +265,15 @@ fn the_obtained_noise_level_is_the_demanded_one() {
                 let n = f64::from(runs as u32);
                 let mean = levels.iter().sum::<f64>() / n;
                 let spread = (levels.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
-                // The mean of a ratio lies a little below the ratio of the means: 0.003 as in the
-                // expected values, and four standard errors.
+                // The mean of a ratio is slightly below the ratio of the means; the tolerance is 0.003, as for the
+                // expected values, plus four standard errors.
                 let allowed = 0.003 + 4.0 * spread / n.sqrt();
                 assert!(
                     (mean - demanded).abs() < allowed,
                     "{condition} m={order} {definition:?}: {mean} +- {spread}"
                 );
                 if definition == NoiseDefinition::Response {
-                    // Expected values: one run scatters by 0.02 to 0.05.
+                    // Expected values: a single run scatters by 0.02 to 0.05.
                     assert!((0.015..0.055).contains(&spread), "{condition} m={order}: {spread}");
                 }
             }
@@ -365,7 +364,7 @@ fn the_remnant_has_its_theoretical_variance() {
             .collect();
         let mean = variances.iter().sum::<f64>() / 100.0;
         let spread = (variances.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 99.0).sqrt();
-        // Four standard errors of the mean over 100 runs.
+        // The tolerance is four standard errors of the mean over 100 runs.
         assert!(
             (mean - theory).abs() < 4.0 * spread / 10.0,
             "m={order}: {mean} and {theory} +- {}",
@@ -386,13 +385,13 @@ fn a_diverging_loop_is_an_error_and_not_a_row_of_nan() {
         simulator.run(RunSeed::default(), false),
         Err(SimError::Diverged { .. })
     ));
-    // A noise level has no meaning there, and is refused before any run.
+    // For an unstable loop a noise level has no meaning, and it is refused before any run.
     scenario.remnant.strength = RemnantStrength::Level {
         level: 0.1,
         definition: NoiseDefinition::Response,
     };
     assert!(Simulator::new(&scenario).is_err());
-    // Without noise there is no level to reach: the unstable loop can be examined until it overflows.
+    // Without noise no level has to be reached: the unstable loop can be examined until it overflows.
     let silent = with_unstable_operator(with_level(Condition::C2, 0.0));
     assert!(Simulator::new(&silent).is_ok());
     let good = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();

@@ -37,7 +37,7 @@ fn lead_lag(tau_e_s: f64) -> FamilyOperator {
     FamilyOperator::new(Form::LeadLag, true, &x).unwrap()
 }
 
-/// A person on a single integrator with a disturbance.
+/// Returns a person who controls a single integrator with a disturbance.
 fn typical() -> FamilyScenario {
     let state = FamilyState {
         operator: lead_lag(0.15),
@@ -53,7 +53,7 @@ fn mean_square(values: impl Iterator<Item = f64>) -> f64 {
     sum / n
 }
 
-/// The reference scenario in terms of the family.
+/// Returns the reference scenario in terms of the family.
 fn of_family(scenario: &Scenario) -> FamilyScenario {
     let state = |s: &hoid_model::scenario::OperatingState| {
         let o = s.operator;
@@ -130,7 +130,7 @@ fn part(operator: &FamilyOperator, wanted: Coordinate) -> f64 {
     at.map_or(0.0, |i| operator.coordinates()[i])
 }
 
-/// `z' = slope(z)` over a time of h, fourth-order Runge-Kutta.
+/// Integrates `z' = slope(z)` over the time h by fourth-order Runge-Kutta.
 fn runge_kutta<const N: usize>(z: [f64; N], h: f64, slope: impl Fn(&[f64; N]) -> [f64; N]) -> [f64; N] {
     let on = |z: &[f64; N], by: f64, d: &[f64; N]| std::array::from_fn(|i| z[i] + by * d[i]);
     let a = slope(&z);
@@ -142,9 +142,10 @@ fn runge_kutta<const N: usize>(z: [f64; N], h: f64, slope: impl Fn(&[f64; N]) ->
 
 const STEPS: usize = 60;
 
-/// The loop by the differential equations: neuromuscular part `v'' + 2 zeta omega v' + omega^2 v =
-/// omega^2 e(t - tau)`, lag `w' = v - w/T_I`, lead `u = K/T_I (w + p T_L w' + ...)`; element by
-/// `x''' + c_2 x'' + c_1 x' + c_0 x = u + d`. The sampled error is held and comes tau later.
+/// Simulates the loop by its differential equations: neuromuscular part
+/// `v'' + 2 zeta omega v' + omega^2 v = omega^2 e(t - tau)`, lag `w' = v - w/T_I`, lead
+/// `u = K/T_I (w + p T_L w' + ...)`; element by `x''' + c_2 x'' + c_1 x' + c_0 x = u + d`. The sampled error is held
+/// and delayed by tau.
 fn by_integration(scenario: &FamilyScenario, d: &[f64]) -> Vec<[f64; 2]> {
     let FamilyState {
         operator,
@@ -243,13 +244,13 @@ fn is_what_integration_of_the_differential_equations_gives() {
         let size = signals.u.iter().map(|u| u.abs()).fold(0.0, f64::max);
         for (k, [e, u]) in by_integration(&scenario, &signals.d).into_iter().enumerate() {
             let worst = (signals.e[k] - e).abs().max((signals.u[k] - u).abs());
-            // Fourth order in steps of 0.003/omega_nm.
+            // Fourth-order integration in steps of 0.003/omega_nm.
             assert!(worst < 1e-8 * size, "{form} {k}: {worst}");
         }
     }
 }
 
-/// Fourier coefficient of a signal at a frequency.
+/// Returns the Fourier coefficient of a signal at a frequency.
 fn coefficient(values: &[f64], omega_rad_s: f64, ts: f64) -> Complex64 {
     let turn = |(k, v): (usize, &f64)| Complex64::from_polar(*v, -omega_rad_s * k as f64 * ts);
     values.iter().enumerate().map(turn).sum()
@@ -258,7 +259,7 @@ fn coefficient(values: &[f64], omega_rad_s: f64, ts: f64) -> Complex64 {
 #[test]
 fn the_describing_function_is_the_operator_behind_a_hold() {
     let mut operators = vec![lead_lag(0.1437)];
-    // Without neuromuscular part e passes at once, after the hold's half sample.
+    // Without a neuromuscular part, e acts immediately, after half a sample of the hold.
     operators.push(FamilyOperator::new(Form::LeadLag, false, &[2.0, 0.3, 0.2, 0.15]).unwrap());
     operators.push(FamilyOperator::new(Form::Gain, false, &[2.0, 0.15]).unwrap());
     operators.push(FamilyOperator::new(Form::Gain, false, &[2.0, 0.002]).unwrap());
@@ -279,7 +280,7 @@ fn the_describing_function_is_the_operator_behind_a_hold() {
                 polynomial::value(&held.b, backward) / polynomial::value(&f, backward) * backward.powu(held.nk as u32);
             let error = (found - exact).norm() / exact.norm();
             assert!(error < 1e-6, "{:?} {omega}: {error}", operator.form());
-            // In continuous time with half a sample of delay, up to (omega Ts)^2.
+            // The response in continuous time with half a sample of delay, accurate to (omega Ts)^2.
             let near = operator.response(omega) * Complex64::from_polar(1.0, -omega * ts / 2.0);
             assert!((found - near).norm() / near.norm() < 2e-3 + (omega * ts).powi(2));
         }
@@ -288,8 +289,8 @@ fn the_describing_function_is_the_operator_behind_a_hold() {
 
 #[test]
 fn parameters_that_change_are_those_in_force() {
-    // A step of all parameters at once: from then on the loop of the last state, from the state left by the first. For
-    // comparison both states are simulated in one run, each with its own recursion.
+    // All parameters change in a step: from then on the loop is that of the final state, starting from the states of
+    // the initial loop. For comparison, both loops are simulated in one run, each with its own recursion.
     let mut scenario = typical();
     let x = [6.0, 0.4, 0.3, 9.0_f64.ln(), 0.3_f64.ln(), 0.15];
     scenario.last.operator = FamilyOperator::new(Form::LeadLag, true, &x).unwrap();
@@ -302,7 +303,7 @@ fn parameters_that_change_are_those_in_force() {
     let truth = record.channel("omega_nm").unwrap();
     assert!((truth[1200] - 12.0).abs() < 1e-12 && (truth[1201] - 9.0).abs() < 1e-12);
     assert!((record.channel("T_I").unwrap()[2399] - 1.0 / 0.3).abs() < 1e-12);
-    // The response of the last state continues from the earlier one.
+    // The response of the final state continues from the earlier response.
     let only = |state: &FamilyState| {
         let held = state.operator.zoh(sixty()).unwrap();
         (held.nk, held.b, held.f)
@@ -314,7 +315,7 @@ fn parameters_that_change_are_those_in_force() {
         let own: f64 = f.iter().enumerate().map(|(i, f)| f * u[k - 1 - i]).sum();
         assert!((u[k] - response + own).abs() < 1e-9, "{k}");
     }
-    // A delay that changes does so in whole samples.
+    // A changing delay changes in whole samples.
     let x = [4.0, 0.6, 0.2, 12.0_f64.ln(), 0.4_f64.ln(), 0.2];
     scenario.last.operator = FamilyOperator::new(Form::LeadLag, true, &x).unwrap();
     let later = FamilySimulator::new(&scenario)
@@ -325,7 +326,7 @@ fn parameters_that_change_are_those_in_force() {
     assert!((tau[0] - 9.0 / 60.0).abs() < 1e-12 && (tau[2399] - 0.2).abs() < 1e-12);
 }
 
-/// Every kind of remnant.
+/// Returns every kind of remnant.
 fn parts() -> Vec<Vec<RemnantPart>> {
     let lag = RemnantShape::Lag {
         time_constant_s: 0.1,
@@ -378,7 +379,7 @@ fn parts() -> Vec<Vec<RemnantPart>> {
 
 #[test]
 fn each_remnant_has_its_share_of_the_variance() {
-    // The last one is that of a person who answers a target, with most of u from it.
+    // In the last scenario, most of u is the response of the person to a target.
     let mut seen = typical();
     let sum = |rms, interleaved| MultiSine {
         rms,
@@ -404,7 +405,7 @@ fn each_remnant_has_its_share_of_the_variance() {
         let mut shares = Vec::new();
         let (mut whole, mut of_error) = (0.0, 0.0);
         for replication in 0..runs {
-            // The loop is linear: the effect of the remnant is the difference.
+            // The loop is linear, so the effect of the remnant is the difference.
             let (a, b) = (
                 silent.signals(seed(replication)).unwrap(),
                 noisy.signals(seed(replication)).unwrap(),
@@ -442,13 +443,13 @@ fn remnants_are_of_their_kind() {
         mean_square(n.iter().map(|v| v * v)) / (square * square)
     };
     let steady = kurtosis(remnant_of(&kinds[0]).channel("n").unwrap());
-    // Gaussian: 3. Pulses at 1.5 a second that last 0.1 s, and silence, have heavy tails.
+    // The kurtosis of a Gaussian remnant is 3. Pulses of 0.1 s at 1.5 per second, and intermittence, cause heavy tails.
     assert!((steady - 3.0).abs() < 0.5, "{steady}");
     for kind in [6, 7] {
         let heavy = kurtosis(remnant_of(&kinds[kind]).channel("n").unwrap());
         assert!(heavy > 5.0, "{kind}: {heavy}");
     }
-    // The remnant that follows u is larger where u has been large.
+    // The remnant that depends on u is larger where u has been large.
     let record = remnant_of(&kinds[4]);
     let (n, u) = (record.channel("n").unwrap(), record.output());
     let (mut products, mut large, mut small) = (0.0, 0.0, 0.0);
@@ -477,7 +478,7 @@ fn the_stick_drifts_and_records_are_offset() {
         assert!((offset.e[k] - plain.e[k] - 0.3).abs() < 1e-14 && (offset.u[k] - plain.u[k] + 0.2).abs() < 1e-14);
         assert_eq!(offset.y[k], plain.y[k]);
     }
-    // In the loop the integrator removes a constant bias from u, and leaves it in e.
+    // In the loop the integrator removes a constant bias from u and leaves it in e.
     scenario.stick = Stick {
         bias: 0.5,
         ..Stick::default()
@@ -486,16 +487,16 @@ fn the_stick_drifts_and_records_are_offset() {
     let end = plain.u.len() - 1;
     assert!((biased.n[end] - 0.5).abs() < 1e-14);
     assert!((biased.u[end] - plain.u[end]).abs() < 1e-3);
-    // K = 4/0.2 contributes 0.5 of it.
+    // The gain K = 4/0.2 and the bias of 0.5 determine the offset of e.
     assert!((biased.e[end] - plain.e[end] + 0.5 / 20.0).abs() < 1e-3);
-    // A walk of s per root second has the variance s^2 T after T seconds.
+    // A random walk of s per root second has the variance s^2 T after T seconds.
     scenario.stick = Stick {
         walk_per_root_s: 0.1,
         ..Stick::default()
     };
     let simulator = FamilySimulator::new(&scenario).unwrap();
     let ends = (0..60).map(|r| *simulator.signals(seed(r)).unwrap().n.last().unwrap());
-    // Standard error of a variance of 60: 18 %.
+    // The standard error of a variance of 60 values is 18 %.
     assert!((mean_square(ends) / (0.01 * 45.0) - 1.0).abs() < 4.0 * 0.18);
 }
 
@@ -508,7 +509,7 @@ fn runs_are_named_by_their_seed() {
     let run = simulator.run(seed(1), false).unwrap();
     assert_eq!(run, again.run(seed(1), false).unwrap());
     let other = simulator.run(seed(2), false).unwrap();
-    // Other phases, other remnant.
+    // Another run has other phases and another remnant.
     assert_ne!(run.channel("d"), other.channel("d"));
     assert_ne!(run.channel("n"), other.channel("n"));
     assert_eq!((run.len(), run.time_s(0)), (2400, 0.0));
@@ -562,7 +563,7 @@ fn what_has_no_run_is_refused() {
 
 #[test]
 fn a_target_that_is_seen_moves_the_control_before_there_is_an_error() {
-    // e = f - y and y = P u, so that at each line of f in the steady state U = Y E + F R e^{j omega preview}.
+    // e = f - y and y = P u, so at each line of f in the steady state U = Y E + F R e^{j omega preview}.
     let mut scenario = typical();
     scenario.disturbance = Excitation::default();
     scenario.target = MultiSine::default().excitation().unwrap();

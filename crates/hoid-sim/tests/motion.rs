@@ -24,7 +24,7 @@ fn operator(form: Form, head: &[f64], tau_s: f64) -> FamilyOperator {
     FamilyOperator::new(form, true, &[head, &tail].concat()).unwrap()
 }
 
-/// A person on 3/(s(s+1)) with a target and a disturbance on lines of their own.
+/// Scenario of a person who controls 3/(s(s+1)), with separate lines for target and disturbance.
 fn task(motion: Option<FamilyOperator>) -> FamilyScenario {
     let state = FamilyState {
         operator: operator(Form::Lead, &[0.6, 0.6], 0.2),
@@ -62,7 +62,7 @@ fn coefficient(record: &Record, name: &str, omega: f64) -> Complex64 {
     record.channel(name).unwrap().iter().enumerate().map(turned).sum()
 }
 
-/// At each line of target and disturbance U = Y E + M Y_out, with the exact discrete models.
+/// At each line of target and disturbance, U = Y E + M Y_out with the exact discrete models.
 #[test]
 fn the_response_to_motion_is_exact_at_every_line() {
     for felt in responses() {
@@ -86,7 +86,7 @@ fn the_response_to_motion_is_exact_at_every_line() {
                 let of = |name: &str| coefficient(&record, name, omega);
                 let expected = held(&scenario.initial.operator) * of("e") + held(&felt) * of("y");
                 assert!((of("u") / expected - 1.0).norm() < 1e-6, "{felt:?} {omega}");
-                // The remnant does not enter, and r = e + y.
+                // There is no remnant, and r = e + y.
                 assert!((of("f_t") - of("e") - of("y")).norm() < 1e-9);
             }
         }
@@ -124,7 +124,7 @@ fn the_share_of_the_remnant_counts_the_response_to_motion() {
     assert!((ratio - 1.0).abs() > 0.1, "{ratio}");
 }
 
-/// A neuromuscular system that changes is shared: after the change, the response is that of the last state.
+/// Both responses share a changing neuromuscular system: after the change, the response is that of the final state.
 #[test]
 fn the_neuromuscular_system_is_shared_while_it_changes() {
     let mut scenario = task(Some(operator(Form::Canals, &[-0.9], 0.18)));
@@ -154,7 +154,7 @@ fn motion_that_cannot_be_simulated_is_refused() {
     let bare = FamilyOperator::new(Form::Gain, false, &[-0.2, 0.1]).unwrap();
     let refused = FamilySimulator::new(&task(Some(bare))).unwrap_err().to_string();
     assert!(refused.contains("share one neuromuscular system"), "{refused}");
-    // A response that drives the machine on is unstable.
+    // A response that reinforces the motion of the machine makes the loop unstable.
     let unstable = FamilySimulator::new(&task(Some(operator(Form::Gain, &[2.0], 0.2))));
     assert!(matches!(unstable, Err(SimError::Model(_))), "{unstable:?}");
     // The operator alone has the error as its only input.

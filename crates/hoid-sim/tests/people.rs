@@ -58,7 +58,7 @@ fn runs_are_named_and_have_their_strength() {
         assert_ne!(run.record.output(), found.run(2).unwrap().record.output());
         let other = person(plant, RemnantKind::SignalDependent, 4);
         assert_ne!(found.state, other.state);
-        // dy/dt = u + d, e = -y: without the offsets of the recorder.
+        // dy/dt = u + d and e = -y, without the offsets of the recorder.
         let (e, y) = (run.record.input(), run.record.channel("y").unwrap());
         let d = run.record.channel("d").unwrap();
         for k in 0..run.record.len() - 1 {
@@ -99,7 +99,7 @@ fn runs_spread_where_they_are_told_to() {
     let own = steady.state.operator.coordinates()[lead].ln();
     let runs = 40;
     let square = (0..runs).map(|run| (of(run) - own).powi(2)).sum::<f64>() / runs as f64;
-    // Standard error of the root of a mean square of 40: 11 %.
+    // The standard error of the root of a mean square of 40 values is 11 %.
     assert!((square.sqrt() / 0.05 - 1.0).abs() < 0.44, "{}", square.sqrt());
     assert_eq!(steady.run(3).unwrap().state, steady.state);
 }
@@ -126,7 +126,7 @@ fn other_rates_and_forms_are_drawn_too() {
             (form, 4000)
         );
     }
-    // A lag on 1/s has no phase left for a margin.
+    // A lag on 1/s leaves no phase for a margin.
     assert!(matches!(
         draw(Plant::Integrator, Form::Lag),
         Err(SimError::NoAcceptablePerson { .. })
@@ -185,8 +185,8 @@ fn ranges_without_people_are_refused() {
     assert!(Person::draw(&typical, &spread, Plant::Integrator, None, kind, 1, 1).is_err());
 }
 
-/// A person with a displayed target is the same person with a response to it, which each run shares in part: the
-/// neuromuscular system of a run is that of both responses.
+/// A person with a displayed target is the same person with an additional response to it; in each run both responses
+/// share the neuromuscular system of the run.
 #[test]
 fn people_respond_to_a_displayed_target() {
     for plant in Plant::ALL {

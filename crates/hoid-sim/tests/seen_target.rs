@@ -84,8 +84,8 @@ fn both_responses_are_exact_at_every_line() {
     }
 }
 
-/// The same task as a scenario of the family, simulated with matrices of any order: through a change of the operator,
-/// of its neuromuscular system and of the response to the target.
+/// The same task as a scenario of the family, simulated with matrices of any order, gives the same loop through a
+/// change of the operator, of its neuromuscular system and of the response to the target.
 #[test]
 fn the_loop_is_that_of_the_family() {
     for condition in [Condition::C1, Condition::C3, Condition::C4, Condition::C6] {

@@ -66,7 +66,7 @@ impl Change {
 /// before the change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorThreshold {
-    /// Mean and standard deviation of the error and of its rate, the latter per second.
+    /// Mean and standard deviation of the error, and of its rate per second.
     levels: [[f64; 2]; 2],
     sample_time_s: f64,
     last: Option<f64>,

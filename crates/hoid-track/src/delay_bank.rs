@@ -9,17 +9,16 @@
 //! `L_k(t) = gamma L_k(t-1) - eps_k(t)^2/(2 sigma^2)`,  `gamma = 1 - Ts/T`,
 //!
 //! with T = 10 s: evidence from before a change fades with time. Another delay is reported once its L_k leads by 2. Its
-//! recursion has been running all the time, so that the estimate need not restart. The weights `p_k` are proportional
-//! to `exp(L_k/3)`, because neighbouring innovations of a wrong model repeat the same information. (For a constant
-//! delay, 95 % bands contain the delay in 82 % of cases without the factor 3, and in 95 % with it.) tau_e is reported
-//! as the weighted mean of the delays; its variance is the weighted variance of the delays plus that of a delay
+//! recursion has been running all the time, so the estimate need not restart. The weights `p_k` are proportional to
+//! `exp(L_k/3)`, because neighbouring innovations of a wrong model repeat the same information. (For a constant delay,
+//! 95 % bands contain the delay in 82 % of cases without the factor 3, and in 95 % with it.) tau_e is reported as the
+//! weighted mean of the delays; its variance is the weighted variance of the delays plus the variance of a delay
 //! uniformly distributed between two samples, `Ts^2/12`.
 //!
 //! Before there is any evidence, the delay is distributed about the delay of the start,
 //! `L_k = -(tau_k - tau_start)^2/(2 s^2)` with s = 0.03 s; this prior fades like all evidence. Innovations count with
-//! at most [`LARGEST`] standard deviations, so that a single outlier does not decide. While the estimate is kept
-//! constant, the evidence is not updated, because all recursions but one then have coefficients that belong to another
-//! delay.
+//! at most [`LARGEST`] standard deviations, so a single outlier does not decide. While the estimate is kept constant,
+//! the evidence is not updated, because all recursions except one then have coefficients that belong to another delay.
 
 use hoid_core::state::{State, visit_all};
 use hoid_model::{MAX_DELAY, Orders, SampleTime, uncertainty::Estimate};

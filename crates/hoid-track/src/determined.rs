@@ -1,7 +1,7 @@
 //! The parameters of an operator that the data determine.
 //!
 //! A parameter is determined if it is more than two standard errors from zero and, if the method has a prior for the
-//! parameter, the data have at least halved the prior variance. Otherwise the value is mainly that of the prior.
+//! parameter, the data have at least halved the prior variance. Otherwise the value comes mainly from the prior.
 
 use hoid_model::uncertainty::OperatorEstimate;
 
@@ -88,7 +88,7 @@ mod tests {
             zeta_nm: e(0.25, 0.05),
             tau_e_s: Estimate::fixed(0.2),
         };
-        // Before the first sample the standard deviation of omega is 3.3 rad/s, that of zeta .125.
+        // Before the first sample the standard deviations are 3.3 rad/s for omega and .125 for zeta.
         let found = determined(&Method::adaptive(), &operator);
         let expected = [
             ("K_e", false),

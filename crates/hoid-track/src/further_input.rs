@@ -3,7 +3,7 @@
 //!
 //! A person who sees the target r responds to the error and to r. With one input, a recursion attributes both responses
 //! to the error. In theta the coefficients of B_r and F_r follow those of the model of e. The response to r is
-//! `B_r z^-nk_r/(A F_r)`; its covariance is a part of that of theta.
+//! `B_r z^-nk_r/(A F_r)`; its covariance follows from a part of the covariance of theta.
 
 use std::fmt;
 
@@ -19,7 +19,7 @@ use crate::response::Response;
 /// A further input of a tracked model.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TrackedInput {
-    /// Name of the channel in the record.
+    /// Role of the input in the task of the person.
     pub channel: String,
     /// Its role in the task of the person.
     pub role: ChannelRole,
@@ -58,15 +58,15 @@ impl TrackedInput {
             na: orders.na,
             nc: orders.nc,
             nd: orders.nd,
-            // The first input of a batch model is that of the record; its name only labels coefficients.
+            // The first input of a batch model is the input of the record; its name only labels coefficients.
             inputs: vec![(String::new(), first), (self.channel.clone(), self.orders)],
             search,
             ..SeveralInputs::new(structure)
         }
     }
 
-    /// Returns the response to this input at a frequency in rad/s; `orders` are those of the model of e, and
-    /// `covariance` is that of the whole theta, by rows.
+    /// Returns the response to this input at a frequency in rad/s; `orders` are the orders of the model of e, and
+    /// `covariance` is the covariance of the whole theta by rows.
     pub(crate) fn response(
         &self,
         orders: &Orders,

@@ -27,12 +27,12 @@ const EARLY_FORGETTING: f64 = 0.01;
 const EARLY_SHARE: f64 = 0.9993;
 /// Smallest factor of variable forgetting: a memory of ten samples.
 const SMALLEST_FACTOR: f64 = 0.9;
-/// Longest sliding window, samples; each of them takes as many numbers as there are parameters, and one more.
+/// Longest sliding window, samples; each sample takes as many numbers as there are parameters, plus one.
 const LONGEST_WINDOW: f64 = 1e7;
 /// Memory length of the innovation variance, as a multiple of the shortest memory of a parameter.
 const LEVEL_MEMORIES: f64 = 4.0;
 
-/// The gains of the kernel as one type, so that each recursion is compiled once.
+/// The gains of the kernel as one type, so each recursion is compiled once.
 pub enum Gain<const N: usize> {
     /// P in factored form.
     Covariance(Covariance<N>),
@@ -51,8 +51,8 @@ impl<const N: usize> State for Gain<N> {
 
 impl<const N: usize> Gain<N> {
     /// Builds the gain with capacity for N parameters. If `growing` is true, the memory of a start without a fit grows
-    /// from a short length, so that the gradients of early, unreliable estimates are forgotten. Least squares has no
-    /// such gradients.
+    /// from a short length, so the gradients of early, unreliable estimates are forgotten. Least squares has no such
+    /// gradients.
     ///
     /// # Errors
     /// [`IdentError`] for options that contradict each other, or a start covariance that is not positive.

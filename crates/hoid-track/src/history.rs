@@ -11,7 +11,7 @@ pub fn bounded(x: f64) -> f64 {
     if x.is_nan() { 0.0 } else { x.clamp(-LARGEST, LARGEST) }
 }
 
-/// The last n values in one slice. Each value is stored twice, n elements apart, so that no values have to be moved.
+/// The last n values in one slice. Each value is stored twice, n elements apart, so no values have to be moved.
 #[derive(Debug, Clone)]
 pub struct History {
     values: Vec<f64>,
@@ -75,7 +75,7 @@ mod tests {
         }
     }
 
-    /// The newest values remain within the buffer after the history was restored from numbers that were altered.
+    /// The newest values remain within the buffer after invalid numbers were restored.
     #[test]
     fn the_newest_ones_are_within() {
         let mut past = History::new(3);

@@ -106,7 +106,7 @@ mod tests {
             assert!((1490..1540).contains(&head), "{head}");
             let (from, to) = default_start_span(&idle);
             assert!((from - 15.0).abs() < 0.5 && (to - from - third).abs() < 0.2);
-            // An idle head of half a second is not reported, nor one in which only e is idle.
+            // An idle head of half a second is not reported, nor is a head in which only e is idle.
             assert_eq!(idle_head(&with_head(&record, &noise[..50], &offset[..50])), 0);
             let moving: Vec<f64> = (0..1500).map(|k| (f64::from(k) * 0.02).sin()).collect();
             assert_eq!(idle_head(&with_head(&record, &moving, &offset)), 0);

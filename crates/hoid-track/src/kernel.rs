@@ -66,8 +66,8 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Builds a recursion of the kernel with the smallest capacity that is sufficient for its parameters. If the orders
-    /// are those of the operator, the recursion is compiled for these orders.
+    /// Builds a recursion of the kernel with the smallest capacity that is sufficient for its parameters. For the
+    /// orders of the operator there is a recursion compiled for these orders.
     ///
     /// # Errors
     /// [`IdentError`] for options that contradict each other, or a start that the recursion cannot use.
@@ -116,7 +116,7 @@ impl<'a> Plan<'a> {
     /// Returns the gain of the recursion ([`Gain::new`]).
     ///
     /// # Errors
-    /// As [`Gain::new`].
+    /// Same as [`Gain::new`].
     pub fn gain<const N: usize>(&self, growing: bool) -> Result<Gain<N>, IdentError> {
         Gain::new(self.setup, self.from, self.sample_time, growing)
     }
@@ -124,7 +124,7 @@ impl<'a> Plan<'a> {
     /// Returns the error bars at the start ([`gain::error_bars`]).
     ///
     /// # Errors
-    /// As [`gain::error_bars`].
+    /// Same as [`gain::error_bars`].
     pub fn bars<const N: usize, const K: usize>(&self) -> Result<ErrorBars<N, K>, IdentError> {
         gain::error_bars(self.setup, self.from, self.sample_time)
     }

@@ -4,8 +4,8 @@
 //!
 //! `theta(t) = theta(t-1) + P(t) psi(t) eps(t)`,
 //!
-//! and forgets the past, so that it can follow changes (L. Ljung, *System Identification*, 1999, chapter 11). The
-//! methods differ in psi, in the parameters theta, and in their prior for the change of the person.
+//! and forgets the past, so it can follow changes (L. Ljung, *System Identification*, 1999, chapter 11). The methods
+//! differ in psi, in the parameters theta, and in their prior for the change of the person.
 //!
 //! ```
 //! use hoid_model::scenario::{Condition, Scenario};
@@ -51,8 +51,8 @@
 //!
 //! **A recursion starts from the available knowledge.** For methods with a start fit this is by default the batch fit
 //! of the first third of a record, with the covariance of that fit. Until the end of that span only the filters are
-//! updated and the estimate is kept constant, so that no sample counts twice and the error bars are valid. With the
-//! start of the thesis, `P_0 = 0.1 I` (eq. 38, 5.41, 5.55), the estimate is updated from the first sample on.
+//! updated and the estimate is kept constant, so no sample counts twice and the error bars are valid. With the start of
+//! the thesis, `P_0 = 0.1 I` (eq. 38, 5.41, 5.55), the estimate is updated from the first sample on.
 //!
 //! **Faulty samples** never reach the filters. A value is faulty if it is not a finite number or is larger than
 //! [`TrackOptions::largest`]. A faulty error e is replaced by the last good value and a faulty output u by the one-step

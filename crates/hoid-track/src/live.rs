@@ -63,7 +63,7 @@ impl Live {
     /// Builds the recursion of a plan, at the rate of the plan.
     ///
     /// # Errors
-    /// As [`Live::new`].
+    /// Same as [`Live::new`].
     pub fn of_plan(plan: TrackPlan, warm_up_s: f64) -> Result<Self, IdentError> {
         let bad = |option: &str, found: String, expected: &str| IdentError::BadOption {
             option: option.to_owned(),
@@ -242,7 +242,7 @@ mod tests {
     use super::*;
     use crate::Method;
 
-    /// The first seconds of a run of C1 at 1000 Hz, each sample of the run repeated.
+    /// Returns the first seconds of a run of C1 at 1000 Hz, with each sample of the run repeated.
     fn fast(length_s: f64) -> Record {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();
@@ -321,7 +321,8 @@ mod tests {
         }
     }
 
-    /// Changes each number of the decimator in turn and seals the numbers again: no index or counter ends the process.
+    /// Changes each number of the decimator in turn and seals the numbers again: no index or counter may end the
+    /// process.
     #[test]
     fn a_decimator_takes_any_numbers() {
         let record = fast(1.0);

@@ -176,12 +176,13 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         f64::INFINITY
     }
 
-    /// Returns the limit of P where nothing excites a parameter; `None` if the limit follows from the start.
+    /// Returns the limit of P for unexcited parameters; `None` if the limit follows from the start.
     fn windup_guard(&self, _structure: Structure) -> Option<WindupGuard> {
         self.gain().and_then(|gain| gain.windup_guard)
     }
 
-    /// Returns the choice of a guard; `None` if neither the user nor the method specifies one: there is then no guard.
+    /// Returns the choice of a guard; `None` if neither the user nor the method specifies one, in which case there is
+    /// no guard.
     fn guard(&self) -> Option<GuardChoice> {
         None
     }
@@ -268,7 +269,7 @@ pub fn bad(option: &str, found: String, expected: &str) -> IdentError {
     }
 }
 
-/// Checks that the orders are those of a Box-Jenkins model of the operator.
+/// Checks that the orders belong to a Box-Jenkins model of the operator.
 ///
 /// # Errors
 /// [`IdentError::BadOption`].

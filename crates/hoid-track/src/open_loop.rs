@@ -2,7 +2,7 @@
 //!
 //! `L(omega) = Y(omega) Y_c(j omega)`, where Y is the sampled response of the estimate. The crossover and its
 //! sensitivity to `dL/L` are computed as for batch fits ([`Crossover`]); `dL/L = dY/Y`, whose covariance follows from
-//! that of the real and imaginary part of the response at the crossover.
+//! the covariance of the real and imaginary part of the response at the crossover.
 //!
 //! Nothing is reported if |L| does not fall through one, or if the standard error of the crossover is more than half of
 //! the crossover: the first-order error is then meaningless.

@@ -76,7 +76,7 @@ impl TrackOptions {
     /// Sets options of the method from text, such as `[("memory", "256"), ("covariance", "0.1")]`.
     ///
     /// # Errors
-    /// As [`Method::set`].
+    /// Same as [`Method::set`].
     pub fn with(mut self, settings: &[(&str, &str)]) -> Result<Self, IdentError> {
         for (name, text) in settings {
             self.method.set(name, text)?;
@@ -165,7 +165,7 @@ impl TrackOptions {
     /// Returns the components of the recursion.
     ///
     /// # Errors
-    /// As [`TrackOptions::memories`].
+    /// Same as [`TrackOptions::memories`].
     pub(crate) fn setup(&self) -> Result<Setup, IdentError> {
         let method = &self.method;
         Ok(Setup {

@@ -7,7 +7,7 @@ pub struct Counts {
     pub samples: u64,
     /// Number of samples with a fault in e or u, at which the estimate stayed constant.
     pub skipped: u64,
-    /// Number of samples that the guard held back, or during which it kept the estimate constant; those with a fault
+    /// Number of samples that the guard held back, or during which it kept the estimate constant; samples with a fault
     /// in e or u are not included.
     pub held: u64,
     /// Number of restarts by the guard.

@@ -22,11 +22,11 @@ pub fn track(record: &Record, options: &TrackOptions, every: usize) -> Result<Tr
     track_from(record, options, every, None)
 }
 
-/// As [`track`], with a given fit of the start span by [`TrackOptions::start_estimator`], so that several methods with
-/// the same start need this fit only once.
+/// As [`track`], with a given fit of the start span by [`TrackOptions::start_estimator`], so several methods with the
+/// same start need this fit only once.
 ///
 /// # Errors
-/// As [`track`].
+/// Same as [`track`].
 pub fn track_from(
     record: &Record,
     options: &TrackOptions,
@@ -78,7 +78,7 @@ pub(crate) fn track_with(
     let (input, output) = (record.input(), record.output());
     let p = options.coefficients();
     let mut covariance = vec![0.0; p * p];
-    // The limit is half a sample earlier, so that rounding of the times has no effect.
+    // The limit is half a sample earlier, so rounding of the times has no effect.
     let first_update = from_s - sample_time.s() / 2.0;
     for k in 0..record.len() {
         let t = record.time_s(k);

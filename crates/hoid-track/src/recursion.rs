@@ -70,12 +70,12 @@ pub trait Recursion: State + Send + Sync {
     fn failures(&self) -> Option<(usize, String)> {
         None
     }
-    /// Returns the response at a frequency in rad/s, if it differs from that of the polynomials.
+    /// Returns the response at a frequency in rad/s, if it differs from the response of the polynomials.
     fn response(&self, _omega_rad_s: f64) -> Option<Response> {
         None
     }
     /// Returns the real and imaginary part of the response at a frequency in rad/s, without covariance, if it differs
-    /// from that of the polynomials.
+    /// from the response of the polynomials.
     fn response_value(&self, _omega_rad_s: f64) -> Option<[f64; 2]> {
         None
     }

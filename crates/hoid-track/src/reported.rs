@@ -16,7 +16,7 @@ use crate::start::StartState;
 pub const OPERATOR: usize = 4;
 
 /// Coefficients `[b0, b1, d.., f1, f2]` with the Jacobian of b and f with respect to the parameters of the operator,
-/// and the covariance of d, which remains that of the start fit.
+/// and the covariance of d, which does not change after the start fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reported {
     sample_time_s: f64,

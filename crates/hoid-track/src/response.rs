@@ -55,7 +55,8 @@ impl Response {
         Estimate::with_variance(degrees * im.atan2(re), degrees * degrees * self.along([-im, re]))
     }
 
-    /// Returns the variance of the response along the direction `[a, b]`, a vector as long as H, divided by |H|^4.
+    /// Returns the variance of the response along the direction `[a, b]`, a vector with the magnitude of H, divided
+    /// by |H|^4.
     fn along(&self, [a, b]: [f64; 2]) -> f64 {
         let c = &self.covariance;
         let square = self.value[0] * self.value[0] + self.value[1] * self.value[1];
@@ -104,8 +105,8 @@ impl Response {
         over(times(b, [cos, sin]), times(a, f))
     }
 
-    /// Returns the response of polynomials with the coefficients theta and these orders; `covariance` is that of theta,
-    /// by rows.
+    /// Returns the response of polynomials with the coefficients theta and these orders; `covariance` is the covariance
+    /// of theta by rows.
     pub(crate) fn of_polynomials(
         orders: &Orders,
         theta: &[f64],

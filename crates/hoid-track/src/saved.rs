@@ -1,4 +1,4 @@
-//! The state of a tracker as numbers, so that it can continue elsewhere: in another process, or after a restart.
+//! The state of a tracker as numbers, so it can continue elsewhere: in another process, or after a restart.
 //!
 //! The numbers are the start, from which gains and bounds are computed, all numbers that change ([`hoid_core::state`]),
 //! and a seal that detects damage. A restored tracker continues with identical results, but does not contain the start
@@ -132,7 +132,7 @@ mod tests {
     use super::*;
     use crate::{Method, TrackOptions};
 
-    /// Changes each number in turn and seals the numbers again: no index, length or difference of counters ends the
+    /// Changes each number in turn and seals the numbers again: no index, length or difference of counters may end the
     /// process.
     fn each_number_may_be_anything(method: Method, with: &[(&str, &str)], saved_at: usize, to: usize) {
         let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
@@ -140,7 +140,7 @@ mod tests {
         let span = record.span(0.0, 20.0).unwrap();
         let options = TrackOptions::default_for(method, 29).with(with).unwrap();
         let mut tracker = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();
-        // A gap in the samples, within which the tracker is saved.
+        // The tracker is saved within a gap in the samples.
         let step = |tracker: &mut Tracker, k: usize| {
             let gap = (2300..2360).contains(&k);
             tracker.step(record.input()[k], if gap { f64::NAN } else { record.output()[k] })

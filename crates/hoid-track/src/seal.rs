@@ -44,7 +44,7 @@ mod tests {
 
     #[test]
     fn the_seal_is_fnv_1a() {
-        // The published checksum of no bytes is the offset basis; that of eight zero bytes follows by hand.
+        // The published checksum of no bytes is the offset basis; the checksum of eight zero bytes follows by hand.
         assert_eq!(sealed(Vec::new()), [(BASIS >> 11) as f64]);
         let eight = (0..8).fold(BASIS, |sum, _| sum.wrapping_mul(PRIME));
         assert_eq!(sealed(vec![0.0])[1], (eight >> 11) as f64);

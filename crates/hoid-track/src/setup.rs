@@ -44,7 +44,7 @@ pub struct Setup {
     pub forgetting: ForgettingRule,
     /// P at the start as a multiple of the unit matrix; `None` for the covariance of the start fit.
     pub covariance: Option<f64>,
-    /// Limit of P where nothing excites a parameter; `None` if the limit follows from the start.
+    /// Limit of P for unexcited parameters; `None` if the limit follows from the start.
     pub windup_guard: Option<WindupGuard>,
     /// Limit on an innovation in the update, in standard deviations of the innovation.
     pub limit: f64,

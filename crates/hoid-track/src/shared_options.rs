@@ -10,7 +10,7 @@ use hoid_ident::{
 
 use crate::{forgetting::ForgettingRule, memory::MemoryOptions};
 
-/// Limit on the growth of the variances of P where nothing excites a parameter.
+/// Limit on the growth of the variances of P for unexcited parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum WindupGuard {
     /// No limit: equations 5.26 and 31 of the thesis unchanged.

@@ -40,7 +40,7 @@ pub struct LiveOutcome {
     pub outcome: Option<Outcome>,
     /// Options of the tracker and result of the search for orders, if the warm-up ended at this sample.
     pub started: Option<(TrackOptions, Option<Choice>)>,
-    /// True if no sample of the decimated stream was completed, so that the recursion did not advance.
+    /// True if no sample of the decimated stream was completed, so the recursion did not advance.
     pub between: bool,
 }
 

@@ -301,7 +301,7 @@ struct FittedStart {
     covariance: Option<Vec<f64>>,
     fit: Option<Fit>,
     variance: f64,
-    /// Number of residuals without the number of estimated values.
+    /// Number of residuals minus the number of estimated values.
     residuals: usize,
 }
 
@@ -484,7 +484,8 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<FittedStart, IdentErr
         }
         for i in 0..p {
             // Parameters that the grey box did not have, or kept fixed, are unknown: the standard deviation of a
-            // coefficient is set to at least 1, that of a physical parameter to at least its own size.
+            // coefficient is set to at least 1, and the standard deviation of a physical parameter to at least the
+            // magnitude of the parameter.
             if covariance[i * p + i] == 0.0 {
                 let size = if i < operator { eta[i] * eta[i] } else { 1.0 };
                 covariance[i * p + i] = size.max(variance);

@@ -20,7 +20,7 @@
 //!   covariance and innovation variance keep their values of that time for the whole span.
 //! - The estimate is updated again once both signals move and the filters have settled ([`crate::guard`]).
 //!
-//! Without stationary spans, the results are identical to those without this watch. At sample times below 40 us, there
+//! Without stationary spans, the results are the same with and without this watch. At sample times below 40 us, there
 //! is no watch.
 
 use hoid_core::state::{State, visit_all};
@@ -156,8 +156,8 @@ impl Channel {
     }
 
     /// Returns the number of samples of the current stationary span that must be undone, and true if the signal jumped
-    /// at its start, so that the sample before it must also be undone. `least` is the shortest span without
-    /// information; if the last value was repeated for three quarters of this length, only its repetitions are counted.
+    /// at its start, so the sample before it must also be undone. `least` is the shortest span without information; if
+    /// the last value was repeated for three quarters of this length, only its repetitions are counted.
     fn samples_to_undo(&self, least: u64) -> (u64, bool) {
         if self.same.saturating_mul(4) >= least.saturating_mul(3) {
             (self.same, self.jumped[1])

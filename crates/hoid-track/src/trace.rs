@@ -30,11 +30,11 @@ pub struct Trace {
     pub(crate) operator: Vec<OperatorEstimate>,
     /// Delay of each row, if it is tracked.
     pub(crate) delays: Vec<Delay>,
-    /// Responses of each row at the frequencies of the options, for methods whose response is not that of the
-    /// polynomials.
+    /// Responses of each row at the frequencies of the options, for methods whose response differs from the response of
+    /// the polynomials.
     pub(crate) responses: Vec<f64>,
-    /// Crossover and margin of each row, for methods whose response is not that of the polynomials, and the reason in
-    /// rows without a crossover.
+    /// Crossover and margin of each row, for methods whose response differs from the response of the polynomials, and
+    /// the reason in rows without a crossover.
     pub(crate) open_loops: Vec<f64>,
     pub(crate) no_crossover: Vec<Option<NoCrossover>>,
     pub(crate) innovation: Vec<f64>,
@@ -177,7 +177,7 @@ impl Trace {
         whole.iter().all(|c| c.is_finite()).then_some(whole)
     }
 
-    /// True for a row before the first estimate of a method that needs no start fit; such a row holds no estimate.
+    /// True for a row before the first estimate of a method that needs no start fit; such a row contains no estimate.
     pub fn is_before_the_first(&self, row: usize) -> bool {
         self.options.method.starts_itself() && self.covariance(row).is_none()
     }
@@ -391,8 +391,8 @@ impl Trace {
     /// Replaces each row by the mean of the last `rows` rows: theta, operator, delay, responses, crossover and margin,
     /// with their variances and covariances.
     ///
-    /// The mean lags by `(rows - 1)/2` rows. Estimates of neighbouring samples have nearly the same error, so that the
-    /// mean of the covariances is close to, and never below, the covariance of the mean.
+    /// The mean lags by `(rows - 1)/2` rows. Estimates of neighbouring samples have nearly the same error, so the mean
+    /// of the covariances is close to, and never below, the covariance of the mean.
     #[must_use]
     pub fn moving_average(mut self, rows: usize) -> Self {
         let p = self.width();
@@ -506,7 +506,7 @@ fn causal_mean(values: &[f64], width: usize, rows: usize) -> Vec<f64> {
     for column in 0..width {
         let (mut sum, mut unknown) = (0.0, 0usize);
         for t in 0..n {
-            // The sum restarts with each window, so that rounding errors do not accumulate.
+            // The sum restarts with each window, so rounding errors do not accumulate.
             if t % rows == 0 {
                 let window = t.saturating_sub(rows - 1)..t;
                 let known = window.map(|s| values[s * width + column]).filter(|v| !v.is_nan());

@@ -96,8 +96,8 @@ impl Tracker {
     }
 
     /// Takes a sample. The number of operations is bounded, regardless of the values and of the length of the run. On a
-    /// PC at 100 samples per second, `adaptive` takes 33 us in the median and 86 us at the 99 % quantile, without
-    /// replays (`replay` of 0) 0.5 and 22 us, and `rpem` 0.1 and 0.2 us.
+    /// PC at 100 samples per second, `adaptive` takes 33 us in the median and 86 us at the 99 % quantile; without
+    /// replays (`replay` of 0) it takes 0.5 and 22 us, and `rpem` takes 0.1 and 0.2 us.
     pub fn step(&mut self, e: f64, u: f64) -> Outcome {
         self.update(Sample { e, u, reference: None }, true)
     }

@@ -11,8 +11,8 @@
 //!
 //! and from a grid of `P_0 = p I` the p is chosen whose trace explains most of the second run. An estimate that follows
 //! the remnant of the first run explains less of the second run, which has another remnant; an estimate that changes
-//! too slowly explains less after a change of the person. The runs are aligned at their first samples, so that changes
-//! of the task must occur at the same time in both runs.
+//! too slowly explains less after a change of the person. The runs are aligned at their first samples, so changes of
+//! the task must occur at the same time in both runs.
 //!
 //! [`track_validated`] follows the proposal literally: P is updated during the run. At regular times the current model
 //! and the model of one interval earlier are both simulated over the last few seconds of the second run; if the current
@@ -22,7 +22,7 @@
 //!
 //! so that the estimate changes less until this reduction of P has been forgotten; if the current model explains more,
 //! P is left unchanged. The share of the second run that the remnant leaves unexplained is the same for both models, so
-//! that noise does not penalise a correct model.
+//! noise does not penalise a correct model.
 //!
 //! No mean is removed for the VAF. The first 2 s are excluded, since the simulation starts at rest and the person does
 //! not.

@@ -1,5 +1,5 @@
-//! Estimates of `adaptive` for virtual people in their first seconds: from the second second on, with valid error
-//! bands.
+//! Estimates of `adaptive` for virtual people in their first seconds: available from the second second on, with valid
+//! error bands.
 #![allow(clippy::unwrap_used)]
 
 use hoid_model::{Complex64, ContinuousTransferFunction, FamilyOperator, SampleTime};
@@ -15,7 +15,7 @@ fn held(operator: &FamilyOperator, omega: f64, ts: SampleTime) -> Complex64 {
     operator.response(omega) * Complex64::from_polar(half.sin() / half, -half)
 }
 
-/// Whether gain and phase lie within 1.96 standard errors of the truth.
+/// Numbers of estimates whose gain and phase are within 1.96 standard errors of the truth.
 struct Count {
     inside: f64,
     all: f64,
@@ -74,11 +74,11 @@ fn bands_hold_from_the_second_second_on() {
         shares(&loops),
         loops.each_ref().map(|c| c.all)
     );
-    // Of 270 each, some six of which go together: a standard error of 3 to 4 %.
+    // Shares of 270 values, about six of which are correlated with each other: a standard error of 3 to 4 %.
     for (share, at) in shares(&counts).into_iter().zip(AT_S) {
         assert!((0.85..=1.0).contains(&share), "{at} s: {share}");
     }
-    // Before 8 s few have a determined crossover.
+    // Before 8 s few estimates have a determined crossover.
     for (count, at) in loops.iter().zip(AT_S).skip(3) {
         assert!(count.all >= 30.0, "{at} s: {}", count.all);
         let share = count.inside / count.all;

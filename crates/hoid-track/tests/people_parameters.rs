@@ -1,4 +1,4 @@
-//! Parameters of virtual people by `adaptive`: within their errors, or reported as not determined.
+//! Parameters of virtual people estimated by `adaptive`: within their errors, or reported as undetermined.
 #![allow(clippy::unwrap_used)]
 
 use hoid_model::uncertainty::Estimate;
@@ -6,7 +6,7 @@ use hoid_sim::people::{Person, Plant, Population, RemnantKind, Task};
 use hoid_track::{Method, TrackOptions, Tracker};
 
 const PEOPLE: u64 = 45;
-/// In the first second of an estimate, during the trials from other starting points, and after them.
+/// Times in s: in the first second of an estimate, during the trials from other starting points, and after them.
 const AT_S: [f64; 3] = [2.0, 15.0, 30.0];
 
 #[test]

@@ -1,5 +1,5 @@
-//! The recursions of the thesis as available to users, compared with a separate implementation of its equations: P as
-//! a plain matrix, no code shared with the library.
+//! The recursions of the thesis as available to users, compared with a separate implementation of its equations, in
+//! which P is a plain matrix and no code is shared with the library.
 //!
 //! ```text
 //! RLS, eq. 25 and 5.26:  psi = [-u(t-1) -u(t-2) x(t) x(t-1)],  eps = u - psi' theta
@@ -9,7 +9,8 @@
 //! ```
 //!
 //! with x(t) = e(t - nk); a step after which F or D is not stable is halved; w and v are computed again with the new
-//! theta. Settings are those of the thesis: lambda = 1 - 1/256, P0 = 0.1 I, from the batch fit of [0, 30.72] s.
+//! theta. The settings are those of the thesis: lambda = 1 - 1/256 and P0 = 0.1 I, started from the batch fit of [0,
+//! 30.72] s.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -39,7 +40,7 @@ fn run(condition: Condition, order: usize, noise_level: f64, replication: u64) -
     Simulator::new(&scenario).unwrap().run(seed, false).unwrap()
 }
 
-/// Options with the settings of the thesis, and additional ones.
+/// Returns options with the settings of the thesis and additional settings.
 fn of_the_text(method: Method, besides: &[(&str, &str)]) -> TrackOptions {
     let rpem = method == Method::rpem();
     let options = TrackOptions {
@@ -55,7 +56,7 @@ fn of_the_text(method: Method, besides: &[(&str, &str)]) -> TrackOptions {
     options.with(own).unwrap().with(besides).unwrap()
 }
 
-/// P and its step.
+/// P as a plain matrix, with its update.
 struct Plain<const N: usize>([[f64; N]; N]);
 
 impl<const N: usize> Plain<N> {
@@ -105,7 +106,7 @@ fn is_stable(theta: &[f64; 5]) -> bool {
 fn rpem(record: &Record, start: &[f64]) -> Vec<Vec<f64>> {
     let mut theta = <[f64; 5]>::try_from(start).unwrap();
     let (mut p, u) = (Plain::new(), record.output());
-    // x, v, w and their versions filtered by D/F, of the last two samples.
+    // x, v, w, and their values filtered by D/F, at the last two samples.
     let (mut x_1, mut v_1, mut w, mut x_f, mut w_f) = (0.0, 0.0, [0.0; 2], [0.0; 2], [0.0; 2]);
     let step = |k: usize| {
         let x = delayed(record, k);
@@ -127,7 +128,7 @@ fn rpem(record: &Record, start: &[f64]) -> Vec<Vec<f64>> {
     (0..u.len()).map(step).collect()
 }
 
-/// Largest difference of a coefficient in any row.
+/// Returns the largest difference of a coefficient over all rows.
 fn difference(trace: &Trace, twin: &[Vec<f64>]) -> f64 {
     assert_eq!(trace.len(), twin.len());
     let of_row = |(k, row): (usize, &Vec<f64>)| {
@@ -137,7 +138,7 @@ fn difference(trace: &Trace, twin: &[Vec<f64>]) -> f64 {
     twin.iter().enumerate().map(of_row).fold(0.0, f64::max)
 }
 
-/// Largest difference between the recursion of the program and the equations of the thesis.
+/// Returns the largest difference between the recursion of the program and the equations of the thesis.
 fn from_equations(method: &Method, record: &Record, besides: &[(&str, &str)]) -> f64 {
     let trace = track(record, &of_the_text(method.clone(), besides), 1).unwrap();
     let start = trace.start().unwrap().model().theta();
@@ -171,12 +172,13 @@ fn by_the_settings_of_the_text_they_are_its_equations() {
         "with a guard of 1e4 P0 coefficients differ by {:.1e} (RLS), {:.1e} (RPEM)",
         with_a_guard[0], with_a_guard[1]
     );
-    // The test can fail: with a guard the recursions differ.
+    // Shows that the test can fail: with a guard the recursions differ.
     assert!(with_a_guard.iter().all(|most| *most > 1e-5), "{with_a_guard:?}");
 }
 
 /// Nothing is excited for an hour: P overflows and restarts, and all numbers stay finite. Least squares recovers. RPEM
-/// need not: with a P that has grown for minutes the first samples move it anywhere, which its guard prevents.
+/// need not recover: after P has grown for minutes, the first samples change the estimate arbitrarily, which the windup
+/// guard prevents.
 #[test]
 fn an_hour_of_silence_leaves_every_number_finite() {
     let run = run(Condition::C1, 1, 0.1, 1);
@@ -204,7 +206,7 @@ fn an_hour_of_silence_leaves_every_number_finite() {
         if method == Method::rpem() {
             continue;
         }
-        // After it the estimate is that of a run that starts there.
+        // Afterwards the estimate equals that of a run that starts at this time.
         let alone = track(&run, &of_the_text(method.clone(), &[]), loud).unwrap();
         let (last, first) = (trace.theta(trace.len() - 1), alone.theta(alone.len() - 1));
         for (a, b) in last.iter().zip(first) {
@@ -234,11 +236,11 @@ fn a_guard_that_is_none_is_refused_with_what_to_do() {
         found.contains("windup_guard") && found.contains("exponential"),
         "{found}"
     );
-    // Without a guard that is requested, the window is served.
+    // If no windup guard is requested, the window is accepted.
     assert!(of_the_text(Method::rls(), &[("forgetting", "window")]).check().is_ok());
 }
 
-/// A recursion other than that of the thesis keeps its guard: a start with the covariance of its fit, limited
+/// Settings other than those of the thesis keep the windup guard: a start with the covariance of the fit, limited
 /// innovations, and structures that the thesis does not have.
 #[test]
 fn other_settings_keep_their_guard() {

@@ -1,4 +1,4 @@
-//! Recursions with a further input: against the batch fit, through a change of one response, and refused options.
+//! Recursions with a further input: comparison with the batch fit, a change of one response, and refused options.
 #![allow(clippy::unwrap_used)]
 
 use hoid_ident::{
@@ -9,7 +9,7 @@ use hoid_ident::{
 use hoid_model::{Channel, Orders, Record, SampleTime, Structure};
 use hoid_track::{Method, Sample, StartAt, Trace, TrackOptions, TrackedInput, Tracker, track};
 
-/// Standard normal numbers.
+/// Standard normal random numbers.
 struct Noise(u64);
 
 impl Noise {
@@ -33,12 +33,13 @@ const NK: usize = 10;
 const NK_R: usize = 5;
 const SAMPLES: usize = 4000;
 
-/// Coefficient b0 of the response to r at a sample: it doubles in the middle of the record.
+/// Returns the coefficient b0 of the response to r at a sample; it doubles in the middle of the record.
 fn gain(k: usize, changes: bool) -> f64 {
     if changes && k >= SAMPLES / 2 { 0.06 } else { 0.03 }
 }
 
-/// A record of `u = (B/F) q^-10 e + (B_r/F) q^-5 r + n`, `n = eps/D`; e and r are sums of sines with random phases.
+/// Returns a record of `u = (B/F) q^-10 e + (B_r/F) q^-5 r + n`, `n = eps/D`, where e and r are sums of sines with
+/// random phases.
 fn record(seed: u64, level: f64, changes: bool) -> Record {
     let mut noise = Noise(seed);
     let mut sines = |lines: &[f64]| -> Vec<f64> {
@@ -91,7 +92,7 @@ fn orders(na: usize, nd: usize, nf: usize) -> Orders {
     }
 }
 
-/// Options of a Box-Jenkins model by the prediction-error method.
+/// Returns the options of a Box-Jenkins model for the prediction-error method.
 fn box_jenkins() -> TrackOptions {
     TrackOptions {
         further: input(1, 2, NK_R),
@@ -135,7 +136,7 @@ fn without_forgetting_rls_ends_at_the_batch_fit() {
         let [found, expected] = [found, *expected].map(|e| e.standard_error.unwrap());
         assert!((found / expected - 1.0).abs() < 0.01, "{name}: {found} {expected}");
     }
-    // The response to r is B/A of its own coefficients.
+    // The response to r is B_r/A with its own coefficients.
     let response = trace.further_response(last, 2.0).unwrap();
     let of_fit = &fit.frequency_response(1, &[2.0])[0];
     assert!((response.gain_db().value - of_fit.magnitude_db.value).abs() < 1e-4);
@@ -180,7 +181,7 @@ fn a_change_of_one_response_is_followed_in_that_response_alone() {
     for (name, z) in [("before", before), ("after", after)] {
         let rms = (z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64).sqrt();
         let inside = z.iter().filter(|z| z.abs() < 1.96).count() as f64 / z.len() as f64;
-        // 48 numbers: the standard error of the rms is .1, that of the share .03.
+        // 48 values: the standard error of the rms is .1, that of the share is .03.
         assert!(
             (0.6..1.35).contains(&rms) && inside > 0.85,
             "{name}: {rms:.2}, {inside:.2}"
@@ -203,7 +204,7 @@ fn db(b: &[f64], nk: usize) -> f64 {
     20.0 * (b_re.hypot(b_im) / (1.0 + f_re).hypot(f_im)).log10()
 }
 
-/// Gain of the response to r before the change, and of the response to e, at 2 rad/s.
+/// Gain in dB of the response to r before the change, and of the response to e, at 2 rad/s.
 fn level_db() -> f64 {
     db(&[0.03], NK_R)
 }
@@ -214,7 +215,7 @@ fn own_db() -> f64 {
 
 #[test]
 fn with_one_input_the_response_to_the_error_is_wrong() {
-    // A target that e follows: without it as an input the response to e takes over the response to r.
+    // A target that e follows: without the target as an input, the estimated response to e includes the response to r.
     let plain = record(3, 0.01, false);
     let r = plain.channel("r").unwrap().to_vec();
     let e: Vec<f64> = plain.input().iter().zip(&r).map(|(e, r)| 0.3 * e + r).collect();
@@ -261,7 +262,7 @@ fn samples_without_the_further_input_change_nothing() {
             _ => {}
         }
     }
-    // Without the samples the estimate stays as good.
+    // The samples without r do not degrade the estimate.
     let found = (tracker.parameter_names().into_iter().zip(tracker.parameters())).find(|(name, _)| name == "b0[r]");
     let found = found.unwrap().1;
     let away = (found.value - 0.03).abs() / found.standard_error.unwrap();

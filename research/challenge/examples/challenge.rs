@@ -1,10 +1,10 @@
 //! The challenge (`hoid_challenge`): tracking methods in cases that can refute them.
 //!
 //! `cargo xtask slow challenge [--cases NAME,...] [--methods NAME,...] [--seeds open|sealed] [--runs N] [--part I/N]
-//! [--out DIRECTORY] [--page FILE --measured TEXT] [--list]`: by default 4 runs of every case, all contestants, the
-//! open seeds, and lines of JSON in `challenge-results/`. Existing results are not computed again. A case is selected
-//! by its name, the start of its name (`none-`) or its theme. `--page` writes `research/notes/challenge.md`; `--list`
-//! only lists the cases.
+//! [--out DIRECTORY] [--page FILE --measured TEXT] [--list]`: by default 4 runs of every case, all entrants, the open
+//! seeds, and lines of JSON in `challenge-results/`. Existing results are not computed again. A case is selected by its
+//! name, the start of its name (`none-`) or its theme. `--page` writes `research/notes/challenge.md`; `--list` only
+//! lists the cases.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 use std::{path::PathBuf, process::ExitCode};

@@ -178,7 +178,7 @@ pub struct Case {
     pub spectrum: Spectrum,
     /// Time course of the remnant's strength.
     pub course: Course,
-    /// Standard deviation of the remnant, relative to that of u without remnant.
+    /// Standard deviation of the remnant, relative to the standard deviation of u without remnant.
     pub ratio: f64,
     /// Imperfection of the stick or the recorder.
     pub imperfection: Imperfection,
@@ -226,7 +226,7 @@ impl Case {
         times
     }
 
-    /// True if every change takes at most two seconds, so that the changes have definite times.
+    /// True if every change takes at most two seconds, so the changes have definite times.
     pub fn changes_at_once(&self) -> bool {
         self.operator_changes.iter().all(|shift| shift.takes_s <= 2.0)
     }

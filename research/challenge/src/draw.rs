@@ -1,9 +1,9 @@
 //! Seeds of a run, and the person who is drawn for it.
 //!
-//! Every run has a different person, so that no method can know the parameters. The parameters are uniformly
-//! distributed over the ranges of people (see [`hoid_sim::people`] for the sources), and the gain follows from a random
-//! crossover frequency. A person is drawn again if the loop is unstable or poorly damped (`|1/(1 + Y P)|` above 3.5)
-//! before, after or half-way through a change.
+//! Every run has a different person, so no method can know the parameters. The parameters are uniformly distributed
+//! over the ranges of people (see [`hoid_sim::people`] for the sources), and the gain follows from a random crossover
+//! frequency. A person is drawn again if the loop is unstable or poorly damped (`|1/(1 + Y P)|` above 3.5) before,
+//! after or half-way through a change.
 
 use std::{fmt, str::FromStr};
 
@@ -46,7 +46,7 @@ pub struct RunOf {
 }
 
 impl RunOf {
-    /// Returns a random stream of the run. The streams depend only on the name of the case, so that cases can be added.
+    /// Returns a random stream of the run. The streams depend only on the name of the case, so cases can be added.
     pub(super) fn stream(self, case: &Case, tag: u64) -> RunSeed {
         // FNV-1a hash of the name.
         let name = case.name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
@@ -172,7 +172,7 @@ fn drawn(case: &Case, ts: SampleTime, draw: &[f64]) -> Result<Option<Operator>, 
         states.push(before.times(shift.parameter, shift.factor.sqrt()));
         states.push(before.times(shift.parameter, shift.factor));
     }
-    // There are two holds, each of which adds half a sample of delay.
+    // There are two holds; each adds half a sample of delay.
     let late = if case.sampling == Sampling::Held { ts.s() } else { 0.0 };
     for state in states {
         let state = Operator {

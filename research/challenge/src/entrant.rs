@@ -15,7 +15,7 @@ pub struct Task {
     pub label: String,
     /// Span that may be used as a whole for a start fit, s. No estimate is requested before its end.
     pub start_s: (f64, f64),
-    /// Delay in samples including that of the hold; `None` if it is not given.
+    /// Delay in samples including the delay of the hold; `None` if it is not given.
     pub nk: Option<usize>,
     /// Frequencies at which the response is requested, rad/s.
     pub lines_rad_s: Vec<f64>,

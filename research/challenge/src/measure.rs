@@ -2,7 +2,7 @@
 //!
 //! The response is requested at seven lines from .5 to 6 rad/s, at +2, +4, +8, +13, +18 and +28 s after each change,
 //! once before the first change, and every 10 s if there is no change. The error is the mean of `|dH|/|H|` over the
-//! lines. A missing estimate has the error 1, which is that of a zero response; an estimate that is not finite has the
+//! lines. A missing estimate has the error 1, the error of a zero response; an estimate that is not finite has the
 //! largest error, 10. Coverage is counted separately for the real and the imaginary part at each line: a part is
 //! covered if the truth lies within 1.96 standard errors.
 

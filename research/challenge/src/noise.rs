@@ -243,8 +243,8 @@ mod tests {
         ] {
             let n = noise(spectrum, course, 150_000);
             let variance = n.iter().map(|x| x * x).sum::<f64>() / n.len() as f64;
-            // The drift of 5.5 s has 1500 s/11 s independent values: 10 % of the variance to 10 %;
-            // the intermittent part 375 on-off pairs.
+            // The drift of 5.5 s has 1500 s/11 s independent values, so its 10 % of the variance are accurate to 10 %;
+            // the intermittent part has 375 on-off pairs.
             assert!((variance - 1.0).abs() < 0.12, "{spectrum:?} {course:?} {variance}");
         }
     }
@@ -265,7 +265,7 @@ mod tests {
                 .map(|k| a.iter().enumerate().map(|(i, a)| a * n[k - i]).sum())
                 .collect();
             let power = w.iter().map(|x| x * x).sum::<f64>() / w.len() as f64;
-            // Standard error sqrt(2/n): .008.
+            // The standard error sqrt(2/n) is .008.
             assert!(
                 (power / variance - 1.0).abs() < 0.03,
                 "{spectrum:?}: {power} {variance}"

@@ -177,7 +177,7 @@ pub fn hold(omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
 pub(super) const MOST_STATES: usize = 6;
 
 /// A system without zeros, `x = v/(a_0 + a_1 s + ... + a_n s^n)`, whose states are x and its derivatives. Outputs are
-/// weighted sums of the states, so that a change of the gain acts at once.
+/// weighted sums of the states, so a change of the gain acts at once.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Canonical {
     /// The state: x, its first derivative, and so on.

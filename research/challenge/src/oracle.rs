@@ -1,11 +1,11 @@
 //! Bounds that follow from the available information and that no method can exceed.
 //!
 //! **Evidence of a change.** The logarithm of the likelihood ratio of the true model after a change against the true
-//! model before it, if the time of the change and the spectrum, density and time course of the remnant are known: `sum
-//! over k of log f(A n/s) - log f(A (n + delta)/s)`. Here n is the remnant, delta the response of the present operator
-//! minus that of the operator before the change to the same errors, and A the whitening filter. Above 12 a change is
-//! certain: a good test with one false alarm per hour finds it. The ratio is computed before stick and recorder, where
-//! the model is exact.
+//! model before it, if the time of the change and the spectrum, density and time course of the remnant are known:
+//! `sum over k of log f(A n/s) - log f(A (n + delta)/s)`. Here n is the remnant, delta the difference between the
+//! responses of the present operator and of the operator before the change to the same errors, and A the whitening
+//! filter. Above 12 a change is certain: a good test with one false alarm per hour finds it. The ratio is computed
+//! before stick and recorder, where the model is exact.
 //!
 //! **Batch fit with known changes.** A Box-Jenkins model with the true delay and a noise model of order 4 is fitted by
 //! the prediction-error method to all data since the last change. It uses every sample, and its errors are those that
@@ -130,8 +130,8 @@ mod tests {
         assert!(large > CERTAIN && small < CERTAIN && large > small, "{large} {small}");
     }
 
-    /// The mean of the logarithm is the divergence, half the power of the whitened difference over
-    /// the variance; over runs it scatters by the root of twice that.
+    /// The mean of the log ratio is the divergence: half the power of the whitened difference divided by the variance.
+    /// Its standard deviation over runs is the square root of twice the divergence.
     #[test]
     fn the_evidence_of_a_normal_remnant_is_half_the_power_of_the_difference() {
         let case = cases().into_iter().find(|case| case.name == "change-omega-30").unwrap();

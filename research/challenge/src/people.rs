@@ -2,11 +2,11 @@
 //!
 //! Trials of one person, each with 40 s after a ramp and sampled at 60 Hz, are joined. A trial on `1/s` joined to one
 //! on `1/(s(s+1))`, or vice versa, gives a change of the plant and hence of the operator at 40 s; two trials on the
-//! same plant give a seam without a change. The second trial has its own ramp as history ([`Seam`]), so that no filter
+//! same plant give a seam without a change. The second trial has its own ramp as history ([`Seam`]), so no filter
 //! jumps. Single trials contain no change. The true response is the average describing function of the person over
 //! their other trials on that plant, at the seven lowest lines of the disturbance: `sum U conj(D) / sum E conj(D)` over
 //! trials of two whole periods. The delay is not given. The control output of a row was read one sample before it was
-//! written, so that e(k) is aligned with u(k+1).
+//! written, so e(k) is aligned with u(k+1).
 //!
 //! The recordings are not part of the project.
 
@@ -32,7 +32,7 @@ const PERIOD_S: f64 = 20.0;
 /// Frequencies of the lines as multiples of 1/period.
 const MULTIPLES: [f64; 7] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0];
 const RATE_HZ: f64 = 60.0;
-/// Start span of joined trials, s; `SINGLE_START_S` is that of single trials.
+/// Start span of joined trials, s; `SINGLE_START_S` is the start span of single trials.
 const START_S: (f64, f64) = (5.0, 30.0);
 const SINGLE_START_S: (f64, f64) = (5.0, 20.0);
 
@@ -306,8 +306,8 @@ impl EvaluationRun {
 mod tests {
     use super::*;
 
-    /// A trial whose control is its error after a delay of one sample and a gain: the describing
-    /// function is that gain, the sample is the shift of the recorder.
+    /// The control of the trial is the error, delayed by one sample and multiplied by a gain: the describing function
+    /// is this gain, and the sample is the shift of the recorder.
     #[test]
     fn the_describing_function_of_a_gain_is_the_gain() {
         let n = 2702;

@@ -1,8 +1,8 @@
 //! Runs of the challenge on all cores, with results stored on disk.
 //!
 //! Each run of a case is a file with a line of JSON for each entrant. The file is written under a temporary name and
-//! then renamed. Existing results are not computed again, so that a challenge can be stopped, continued, extended by
-//! another entrant, or run in parts on several machines. The results do not depend on the number of threads.
+//! then renamed. Existing results are not computed again, so a challenge can be stopped, continued, extended by another
+//! entrant, or run in parts on several machines. The results do not depend on the number of threads.
 
 use std::path::{Path, PathBuf};
 
@@ -186,8 +186,8 @@ mod tests {
         }
     }
 
-    /// An existing run is read, not computed; the lines are the same in any order and with any
-    /// number of threads.
+    /// An existing run is read and not computed again; the lines are the same in any order and with any number of
+    /// threads.
     #[test]
     fn what_is_there_is_not_computed_again() {
         let directory = tempfile::tempdir().unwrap();
@@ -202,7 +202,7 @@ mod tests {
         std::fs::write(&path, text).unwrap();
         let again = challenge(&default, &|_| ()).unwrap();
         assert!(again[0].exposed_s > 100.0 && again[2..] == all[2..]);
-        // One thread, another directory.
+        // With one thread and another directory.
         let other = tempfile::tempdir().unwrap();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let single = pool.install(|| challenge(&options(other.path()), &|_| ())).unwrap();

@@ -74,7 +74,8 @@ impl Truth {
         }
     }
 
-    /// Returns the delay in samples of `q^-nk`, including that of the hold; `None` if it is not given to the methods.
+    /// Returns the delay in samples of `q^-nk`, including the delay of the hold; `None` if it is not given to the
+    /// methods.
     pub fn given_nk(&self) -> Option<usize> {
         let samples = self.first.tau_e_s / self.sample_time.s();
         match self.case.delay {
@@ -214,7 +215,7 @@ fn of_person(case: &Case, run: RunOf, operator: Operator, sample_time: SampleTim
     for k in 0..total {
         let t = time(k);
         if changes.contains(&k) {
-            // The parameters are those of the previous sample; this sample is the first at which they may differ.
+            // The parameters are still those of the previous sample; this sample is the first at which they may differ.
             shadows.push((truth.operator(t - ts), world.operator));
             hidden.before.push((k, Vec::new()));
         }
@@ -344,8 +345,8 @@ mod tests {
         number: 0,
     };
 
-    /// U/E at the lines of the excitation over whole periods of 20 s, without a remnant, equals the
-    /// true response: held and continuous, a whole delay and a fractional one.
+    /// Without a remnant, U/E at the lines of the excitation over whole periods of 20 s equals the true response, for
+    /// held and continuous errors and for whole and fractional delays.
     #[test]
     fn the_loop_has_the_response_that_is_called_true() {
         for (name, within) in [("none-lag-1", 1e-3), ("delay-half-60", 1e-3), ("continuous-60", 4e-3)] {
@@ -357,7 +358,7 @@ mod tests {
             };
             let run = simulate(&quiet, RUN).unwrap();
             let per_second = quiet.rate_hz as usize;
-            // Late enough for the initial transient to have decayed.
+            // The span starts after the initial transient has decayed.
             let span = 60 * per_second..80 * per_second;
             for multiple in [2.0, 3.0, 5.0, 11.0, 19.0] {
                 let omega = multiple * TAU / 20.0;

@@ -253,7 +253,7 @@ fn failures(lines: &[Line]) -> String {
     text
 }
 
-/// The two most frequent findings.
+/// Returns the two most frequent findings.
 fn commonest<'a>(lines: impl Iterator<Item = &'a Line> + Clone) -> String {
     let mut counts: Vec<(&str, usize)> = Vec::new();
     for kind in in_order(lines.clone().flat_map(|line| &line.findings).map(String::as_str)) {
@@ -331,7 +331,7 @@ fn share(of: usize, all: usize) -> String {
     }
 }
 
-/// The median; `None` if there are no values.
+/// Returns the median; `None` if there are no values.
 fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let n = values.len();

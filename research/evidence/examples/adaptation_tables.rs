@@ -87,10 +87,10 @@ impl Tables {
         rows.iter().map(|row| row.statistics.median).collect()
     }
 
-    /// Ratio of median errors to the better of RLS and RPEM, cell by cell.
+    /// Returns the ratios of median errors to those of the better of RLS and RPEM, cell by cell.
     fn relative(&self, quantity: &str, conditions: &[&str], name: &str) -> Vec<f64> {
         let of = |name: &str| self.medians(quantity, "all", conditions, name);
-        // A method without a single convertible estimate is NaN, which min ignores.
+        // A method without any convertible estimate is NaN, which min ignores.
         let better: Vec<f64> = of("RLS").iter().zip(of("RPEM")).map(|(a, b)| a.min(b)).collect();
         of(name)
             .iter()
@@ -105,7 +105,7 @@ impl Tables {
             let cell = |p: &&str| {
                 let all = self.relative(&format!("rms_{p}"), conditions, name);
                 let worst = all.iter().copied().fold(f64::NAN, f64::max);
-                // Rounding of a ratio of equal numbers.
+                // Tolerance for the rounding error of a ratio of equal numbers.
                 let above = all.iter().filter(|r| **r > 1.0 + 1e-9).count();
                 format!("{} ({}; {above})", short(median(&all)), short(worst))
             };
@@ -125,8 +125,8 @@ impl Tables {
                     let rows = self.rows(&format!("{what}_{p}"), "all", &CHANGING, name);
                     let bias: Vec<f64> = rows.iter().map(|row| row.statistics.median.abs()).collect();
                     let spread = |row: &&SummaryRow| {
-                        // The standard deviation of a normal sample; a few diverged runs do not
-                        // affect it.
+                        // Standard deviation of a normal sample, from its quartiles; a few diverged runs do not affect
+                        // it.
                         (row.statistics.upper_quartile - row.statistics.lower_quartile) / 1.349
                     };
                     let spread: Vec<f64> = rows.iter().map(spread).collect();
@@ -190,7 +190,7 @@ impl Tables {
         }
     }
 
-    /// Declared changes of a method: false alarms, hours, found in %, median lag in s.
+    /// Returns the declared changes of a method: false alarms, hours, detected changes in %, median delay in s.
     fn declared(&self, name: &str, scenario: &str, conditions: &[&str]) -> [f64; 4] {
         let all = |quantity: &str| -> Vec<f64> {
             let of = |condition: &&str| {
@@ -226,7 +226,7 @@ impl Tables {
         println!();
     }
 
-    /// Errors of all methods in other cases, and the declared changes there.
+    /// Prints the errors of all methods in other cases, and the changes declared there.
     fn elsewhere(&self, cases: &[(&str, &str)], quantities: &[&str], telling: &[&str]) {
         let titles: Vec<&str> = cases.iter().map(|(_, title)| *title).collect();
         println!(
@@ -268,7 +268,7 @@ impl Tables {
         println!();
     }
 
-    /// Errors of every cell of C1 to C6.
+    /// Prints the errors of every cell of C1 to C6.
     fn cells(&self) {
         println!("RMS relative error in %, median run: K_e / T_L / K_ė / ω_nm / ζ_nm.\n");
         header("cell", &SHOWN);
@@ -288,7 +288,7 @@ impl Tables {
         println!();
     }
 
-    /// Cells in which multiple-model is worse than the better of RLS and RPEM.
+    /// Prints the cells in which multiple-model is worse than the better of RLS and RPEM.
     fn above_one(&self) {
         let mut cells = Vec::new();
         for (p, label) in OPERATOR.iter().zip(LABELS) {
@@ -325,7 +325,7 @@ fn line(name: &str, cells: impl Iterator<Item = String>) {
     println!("| {name} | {} |", cells.collect::<Vec<_>>().join(" | "));
 }
 
-/// Two decimals below ten, none above a hundred.
+/// Formats a number with two decimals below ten and none above a hundred.
 fn short(value: f64) -> String {
     match value.abs() {
         v if v > 999.0 => ">999".to_owned(),

@@ -1,11 +1,11 @@
 //! The default tracker compared with earlier methods in the conditions of the thesis: errors, coverage and changes of
-//! each cell, and the ratio of the errors to those of the best of the others.
+//! each cell, and the ratio of its errors to those of the best other method.
 //!
 //! `cargo run --release -p hoid-evidence --example conditions_evidence -- [RUNS] [M,..] [LEVEL,..] [METHOD,..] [CONDITION,..]`
 //!
 //! Methods: `adaptive` gets no prior information; `multiple-model`, `rls` and `rpem` are given the delay and start from
-//! a fit of the first 30.72 s (RLS and RPEM with the settings of the text). Their first rows are therefore not causal:
-//! the ratios are of the rows from then on, and those from 10 s on are given as well.
+//! a fit of the first 30.72 s (RLS and RPEM with the settings of the thesis). Their first rows are therefore not
+//! causal: the ratios use the rows from 30.72 s on, and ratios from 10 s on are given as well.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid_evidence::task::{CHANGE_S, START_S, median, on_all_cores, scenario};
@@ -20,7 +20,7 @@ use hoid_track::{Sample, TrackOptions, Tracker};
 /// A seed that was not used for tuning.
 const SEED: u64 = 46_000;
 const COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
-/// Spans of the coverage: before the change, within 5 s of it, and after, s.
+/// Spans of the coverage, s: before the change, within 5 s after it, and later.
 const SPANS: [(f64, f64); 3] = [(20.0, CHANGE_S), (CHANGE_S, CHANGE_S + 5.0), (CHANGE_S + 5.0, 82.0)];
 
 struct Cell {
@@ -35,7 +35,7 @@ impl Cell {
         !matches!(self.condition, Condition::C1 | Condition::C2)
     }
 
-    /// Start of the change: 1.8 % of a sigmoid are completed 4/G before its middle.
+    /// Returns the start of the change: 1.8 % of a sigmoid are completed 4/G before its middle.
     fn begins_s(&self) -> f64 {
         match self.condition {
             Condition::C3 | Condition::C5 => CHANGE_S - 8.0,
@@ -45,8 +45,8 @@ impl Cell {
 }
 
 /// Result of a run of a method: RMS relative errors from 30.72 s and from 10 s on in percent, coverage of 1.96 standard
-/// errors in each span, false alarms, and the detection delay relative to the middle of the change of the first alarm
-/// between its start and 10 s after its middle.
+/// errors in each span, false alarms, and the detection delay, from the middle of the change to the first alarm between
+/// its start and 10 s after its middle.
 struct RunResult {
     errors: [[f64; 5]; 2],
     covered: [[f64; 5]; 3],

@@ -1,9 +1,9 @@
 //! False alarm rate and power of the test of constancy.
 //!
-//! Clean runs of C1 and C2 (Box-Jenkins and grey box) and of virtual people of every kind of remnant and
-//! controlled element (their true form, one to three runs), `--runs N` of each (default 10), then the
-//! same with a delay that jumps by 1, 5 and 20 samples at 6, 50 and 90 % of a run, and with another
-//! operator in the last third.
+//! The clean runs are runs of C1 and C2 (Box-Jenkins and grey box) and of virtual people with every kind of remnant and
+//! controlled element (in their true form, one to three runs), `--runs N` of each (default 10). The same runs follow
+//! with a delay that jumps by 1, 5 and 20 samples at 6, 50 and 90 % of a run, and with another operator in the last
+//! third.
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 
 use std::{collections::BTreeMap, env};
@@ -31,7 +31,7 @@ fn with_output(record: &Record, output: Vec<f64>) -> Record {
     Record::new(record.sample_time(), e, Channel::new("u", "", output)).unwrap()
 }
 
-/// Replaces the last third by that of another run.
+/// Replaces the last third of a record by the last third of another run.
 fn joined(record: &Record, other: &Record) -> Record {
     let from = 2 * record.len() / 3;
     let of = |a: &[f64], b: &[f64]| [&a[..from], &b[from..]].concat();
@@ -44,7 +44,7 @@ fn bare(record: &Record) -> Record {
     with_output(record, record.output().to_vec())
 }
 
-/// The model, the modification of the record, and whether it was reported as not constant.
+/// Model, modification of the record, and whether the record was reported as not constant.
 type Row = (String, String, Option<bool>);
 
 fn told(verdict: &Verdict) -> bool {

@@ -1,4 +1,4 @@
-//! The numbers of `research/notes/multiple-model-evidence.md` on delays that are tracked.
+//! The numbers of `research/notes/multiple-model-evidence.md` on tracked delays.
 //!
 //! `cargo run --release -p hoid-evidence --example delay_evidence -- [RUNS] [tune]`
 #![allow(clippy::unwrap_used, clippy::print_stdout)]

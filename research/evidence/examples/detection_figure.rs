@@ -6,7 +6,7 @@
 
 use hoid_report::figures::{Curve, CurveGrid, CurvePanel, LineKind, Shade, curves};
 
-/// Position of a zero rate, 1/h: below one alarm in all hours of the table.
+/// Position of a rate of zero, 1/h: less than one alarm in all hours of the table.
 const NONE: f64 = 0.02;
 
 fn main() {
@@ -25,7 +25,7 @@ fn main() {
                 .filter(|cells| cells[1].starts_with(statistic))
                 .map(|cells| (number(cells[3]).max(NONE), number(cells[column])))
                 .collect();
-            // Of the thresholds without a false alarm the lowest is the best.
+            // Of the thresholds without a false alarm, the lowest is the best.
             points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
             let silent = points.iter().rposition(|p| p.0 <= NONE).unwrap_or(0);
             let points = &points[silent..];

@@ -2,8 +2,9 @@
 //!
 //! `cargo run --release -p hoid-evidence --example evidence -- coverage|efficiency|starts|delay [RUNS]`
 //!
-//! `cargo run --release -p hoid-evidence --example evidence -- speed [RUNS] [PYTHON]` compares the time of the
-//! Box-Jenkins fit with that of SciPy; PYTHON is an interpreter that has numpy and scipy, `python3` by default.
+//! `cargo run --release -p hoid-evidence --example evidence -- speed [RUNS] [PYTHON]` compares the times of the
+//! Box-Jenkins fit and of the same fit in SciPy; PYTHON is an interpreter that has numpy and scipy, `python3` by
+//! default.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../../../crates/hoid/tests/common/textbook.rs"]
@@ -148,7 +149,7 @@ fn closed_loop(runs: u64) {
         let theta = [held.b0, held.b1, -(-0.01_f64 / 0.06).exp(), held.f1, held.f2];
         let o = state.operator;
         let bj = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(NK));
-        // No step from the true parameters: the covariance is the Cramer-Rao bound of this record.
+        // No step is made from the true parameters: the covariance is the Cramer-Rao bound of this record.
         let mut at_truth = bj.clone();
         at_truth.start = Some(theta.to_vec());
         at_truth.search.max_iterations = 0;
@@ -204,7 +205,7 @@ fn closed_loop(runs: u64) {
     }
 }
 
-/// Table 6.1: the same minimum from each initial condition.
+/// Table 6.1: every initial condition leads to the same minimum.
 fn starts(runs: u64) {
     let gains = [0.075, 0.05, 0.1];
     let poles = [[-1.912, 0.924], [-1.812, 0.824], [-1.962, 0.974]];
@@ -276,8 +277,8 @@ fn delay(runs: u64) {
     }
 }
 
-/// The Box-Jenkins fit without a start compared with the same in SciPy, in one session on one
-/// thread; the smallest of the times of each.
+/// Compares the Box-Jenkins fit without a start with the same fit in SciPy, in one session on one thread; the smallest
+/// time of each counts.
 fn speed(runs: u64, python: &str) {
     let record = [run(&simulator(Condition::C1, 1, 0.1), 0, 0)];
     let estimator = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(NK));

@@ -1,5 +1,5 @@
-//! The experiment of section VI with virtual people: the tables of `research/notes/virtual-experiment.md`,
-//! and its figures into a directory.
+//! The experiment of section VI with virtual people: prints the tables of `research/notes/virtual-experiment.md` and
+//! writes its figures into a directory.
 //!
 //! `cargo run --release -p hoid-evidence --example experiment -- experiment > experiment.md`
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
@@ -29,7 +29,7 @@ fn main() {
         )
         .unwrap();
     }
-    // Tables of another plan, such as one with another remnant.
+    // Another plan can be given, such as one with another remnant.
     let text = std::env::args()
         .nth(2)
         .map(|path| std::fs::read_to_string(path).unwrap());
@@ -101,7 +101,7 @@ fn main() {
                     100.0 * (middle(run, method, i, AFTER_S) / truth(run).states[1].operator[i] - 1.0)
                 };
                 let all: Vec<f64> = own.iter().map(error).filter(|x| x.is_finite()).collect();
-                // Not -0.
+                // Avoids -0.
                 format!("{:.0}", median(&all).round() + 0.0)
             };
             let cells: Vec<String> = (0..5).map(cell).collect();
@@ -126,7 +126,7 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
     all.iter().sum::<f64>() / all.len() as f64
 }
 
-/// Values of an operator parameter within a span.
+/// Returns the values of an operator parameter within a span.
 fn within(run: &EvaluatedRun, method: usize, i: usize, (from_s, to_s): (f64, f64)) -> Vec<f64> {
     let course = &run.outcome.courses[method];
     let all = course.times_s.iter().zip(&course.states);
@@ -140,7 +140,7 @@ fn middle(run: &EvaluatedRun, method: usize, i: usize, span_s: (f64, f64)) -> f6
     mean(within(run, method, i, span_s).into_iter())
 }
 
-/// Standard deviation over time at the end, relative to the true value.
+/// Returns the standard deviation over time at the end, relative to the true value.
 fn fluctuation(run: &EvaluatedRun, method: usize, i: usize) -> f64 {
     let values = within(run, method, i, AFTER_S);
     let middle = mean(values.iter().copied());

@@ -1,8 +1,8 @@
 //! False alarms and detections of faults in recordings.
 //!
-//! Runs of the conditions of the thesis and of virtual people with every kind of remnant and controlled element,
-//! `--runs N` of each (default 25; 21 kinds). In each run without a fault one sample of e or of u is then moved by 3,
-//! 10 or 20 standard deviations, at a random place.
+//! The runs are those of the conditions of the thesis and of virtual people with every kind of remnant and controlled
+//! element, `--runs N` of each (default 25; 21 kinds). In each run without a fault, one sample of e or of u at a random
+//! place is then moved by 3, 10 or 20 standard deviations.
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 
 use std::env;

@@ -4,12 +4,12 @@
 //! cargo xtask slow inputs-coverage [PEOPLE] [SEED] [RUNS]
 //! ```
 //!
-//! People are virtual ([`hoid_sim::people`]) on an integrator, a lag with an integrator and two integrators, each with
-//! the form that people have there, which is not given to the fit. They see a target on every second prime and a
-//! quarter of a second of its future, and correct a disturbance on the others; their response to the target is `g s/K`
-//! or `g s (T s + 1)/K` for an element `K/s` or `K/(s (T s + 1))`, g .4 to 1, with a delay of -.1 to .2 s, in series
-//! with their neuromuscular system. Every second person sees the error only. A share of 95 % of n intervals has a
-//! standard error of `sqrt(.95 .05/n)`.
+//! Virtual people ([`hoid_sim::people`]) control an integrator, an integrator with a lag, or two integrators, each with
+//! the form that people use with this element; the form is not given to the fit. They see a target at every second
+//! prime, with a preview of a quarter of a second, and correct a disturbance at the other primes. Their response to the
+//! target is `g s/K` or `g s (T s + 1)/K` for an element `K/s` or `K/(s (T s + 1))`, with g from .4 to 1 and a delay of
+//! -.1 to .2 s, in series with their neuromuscular system. Every second person sees only the error. A share of 95 % of
+//! n intervals has a standard error of `sqrt(.95 .05/n)`.
 
 #![allow(clippy::print_stdout)]
 
@@ -28,7 +28,7 @@ use hoid_sim::{
 
 const PREVIEW_S: f64 = 0.25;
 
-/// Number of intervals that cover the truth, of determined ones, and of all.
+/// Number of intervals that cover the truth, number of determined intervals, and number of all intervals.
 #[derive(Default)]
 struct Held {
     held: usize,
@@ -78,7 +78,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             Plant::Integrator => Form::Derivative,
             _ => Form::DerivativeLead,
         };
-        // Of K/(s + a): a/K the gain of its inverse, 1/a the lead; of two integrators an acceleration with a small rate.
+        // The inverse of K/(s + a) has the gain a/K and the lead 1/a; for two integrators it is an acceleration with a
+        // small rate.
         let rate = element.den().get(1).copied().unwrap_or(0.0).max(0.3);
         let (omega, zeta) = person.state.operator.neuromuscular().unwrap_or((11.0, 0.3));
         let muscles = [omega.ln(), zeta.ln()];

@@ -5,12 +5,12 @@
 //! cargo xtask slow little-noise [PEOPLE] [SEED]
 //! ```
 //!
-//! Each is drawn with K from 0.1 to 10 (log-uniform), leads of 0.1 to 2 s, lags of 0.2 to 5 s, a neuromuscular system
-//! of 6 to 20 rad/s and damping 0.1 to 0.8, delays of 0.1 to 0.4 s; sampled at 20 to 200 Hz for 60 s. The error is a
-//! sum of twelve sinusoids of random phases from 0.2 to 15 rad/s and white noise, with a hold between its samples or,
-//! for every second person, linear. The noise of u is white, with a share of its power of 0, 1e-12, 1e-9, 1e-6 or 1e-3.
-//! Counted are correct forms and intersample behaviours, and people whose response from 0.5 to 10 rad/s deviates by
-//! more than 1e-6 of it and five standard errors.
+//! Each operator has a gain K from 0.1 to 10 (log-uniform), leads of 0.1 to 2 s, lags of 0.2 to 5 s, a neuromuscular
+//! system of 6 to 20 rad/s with damping 0.1 to 0.8, and a delay of 0.1 to 0.4 s; the records have 60 s and 20 to 200
+//! Hz. The error is a sum of twelve sinusoids of random phases from 0.2 to 15 rad/s and white noise; it is held between
+//! samples or, for every second person, linear. The noise of u is white, with a share of its power of 0, 1e-12, 1e-9,
+//! 1e-6 or 1e-3. The study counts correct forms and intersample behaviours, and people whose response from 0.5 to 10
+//! rad/s deviates by more than 1e-6 of the response and by more than five standard errors.
 
 #![allow(clippy::print_stdout)]
 
@@ -48,7 +48,7 @@ fn operator(form: Form, random: &mut Uniform) -> Result<FamilyOperator, Box<dyn 
     Ok(FamilyOperator::new(form, true, &coordinates)?)
 }
 
-/// The discrete model for a held or a linear error.
+/// Returns the discrete model for a held or a linear error.
 fn discrete(operator: &FamilyOperator, course: Intersample, ts: SampleTime) -> Result<HeldFamily, Box<dyn Error>> {
     if course == Intersample::Zoh {
         return Ok(operator.zoh(ts)?);
@@ -131,7 +131,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 continue;
             }
             forms += 1;
-            // If the intersample behaviour is unknown, the delay is that of a held error.
+            // If the intersample behaviour is unknown, the delay is defined as for a held error.
             let known = fit.course_is_known || course == Intersample::Zoh;
             let late = if known { 0.0 } else { 0.5 * ts.s() };
             let off = OMEGA_RAD_S.map(|omega| {

@@ -19,7 +19,7 @@ const COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
 const LEVELS: [f64; 4] = [0.01, 0.1, 0.2, 0.3];
 /// End of the search for a change, s.
 const FOUND_UNTIL_S: f64 = CHANGE_S + 5.0;
-/// Alarms of one event: further ones within this time are not counted, s.
+/// Further alarms within this time belong to the same event and are not counted, s.
 const ONE_EVENT_S: f64 = 4.0;
 
 fn main() {
@@ -39,7 +39,7 @@ fn simulator(condition: Condition, remnant_order: usize, level: f64) -> Simulato
     Simulator::new(&scenario(condition, remnant_order, level)).unwrap()
 }
 
-/// Seed 7000; the method was tuned on seed 9000, and examined on seed 5000.
+/// Returns a run with seed 7000; the method was tuned on seed 9000 and examined on seed 5000.
 fn run(simulator: &Simulator, condition: Condition, order: usize, level: usize, replication: u64) -> Record {
     let run_seed = RunSeed {
         seed: 7000,
@@ -57,7 +57,7 @@ struct RunResult {
     /// standard errors cover the truth.
     covered: [f64; 5],
     covered_through: [f64; 5],
-    /// Changes declared before and after t_M, and whether one was within 5 s after it.
+    /// Number of changes declared before and after t_M, and whether one was declared within 5 s after it.
     declared: [f64; 3],
     /// Time after the change at which K_e_dot has covered half, and nine tenths, of its step, s.
     settling_s: [f64; 2],
@@ -139,7 +139,7 @@ fn row(values: [f64; 5], digits: usize) -> String {
 /// A statistic over time, from the end of the start fit on.
 type Statistic = Vec<(f64, f64)>;
 
-/// First crossing after the change within 5 s, and the events outside these 5 s.
+/// Returns the first crossing within 5 s after the change, and the number of events outside these 5 s.
 fn alarms(statistic: &Statistic, threshold: f64, changes: bool) -> (Option<f64>, usize) {
     let (mut lag, mut events, mut quiet_from) = (None, 0, 0.0);
     for &(t, s) in statistic {
@@ -159,7 +159,7 @@ fn alarms(statistic: &Statistic, threshold: f64, changes: bool) -> (Option<f64>,
     (lag, events)
 }
 
-/// Detections in C4 and C6 against false alarms in C1 and C2, for the odds and for the baseline.
+/// Prints the detections in C4 and C6 against the false alarms in C1 and C2, for the odds and for the baseline.
 fn detection(runs: usize) {
     let statistics = |record: &Record| -> [Statistic; 2] {
         let span = record.span(0.0, START_S).unwrap();
@@ -240,8 +240,8 @@ fn detection(runs: usize) {
     }
 }
 
-/// Errors relative to the better of RLS and RPEM on the cells used for tuning: C3 and C5, m0 = 2
-/// and 3, seed 9000.
+/// Prints the errors relative to the better of RLS and RPEM on the cells used for tuning: C3 and C5, m0 = 2 and 3,
+/// seed 9000.
 fn tune(runs: usize) {
     let methods = [
         of_the_text(Method::rls()),
@@ -289,8 +289,8 @@ fn tune(runs: usize) {
     }
 }
 
-/// Cells for tuning `multiple-model`: C3 and C5, C1 and C2, and changes of the neuromuscular system
-/// other than those of the plan. Errors: geometric mean over the cells of the median run.
+/// Prints the results for the cells for tuning `multiple-model`: C3 and C5, C1 and C2, and changes of the neuromuscular
+/// system other than those of the plan. The errors are geometric means over the cells of the median run.
 fn set(runs: usize) {
     let options = options(hoid_survey::multiple_model());
     let neuromuscular = |omega: f64, zeta: f64| {
@@ -392,7 +392,7 @@ fn set(runs: usize) {
     }
 }
 
-/// Error and control of t in [5, 45) s.
+/// Reads error and control for t in [5, 45) s.
 fn recording(path: &str) -> [Vec<f64>; 2] {
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines();
@@ -410,8 +410,8 @@ fn recording(path: &str) -> [Vec<f64>; 2] {
     [e, control]
 }
 
-/// Changes declared around the junction of two recordings of a person: the first 30 s are the start
-/// span, up to 40 s nothing changes.
+/// Prints the changes declared around the junction of two recordings of a person: the first 30 s are the start span,
+/// and nothing changes until 40 s.
 fn joined(files: &[String]) {
     let (start_s, seam_s) = (30.0, 40.0);
     let sample_time = SampleTime::new(1.0 / 60.0).unwrap();
@@ -448,7 +448,7 @@ fn joined(files: &[String]) {
             tracker.update(sample, t >= start_s);
             let distance = baseline.step(e);
             if t >= start_s {
-                // As if the seam were at the change of the conditions.
+                // The times are shifted as if the seam were at the change of the conditions.
                 both[0].push((t + CHANGE_S - seam_s, tracker.change_odds().unwrap()));
                 both[1].push((t + CHANGE_S - seam_s, distance));
             }
@@ -480,7 +480,7 @@ fn joined(files: &[String]) {
     }
 }
 
-/// Time of a step with its estimate, the smallest mean of a given number of runs, ns.
+/// Prints the time of a step with its estimate, ns: the smallest mean of a given number of runs.
 fn cost(runs: usize) {
     let simulator = simulator(Condition::C4, 2, 0.1);
     let record = run(&simulator, Condition::C4, 2, 1, 0);

@@ -1,5 +1,5 @@
-//! Times of a fit and of a step in Rust, for comparison with those from Python
-//! (`python/benchmarks/overhead.py`): run one after the other on an idle machine.
+//! Times of a fit and of a step in Rust, for comparison with those from Python (`python/benchmarks/overhead.py`); run
+//! the two programs in turn on an idle machine.
 //!
 //! ```sh
 //! cargo run --release -p hoid-evidence --example overhead
@@ -54,7 +54,7 @@ fn main() {
     }
 }
 
-/// Median time of a given number of runs, s.
+/// Returns the median time of a given number of runs, s.
 fn median(runs: usize, mut work: impl FnMut()) -> f64 {
     let mut times: Vec<f64> = (0..runs)
         .map(|_| {

@@ -1,12 +1,13 @@
-//! Tracking of recorded people: two joined trials of a person, of one controlled element or of two.
+//! Tracking of recorded people: two joined trials of a person, with the same or with different controlled elements.
 //!
 //! `HOID_HUMAN_DATA=DIR cargo run --release -p hoid-evidence --example people_evidence -- [METHOD...]`
 //!
-//! Error: mean of `|dH|/|H|` over seven lines of the disturbance relative to the describing function of the person's
-//! ten trials of that element, `mean(U/D)/mean(E/D)`. The start span of methods that have one is 5 to 30 s. The jump of
-//! a seam is not made by a person: the filters process the ramp before the second trial there, without an update. A
-//! seam without a change is not a change, but alarms within 12 s of it are not counted as false alarms. Certain changes
-//! are those whose likelihood ratio for known operators before and after is above 12 within 8 s ([`oracle`]).
+//! The error is the mean of `|dH|/|H|` over seven lines of the disturbance, relative to the describing function of the
+//! person's ten trials with that element, `mean(U/D)/mean(E/D)`. The start span of methods that have one is 5 to 30 s.
+//! The jump at a seam does not come from the person: there the filters process the ramp before the second trial,
+//! without an update. At a seam without a change, alarms within 12 s are not counted as false alarms. A change is
+//! certain if the logarithm of the likelihood ratio for known operators before and after it exceeds 12 within 8 s
+//! ([`oracle`]).
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::{env, f64::consts::PI, fs, path::PathBuf};
@@ -30,7 +31,7 @@ const SETTLING_S: f64 = 12.0;
 const WITHIN_S: f64 = 8.0;
 const CERTAIN: f64 = 12.0;
 
-/// Error, output, disturbance of a trial, and error and output of its ramp, which precedes them.
+/// Error, output and disturbance of a trial, and error and output of the ramp before it.
 struct Trial {
     signals: [Vec<f64>; 3],
     ramp: [Vec<f64>; 2],
@@ -58,7 +59,7 @@ fn read(folder: &PathBuf, person: &str, element: &str) -> Vec<Trial> {
             all[1].push(u);
             all[2].push(d);
         }
-        // u of a row was read one sample before.
+        // u of a row was read one sample earlier.
         let later = [0, 1, 0];
         let of = |c: usize, from: usize, rows: usize| all[c][from + later[c]..from + later[c] + rows].to_vec();
         Trial {
@@ -119,7 +120,7 @@ struct Run {
     certain: bool,
 }
 
-/// True if the change from a trial of one cell to one of another is certain for known operators.
+/// True if the change from a trial of one cell to a trial of another is certain for known operators.
 fn is_certain(before: &[Trial], joined: usize, after: &[Trial], second: usize) -> bool {
     let rows = |trial: &Trial| {
         let of = |c: usize| [trial.ramp[c].as_slice(), &trial.signals[c]].concat();

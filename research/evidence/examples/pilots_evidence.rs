@@ -3,12 +3,12 @@
 //!
 //! `HOID_PILOT_DATA=DIR cargo run --release -p hoid-evidence --example pilots_evidence -- [RUNS|all] [METHOD...]`
 //!
-//! The folder has the recordings `A1_C1_pitch_1.parquet` (t, e, u at 100 Hz), and `reference_h.csv`: logarithm of the
-//! gain and phase of each cell at three frequencies before and after 50 s, by Fourier coefficients over its six runs.
-//! Error of H: `sqrt(mean((ln |H|/|H_ref|)^2 + (arg H/H_ref)^2))` over the frequencies. Everything gets no information.
-//! Conditions C6 to C8 change at 50 s, C3 to C5 change slowly about it; C1 and C2, and the axis that does not change,
-//! are constant. Alarms are counted there from 20 s on, and before the change. Bands: how often the 95 % interval of
-//! gain and of phase holds the reference.
+//! The folder contains the recordings `A1_C1_pitch_1.parquet` (t, e, u at 100 Hz) and `reference_h.csv`: the logarithm
+//! of the gain and the phase of each cell at three frequencies before and after 50 s, from Fourier coefficients over
+//! its six runs. The error of H is `sqrt(mean((ln |H|/|H_ref|)^2 + (arg H/H_ref)^2))` over the frequencies. No method
+//! gets prior information. Conditions C6 to C8 change at 50 s, and C3 to C5 change slowly about 50 s; C1 and C2, and
+//! the axis that does not change, are constant. Alarms are counted from 20 s on if nothing changes, and otherwise
+//! before the change. The bands are the shares of the 95 % intervals of gain and of phase that contain the reference.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::{collections::BTreeMap, env, f64::consts::PI, fs, path::Path};
@@ -23,7 +23,7 @@ const CHANGE_S: f64 = 50.0;
 const READ_S: [f64; 3] = [45.0, 60.0, 70.0];
 /// Times at which bands are evaluated, s after the change.
 const BANDS_S: [f64; 6] = [-10.0, -5.0, 5.0, 10.0, 20.0, 39.0];
-/// Alarms of one event, s.
+/// Time within which alarms belong to one event, s.
 const ONE_EVENT_S: f64 = 8.0;
 
 type Response = [[f64; 2]; 3];
@@ -46,7 +46,7 @@ fn turned(phase: f64) -> f64 {
     (phase + PI).rem_euclid(2.0 * PI) - PI
 }
 
-/// Logarithm of the gain and phase minus those of a reference.
+/// Returns the logarithm of the gain, and the phase, minus those of a reference.
 fn away(h: [f64; 2], reference: [f64; 2]) -> [f64; 2] {
     [
         h[0].hypot(h[1]).ln() - reference[0],
@@ -96,13 +96,13 @@ fn kind(condition: &str, axis: &str) -> Kind {
 struct Run {
     kind: Kind,
     errors: [f64; 3],
-    /// Share of the time nearer to the operator with H2, before 50 s and from 65 s on.
+    /// Share of the time in which the estimate is nearer to the operator with H2, before 50 s and from 65 s on.
     nearer: [f64; 2],
-    /// Number of bands of gain and of phase that cover.
+    /// Number of bands of gain and of phase that contain the reference.
     hold: [[f64; 2]; 6],
     alarms_s: Vec<f64>,
     changed_at_s: Vec<f64>,
-    /// K_e, T_L, K_e_dot and tau_e before and at the end.
+    /// K_e, T_L, K_e_dot and tau_e before the change and at the end.
     operator: [[f64; 4]; 2],
     restarts: u64,
     /// Events of the guard, by kind.
@@ -214,7 +214,7 @@ fn run(name: &str, folder: &Path, references: &References, method: &str) -> Run 
     run
 }
 
-/// Alarms within a span, those of one event counted once.
+/// Returns the number of alarms within a span; the alarms of one event are counted once.
 fn alarms(run: &Run, from: f64, to: f64) -> usize {
     let mut last = f64::MIN;
     let mut count = 0;
@@ -225,7 +225,7 @@ fn alarms(run: &Run, from: f64, to: f64) -> usize {
     count
 }
 
-/// Events of the guard, by kind, and the number of recordings with events.
+/// Formats the events of the guard, by kind, and the number of recordings with events.
 fn told(all: &[Run]) -> String {
     let mut kinds = BTreeMap::<&str, usize>::new();
     for (kind, count) in all.iter().flat_map(|r| &r.faults) {

@@ -1,16 +1,17 @@
-//! Errors that a design predicts for recorded people from one run, against the scatter of their other runs.
+//! Errors that a design predicts for recorded people from one run, compared with the scatter of their other runs.
 //!
 //! ```sh
 //! HOID_HUMAN_DATA=DIR HOID_PILOT_DATA=DIR cargo run --release -p hoid-evidence --example recorded_design
 //! ```
 //!
-//! A cell is a person with an element (and an axis). Each run is identified alone, with one form for each element. From
-//! one run come the person, the lines (Fourier coefficients of the recorded disturbance or target) and the remnant, its
-//! share of the variance of u at non-excited frequencies; `hoid design` predicts the errors of a run of this length. The scatter is the
-//! standard deviation of the estimates of the other runs, which contains the person's variation from run to run: it is
-//! also compared with `sqrt(error^2 + w^2)`, where w is 13 % of each quantity (of the margin, as if the gain varied). The
-//! gain of the people with a disturbance varied by that in the median, so that the pilots are the test of it.
-//! The standard deviation of n values is divided by its expectation, `c_4 = 1 - 1/(4 (n - 1))` of the true one.
+//! A cell is a person with an element (and an axis). Each run is identified alone, with one form for each element. One
+//! run gives the operator, the lines (Fourier coefficients of the recorded disturbance or target) and the remnant, its
+//! share of the variance of u at non-excited frequencies; from these `hoid design` predicts the errors of a run of this
+//! length. The scatter is the standard deviation of the estimates of the other runs, which contains the person's
+//! variation from run to run. It is therefore also compared with `sqrt(error^2 + w^2)`, where w is 13 % of each
+//! quantity (for the margin, as if the gain varied). This is the median variation of the gain of the people with a
+//! disturbance, so the pilots are an independent test. The standard deviation of n values is divided by its expectation
+//! relative to the true value, `c_4 = 1 - 1/(4 (n - 1))`.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::{env, fs, path::Path};
@@ -31,7 +32,7 @@ const QUANTITIES: [&str; 4] = ["crossover", "phase_margin", "K", "tau_e"];
 /// Variation from run to run, relative to the quantity.
 const RUN_TO_RUN: f64 = 0.13;
 
-/// A run with the lines of what excites it.
+/// A run with the lines of its excitation.
 struct Run {
     record: Record,
     lines: Vec<Sinusoid>,
@@ -49,7 +50,7 @@ struct Cell {
 }
 
 impl Run {
-    /// Of records over whole periods of these frequencies.
+    /// Builds the run from a record, over whole periods of these frequencies.
     fn new(record: Record, exciting: &[f64], omegas: &[f64]) -> Self {
         let ts = record.sample_time().s();
         let coefficient = |values: &[f64], omega: f64| -> Complex64 {
@@ -98,8 +99,8 @@ impl Cell {
         }
     }
 
-    /// Prints ratios of scatter to prediction, and returns those of all quantities, without and with the variation from run
-    /// to run.
+    /// Prints ratios of scatter to prediction, and returns the ratios of all quantities, without and with the variation
+    /// from run to run.
     fn ratios(&self) -> Vec<[f64; 2]> {
         let fitted: Vec<Option<FamilyOperator>> = self.runs.iter().map(|run| run.operator(self.form)).collect();
         let values: Vec<Option<[f64; 4]>> = fitted
@@ -146,7 +147,7 @@ impl Cell {
         self.task(operator.clone(), 0.2).state
     }
 
-    /// Standard deviations that the variation of gain and delay from run to run makes.
+    /// Returns the standard deviations caused by the variation of gain and delay from run to run.
     fn run_to_run(&self, operator: &FamilyOperator) -> [f64; 4] {
         let own = quantities(&self.state(operator));
         let mut coordinates = operator.coordinates().to_vec();
@@ -185,7 +186,7 @@ fn deviation(values: Vec<f64>) -> f64 {
     square.sqrt() / (1.0 - 0.25 / (n - 1.0))
 }
 
-/// People with a disturbance: two periods of 20 s at 60 Hz, u one row later.
+/// Returns the people with a disturbance: two periods of 20 s at 60 Hz, u one row later.
 fn people(folder: &Path) -> Vec<Cell> {
     const PRIMES: [f64; 11] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0];
     let mut cells = Vec::new();
@@ -227,7 +228,7 @@ fn people(folder: &Path) -> Vec<Cell> {
     cells
 }
 
-/// Pilots without a change: one period of 81.92 s of a target; the elements as they ran.
+/// Returns the pilots without a change: one period of 81.92 s of a target, with the elements as they ran.
 fn pilots_of(folder: &Path) -> Vec<Cell> {
     const LINES: [f64; 10] = [3.0, 5.0, 8.0, 13.0, 22.0, 34.0, 53.0, 86.0, 139.0, 229.0];
     let omegas = LINES.map(|m| m * std::f64::consts::TAU / 81.92);

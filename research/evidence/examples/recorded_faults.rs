@@ -1,12 +1,12 @@
-//! Events of the guard on recordings: on unmodified ones, and on ones with inserted faults.
+//! Events of the guard on unmodified recordings, and on recordings with inserted faults.
 //!
 //! `HOID_PILOT_DATA=DIR cargo run --release -p hoid-evidence --example recorded_faults --
 //! [RUNS|all] [METHOD]`
 //!
-//! The folder is that of the example `pilots_evidence`. For each recording as it is the first line counts what was
-//! reported, by kind. Each fault of the study `tracker-faults` that fits into it, and steps and ramps of a target as
-//! well, is put in at two places; *told* is an event between its first sample and 3 s after its last that the recording
-//! without it does not have there.
+//! The folder is the same as for the example `pilots_evidence`. For the unmodified recordings, the first line counts
+//! the reported events by kind. Each fault of the study `tracker-faults` that is short enough for a recording, and also
+//! steps and ramps of a target, is inserted at two places. The column *told* counts the faults with an event between
+//! their first sample and 3 s after their last sample that the unmodified recording does not have there.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../../../crates/hoid/tests/common/tracker_faults/faults.rs"]
@@ -49,7 +49,7 @@ fn told(recording: &Recording, e: &[f64], u: &[f64], method: &str) -> Vec<(usize
     all
 }
 
-/// The faults of the study, short enough for a recording, and others.
+/// Returns the faults of the study that are short enough for a recording, and others.
 fn all_faults() -> Vec<Fault> {
     let short = |fault: &Fault| match *fault {
         Fault::Scaled { factor, .. } => Fault::Scaled {

@@ -52,7 +52,7 @@ fn run(simulator: &Simulator, cell: u64, replication: u64) -> Record {
     simulator.run(run_seed, false).unwrap()
 }
 
-/// Results of the runs in their order, computed on all cores.
+/// Returns the results of the runs in order, computed on all cores.
 fn on_all_cores<T: Send>(runs: usize, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
     (0..runs).into_par_iter().map(|r| one(r as u64)).collect()
 }
@@ -65,14 +65,15 @@ fn options(method: Method) -> TrackOptions {
     }
 }
 
-/// RLS or RPEM with the settings of the text.
+/// Returns RLS or RPEM with the settings of the thesis.
 fn of_the_text(method: Method) -> TrackOptions {
     let mut settings = vec![("memory", "256"), ("covariance", "0.1"), ("limit", "inf")];
     settings.extend((method != Method::rls()).then_some(("stable", "noise")));
     options(method.clone()).with(&settings).unwrap()
 }
 
-/// RMS of the relative error over t in [10, 81.92], percent, and the share of rows that can be converted.
+/// Returns the RMS of the relative error over t in [10, 81.92] s in percent, and the share of rows that can be
+/// converted.
 fn relative_errors(trace: &Trace, record: &Record) -> ([f64; 5], f64) {
     let truth = COLUMNS.map(|c| record.channel(c).unwrap());
     let (mut sums, mut rows, mut all) = ([0.0; 5], 0, 0);
@@ -99,8 +100,8 @@ fn median(values: &mut [f64]) -> f64 {
     values[values.len() / 2]
 }
 
-/// Standard error of the median of sorted values, from the order statistics one binomial standard
-/// deviation to each side.
+/// Returns the standard error of the median of sorted values, from the order statistics one binomial standard deviation
+/// to each side.
 fn error_of_median(sorted: &[f64]) -> f64 {
     let n = sorted.len();
     let away = (0.5 * (n as f64).sqrt()).round() as usize;
@@ -108,8 +109,8 @@ fn error_of_median(sorted: &[f64]) -> f64 {
     (sorted[(middle + away).min(n - 1)] - sorted[middle.saturating_sub(away)]) / 2.0
 }
 
-/// Time after the change at 40.96 s at which the median trace has covered 90 % of the step from
-/// .036 to .084 s.
+/// Returns the time after the change at 40.96 s at which the median trace has covered 90 % of the step from .036 to
+/// .084 s.
 fn settling_time_s(traces: &[&[f64]]) -> f64 {
     for k in 4096..traces[0].len() {
         let mut values: Vec<f64> = traces.iter().map(|t| t[k]).filter(|v| v.is_finite()).collect();
@@ -133,7 +134,7 @@ fn table(runs: usize) {
         (4, 0.1),
         (4, 0.2),
     ];
-    // Behaviour of the order of the filters of the gradient.
+    // Effect of the order of the filters of the gradient.
     let cascade = of_the_text(Method::rpem()).with(&[("regressor", "cascade")]).unwrap();
     let methods: [(&str, TrackOptions); 5] = [
         ("RLS, text", of_the_text(Method::rls())),
@@ -206,7 +207,7 @@ fn divergence(runs: usize) {
     println!("of {total} runs diverged: {diverged:?}");
 }
 
-/// Alternating signals: the loop, silence, constants, saturation.
+/// Returns alternating signals: the loop, silence, constants, saturation.
 fn alternating(k: usize, record: &Record) -> (f64, f64) {
     let (e, u) = (record.input()[k % record.len()], record.output()[k % record.len()]);
     match (k / 20_000) % 5 {

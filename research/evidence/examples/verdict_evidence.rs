@@ -3,15 +3,16 @@
 //! `cargo run --release -p hoid-evidence --example verdict_evidence -- [--runs N] [--seed S] [--method M] [--element]
 //! [--kinds]`
 //!
-//! Operators with a lead on `1/s^2` and `1/(s(s+1))`, gain-like ones on `1/s`, lags on a gain, 82 s at 100 Hz, with
-//! remnants of 5 to 30 % of the variance of u (a lag, one that follows u, pulses); and, without faults, the virtual
-//! people of [`hoid_sim::people`]. The loop of the attacks is integrated here, in steps of 1 ms, and shares nothing
-//! with [`hoid_sim`]. Limits were set on seeds below 1000, the default seed is 9000.
+//! The runs have 82 s at 100 Hz: operators with a lead on `1/s^2` and `1/(s(s+1))`, gain-like operators on `1/s`, and
+//! lags on a gain, with remnants of 5 to 30 % of the variance of u (a lag, a remnant that depends on u, or pulses). The
+//! virtual people of [`hoid_sim::people`] are added without faults. The loop of the modified runs is integrated here,
+//! in steps of 1 ms, and shares no code with [`hoid_sim`]. The limits were set on seeds below 1000; the default seed
+//! is 9000.
 //!
 //! `HOID_HUMAN_DATA=DIR` evaluates the recordings of people in a folder instead: CSV with columns t, u and e, or r and
-//! y, whose u of a row was read one sample before.
+//! y instead of e; u of a row was read one sample earlier.
 //!
-//! A run counts as flagged if its trace is not trustworthy, and, for a single change, also if the change was declared;
+//! A run counts as flagged if its trace is not trustworthy and, for a single change, also if the change was declared;
 //! both shares are printed. `--element` gives the controlled element, `--kinds` counts the findings.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -138,7 +139,7 @@ impl Forcing {
     }
 }
 
-/// e and u; `None` if the loop is unbounded.
+/// Simulates a loop and returns e and u; `None` if the loop is unbounded.
 fn simulate(
     who: &Somebody,
     forcing: &Forcing,
@@ -220,7 +221,7 @@ fn simulate(
     Some([e_all[from..].to_vec(), u_all[from..].to_vec()])
 }
 
-/// Numbers from `[0, 1)` of a stream (G. L. Steele, D. Lea and C. H. Flood, OOPSLA 2014: splitmix64).
+/// Returns uniform numbers in `[0, 1)` from a stream (G. L. Steele, D. Lea and C. H. Flood, OOPSLA 2014: splitmix64).
 fn uniform(of: [u64; 4], n: usize) -> Vec<f64> {
     let mixed = |mut x: u64| {
         x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -284,7 +285,7 @@ impl Attack {
     }
 }
 
-/// A run of a kind of operator with a modification.
+/// Simulates a run of a kind of operator with a modification.
 fn run(kind: Kind, attack: Attack, seed: u64, number: u64) -> Option<(Record, Element)> {
     let stream = |of: u64, n: usize| uniform([seed, kind as u64, number, of], n);
     let numbers = stream(0, 4000);
@@ -393,7 +394,7 @@ fn said(
     }
 }
 
-/// The recordings of a folder, each as its name and the record from 5 s on.
+/// Returns the recordings of a folder, each with its name and its record from 5 s on.
 fn recordings(folder: &str) -> Vec<(String, Record)> {
     let files = fs::read_dir(folder).unwrap().map(|file| file.unwrap().path());
     let mut files: Vec<_> = files
@@ -461,7 +462,7 @@ fn main() {
     if let Some(folder) = &folder {
         let all_of = recordings(folder);
         let of_people = all_of.par_iter().map(|(name, record)| {
-            // Separate persons, and the controlled element.
+            // Recordings are grouped by the second and third part of their names, without numbers.
             let group: Vec<&str> = name
                 .split('_')
                 .skip(1)

@@ -1,5 +1,5 @@
-//! Upper bound of the available information: the likelihood ratio of the operator after a change against that before
-//! it, if both operators are known.
+//! Upper bound of the available information: the likelihood ratio of the operators after and before a change, if both
+//! are known.
 //!
 //! The gains s of each operator are estimated from all trials with that element (except the examined trial), in the
 //! basis of the default operator. After the whitening filter of the first trial's remnant, whose variance is sigma^2,
@@ -88,8 +88,8 @@ fn autoregression(v: &[f64]) -> Vec<f64> {
     core::iter::once(1.0).chain(d.iter().map(|d| -d)).collect()
 }
 
-/// Returns `log Lambda` over the first `samples` of the second trial. `before` are the trials with the first operator,
-/// of which the trial `joined` precedes the second trial; `after` are the trials with the second operator, without the
+/// Returns `log Lambda` over the first `samples` of the second trial. `before` are the trials with the first operator;
+/// the trial `joined` of these precedes the second trial. `after` are the trials with the second operator, without the
 /// examined trial.
 pub fn log_ratio(before: &[&Rows], joined: usize, after: &[&Rows], second: &Rows, samples: usize) -> f64 {
     let first = before[joined];

@@ -19,7 +19,7 @@ const KEPT: &str = "crates/hoid/benches/instructions.json";
 /// Permitted increase relative to the stored number.
 const ALLOWED: f64 = 0.05;
 /// Tasks with one thread and one record. Valgrind uses AVX2 if the processor has it, but not AVX-512. The sums of `arx`
-/// and `bj` therefore use the same registers on all but old processors, which need more instructions.
+/// and `bj` therefore use the same registers on all processors except old ones, which need more instructions.
 const TASKS: [&str; 6] = ["arx", "bj", "rls", "rpem", "loop", "loop with noise"];
 
 /// Counts the instructions and compares them with the stored numbers; `keep` stores the new numbers.

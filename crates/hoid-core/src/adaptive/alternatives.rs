@@ -56,8 +56,8 @@ impl Alternatives {
         }
     }
 
-    /// Returns the weighted scatter of the alternatives about an operator. `samples` is the current number of samples,
-    /// of which the last `window` are replayed.
+    /// Returns the weighted scatter of the alternatives about an operator. `samples` is the current number of samples;
+    /// the last `window` of them are replayed.
     pub fn scatter(&self, about: &[f64; PARAMETERS], samples: u64, window: u64) -> [[f64; PARAMETERS]; PARAMETERS] {
         let mut scatter = [[0.0; PARAMETERS]; PARAMETERS];
         let mut weights = 1.0;
@@ -92,7 +92,7 @@ mod tests {
         // If half of the replayed samples are new, its weight is 1/4; if all are, it is zero.
         assert!((all.scatter(&about, 175, 150)[2][2] - 0.8).abs() < 1e-12);
         assert_eq!(all.scatter(&about, 250, 150)[2][2], 0.0);
-        // The same again, much less likely.
+        // The same operator again, with a much larger deficit.
         all.put(0, other, 300.0, 200);
         assert!(all.scatter(&about, 200, 150)[2][2] < 1e-9);
         all.put(STARTS, other, 0.0, 200);

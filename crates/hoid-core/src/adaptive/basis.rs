@@ -22,9 +22,9 @@
 //! (K. J. Åström and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 3.2; the triangle hold of G. F.
 //! Franklin, J. D. Powell and M. Workman, *Digital Control of Dynamic Systems*, 1998, section 6.3). The recursion is
 //! exact for a piecewise linear error and any delay. Apart from aliasing, the response to a sampled sine is the
-//! operator's response multiplied by that of the hold, `(sin(omega Ts/2)/(omega Ts/2))^2`.
+//! response of the operator multiplied by the response of the hold, `(sin(omega Ts/2)/(omega Ts/2))^2`.
 //!
-//! Each r_i is divided by its gain at [`REFERENCE`], so that all gains of the numerator are in units of |Y| at that
+//! Each r_i is divided by its gain at [`REFERENCE`], so all gains of the numerator are in units of |Y| at that
 //! frequency.
 
 use super::{
@@ -178,7 +178,7 @@ impl Basis {
         (self.delay, self.part) = (whole as usize, part);
     }
 
-    /// Returns a filter at another point, with the same lag and scale, whose slow mode `g = 1/(s + a) e` continues that
+    /// Returns a filter at another point, with the same lag and scale, which continues the slow mode `g = 1/(s + a) e`
     /// of this filter; in the states of either filter, g is `Q^2 z_0`. The fast modes start at rest and settle within a
     /// few multiples of `1/(zeta omega)`. `error` is the current delayed error. Returns `None` for an invalid point.
     pub fn moved(&self, point: Point, error: f64) -> Option<Self> {
@@ -295,7 +295,7 @@ impl Basis {
         weights
     }
 
-    /// Returns the factors that convert gains from the units of this basis to those of the basis `to`.
+    /// Returns the factors that convert gains from the units of this basis to the units of the basis `to`.
     pub(super) fn units_of(&self, to: &Self) -> [f64; GAINS] {
         core::array::from_fn(|i| self.scale[i] / to.scale[i])
     }

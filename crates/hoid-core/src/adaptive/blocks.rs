@@ -8,7 +8,7 @@
 //! where x are the unknown gains and level, and p_1 the unknown corrections. Each sample is weighted by the reciprocal
 //! of the variance of eps, so the sums are in units of that variance. Each output is limited to a number of standard
 //! deviations about its prediction. The dynamics have a weak prior at their current value, the same for all spans, so
-//! that two spans without information about the dynamics do not differ in them.
+//! two spans without information about the dynamics do not differ in them.
 
 use hoid_numerics::{cholesky, products::dot};
 

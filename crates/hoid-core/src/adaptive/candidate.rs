@@ -9,8 +9,8 @@
 //! `evidence` is the sum of the log predictive densities of the blocks (A. P. Dawid, *J. Royal Statistical Society* A
 //! 147 (1984) 278-292). It is the criterion by which candidates are compared over the same data. Each block is
 //! predicted from earlier blocks only, so additional parameters give no advantage. The density is Student's, with a
-//! running innovation variance and as many degrees of freedom as the block has samples, so that a change that was not
-//! predicted does not dominate the sum. Old evidence is forgotten, so that the sum measures the quality of the current
+//! running innovation variance and as many degrees of freedom as the block has samples, so a change that was not
+//! predicted does not dominate the sum. Old evidence is forgotten, so the sum measures the quality of the current
 //! estimate rather than the speed of initial convergence.
 
 use super::{
@@ -169,7 +169,7 @@ impl Candidate {
         self
     }
 
-    /// Makes the candidate continue without the guide, so that the noise model uses the mean of the mixture.
+    /// Makes the candidate continue without the guide, so the noise model uses the mean of the mixture.
     pub fn clear_guide(&mut self) {
         self.guide = Segments::NONE;
     }
@@ -335,7 +335,7 @@ impl Candidate {
         let settled = self.samples as f64 * ts > UNSETTLED_S;
         let [predictive_variance, rests_on] = &mut self.predictive_variance;
         if settled {
-            // Student's density with n degrees of freedom, without constants that cancel in differences between
+            // Student's density with n degrees of freedom, without the constants that cancel in differences between
             // candidates.
             let density =
                 -0.5 * n * (libm::log(*predictive_variance) + 2.0 * libm::log1p(energy / (n * *predictive_variance)));

@@ -98,8 +98,8 @@ impl Contrast {
         })
     }
 
-    /// Returns the mean ratio of this covariance to that of another contrast, `tr(C_other^-1 C)/N`, or `None` if the
-    /// covariance of the other contrast is not positive definite.
+    /// Returns the mean ratio of this covariance to the covariance of another contrast, `tr(C_other^-1 C)/N`, or `None`
+    /// if the latter is not positive definite.
     pub(super) fn dispersion(&self, other: &Self) -> Option<f64> {
         let mut factor = other.covariance;
         if !cholesky::factor(&mut factor, STATES) {
@@ -152,7 +152,7 @@ mod tests {
     use super::*;
     use crate::adaptive::blocks::{EMPTY, Row};
 
-    /// A number of the standard normal distribution, except for its tails.
+    /// Returns a number of the standard normal distribution, except for its tails.
     fn normal(state: &mut u64) -> f64 {
         let uniform = |state: &mut u64| {
             *state = state
@@ -165,11 +165,11 @@ mod tests {
 
     const STATE: [f64; STATES] = [1.0, -0.5, 0.3, 0.2, 0.1, -0.2, 0.4];
     const PLACES: [usize; 6] = [0, 1, 2, 4, 5, 6];
-    /// Samples of a block.
+    /// Number of samples in a block.
     const SAMPLES: usize = 25;
 
-    /// Blocks whose regressors and noise are first-order processes with these poles. The regressors carry
-    /// different signs of the noise's frequency, so that a slow noise meets slow regressors.
+    /// Returns blocks whose regressors and noise are first-order processes, with the pole 0.8 for the regressors and
+    /// the given pole for the noise.
     fn blocks(count: usize, state: &[f64; STATES], noise_pole: f64, random: &mut u64) -> std::vec::Vec<Block> {
         let (mut x, mut v) = ([0.0; STATES], 0.0);
         let mut all = std::vec::Vec::new();
@@ -193,8 +193,8 @@ mod tests {
         all
     }
 
-    /// Mean and its standard error of T over a given number of pairs of 60 blocks before and 10 now, and by the model
-    /// alone.
+    /// Returns the mean of T and its standard error over a number of pairs of 60 blocks before and 10 blocks after, and
+    /// the mean with the covariance given by the noise model.
     fn mean_distance(noise_pole: f64, runs: usize, seed: u64) -> [f64; 3] {
         let mut random = seed;
         let (mut sum, mut square, mut by_model) = (0.0, 0.0, 0.0);
@@ -216,7 +216,8 @@ mod tests {
     #[test]
     fn where_the_noise_is_white_the_distance_is_a_chi_square() {
         let [mean, error, by_model] = mean_distance(0.0, 400, 1);
-        // The standard error of a mean of 400 with variance 12 is .17; S rests on 35 stretches, hence the margin.
+        // The mean of 400 values with variance 12 has a standard error of .17; the margin is larger because S is
+        // estimated from 35 stretches.
         assert!((by_model - 6.0).abs() < 0.7, "{by_model}");
         assert!((mean - 6.0).abs() < 1.0 && error < 0.3, "{mean} {error}");
     }
@@ -224,7 +225,7 @@ mod tests {
     #[test]
     fn where_it_is_not_the_scores_know() {
         let [mean, error, by_model] = mean_distance(0.9, 400, 2);
-        // By the model alone the distance is several times too large.
+        // With the covariance given by the noise model, T is several times too large.
         assert!(by_model > 20.0, "{by_model}");
         assert!(mean < 10.0 && error < 0.5, "{mean} {error}");
     }

@@ -53,8 +53,8 @@ const CHANGES: ChangePrior = ChangePrior {
 const NOISE_MEMORY_S: f64 = 100.0;
 /// Limit of an innovation in the change detector, in standard deviations.
 const DETECTOR_LIMIT: f64 = 3.5;
-/// Starting points of the first estimate: delay in s relative to that of the person, natural frequency in rad/s, and
-/// damping ratio. If the delay is given, all starting points have this delay.
+/// Starting points of the first estimate: delay in s relative to the delay of the person, natural frequency in rad/s,
+/// and damping ratio. If the delay is given, all starting points have this delay.
 const STARTING_POINTS: [[f64; 3]; STARTS] = [
     [0.0, OMEGA_RAD_S, ZETA],
     [0.1, 11.0, 0.3],

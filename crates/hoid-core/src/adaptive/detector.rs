@@ -8,9 +8,9 @@
 //! `T = d' C^-1 d`
 //!
 //! has a chi-square distribution with `nu = 6` degrees of freedom if there is no change (G. C. Chow, *Econometrica* 28
-//! (1960) 591-605). T is computed for a short and for a long present, since the detection of small changes needs more
-//! data than that of large changes. One second between past and present is left out, since a change need not coincide
-//! with the border of a block.
+//! (1960) 591-605). T is computed for a short and for a long present, since small changes take more data to detect than
+//! large ones. One second between past and present is left out, since a change need not coincide with the border of a
+//! block.
 //!
 //! **Normalisation.** Some operators vary more than others. T is therefore divided by the square root of c, the level
 //! of T relative to a chi-square in the absence of a change. c is estimated from the mean of `ln T`, whose expected
@@ -25,8 +25,8 @@
 //! the block border that gives the smallest residual sum of squares when all parameters are free before and after it
 //! (R. E. Quandt, *J. American Statistical Association* 53 (1958) 873-880).
 //!
-//! The blocks are those of the live candidate (`last_blocks`), with its noise model and basis. From four seconds after
-//! a gap, the data recorded after the gap are compared with those recorded before it.
+//! The blocks come from the live candidate (`last_blocks`) and use its noise model and basis. From four seconds after a
+//! gap, the data recorded after the gap are compared with those recorded before it.
 
 use super::{
     blocks::Block,
@@ -52,8 +52,8 @@ const LEAST_AFTER_GAP: usize = 4;
 const PRIOR_BLOCKS: f64 = 60.0;
 /// Maximum number of blocks, in addition to the prior, in the mean that estimates the level of a statistic.
 const LEVEL_MEMORY: f64 = 240.0;
-/// Largest amount by which the logarithm of a statistic may exceed its mean level in the update of that level, so that
-/// a change does not count as normal variation.
+/// Largest amount by which the logarithm of a statistic may exceed its mean level in the update of that level, so a
+/// change does not count as normal variation.
 const LARGEST_LOG_STEP: f64 = 3.0;
 
 /// Settings of the change detector.
@@ -98,7 +98,7 @@ impl Statistic {
     }
 
     fn take(&mut self, t: f64) {
-        // The test uses the level estimated before this block, so that a change does not reduce its own significance.
+        // The test uses the level estimated before this block, so a change does not reduce its own significance.
         self.log_significance = log_significance(t / libm::sqrt(self.scale()), PAIRS);
         self.levels = (self.levels + 1.0).min(PRIOR_BLOCKS + LEVEL_MEMORY);
         let log = libm::log(t.max(0.05)).min(self.level + LARGEST_LOG_STEP);
@@ -158,8 +158,8 @@ impl Detector {
         })
     }
 
-    /// Tests the stored blocks, of which the last one is new. `dynamics` are the current corrections of natural
-    /// frequency, damping and delay, relative to the basis of the blocks.
+    /// Tests the stored blocks; the last one is new. `dynamics` are the current corrections of natural frequency,
+    /// damping and delay, relative to the basis of the blocks.
     pub(super) fn test(&mut self, last: &LastBlocks, dynamics: [f64; DYNAMICS]) {
         self.declared = false;
         self.since += 1;

@@ -9,8 +9,8 @@
 //! `d_S = (W_SS)^-1 (W d)_S`, with the covariance `(W_SS)^-1`,
 //!
 //! and `chi_S^2 = d' W d - d_S' (W d)_S` is the statistic of the hypothesis that the other components did not change.
-//! The set with the smallest `chi_S^2 + 4 |S|` is reported. The penalty of 4 per parameter lies between that of Akaike,
-//! 2, and that of Schwarz, the logarithm of the number of samples (*Annals of Statistics* 6 (1978) 461-464).
+//! The set with the smallest `chi_S^2 + 4 |S|` is reported. The penalty of 4 per parameter is between Akaike's penalty,
+//! 2, and Schwarz's penalty, the logarithm of the number of samples (*Annals of Statistics* 6 (1978) 461-464).
 
 use hoid_numerics::{cholesky, products::dot};
 
@@ -103,7 +103,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// A delay that is reported only together with the gains.
+    /// Returns a contrast in which the delay is poorly distinguished from the gains.
     fn contrast(difference: [f64; STATES]) -> Contrast {
         let mut covariance = [[0.0; STATES]; STATES];
         for (i, row) in covariance.iter_mut().enumerate() {
@@ -123,15 +123,15 @@ mod tests {
 
     #[test]
     fn the_simplest_set_that_explains_is_told() {
-        // Along the delay only: neither gains nor delay differ by much compared with their own errors.
+        // Only the delay changed; compared with their own errors, neither the gains nor the delay differ by much.
         let told = Difference::of(&contrast([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5])).unwrap();
         assert_eq!(told.changed, [false, false, true]);
         assert!((told.value[6] - 1.5).abs() < 1e-9 && told.value[0] == 0.0);
-        // The variance of the delay for known gains: far less than its marginal variance, 1.82.
+        // The variance of the delay for known gains is far less than its marginal variance, 1.82.
         assert!(told.covariance[6][6] < 0.1, "{}", told.covariance[6][6]);
         let told = Difference::of(&contrast([0.0, 1.5, 0.0, 0.0, 2.0, 0.0, 0.0])).unwrap();
         assert_eq!(told.changed, [true, true, false]);
-        // All together give the difference.
+        // If all groups changed, the difference itself is reported.
         let difference = [2.0, 2.0, 2.0, 2.0, 2.0, 2.0, -12.0];
         let told = Difference::of(&contrast(difference)).unwrap();
         assert_eq!(told.changed, [true; 3]);

@@ -327,15 +327,15 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// As [`AdaptiveFilter::step`], but the estimate stays constant and only the filters are advanced.
+    /// Like [`AdaptiveFilter::step`], but the estimate stays constant and only the filters are advanced.
     pub fn step_without_update(&mut self, e: f64, u: f64) -> Step {
         self.advance_basis(e);
         self.detector.pass_over();
         self.pass(u, Use::FilterOnly)
     }
 
-    /// As [`AdaptiveFilter::step_without_update`], for a sample without u; the one-step prediction replaces the missing
-    /// output.
+    /// Like [`AdaptiveFilter::step_without_update`], for a sample without u; the one-step prediction replaces the
+    /// missing output.
     pub fn bridge(&mut self, e: f64) {
         self.advance_basis(e);
         self.detector.pass_over();

@@ -4,7 +4,7 @@
 
 use crate::state::State;
 
-/// Index of the ring of errors; the constants below are those of the other rings.
+/// Index of the ring of errors; the constants below are the indices of the other rings.
 const ERRORS: usize = 0;
 const OUTPUTS: usize = 1;
 const USES: usize = 2;
@@ -166,7 +166,7 @@ mod tests {
         assert_eq!(history.error(3, 4), 0.0);
         history.clear();
         assert_eq!((history.samples(), history.error(0, 0)), (0, 0.0));
-        // No room at all is not a panic.
+        // A memory without room for a sample causes no panic.
         let mut none = History::new([0.0; 2]);
         none.push(1.0);
         none.complete(1.0, Use::Update);

@@ -10,9 +10,9 @@
 //!
 //! (Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001,
 //! section 7.2, information form). `(I + P A/sigma^2)^-1 P` needs no inverse of P, which is singular if the three gains
-//! are restricted to those of a gain with a lead.
+//! are restricted to a gain with a lead.
 //!
-//! Each hypothesis has its own innovation variance, so that a change of the remnant can be part of a change. Since this
+//! Each hypothesis has its own innovation variance, so a change of the remnant can be part of a change. Since this
 //! variance is estimated, the part of the block energy common to all hypotheses has a Student density with the degrees
 //! of freedom of the variance (A. Zellner, *An Introduction to Bayesian Inference in Econometrics*, 1971, section 3.2).
 
@@ -131,8 +131,8 @@ impl Hypothesis {
             })
         });
         (0..STATES).for_each(|i| matrix[i][i] += 1.0);
-        // Solving (I + P A/sigma^2) P+ = P also gives the determinant of I + P A/sigma^2, which equals that of
-        // S/sigma^2.
+        // Solving (I + P A/sigma^2) P+ = P also gives the determinant of I + P A/sigma^2, which equals the determinant
+        // of S/sigma^2.
         let mut after = self.covariance;
         let log_determinant = elimination::solve_any(&mut matrix, &mut after);
         // Rounding makes P+ slightly asymmetric, and without this correction the asymmetry would grow from block to
@@ -228,7 +228,7 @@ mod tests {
 
     #[test]
     fn the_update_is_the_twin_of_the_kalman_gain() {
-        // A singular covariance: the gains lie on one line.
+        // A singular covariance: the gains are on a line.
         let mut p = covariance(0.0);
         for i in 0..GAINS {
             for j in 0..GAINS {
@@ -240,7 +240,8 @@ mod tests {
         let moments = blocks(2);
         let about = moments.about(&basis(), &h.state);
         h.update(&moments, &basis(), 1.0);
-        // P+ = P - P (A^-1 sigma^2 + P)^-1 P has no inverse of A here; P+ (I + A P/sigma^2) = P is the same.
+        // A is singular here, so P+ = P - P (A^-1 sigma^2 + P)^-1 P cannot be used; P+ (I + A P/sigma^2) = P is
+        // equivalent.
         for i in 0..STATES {
             for j in 0..STATES {
                 let back: f64 = (0..STATES)
@@ -254,7 +255,7 @@ mod tests {
             let step: f64 = (0..STATES).map(|k| h.covariance[i][k] * about.score[k]).sum::<f64>() / 0.01;
             assert!((h.state[i] - step).abs() < 1e-12);
         }
-        // The gains stay on their line.
+        // The gains remain on this line.
         assert!((h.covariance[1][1] - 2.0 * h.covariance[0][1]).abs() < 1e-9);
     }
 
@@ -267,7 +268,7 @@ mod tests {
             (h.state, h.covariance, left.energy),
             (before.state, before.covariance, 0.0)
         );
-        // Nor does one that overflows.
+        // A block that overflows does not change the estimate either.
         let mut huge = Moments::NONE;
         huge.add(&[1e200; SIGNALS], 1.0, 1.0);
         h.update(&huge, &basis(), 1.0);

@@ -1,8 +1,8 @@
 //! Initial estimate from an earlier fit of the person, with its covariance.
 //!
 //! Gains and corrections start at the fitted values with their covariance and are updated from the first sample. The
-//! noise model starts as if it had already been estimated from the remnant of the fit, so that it need not be estimated
-//! in the first seconds.
+//! noise model starts as if it had already been estimated from the remnant of the fit, so it need not be estimated in
+//! the first seconds.
 
 use super::{
     noise::{Lags, NoiseModel},

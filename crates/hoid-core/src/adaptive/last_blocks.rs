@@ -137,7 +137,7 @@ mod tests {
         assert_eq!((closed, last.all().len()), (BLOCKS + 3, BLOCKS));
     }
 
-    /// The blocks remain within the list after it was restored from numbers that were altered.
+    /// The number of blocks remains within the list after invalid numbers were restored.
     #[test]
     fn restored_blocks_are_within() {
         let mut last = LastBlocks::new(0.1);
@@ -153,13 +153,13 @@ mod tests {
         let mut last = LastBlocks::new(0.05);
         (0..25).for_each(|_| last.take(&ROW));
         assert_eq!(last.all().len(), 2);
-        // Shorter than a gap, then one.
+        // First fewer unused samples than in a gap, then a gap.
         (0..4).for_each(|_| last.skip());
         last.take(&ROW);
         assert_eq!(last.all().len(), 2);
         (0..5).for_each(|_| last.skip());
         assert_eq!((last.all().len(), last.fresh()), (1, 0));
-        // Two seconds after it are not examined.
+        // The two seconds after the gap are skipped.
         (0..49).for_each(|_| last.take(&ROW));
         assert_eq!(last.all().len(), 1);
         last.take(&ROW);

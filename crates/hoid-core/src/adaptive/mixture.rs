@@ -1,13 +1,13 @@
 //! Mixture of hypotheses about the time of the last change of the operator.
 //!
 //! After each block the likeliest hypothesis of each class has a child, which assumes that the operator changed in this
-//! block. The child has the estimate of its parent before the block, with the covariance of a jump added to that of the
-//! gains (A. S. Willsky and H. L. Jones, *IEEE Trans. Automatic Control* 21 (1976) 108-112). The initial probability of
-//! the child is that of the class times the hazard, the prior probability of a change since the last birth; it is then
-//! weighted by its likelihood like all other hypotheses (R. P. Adams and D. J. C. MacKay, *Bayesian online changepoint
-//! detection*, 2007, algorithm 1; P. Andersson, *International Journal of Control* 42 (1985) 1175-1193). If there is no
-//! free slot, the least likely of the hypotheses that are old enough is pruned. Between changes the estimate therefore
-//! uses all data since the last change.
+//! block. The child has the estimate of its parent before the block, with the covariance of a jump added to the
+//! covariance of the gains (A. S. Willsky and H. L. Jones, *IEEE Trans. Automatic Control* 21 (1976) 108-112). The
+//! child starts with the probability of the class times the hazard, the prior probability of a change since the last
+//! birth; it is then weighted by its likelihood like all other hypotheses (R. P. Adams and D. J. C. MacKay, *Bayesian
+//! online changepoint detection*, 2007, algorithm 1; P. Andersson, *International Journal of Control* 42 (1985)
+//! 1175-1193). If there is no free slot, the least likely of the hypotheses that are old enough is pruned. Between
+//! changes the estimate therefore uses all data since the last change.
 //!
 //! **Samples that a child skips.** For up to p samples after a change, a whitening filter D of order p contains
 //! responses with the gains before and after the change: it computes `D (theta r)`, whereas the model computes theta
@@ -206,14 +206,14 @@ impl Mixture {
             }
         }
         // A newborn hypothesis skips its early samples. It is charged the residual energy that the best hypothesis has
-        // at these samples, so that skipping gives it neither an advantage nor a disadvantage.
+        // at these samples, so skipping gives it neither an advantage nor a disadvantage.
         let of_early = early.energy(basis, &best);
         for (_, left) in self.all().iter().zip(&mut left).filter(|(h, _)| newborn(h)) {
             left.passed = [early.samples, of_early];
             left.energy += of_early;
             common = common.min(left.energy);
         }
-        // The memory of the variance is half the time since the start, so that the large residuals of the start are
+        // The memory of the variance is half the time since the start, so the large residuals of the start are
         // forgotten.
         let [longest, shortest] = prior.variance.map(|seconds| seconds / scales.sample_time);
         let memory = longest.min((0.5 * blocks as f64 * moments.samples).max(shortest));
@@ -408,8 +408,8 @@ impl Mixture {
         segments
     }
 
-    /// Replaces the prior of the corrections. The old prior is normal with mean zero and variances `was`, the new one,
-    /// that of people, is normal with `mean` and variances `is`: `P' = (I + P D)^-1 P`, `D = 1/is - 1/was`,
+    /// Replaces the prior of the corrections. The old prior is normal with mean zero and variances `was`, the new
+    /// prior, for people, is normal with `mean` and variances `is`: `P' = (I + P D)^-1 P`, `D = 1/is - 1/was`,
     /// `x' = x + P' (mean/is - D x)`. In information form this subtracts the old prior and adds the new one.
     pub fn replace_prior(&mut self, was: [f64; DYNAMICS], is: [f64; DYNAMICS], mean: [f64; DYNAMICS]) {
         for h in self.all_mut() {
@@ -522,11 +522,11 @@ mod tests {
     use super::*;
     use crate::adaptive::{basis::Point, defaults::DefaultOperator, sizes::SIGNALS};
 
-    /// The sample of the change: two before the end of block 56.
+    /// Sample of the change: two samples before the end of block 56.
     const CHANGE: usize = 32 * 56 - 2;
 
-    /// How far the gains are after a given number of blocks from those of an operator that has changed, over the
-    /// change, with a remnant of four poles; of each block so many samples are its first.
+    /// Returns the distance of the gains from those of the changed operator after a given number of blocks, relative to
+    /// the change. The remnant has four poles; `first` is the number of early samples of each block.
     fn off(first: usize, blocks: usize) -> f64 {
         let point = Point {
             tau: 0.2,
@@ -597,7 +597,7 @@ mod tests {
 
     #[test]
     fn blocks_shorter_than_the_whitening_filter_do_no_harm() {
-        // None of the first block of a child is taken, and its variance is that of the next ones.
+        // A child then skips its whole first block, and its variance is that of the next blocks.
         let all = off(32, 63);
         assert!(all < 0.2, "{all}");
     }

@@ -25,8 +25,8 @@
 //! 8. **Mixture** ([`mixture`]; BLK section 1.4.16). `x^ = sum_j mu_j x^_j`,
 //!    `P = sum_j mu_j (P_j + (x^_j - x^)(x^_j - x^)')`.
 //! 9. **Births and pruning** ([`mixture`]; AM algorithm 1, WJ). The best hypothesis of each class has a child. The
-//!    initial probability of the child is that of the class times the hazard `H = block/mean time between changes`, and
-//!    the covariance of a jump is added to P_j.
+//!    child starts with the probability of the class times the hazard `H = block/mean time between changes`, and the
+//!    covariance of a jump is added to P_j.
 //! 10. **Noise** ([`noise`], `volatility`). D is an autoregression of the residuals, fitted by least squares. The
 //!     spread of the block energies gives the number of samples that count as one independent sample.
 //! 11. **Replay** (`filter`). A second candidate reads the record again with the new basis point and D, and replaces

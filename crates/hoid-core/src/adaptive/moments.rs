@@ -175,7 +175,7 @@ mod tests {
         let about = moments.about(&basis(), &state);
         assert!((about.energy - moments.energy(&basis(), &state)).abs() < 1e-12);
         for i in 0..STATES {
-            // E is of the fourth degree in the state, but quadratic in each number: a difference is exact.
+            // E has degree four in the state but is quadratic in each number, so a difference quotient is exact.
             let at = |step: f64| {
                 let mut moved = state;
                 moved[i] += step;

@@ -3,13 +3,13 @@
 //! D minimises `sum_k lambda^{t-k} w_k (v(k) + d_1 v(k-1) + .. + d_p v(k-p))^2` with `v = u - theta' r - level` (L.
 //! Ljung, *System Identification*, 1999, section 10.1). At each sample the products of `[v(t), .., v(t-p)]`, computed
 //! with the gains at that sample, are added to sums; the normal equations are solved at intervals. The weights w are
-//! one, or less if eps is large. The memory grows with the time since the start up to a limit, so that the first
-//! seconds, with unknown gains, are forgotten.
+//! one, or less if eps is large. The memory grows with the time since the start up to a limit, so the first seconds,
+//! with unknown gains, are forgotten.
 //!
 //! The prior of the coefficients is normal. Its mean is the model of a typical remnant, and its standard deviation is
 //! `PRIOR_DEVIATION`. This prior adds `sigma^2/PRIOR_DEVIATION^2` to the diagonal of the sums (a ridge), where sigma^2
-//! is the variance of eps. The ridge scales with the variance of eps and not with that of v: the spectrum of a remnant
-//! with more than two poles falls to a very small fraction of its power, and D has to follow it there.
+//! is the variance of eps. The ridge scales with the variance of eps and not with the variance of v: the spectrum of a
+//! remnant with more than two poles falls to a very small fraction of its power, and D has to follow it there.
 //!
 //! D is used only as an FIR filter, so its inverse need not be stable.
 
@@ -42,7 +42,7 @@ pub struct NoiseModel {
     longest: f64,
     shortest: f64,
     /// Upper triangle of the sums divided by `fade`, in pairs of rows and columns. A new sample gets the weight 1/fade,
-    /// so that the old sums need not be reduced at each sample.
+    /// so the old sums need not be reduced at each sample.
     products: [[[F64x2; PAIRS]; 2]; PAIRS],
     fade: f64,
     /// Sum of the weights, followed by the weighted sum of eps^2.
@@ -135,7 +135,7 @@ impl NoiseModel {
             self.fade = 1.0;
         }
         let weight = weight / self.fade;
-        // The default order is passed as a constant, so that the loops over the lags have a constant length.
+        // The default order is passed as a constant, so the loops over the lags have a constant length.
         match self.order {
             ORDER => self.add(v, weight, ORDER),
             order => self.add(v, weight, order),
@@ -233,7 +233,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// Noise of a fixed stream, uniform with variance 1/12.
+    /// Returns uniform noise with variance 1/12 from a fixed stream.
     fn stream(seed: &mut u64) -> f64 {
         *seed = seed
             .wrapping_mul(6_364_136_223_846_793_005)
@@ -243,7 +243,7 @@ mod tests {
 
     #[test]
     fn an_autoregression_is_found() {
-        // Poles .95 and .6: D = 1 - 1.55 q^-1 + .57 q^-2.
+        // The poles .95 and .6 give D = 1 - 1.55 q^-1 + .57 q^-2.
         let (mut model, mut seed) = (NoiseModel::new(6, 100.0, 0.01).unwrap(), 7);
         let mut v = [0.0; WIDTH];
         for t in 0..10_000 {
@@ -255,9 +255,9 @@ mod tests {
                 model.solve();
             }
         }
-        // With a memory of half the time the weights are (s/t)^2, and 10 000 samples count as
-        // 5/9 of them. The variance of a coefficient is at most (1 + 1.55^2 + .57^2)/5556, a
-        // standard error of .026; four of them.
+        // With a memory of half the elapsed time, the weights are (s/t)^2, and 10 000 samples count as 5/9 of their
+        // number. The variance of a coefficient is at most (1 + 1.55^2 + .57^2)/5556, a standard error of .026; the
+        // tolerance is four of these.
         for (d, expected) in model.d().iter().zip([-1.55, 0.57, 0.0, 0.0, 0.0, 0.0]) {
             assert!((d - expected).abs() < 0.104, "{:?}", model.d());
         }
@@ -267,7 +267,7 @@ mod tests {
     #[test]
     fn a_steep_remnant_is_whitened_to_the_end() {
         // Four poles at .85: v has 1.6e4 times the power of eps, and its spectrum falls by 5e8 up to half the sampling
-        // frequency. With a prior that scales with the power of v, D would be whiter there than the remnant.
+        // frequency. With a prior that scales with the power of v, D would not follow the remnant there.
         let (mut model, mut seed) = (NoiseModel::new(8, 100.0, 0.01).unwrap(), 3);
         let (mut v, mut poles, mut power) = ([0.0; WIDTH], [0.0; 4], 0.0);
         for t in 0..20_000 {
@@ -287,14 +287,15 @@ mod tests {
                 model.solve();
             }
         }
-        // 1/12, with a standard error of .9 %, and 8/5556 for what D does not know.
+        // The power is 1/12 with a standard error of .9 %, plus a share of 8/5556 due to the errors of D.
         assert!((12.0 * power - 1.0).abs() < 0.04, "{power}");
     }
 
     #[test]
     fn the_covariance_of_d_holds() {
-        // z of four coefficients in 100 runs; the mean of their squares has a standard error of
-        // .07, of .14 were they all the same. Both while the memory grows and when it is full.
+        // Squared errors of four coefficients in 100 runs, in standard errors: their mean has a standard error of .07,
+        // or .14 if the four were fully correlated. This is tested while the memory grows and when it has its full
+        // length.
         for memory in [1000.0, 10.0] {
             let (mut squares, mut seed) = (0.0, 11);
             for _ in 0..100 {
@@ -318,7 +319,7 @@ mod tests {
 
     #[test]
     fn a_remnant_that_is_known_is_there_at_once_and_left_as_data_come() {
-        // An autoregression of order 1 with the pole .9: its autocovariances are .9^k/(1 - .81).
+        // An autoregression of order 1 with the pole .9 has the autocovariances .9^k/(1 - .81).
         let (mut model, mut seed) = (NoiseModel::new(6, 40.0, 0.01).unwrap(), 5);
         let lags: Lags = core::array::from_fn(|k| 0.9_f64.powi(k as i32) / 0.19);
         assert!(model.set_prior(&lags, 1.0 / 12.0, 2000.0));
@@ -335,7 +336,7 @@ mod tests {
             model.update(&v, eps, 1.0);
         }
         model.solve();
-        // Ten memories of 4000 samples: the prior is forgotten, d1 has a standard error of .01.
+        // 4000 samples are ten memories: the prior is forgotten, and d1 has a standard error of .01.
         assert!((model.d()[0] + 0.5).abs() < 0.05, "{:?}", model.d());
         let mut other = NoiseModel::new(6, 40.0, 0.01).unwrap();
         assert!(!other.set_prior(&[0.0; WIDTH], 1.0, 2000.0) && !other.set_prior(&lags, 1.0, f64::NAN));

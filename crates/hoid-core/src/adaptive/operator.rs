@@ -1,7 +1,7 @@
 //! Reported operator: its parameters and their covariance, computed from gains and corrections.
 //!
-//! K_e and K_e_dot are those of the gain and lead nearest to the numerator at [`NEAR_RAD_S`], by least squares in
-//! `K_e + K_e_dot j omega = Y e^{j tau omega} (1 - omega^2/omega_nm^2 + 2 j zeta omega/omega_nm)`; this is exact for an
+//! K_e and K_e_dot describe the gain and lead nearest to the numerator at [`NEAR_RAD_S`], by least squares in `K_e +
+//! K_e_dot j omega = Y e^{j tau omega} (1 - omega^2/omega_nm^2 + 2 j zeta omega/omega_nm)`; this is exact for an
 //! operator with a gain and a lead. K_e and K_e_dot are linear in the state, so their covariance is `M P M'`, where M
 //! maps the state to them and P is the covariance of the mixture ([`super::mixture`]). The scatter of other operators
 //! that predict u about as well ([`super::alternatives`]) is added.
@@ -15,7 +15,7 @@ use super::{
 
 /// Time constant in s of a correction of the standard errors, which are too small in the first seconds because the
 /// noise model is uncertain. After t seconds they are multiplied by `1 + SETTLING_S/t`. The value was chosen on virtual
-/// people with another seed than those of the test (`tests/first_seconds.rs` of `hoid-track`).
+/// people with a seed that the test does not use (`tests/first_seconds.rs` of `hoid-track`).
 const SETTLING_S: f64 = 4.0;
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
@@ -46,7 +46,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 
     /// Returns T_L in s and its variance. Each hypothesis has the lead time T that minimises the expected value of
-    /// `(K_e_dot - T K_e)^2`. T_L is the mean of these lead times, and its variance is computed from that of
+    /// `(K_e_dot - T K_e)^2`. T_L is the mean of these lead times, and its variance is computed from the variance of
     /// `K_e_dot - T_L K_e` with the covariance of the mixture. A single T for the mixture would be far too short if
     /// unlikely hypotheses, such as those born in the last second, leave K_e undetermined.
     pub fn lead_time(&self) -> [f64; 2] {

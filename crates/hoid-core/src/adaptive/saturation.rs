@@ -18,7 +18,7 @@ pub(super) struct Saturation {
     lowest: f64,
     highest: f64,
     last: f64,
-    /// True for the lower and for the upper limit if u has stayed there, so that the limit is known.
+    /// True for the lower and for the upper limit if u has stayed there, so the limit is known.
     known: [bool; 2],
 }
 
@@ -85,7 +85,7 @@ mod tests {
     #[test]
     fn a_stick_that_stands_farther_out_than_ever_is_at_its_end() {
         let ends = after(&[0.1, -0.4, 1.0]);
-        // Predictions beyond the limit, inside of it, and farther than one range beyond.
+        // Predictions beyond the limit, inside the limit, and more than one range beyond it.
         let beyond = |u: f64, predicted: f64| ends.end(u).map(|end| ends.beyond(end, u, predicted));
         assert_eq!(beyond(1.0, 1.3), Some(1.3));
         assert_eq!(beyond(1.0, 0.2), Some(1.0));

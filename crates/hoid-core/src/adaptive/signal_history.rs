@@ -1,6 +1,6 @@
 //! Last signals of a basis, the newest first, stored so that no signal is moved when a sample is added.
 //!
-//! The ring is stored twice in succession, so that its signals are contiguous from any start.
+//! The ring is stored twice in succession, so its signals are contiguous from any start.
 
 use super::{
     f64x2::F64x2,
@@ -39,7 +39,7 @@ impl SignalHistory {
             .map_or(&[], |past| past)
     }
 
-    /// Stores the signals of a new sample in place of those of the oldest sample.
+    /// Stores the signals of a new sample in place of the signals of the oldest sample.
     #[inline(always)]
     pub fn push(&mut self, signals: &[f64; SIGNALS]) {
         self.newest = self.newest.checked_sub(1).unwrap_or(LARGEST_ORDER - 1);

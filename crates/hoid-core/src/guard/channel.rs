@@ -22,11 +22,11 @@
 //!
 //! averaged over about the last 20 s, since the ratio of two tracked quantiles is noisy. In a tail of the form
 //! `P(|r| > x) = exp(-(x/s)^k)` (W. Weibull, *Journal of Applied Mechanics* 18 (1951) 293-297), the value exceeded with
-//! probability P is `s (-log P)^(1/k)`. The values for P = .1 and .01 differ by the factor `2^(1/k)`, those for 1e-2
-//! and 1e-8 by its square, `4^(1/k)`. The limit `m q` is therefore exceeded by one of 1e8 samples, both for a steady
-//! hand (k = 2: m = 2; a Gaussian tail gives 2.45) and for a hand that moves in bursts (k = 1: m = 4; k = .7: m = 7).
-//! With m = 2.5, Gaussian errors are held back above 6.4 standard deviations, which is one of 8e9 samples. The floor is
-//! a fraction of the mean magnitude of the signal; a smaller outlier has no effect.
+//! probability P is `s (-log P)^(1/k)`. The values for P = .1 and .01 differ by the factor `2^(1/k)`, and the values
+//! for 1e-2 and 1e-8 by its square, `4^(1/k)`. The limit `m q` is therefore exceeded by one of 1e8 samples, both for a
+//! steady hand (k = 2: m = 2; a Gaussian tail gives 2.45) and for a hand that moves in bursts (k = 1: m = 4; k = .7:
+//! m = 7). With m = 2.5, Gaussian errors are held back above 6.4 standard deviations, which is one of 8e9 samples. The
+//! floor is a fraction of the mean magnitude of the signal; a smaller outlier has no effect.
 //!
 //! **Held-back samples.** While samples are held back, the signal is continued with its last slope, damped with the
 //! time constant [`SLOPE_S`], if the order is 2 or more, and otherwise with its last value. After h samples, the signal
@@ -163,7 +163,7 @@ impl ChannelGuard {
     }
 
     /// True if consecutive samples, the first of them after a jump, move like the signal: the mean magnitude of the
-    /// prediction errors, of the order in use, is below that of a signal about three times as large.
+    /// prediction errors, of the order in use, is below the value for a signal about three times as large.
     pub fn moves_typically(&self, samples: impl Iterator<Item = f64>) -> bool {
         let (mut past, mut count, mut sum) = ([0.0; ORDERS], 0, 0.0);
         for x in samples {
@@ -287,7 +287,8 @@ impl ChannelGuard {
         for ((tail_ratio, q), p) in self.tail_ratio.iter_mut().zip(&self.quantiles).zip(&self.inner) {
             let quotient = q / p;
             // Unknown quantiles give 0/0; the limit of a signal with such quantiles is the lower bound `LIMIT`, which
-            // is about that of a Gaussian tail. `clamp` would return NaN, which would stay in the average for ever.
+            // is about the limit for a Gaussian tail. `clamp` would return NaN, which would stay in the average for
+            // ever.
             let square = match quotient.is_nan() {
                 true => LIMIT,
                 false => (quotient * quotient).clamp(LIMIT, LARGEST_TAIL_RATIO),
@@ -381,7 +382,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// Comparison: a polynomial of degree j-1 through the last j samples, by Lagrange's formula.
+    /// Reference: a polynomial of degree j-1 through the last j samples, by Lagrange's formula.
     #[test]
     fn errors_are_those_of_the_extrapolated_polynomials() {
         let signal = |t: f64| libm::sin(0.31 * t) + 0.2 * libm::cos(1.7 * t);
@@ -414,8 +415,8 @@ mod tests {
         })
     }
 
-    /// The 99 % quantile of a Gaussian first difference of a random walk is 2.576; its standard
-    /// error by this approximation is about sqrt(g p/2)/(q f(q)/...) = 8 %.
+    /// The 99 % quantile of a Gaussian first difference of a random walk is 2.576; this approximation has a standard
+    /// error of about 8 %.
     #[test]
     fn quantiles_are_found_from_far_off_and_one_outlier_hardly_moves_them() {
         let (mut state, mut x) = (1, 0.0);
@@ -467,8 +468,8 @@ mod tests {
         }
     }
 
-    /// Weibull's law has m = 4^(1/k): twice the quantile for k = 2, seven times for k = .7; the largest of 1e5 samples
-    /// is within the limit, a spike is not. Rests change nothing.
+    /// Weibull's distribution gives m = 4^(1/k): twice the quantile for k = 2, seven times for k = .7; the largest of
+    /// 1e5 samples is within the limit, a spike is not. Rests have no effect.
     #[test]
     fn who_moves_in_bursts_has_a_higher_limit_and_a_spike_is_still_one() {
         for (shape, least, most) in [(2.0, 2.4, 2.6), (1.0, 3.0, 5.5), (0.7, 5.0, 10.5)] {
@@ -483,7 +484,7 @@ mod tests {
             channel.set_quantiles([1.0; ORDERS]);
             let (mut beyond, mut factor, mut x) = (0, 0.0, 0.0);
             for t in 0..100_000 {
-                // Moves for half a second, and rests as long.
+                // Moves for half a second and rests for half a second.
                 if t / 50 % 2 == 0 {
                     let size = libm::pow(-libm::log(uniform()), 1.0 / shape);
                     x += if uniform() < 0.5 { size } else { -size };
@@ -558,7 +559,7 @@ mod tests {
         assert!(!channel.is_outlier(&channel.errors(1e9)));
         assert!(channel.is_outlier(&channel.errors(f64::NAN)));
         assert!(channel.hold(f64::NAN).is_finite() && channel.held() == 1);
-        // A signal that never moves has no scale, and outliers only by its floor.
+        // A signal that never moves has no scale, and only its floor detects outliers.
         channel.restart([3.0; 9].into_iter());
         channel.set_quantiles([1e-300; ORDERS]);
         channel.set_floor(0.1);

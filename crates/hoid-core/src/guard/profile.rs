@@ -1,10 +1,10 @@
 //! Comparison of the signals of one second with earlier data.
 //!
-//! For each block of one second, the following mean magnitudes are computed: those of e and u about their long-run
-//! means, `m_c` for channel c; those of their backward differences of order j = 1 to 4, `a_cj`; and that of the
-//! innovations of the recursion, `a_eps`. The long-run values M_c and A_cj follow with a time constant of 60 blocks.
-//! The values of a block are limited to between half and twice the long-run values, so that no block changes these by
-//! more than 1/60. Blocks in which a fault is found are not used.
+//! For each block of one second, three kinds of mean magnitudes are computed: `m_c` of each channel c (e and u) about
+//! its long-run mean, `a_cj` of its backward differences of order j = 1 to 4, and `a_eps` of the innovations of the
+//! recursion. The long-run values M_c and A_cj follow with a time constant of 60 blocks. The values of a block are
+//! limited to between half and twice the long-run values, so no block changes these by more than 1/60. Blocks in which
+//! a fault is found are not used.
 //!
 //! | finding | rule | reason |
 //! |---|---|---|
@@ -12,7 +12,7 @@
 //! | frozen u | `a_u1 <= A_u1/1000` in three consecutive blocks, except for a rest ([`super::resting`]) during which `a_eps` is at most twice its long-run value | a hand may rest |
 //! | idle | e and u each within a range of `M_c/20` in two consecutive blocks | only noise is recorded |
 //! | larger | `a_c1 > 5 A_c1` and `a_c3 > 5 A_c3` for both e and u in two consecutive blocks | both signals are scaled by a factor |
-//! | rescaled | all four `a_cj/A_cj` of one channel above 3.5 and within a factor of 1.5 of each other, those of the other channel below 2, in two consecutive blocks | a unit or a gain setting was changed |
+//! | rescaled | all four `a_cj/A_cj` of one channel above 3.5 and within a factor of 1.5 of each other, and all four of the other channel below 2, in two consecutive blocks | a unit or a gain setting was changed |
 //! | swapped | the sum over blocks of `d(own) - d(other) - 1`, at most 4 per block and never below 0, reaches 6 | e resembles the earlier u, and u the earlier e; d is the sum over both channels of `\|log a_1/A_1\| + \|log a_3/A_3\|` |
 //! | misfit | `R = a_eps/min_j a_uj` is above 4 times its long-run value and above 1.5, and a_eps is above twice its long-run value, in two consecutive blocks | the past of u alone predicts u better than the model, which also uses e; earlier, the model was better |
 //!
@@ -450,7 +450,7 @@ mod tests {
         profile
     }
 
-    /// Squares that underflow: infinite innovations are not a long-run value, and nothing panics after them.
+    /// Squares that underflow: infinite innovations do not become a long-run value, and nothing panics afterwards.
     #[test]
     fn numbers_without_a_size_are_not_learnt() {
         let mut profile = known();
@@ -495,8 +495,8 @@ mod tests {
         }
     }
 
-    /// A trouble only if e is constant too, or the control during the rest is not predicted: u is constant at its rest
-    /// position and e continues.
+    /// A constant u at its rest position is a fault only if e is constant too, or if the innovations during the rest
+    /// are too large.
     #[test]
     fn a_rest_is_not_frozen_but_a_rest_that_does_not_fit_is() {
         let still = block([0.02, 0.0], [0.1, 1.1]);
@@ -513,7 +513,7 @@ mod tests {
         assert_eq!(after(true, &quiet(0.19, 0.02)), None);
         assert_eq!(after(true, &quiet(0.21, 0.02)), Some((3, Fault::FrozenOutput)));
         assert_eq!(after(true, &quiet(0.0, 0.0)), Some((1, Fault::FrozenInput)));
-        // A channel that was trusted for long has had the trouble for as long.
+        // The duration of a fault includes the blocks in which it was accepted as a rest.
         let mut profile = known();
         (0..9).for_each(|_| assert_eq!(profile.find_fault(&quiet(0.0, 0.02), true), None));
         let told = profile.find_fault(&quiet(0.0, 0.02), false);

@@ -7,19 +7,19 @@
 //! `s = n log(mean |eps| / mean |eps_0|)`
 //!
 //! units of log likelihood. The mean magnitude is proportional to the standard deviation for every shape of the
-//! distribution, and gives little weight to a few outliers. Relative to those of a fixed model, the innovations of a
-//! sound recursion are larger by half its effective number of parameters divided by its memory: .2 % for memories of 2
-//! to 5 s and white innovations. They are larger by several per cent for a few seconds at a time if the order of the
-//! noise model is too low for the remnant, and by more for an unsteady person. Only the part of the logarithm beyond
-//! [`DRIFT`] counts. The one-sided cumulative sum (E. S. Page, *Biometrika* 41 (1954) 100-115) reports a diverged
-//! estimate when it reaches [`DIVERGED`].
+//! distribution, and gives little weight to a few outliers. The innovations of a sound recursion exceed those of a
+//! fixed model by half the effective number of parameters divided by the memory: .2 % for memories of 2 to 5 s and
+//! white innovations. They are larger by several per cent for a few seconds at a time if the order of the noise model
+//! is too low for the remnant, and by more for an unsteady person. Only the part of the logarithm beyond [`DRIFT`]
+//! counts. The one-sided cumulative sum (E. S. Page, *Biometrika* 41 (1954) 100-115) reports a diverged estimate when
+//! it reaches [`DIVERGED`].
 //!
 //! After a change of the person, an estimate that has followed the change predicts u better than the initial model, and
 //! the sum stays at zero.
 
 /// Highest order of a polynomial of the model.
 pub const MAX_ORDER: usize = 16;
-/// Tolerated increase of the logarithm of the mean magnitude of the innovations over that of the fixed model.
+/// Tolerated increase of the logarithm of the mean magnitude of the innovations, compared with the fixed model.
 pub const DRIFT: f64 = 0.2;
 /// Cumulative sum above which the estimate is reported as diverged.
 pub const DIVERGED: f64 = 40.0;
@@ -164,7 +164,7 @@ mod tests {
         };
         assert_eq!(blocks(1.15, 1000), None);
         assert_eq!(blocks(0.5, 1000), None);
-        // 100 (log 1.4 - .2) = 13.6 a block.
+        // 100 (log 1.4 - .2) = 13.6 per block.
         assert_eq!(blocks(1.4, 1000), Some(2));
         assert_eq!(blocks(1e9, 1000), Some(2));
         assert_eq!(blocks(f64::NAN, 10), None);

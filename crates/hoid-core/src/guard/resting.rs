@@ -95,7 +95,7 @@ impl Resting {
         }
     }
 
-    /// Marks the current constant span as not being a rest, so that it is not learnt.
+    /// Marks the current constant span as not being a rest, so it is not learnt.
     pub fn reject(&mut self) {
         self.rejected = true;
     }
@@ -150,7 +150,8 @@ impl Resting {
 mod tests {
     use super::*;
 
-    /// 2 s of movement and a rest at zero of the given lengths, in samples of 10 ms.
+    /// Returns the rests of a person who moves for 2 s before each rest at zero; the lengths of the rests are in
+    /// samples of 10 ms.
     fn person(rests: &[u64]) -> Resting {
         let mut resting = Resting::new(0.01);
         for rest in rests {
@@ -161,7 +162,7 @@ mod tests {
         resting
     }
 
-    /// The time after which a constant span at a value is no longer a rest, s.
+    /// Returns the time in s after which a constant span at a value is no longer a rest.
     fn rest_ends_after(mut resting: Resting, value: f64) -> f64 {
         let last = (1..10_000).take_while(|_| {
             resting.take(value);
@@ -175,12 +176,12 @@ mod tests {
         let resting = person(&[60, 150, 80, 120]);
         assert!((rest_ends_after(resting, 0.0) - 8.0).abs() < 0.02);
         assert!((rest_ends_after(person(&[60, 600, 80, 120]), 0.0) - 12.0).abs() < 0.02);
-        // A new value, and one with a single rest.
+        // A new value, and a value with a single rest.
         assert!(rest_ends_after(resting, 0.37) == 0.0);
         assert!(rest_ends_after(person(&[150]), 0.0) == 0.0);
     }
 
-    /// A signal with many values for a moment each, as from a coarse converter.
+    /// A signal that takes each of many values for a moment, as from a coarse converter.
     #[test]
     fn values_of_a_coarse_signal_are_no_atoms() {
         let mut resting = Resting::new(0.01);

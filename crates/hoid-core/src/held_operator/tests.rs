@@ -1,4 +1,5 @@
-//! The hold of the operator compared with 60 digits, with itself at the borders of its cases, and on degenerate input.
+//! The hold of the operator compared with results in 60 digits, with itself at the borders between its cases, and for
+//! degenerate input.
 
 use super::*;
 use std::vec::Vec;
@@ -13,12 +14,12 @@ struct Case {
     ts: f64,
     coefficients: [f64; 5],
     sum: f64,
-    /// With respect to omega and to zeta.
+    /// Derivatives with respect to omega and to zeta.
     sum_slopes: [f64; 2],
     jacobian: [[f64; 5]; 5],
 }
 
-/// From fixtures/hold/make.py: 60 digits.
+/// Returns the cases of fixtures/hold/make.py, computed with 60 digits.
 fn cases() -> Vec<Case> {
     include_str!("../../../../fixtures/hold/held_operator.csv")
         .lines()
@@ -46,13 +47,13 @@ fn column(jacobian: &[[f64; 5]; 5], j: usize) -> [f64; 5] {
     core::array::from_fn(|i| jacobian[i][j])
 }
 
-/// Scales of a numerator, and of a denominator with its leading one.
+/// Returns the scales of a numerator, and of a denominator with its leading one.
 fn scales(coefficients: &[f64; 5]) -> [f64; 5] {
     let (b, f) = (largest(&coefficients[..3]), largest(&coefficients[3..]).max(1.0));
     [b, b, b, f, f]
 }
 
-/// Largest pole times the sample time.
+/// Returns the largest pole times the sample time.
 fn size_of_poles(omega: f64, zeta: f64, ts: f64) -> f64 {
     let zeta = zeta.abs().max(1.0);
     omega * ts * (zeta + (zeta * zeta - 1.0).sqrt())
@@ -75,8 +76,8 @@ fn coefficients_agree_with_sixty_digits() {
         let (found, _) = held_operator_delayed(p, case.delta, case.ts);
         let scales = scales(&case.coefficients);
         for i in 0..5 {
-            // An ulp each from the divided differences, the products of gain and time and the two
-            // sums in b1. The largest are 3.92 for b, 0.64 for f.
+            // One ulp each from the divided differences, the products of gain and time, and the two sums in b1. The
+            // largest errors are 3.92 for b and 0.64 for f.
             let what = format_args!("{p:?} {} {}: {}", case.delta, case.ts, ROWS[i]);
             assert_within(found[i], case.coefficients[i], 4.0 * scales[i], what);
         }
@@ -93,9 +94,8 @@ fn the_sum_keeps_its_relative_precision() {
         let found = [poles.sum, poles.sum_omega, poles.sum_zeta];
         let expected = [case.sum, case.sum_slopes[0], case.sum_slopes[1]];
         for (i, name) in ["sum", "by omega", "by zeta"].into_iter().enumerate() {
-            // Relative: 1 + f1 + f2 of the rounded coefficients would lose 1/(omega Ts)^2, up to
-            // 1e12 here. Four products on top of the divided differences; the largest are 1.94,
-            // 3.13 and 2.77.
+            // The errors are relative: 1 + f1 + f2 of the rounded coefficients would lose 1/(omega Ts)^2, up to 1e12
+            // here. Four products are added to the divided differences; the largest errors are 1.94, 3.13 and 2.77.
             let what = format_args!("omega {omega} zeta {zeta} Ts {ts}: {name}");
             assert_within(found[i], expected[i], 8.0 * expected[i].abs(), what);
         }
@@ -107,8 +107,9 @@ fn jacobian_agrees_with_sixty_digits() {
     for case in cases() {
         let p = case.parameters;
         let (_, found) = held_operator_delayed(p, case.delta, case.ts);
-        // A pole times Ts is rounded, and its exponential has |z| times that error: the bound for |z| <= 2 (the largest is
-        // 2.7), and in proportion beyond, where a column also becomes small as the sine passes zero (14.2 at |z| = 4).
+        // A pole times Ts is rounded, and its exponential has |z| times that error. The bound is constant for |z| <= 2
+        // (the largest error is 2.7) and proportional to |z| beyond, where a column also becomes small as the sine
+        // passes zero (14.2 at |z| = 4).
         let tolerance = 8.0 * (size_of_poles(p[2], p[3], case.ts) / 2.0).max(1.0);
         for j in 0..5 {
             let scale = largest(&column(&case.jacobian, j));
@@ -146,7 +147,7 @@ fn a_fraction_of_one_sample_is_a_whole_sample() {
         assert_eq!(any[0], 0.0);
         let scale = largest(&whole[..2]);
         for i in 0..2 {
-            // Both within 4 eps of the truth.
+            // Both are within 4 eps of the exact value.
             assert_within(any[i + 1], whole[i], 8.0 * scale, format_args!("{p:?} {}", ROWS[i + 1]));
             let tolerance = 16.0 * (size_of_poles(p[2], p[3], case.ts) / 2.0).max(1.0);
             for j in 0..4 {
@@ -165,8 +166,8 @@ fn a_fraction_of_one_sample_is_a_whole_sample() {
 #[test]
 fn jacobian_agrees_with_finite_differences() {
     for case in cases() {
-        // Slower ones change by less than the rounding of the differences; the 60 digits hold
-        // those.
+        // Slower operators change by less than the rounding error of the differences; the results in 60 digits cover
+        // them.
         if case.parameters[2] * case.ts < 0.01 {
             continue;
         }
@@ -184,8 +185,8 @@ fn jacobian_agrees_with_finite_differences() {
             let scale = largest(&column(&exact, j));
             for i in 0..5 {
                 let difference = (up[i] - down[i]) / (2.0 * h);
-                // Truncation h^2/6 of a third derivative: 1e-8 times the size of poles cubed, and
-                // rounding 1e-16/1e-4.
+                // Truncation error: h^2/6 of a third derivative, 1e-8 times the cubed size of the poles. Rounding
+                // error: 1e-16/1e-4.
                 assert!(
                     (exact[i][j] - difference).abs() < 1e-7 * scale,
                     "{p:?} Ts {}: {} by {}: {} and {difference}",
@@ -202,7 +203,7 @@ fn jacobian_agrees_with_finite_differences() {
 #[test]
 fn continuous_in_the_fraction() {
     const STEPS: usize = 2000;
-    // The divided differences change their way of evaluation along the sample at all but the first.
+    // For all operators except the first, the way of evaluating the divided differences changes within the sample.
     for (omega, zeta) in [
         (11.25, 0.35),
         (20.0, 1.0),
@@ -214,8 +215,8 @@ fn continuous_in_the_fraction() {
         let p = [0.09, 0.036, omega, zeta];
         let at = |k: usize| held_operator_delayed(p, TS * k as f64 / STEPS as f64, TS);
         let step = TS / STEPS as f64;
-        // The third derivative of R is omega^2 times the divided difference of z^3 e^{zt}, at most
-        // (3 + |z| t) |z|^2 |e^{zt}|; that of A is smaller by |z|.
+        // The third derivative of R is omega^2 times the divided difference of z^3 e^{zt}, at most (3 + |z|
+        // t) |z|^2 |e^{zt}|; for A it is smaller by |z|.
         let fastest = size_of_poles(omega, zeta, TS) / TS;
         let growth = (-2.0 * zeta * omega * TS).exp().max(1.0);
         let third = omega * omega * (3.0 + fastest * TS) * fastest * (p[0] + p[1] * fastest) * growth;
@@ -223,8 +224,8 @@ fn continuous_in_the_fraction() {
         for k in 1..=STEPS {
             let (now, slopes) = at(k);
             for i in 0..3 {
-                // Trapezoidal rule: step^3/12 of the third derivative, of two responses in b1, and
-                // the coefficients' 4 eps each.
+                // Trapezoidal rule: step^3/12 of the third derivative, of two responses in b1, and 4 eps for each
+                // coefficient.
                 let change = step * (slopes[i][4] + slopes_before[i][4]) / 2.0;
                 let bound = step.powi(3) / 12.0 * 2.0 * third + 8.0 * f64::EPSILON * largest(&now[..3]);
                 assert!(

@@ -1,4 +1,4 @@
-//! Data and the plain form of the covariance that tests share.
+//! Data and the plain form of the covariance, shared by the tests.
 #![allow(dead_code)]
 
 use hoid_core::{
@@ -19,8 +19,8 @@ impl Noise {
     }
 }
 
-/// Input and output of `u = (B/F) x + (C/D) eps` with two poles of an operator at 100 Hz; x in the
-/// units of a tracking error.
+/// Returns input and output of `u = (B/F) x + (C/D) eps` with two poles of an operator at 100 Hz; x is in the units of
+/// a tracking error.
 pub fn box_jenkins(samples: usize, seed: u64, level: f64) -> Vec<(f64, f64)> {
     let mut noise = Noise(seed);
     let (mut w, mut x1, mut n, mut eps1, mut slow) = ([0.0; 2], 0.0, 0.0, 0.0, 0.0);
@@ -39,7 +39,7 @@ pub fn box_jenkins(samples: usize, seed: u64, level: f64) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// P by rows, updated as printed in the thesis, made symmetric at each sample: the reference for the factored form.
+/// P by rows, updated as printed in the thesis and made symmetric at each sample: the reference for the factored form.
 pub struct Plain<const N: usize> {
     pub p: [[f64; N]; N],
     pub power: f64,
@@ -70,8 +70,8 @@ impl<const N: usize> Plain<N> {
         }
     }
 
-    /// One sample, without the guard against windup; `variance` is the innovation variance that
-    /// variable forgetting expects.
+    /// Processes one sample, without the guard against windup; `variance` is the innovation variance for variable
+    /// forgetting.
     pub fn update(&mut self, forgetting: &Forgetting<N>, psi: &[f64; N], eps: f64, variance: f64) -> [f64; N] {
         match forgetting {
             Forgetting::Exponential { lambda } => {
@@ -119,7 +119,7 @@ impl<const N: usize> Plain<N> {
     }
 }
 
-/// Largest difference of two matrices in units of the square roots of the diagonal.
+/// Returns the largest difference between two matrices, in units of the square roots of the diagonal.
 pub fn relative_difference<const N: usize>(a: &[[f64; N]; N], b: &[[f64; N]; N]) -> f64 {
     let mut largest = 0.0_f64;
     for i in 0..N {
@@ -133,22 +133,22 @@ pub fn relative_difference<const N: usize>(a: &[[f64; N]; N], b: &[[f64; N]; N])
     largest
 }
 
-/// `value` times the unit matrix.
+/// Returns `value` times the identity matrix.
 pub fn diagonal<const N: usize>(value: f64) -> [[f64; N]; N] {
     std::array::from_fn(|i| std::array::from_fn(|j| if i == j { value } else { 0.0 }))
 }
 
-/// The way of forgetting with P = p0 I and no bound.
+/// Returns the adaptation with this rule of forgetting, P = p0 I and no bound.
 pub fn covariance<const N: usize>(p0: f64, forgetting: Forgetting<N>) -> Covariance<N> {
     Covariance::new(UdCovariance::diagonal([p0; N]), forgetting, [f64::INFINITY; N])
 }
 
-/// Error bars from p0 I, the innovation limited to five deviations.
+/// Returns error bars that start from p0 I, with the innovation limited to five standard deviations.
 pub fn bars<const N: usize, const K: usize>(p0: f64) -> ErrorBars<N, K> {
     ErrorBars::new(&diagonal::<N>(p0), InnovationVariance::new(0.0, 0.0, 1.0), 5.0)
 }
 
-/// Stable coefficients of some orders.
+/// Returns stable coefficients for these orders.
 pub fn start<const N: usize>(shape: &AnyShape) -> [f64; N] {
     let mut theta = [0.0; N];
     let mut at = 0;
@@ -165,7 +165,7 @@ pub fn start<const N: usize>(shape: &AnyShape) -> [f64; N] {
     theta
 }
 
-/// ARX, ARMAX, OE, ARARX, Box-Jenkins, the general form.
+/// Returns the shapes of ARX, ARMAX, OE, ARARX, Box-Jenkins and the general model.
 pub fn shapes() -> [AnyShape; 6] {
     let s = |na, nb, nc, nd, nf| AnyShape { na, nb, nc, nd, nf };
     [

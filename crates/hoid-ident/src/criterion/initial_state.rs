@@ -10,7 +10,7 @@ pub enum InitialState {
     /// No assumption: the initial states of each record are estimated together with the parameters.
     #[default]
     Estimate,
-    /// The noise was stationary before the record, as it is in the record (the unconditional sum of squares of Box and
+    /// The noise was stationary before the record as well as in it (the unconditional sum of squares of Box and
     /// Jenkins); nothing is assumed about the response to the input.
     Backcast,
 }

@@ -3,19 +3,19 @@
 //! The unknown past of a record enters the residuals linearly: the nf past values of w through the free responses of
 //! `1/F` (as `-(D/C) h`, where h is the impulse response of `1/F`), and the nc past innovations through the free
 //! responses of `1/C`. If G is the matrix of these responses and `G = Q R`, the least squares states are
-//! `x = -R^-1 Q' eps_0` and the residuals are `eps = (I - Q Q') eps_0`. The responses decay, so that Q is short
-//! compared with the record. Source: G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432.
+//! `x = -R^-1 Q' eps_0` and the residuals are `eps = (I - Q Q') eps_0`. The responses decay, so Q is short compared
+//! with the record. Source: G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432.
 //!
 //! With a stationary past ([`crate::criterion::stationary_noise`]) the states of the noise model have a known
 //! covariance `sigma^2 L L'`. They equal `L z`, where z has the covariance `sigma^2 I` and counts as additional
 //! residuals. The columns of G for these states, G_n, are then replaced by `[I; G_n L]`.
 //!
 //! A level of u, the constant that is not a response to e, also enters linearly and is eliminated together with the
-//! states. Any constant is the response of `1/F` to another constant plus a free response of `1/F`, so that the column
-//! of the level is `-(D/C) (1/F) 1`, and w contains the level. With a pole close to one (an integration), `(1/F) 1` is a
-//! ramp: the response to a mean that was removed from e. In terms of a constant and of free responses this ramp would be
-//! a difference of numbers that are larger by the inverse of `1 - pole`, and `psi' psi` would lose all digits. The
-//! response to the level does not decay, so that its basis vector is as long as the record.
+//! states. Any constant is the response of `1/F` to another constant plus a free response of `1/F`, so the column of
+//! the level is `-(D/C) (1/F) 1`, and w contains the level. With a pole close to one (an integration), `(1/F) 1` is a
+//! ramp: the response to a mean that was removed from e. In terms of a constant and of free responses this ramp would
+//! be a difference of numbers that are larger by the inverse of `1 - pole`, and `psi' psi` would lose all digits. The
+//! response to the level does not decay, so its basis vector is as long as the record.
 
 use hoid_core::filter::{SecondOrder, divide_in_place};
 

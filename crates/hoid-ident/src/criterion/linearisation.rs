@@ -45,7 +45,7 @@ impl Criterion<'_> {
         value.is_finite().then_some((best, value))
     }
 
-    /// As [`Objective::linearise`], but computes only the derivatives with respect to the coefficients of one
+    /// Like [`Objective::linearise`], but computes only the derivatives with respect to the coefficients of one
     /// polynomial and sets the other elements to zero.
     pub fn linearise_block(&self, theta: &[f64], block: Block, workspace: &mut Workspace) -> Linearisation {
         let (p, place) = (theta.len(), block.place(&self.orders));

@@ -23,8 +23,8 @@
 //! orthonormal basis Q of their responses, `eps = (I - Q Q') eps_0`. The loss is then a function of theta alone. Its
 //! gradient is exactly `-psi' eps`, because the states are optimal, and the Gauss-Newton matrix is
 //! `psi' (I - Q Q') psi` (the approximation of L. Kaufman, *BIT* 15 (1975) 49-57). A shifted signal differs from the
-//! true derivative only by a free response of 1/F or 1/C, which lies in the span of Q, so that shifting remains exact.
-//! All this also holds if u has a level ([`Data::level`]), which is one more such state.
+//! true derivative only by a free response of 1/F or 1/C, which lies in the span of Q, so shifting remains exact. The
+//! same holds if u has a level ([`Data::level`]), which is one more such state.
 //!
 //! With [`InitialState::Backcast`] the past of w is also unknown, but the past of the noise is stationary
 //! ([`stationary_noise`]). The residuals start nd samples earlier, and the r states of the noise model count as
@@ -36,8 +36,8 @@
 //!
 //! **Weights** multiply the squared residuals; the robust loss uses them.
 //!
-//! **Long records** are processed in spans after a first part ([`pass`]), so that a fit needs little memory in addition
-//! to the record.
+//! **Long records** are processed in spans after a first part ([`pass`]), so a fit needs little memory in addition to
+//! the record.
 //!
 //! | module | contents |
 //! |---|---|

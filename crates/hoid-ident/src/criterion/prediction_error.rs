@@ -66,7 +66,7 @@ impl<'a> Criterion<'a> {
         self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()
     }
 
-    /// Returns the number of coefficients, including those of the further inputs.
+    /// Returns the number of coefficients, including the coefficients of the further inputs.
     pub fn parameters(&self) -> usize {
         let of_further: usize = self.further.iter().map(|f| f.orders.nb + f.orders.nf).sum();
         self.orders.parameters() + of_further

@@ -12,8 +12,8 @@
 //! `S(theta) = min over g of  sum eps^2 + g' P^-1 g  =  v' Sigma_v^-1 v`
 //!
 //! is the *unconditional sum of squares* of G. E. P. Box and G. M. Jenkins (*Time Series Analysis*, 1976, section
-//! 7.1.4), who compute it by running the model backwards. With `P = L L'` and `g = L z` the penalty is `z' z`, so that
-//! z can be appended to the residuals.
+//! 7.1.4), who compute it by running the model backwards. With `P = L L'` and `g = L z` the penalty is `z' z`, so z can
+//! be appended to the residuals.
 //!
 //! The gradient of the penalty follows from the solution Z of the adjoint equation `Z = Phi' Z Phi + y y'` with
 //! `y = P^-1 g`: `y' (dP/dc_i) y = 2 (Z K)_i` and `y' (dP/dd_i) y = -2 (Z K)_i - 2 (Z Phi P)_{i1}`.

@@ -130,7 +130,7 @@ fn gradient_agrees_with_finite_differences_in_both_modes() {
                     shifted[i] += delta;
                     c.sum_of_squares(&shifted, &mut ws)
                 };
-                // Fourth order: truncation h^4, rounding eps V/h = 1e-9 V.
+                // Fourth-order difference: truncation error h^4, rounding error eps V/h = 1e-9 V.
                 let slope = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
                 let ours = -2.0 * exact.descent[i];
                 let scale = exact.gram[i * theta.len() + i].sqrt() * exact.sum_of_squares.sqrt();
@@ -158,7 +158,7 @@ fn residuals_obey_the_model_equation() {
     };
     let c = criterion(orders, vec![Data::new(&e, &u)], InitialState::Zero);
     let eps = c.residuals_of(&theta, 0, &mut Workspace::default());
-    // Written out sample by sample with zeros before the record.
+    // The recursions, sample by sample, with zeros before the record.
     let get = |x: &[f64], t: usize, lag: usize| if t >= lag { x[t - lag] } else { 0.0 };
     let (mut w, mut v, mut r) = (vec![], vec![], vec![]);
     for t in 0..u.len() {
@@ -208,7 +208,7 @@ fn estimated_states_leave_nothing_to_gain() {
 
 #[test]
 fn estimated_states_of_a_noise_free_record_are_exact() {
-    // The record is cut out of a longer one: its past is unknown, and the residuals are still zero.
+    // The record is cut out of a longer one, so its past is unknown; the residuals are still zero.
     let (e, _) = record(400);
     let mut u = vec![0.5, -0.3, 0.1, 0.2];
     for t in 4..400 {
@@ -235,7 +235,7 @@ fn estimated_states_of_a_noise_free_record_are_exact() {
             .iter()
             .any(|v| v.abs() > 1e-2)
     );
-    // So they are where u has a level.
+    // The residuals are also zero if u has a level.
     let lifted: Vec<f64> = u[100..].iter().map(|u| u + 3.0).collect();
     let left = |level: bool| {
         let data = Data {
@@ -265,8 +265,7 @@ fn the_unconditional_sum_of_squares_is_that_of_the_covariance_matrix() {
     let theta = vec![-1.5, 0.7, 0.4];
     let c = criterion(orders, vec![Data::new(&[], &u)], InitialState::Backcast);
     let ours = c.linearise(&theta, &mut Workspace::default()).sum_of_squares;
-    // Autocovariance of C/A eps from its impulse response; the poles have the modulus 0.84,
-    // 0.84^400 = 1e-30.
+    // Autocovariance of C/A eps from its impulse response; the poles have modulus 0.84, and 0.84^400 = 1e-30.
     let mut h = vec![1.0, 0.4 + 1.5];
     for t in 2..800 {
         h.push(1.5 * h[t - 1] - 0.7 * h[t - 2]);
@@ -340,7 +339,7 @@ fn a_later_first_residual_leaves_the_gradient_exact() {
     assert!((slope + 2.0 * exact.descent[7]).abs() < 1e-6 * slope.abs());
 }
 
-/// Adds the first record with a head of this length; none if it has to pass whole.
+/// Adds the first record with a head of this length; `None` if the record must be processed as a whole.
 fn add_in_spans(
     c: &Criterion<'_>,
     theta: &[f64],
@@ -358,7 +357,7 @@ fn add_in_spans(
 
 #[test]
 fn long_records_pass_span_by_span_to_the_same_sums() {
-    // Heads of which the rest is whole spans and a part of one.
+    // After each of these heads the rest consists of whole spans and a part of a span.
     let (e, u) = record(9001);
     let long = Data::new(&e, &u);
     let head = 4096;
@@ -391,7 +390,7 @@ fn long_records_pass_span_by_span_to_the_same_sums() {
                 for (a, b) in residuals.iter().zip(c.residuals_of(&theta, 0, &mut ws)) {
                     assert!((a - b).abs() < 1e-12, "{initial:?} {orders}: {a} and {b}");
                 }
-                // Each product next to the size that it can have.
+                // The error of each product is relative to the largest value that the product can have.
                 let size = |i: usize| whole.gram[i * p + i].sqrt();
                 for i in 0..p {
                     let scale = size(i) * whole.sum_of_squares.sqrt();
@@ -459,7 +458,7 @@ fn what_does_not_die_away_passes_whole() {
     assert!(!by_spans(&weighted, 0.9, 4096));
 }
 
-/// Two inputs that are not alike.
+/// Returns two different inputs and an output.
 fn inputs(n: usize) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let (e, u) = record(n);
     let x = (0..n)
@@ -503,7 +502,7 @@ fn a_further_input_alone_is_the_first_one() {
         nk: 0,
         ..alone
     };
-    // b, c, d, f as c, d, b, f.
+    // The order b, c, d, f becomes c, d, b, f.
     let theta = [0.2, -0.1, 0.3, -0.5, 0.1, -1.5, 0.62];
     let order = [2, 3, 4, 0, 1, 5, 6];
     let moved: Vec<f64> = order.iter().map(|&i| theta[i]).collect();

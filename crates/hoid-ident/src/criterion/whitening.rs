@@ -52,8 +52,8 @@ pub(super) fn whiten_on(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: us
     divide_from(c, y, from);
 }
 
-/// Computes `y(t) += sum_i d_i x(t - first_lag - i)` from index `from` on. Each pass adds four lags, so that y is read
-/// and written only once for them.
+/// Computes `y(t) += sum_i d_i x(t - first_lag - i)` from index `from` on. Each pass adds four lags, so y is read and
+/// written only once for them.
 fn add_lags(d: &[f64], first_lag: usize, x: &[f64], y: &mut [f64], from: usize) {
     let (fours, rest) = d.as_chunks::<4>();
     let mut lag = first_lag;

@@ -9,8 +9,8 @@ use hoid_model::Orders;
 
 use super::further_input::{FurtherInput, FurtherSignals};
 
-/// Signals of one record for one theta. Each signal is preceded by `pad` zeros, so that shifts need no special case at
-/// the start.
+/// Signals of one record for one theta. Each signal is preceded by `pad` zeros, so shifts need no special case at the
+/// start.
 #[derive(Debug, Default)]
 pub(crate) struct Workspace {
     pub(super) pad: usize,
@@ -35,7 +35,7 @@ thread_local! {
 pub(crate) struct Borrowed(Workspace);
 
 impl Workspace {
-    /// Returns the workspace of this thread, or a new workspace if that of the thread is in use.
+    /// Returns the workspace of this thread, or a new one if it is in use.
     pub fn of_thread() -> Borrowed {
         Borrowed(LAST_WORKSPACE.take().unwrap_or_default())
     }

@@ -266,7 +266,7 @@ mod tests {
             let fit = Estimator::new(structure, orders).fit(records).unwrap();
             fit.verdict(records, None).unwrap()
         };
-        // As an operator, and as a model of other orders.
+        // Once as an operator, once as a model of other orders.
         let arx = of(Structure::Arx, Structure::Arx.operator_orders(29));
         assert_eq!(arx.level, VerdictLevel::NotDetermined, "{arx}");
         let fir = of(
@@ -333,7 +333,7 @@ mod tests {
         );
         let found = of(-1.95, 1.01);
         assert!(found.iter().any(|f| f.kind == "unstable"), "{found:?}");
-        // Poles at 0.99 and 0.01: 1 and 460 rad/s, a damping of 10.
+        // Poles at 0.99 and 0.01, i.e. 1 and 460 rad/s: a damping ratio of 10.
         let found = of(-1.0, 0.0099);
         assert!(found.iter().any(|f| f.kind == "neuromuscular-lag"), "{found:?}");
     }

@@ -18,7 +18,7 @@ const LATEST_S: f64 = 0.25;
 pub struct LoopResponse {
     /// Probability that chance alone gives a share at least as large, if e does not respond to u.
     pub p_value: f64,
-    /// Of the variance of e that earlier samples do not explain, the share that the latest outputs explain.
+    /// Share of the variance of e, as far as earlier samples do not explain it, that the latest outputs explain.
     pub share: f64,
 }
 
@@ -68,7 +68,7 @@ mod tests {
     use super::*;
     use crate::diagnostics::whitened::stream;
 
-    /// A loop around an integrator: e, and u with a noise of its own.
+    /// Returns e and u of a loop around an integrator, with separate noise on e and on u.
     fn loop_of(seed: u64) -> [Vec<f64>; 2] {
         let mut seed = seed;
         let n = 3000;
@@ -83,7 +83,7 @@ mod tests {
             v = 0.8 * v + stream(&mut seed);
             u[t] = 2.0 * if t >= 10 { e[t - 10] } else { 0.0 } + 0.3 * v;
         }
-        // Without a noise of its own e and its past show all of u.
+        // Without separate noise on e, e and its past determine u completely.
         let e = e.iter().map(|e| e + 1e-3 * stream(&mut seed)).collect();
         [e, u]
     }

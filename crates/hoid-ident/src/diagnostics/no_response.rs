@@ -1,10 +1,10 @@
 //! Test of whether u responds to e at all.
 //!
-//! A search over forms, delays and orders finds a response in any pair of signals, so that its result is only weak
-//! evidence of a response. This test is therefore done before the search, for all forms at once. Each channel is
-//! whitened by an autoregression, so that a slow component does not count as many independent samples. At the
-//! frequencies `omega_k` of the record up to [`HIGHEST_RAD_S`] the whitened output is regressed on a gain, a lead and a
-//! lag of e, followed by a typical neuromuscular system and a delay,
+//! A search over forms, delays and orders finds a response in any pair of signals, so its result is only weak evidence
+//! of a response. This test is therefore done before the search, for all forms at once. Each channel is whitened by an
+//! autoregression, so a slow component does not count as many independent samples. At the frequencies `omega_k` of the
+//! record up to [`HIGHEST_RAD_S`] the whitened output is regressed on a gain, a lead and a lag of e, followed by a
+//! typical neuromuscular system and a delay,
 //!
 //! `U_k = (A_u/A_e) N e^{-j omega tau} (b_1 + b_2 j omega + b_3/(j omega + a)) E_k + R_k`,
 //!
@@ -13,7 +13,7 @@
 //! and u (J. Theiler et al., *Physica D* 58 (1992) 77-94). The values of T for [`SURROGATES`] such records give the
 //! distribution of T if there is no response. If u does not depend on e, T is one more draw from this distribution: the
 //! probability that it exceeds all others is 1/([`SURROGATES`] + 1), regardless of the spectra. Only the past of e is
-//! used, so that a response of e to u does not count as a response of u. Several records have the same b.
+//! used, so a response of e to u does not count as a response of u. Several records have the same b.
 
 use std::f64::consts::{PI, TAU};
 
@@ -47,7 +47,7 @@ const COLUMNS: usize = 3;
 pub struct Response {
     /// T: share of the power of the whitened output that the response explains.
     pub share: f64,
-    /// Number of surrogates with a share at least as large as that of the records.
+    /// Number of surrogates whose share is at least as large as the share of the records.
     pub reached_by: usize,
     /// Number of surrogates.
     pub surrogates: usize,
@@ -59,8 +59,8 @@ impl Response {
         (self.reached_by + 1) as f64 / (self.surrogates + 1) as f64
     }
 
-    /// Returns the finding that no response can be distinguished from chance; `None` if no surrogate has a share as
-    /// large as that of the records.
+    /// Returns the finding that no response can be distinguished from chance; `None` if no surrogate has as large a
+    /// share as the records.
     pub fn finding(&self) -> Option<Finding> {
         (self.reached_by > 0).then(|| {
             Finding::undetermined(
@@ -223,7 +223,7 @@ fn filter(d: &[f64], omega_ts: f64) -> Complex64 {
 
 /// Returns the Fourier coefficients `sum x_t e^{-j omega t}` in these bins.
 fn coefficients(values: &[f64], bins: std::ops::RangeInclusive<usize>) -> Vec<Complex64> {
-    // Converts amplitudes of sinusoids to sums, so that the weight of a record is proportional to its length.
+    // Converts amplitudes of sinusoids to sums, so the weight of a record is proportional to its length.
     let scale = 0.5 * values.len() as f64;
     spectrum::coefficients(values)[bins].iter().map(|x| x * scale).collect()
 }
@@ -247,7 +247,7 @@ mod tests {
         .unwrap()
     }
 
-    /// Noise of these poles.
+    /// Returns noise with these poles.
     fn noise(seed: u64, poles: [f64; 2], n: usize) -> Vec<f64> {
         let seed = RunSeed {
             seed,
@@ -262,8 +262,8 @@ mod tests {
         filtered.collect()
     }
 
-    /// Level of the test by Monte Carlo: of unrelated noise, slow and fast, 1 in 20 has p < .05, standard error .011
-    /// of 400; and e that answers to u.
+    /// Level of the test by Monte Carlo: for unrelated noise, slow and fast, 1 in 20 records has p < 0.05 (standard
+    /// error 0.011 for 400 records). Also tests e that responds to u.
     #[test]
     fn unrelated_channels_have_no_response() {
         let mut small = 0;
@@ -274,7 +274,7 @@ mod tests {
             small += usize::from(found.p_value() < 0.05);
         }
         assert!((4..40).contains(&small), "{small} of 400");
-        // The machine answers to a person who does not look at e.
+        // The machine responds to a person who does not look at e.
         let u = noise(7, [0.95, 0.9], 8000);
         let e: Vec<f64> = u
             .iter()

@@ -205,7 +205,7 @@ mod tests {
             "{}",
             found[0].message
         );
-        // Both channels with reversed sign: the lead is correct.
+        // Both channels have reversed signs: the lead is correct.
         let flipped = OperatorEstimate {
             k_e: e(-0.09, 0.009),
             k_e_dot: e(-0.036, 0.004),
@@ -240,7 +240,7 @@ mod tests {
             ..lead
         };
         assert_eq!(gain_findings(&[("", nothing)])[0].kind, "gain");
-        // For two operators one is known.
+        // The gains of one of the two operators are determined.
         let found = gain_findings(&[(" of record 1", nothing), (" of record 2", operator())]);
         assert_eq!(found[0].kind, "undetermined-parameter");
         assert!(found[0].message.contains("K_e_dot of record 1"), "{}", found[0].message);

@@ -173,7 +173,7 @@ mod tests {
 
     #[test]
     fn one_step_leads_to_the_fit() {
-        // Twin: the grey box of the same stretch, whose noise model has one order, not four.
+        // Reference: a grey-box fit of the same stretch, whose noise model has order one instead of four.
         let record = run(1);
         let start = OperatorParameters {
             k_e: 0.97 * truth().k_e,
@@ -207,7 +207,8 @@ mod tests {
             let tau = of(&steps, "tau_e");
             squares += (tau.value / tau.standard_error.unwrap()).powi(2);
         }
-        // chi-square of 12, errors no less than the model's: up to 28.3 at 0.5 %.
+        // Chi-square with 12 degrees of freedom exceeds 28.3 with a probability of 0.5 %; the errors are no smaller
+        // than the model-based errors.
         assert!(squares < 28.3, "{squares}");
         let late = OperatorParameters {
             tau_e_s: truth().tau_e_s + 0.05,

@@ -10,15 +10,15 @@
 //! Approach*, 2012, section 6.3.2). The equation is linear in the coefficients of A, B, C, `B kappa` and T, which are
 //! found by least squares at the frequencies of manual control. The delay is scanned, with the same delay for d as for
 //! u and, in case only u was recorded late, without a delay for d. Rows are divided by `B h` of the previous iteration,
-//! so that a residual is equivalent to a disturbance at u (C. K. Sanathanan and J. Koerner, IEEE Trans. Automatic
-//! Control 8 (1963) 56-58), and weighted by the smoothed spectrum of the residuals.
+//! so a residual is equivalent to a disturbance at u (C. K. Sanathanan and J. Koerner, IEEE Trans. Automatic Control 8
+//! (1963) 56-58), and weighted by the smoothed spectrum of the residuals.
 //!
 //! | file | contents |
 //! |---|---|
 //! | `spectra` | Fourier coefficients, and the exogenous channels of the loop |
 //! | `equations` | the least-squares fit of an element |
 //!
-//! If a disturbance was not recorded, the person responds to it, so that u is not independent of it. The element is
+//! If a disturbance was not recorded, the person responds to it, so u is not independent of it. The element is
 //! therefore judged only if the recorded signals explain all but [`UNEXPLAINED`] of the power, as they do if all
 //! signals of the loop were recorded. C is free, since it equals A only if e is not scaled.
 
@@ -54,8 +54,8 @@ pub struct RecordedElement {
     pub delay_s: f64,
     /// Share of the power that the element does not explain, expressed as a disturbance at u.
     pub unexplained: f64,
-    /// Frequency in rad/s at which the response of the element differs most from that of the given element, apart from
-    /// the delay, and the ratio of the two responses at this frequency.
+    /// Frequency in rad/s at which the response of the element differs most from the given element, apart from the
+    /// delay, and the ratio of the two responses at this frequency.
     pub difference: (f64, Complex64),
     /// Largest delay for which e and u count as aligned, s.
     aligned_s: f64,

@@ -125,8 +125,8 @@ mod tests {
 
     const TS: f64 = 0.02;
 
-    /// e, the known column and u: `e(t) = .98 e(t-1) + w - .3 v(t-1)`, `u = e(t-2) + echo e(t-20) + v`, v
-    /// autoregressive, with a larger variance where `loud` is true.
+    /// Returns e, the known column and u of the loop `e(t) = .98 e(t-1) + w - .3 v(t-1)`,
+    /// `u = e(t-2) + echo e(t-20) + v`, where v is autoregressive, with a larger variance where `loud` is true.
     fn loop_of(seed: u64, echo: f64, loud: impl Fn(usize) -> f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let mut seed = seed;
         let n = 3000;
@@ -148,7 +148,8 @@ mod tests {
 
     #[test]
     fn the_level_holds_also_where_the_remnant_is_not_steady() {
-        // Shares of p below .1 in 100 loops: .1 with a standard error of .03; the larger of two is less often there.
+        // Share of 100 loops with p < 0.1: 0.1 with a standard error of 0.03; the larger of the two p-values is below
+        // 0.1 less often.
         for loud in [
             |_: usize| 1.0,
             |t: usize| if (t / 250).is_multiple_of(2) { 0.2 } else { 2.0 },
@@ -171,7 +172,7 @@ mod tests {
         let (e, known, mut u) = loop_of(3, 0.0, |_| 1.0);
         let short = |n: usize| residual_response(&[known[..n].to_vec()], &e[..n], &u[..n], 100, TS);
         assert!(short(900).is_none() && short(1400).is_some());
-        // A column twice, and one of nothing.
+        // The same column twice, and a column of zeros.
         for columns in [vec![known.clone(), known.clone()], vec![vec![0.0; e.len()]]] {
             assert!(residual_response(&columns, &e, &u, 100, TS).is_none());
         }

@@ -9,8 +9,8 @@
 //!
 //! The limits are effect sizes, not significance levels: with the samples of ten runs a test rejects every model of a
 //! person, and the important question is how much the model leaves unexplained. In short records chance alone gives
-//! effects of this size. There the limits are four standard errors `1/sqrt(n)` of a correlation of white noise, and a
-//! share of 20/n of the sum of squares, which one of n normal residuals exceeds with the probability 8e-6 n.
+//! effects of this size. For them the limits are four standard errors `1/sqrt(n)` of a correlation of white noise, and
+//! a share of 20/n of the sum of squares, which one of n normal residuals exceeds with the probability 8e-6 n.
 
 use hoid_model::{Finding, Record};
 

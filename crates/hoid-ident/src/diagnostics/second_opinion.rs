@@ -2,11 +2,11 @@
 //!
 //! | removed | cause of a difference | finding |
 //! |---|---|---|
-//! | deviations of a sample of e or u from its neighbours beyond a limit ([`crate::faults::held`]), so that no sample has a large effect on the filters of the fit | a few samples | `leverage` |
+//! | deviations of a sample of e or u from its neighbours beyond a limit ([`crate::faults::held`]), so no sample has a large effect on the filters of the fit | a few samples | `leverage` |
 //! | components slower than 20 s or, for a slow system, than ten periods of its slowest pole ([`crate::faults::without_slow`]) | a drift or a step of a sensor, which the person does not follow | `slow` |
 //!
 //! Two fits differ if a parameter, the crossover or the phase margin differs by more than three standard errors. The
-//! standard error is that of the first fit or, if larger, that of the information lost in the second fit,
+//! standard error is the one from the first fit or, if larger, the one from the information lost in the second fit,
 //! `sqrt(se'^2 - se^2)`. If nothing is removed, there is no second fit, because it would be identical to the first.
 
 use std::f64::consts::TAU;
@@ -307,7 +307,7 @@ mod tests {
         simulator.run(RunSeed::default(), false).unwrap()
     }
 
-    /// The record with one sample of e that is wrong.
+    /// Returns the record with one faulty sample of e.
     fn spoilt(record: &Record) -> [Record; 1] {
         let mut e = record.input().to_vec();
         e[4000] = 30.0;

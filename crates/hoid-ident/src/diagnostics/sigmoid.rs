@@ -148,7 +148,7 @@ fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTi
             ),
         ));
     }
-    // The error of T_I is at least half of T_I, so that 1/T_I does not differ significantly from zero.
+    // The error of T_I is at least half of T_I, so 1/T_I does not differ significantly from zero.
     if first.get("T_I").as_ref().is_some_and(is_open) {
         all.push(Finding::note(
             "lag",

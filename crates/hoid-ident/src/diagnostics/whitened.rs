@@ -1,7 +1,7 @@
-//! Least squares with autoregressive noise: the white part of u that given columns do not explain.
+//! Least squares with autoregressive noise: the white part of u that the given columns do not explain.
 //!
-//! In `u = X b + level + v`, `D v = eps`, the noise model D of order [`NOISE`] and b are estimated in turn. Residuals
-//! are limited to a given number of standard deviations, which may be infinite.
+//! In `u = X b + level + v`, `D v = eps`, the noise model D of order [`NOISE`] and b are estimated alternately.
+//! Residuals are limited to a given number of standard deviations, which may be infinite.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,7 +13,7 @@ const RATE_HZ: f64 = 50.0;
 pub(super) const LIMIT: f64 = 3.5;
 /// The unexplained part v is only rounding errors if its power is below this share of the power of u.
 const EXACT: f64 = 1e-18;
-/// Number of times that the coefficients and the noise model are estimated in turn.
+/// Number of alternations between the estimates of the coefficients and of the noise model.
 const ROUNDS: usize = 3;
 
 /// Returns the decimation factor for this sample time.

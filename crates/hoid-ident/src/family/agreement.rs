@@ -10,11 +10,11 @@
 //! 1. and 2. The covariances of the two methods, each from all residuals (times kappa) or from all lines together. A
 //!    jackknife over n runs has a rank of at most n - 1: with five runs and four coordinates, chance gives a very small
 //!    variance in some direction (H. Hotelling, *Annals of Mathematical Statistics* 2 (1931) 360-378). Both methods use
-//!    the same records, so that their errors are correlated: the sum of the covariances overestimates the covariance of
-//!    d, and false alarms are rarer than the significance level.
+//!    the same records, so their errors are correlated: the sum of the covariances overestimates the covariance of d,
+//!    and false alarms are rarer than the significance level.
 //! 3. The squared bias of the prediction error fit, in the pairs that contain it. In a closed loop this fit is biased
-//!    if its noise model is wrong, and no scatter between runs shows the bias. The squared bias is estimated as
-//!    `sum d_k d_k'` over the differences d_k from fits with other noise models ([`super::sensitivity`]). It is
+//!    if its noise model is wrong, and the scatter between runs does not show the bias. The squared bias is estimated
+//!    as `sum d_k d_k'` over the differences d_k from fits with other noise models ([`super::sensitivity`]). It is
 //!    included in the reported errors, and is therefore no evidence against the result.
 //!
 //! **Compared coordinates** are the gain and those coordinates that the data determine, if their prior share is at most
@@ -22,7 +22,7 @@
 //! may be determined by the prior in one method and by the data in another.
 //!
 //! The gain is compared as `ln |Y|` in the middle of the band of manual control. Gain and lead time, or gain and lag,
-//! can compensate each other along a curve such as K T_L = constant, so that two distant points on this curve may be
+//! can compensate each other along a curve such as K T_L = constant, so two distant points on this curve may be
 //! equivalent. A linear test of the gain itself would report a difference between them.
 //!
 //! T has a chi-square distribution with as many degrees of freedom as there are compared coordinates. For several pairs
@@ -134,8 +134,8 @@ impl Side {
     pub fn of(method: AgreementMethod, operator: &FamilyOperator, covariance: &[f64], reported: &[f64]) -> Self {
         let p = operator.coordinates().len();
         let gradient = level(operator).1;
-        // The covariance is transformed by a matrix whose first row is the gradient of the level; its other rows are
-        // those of the identity matrix.
+        // The covariance is transformed by a matrix whose first row is the gradient of the level; the other rows are
+        // rows of the identity matrix.
         let times = |c: &[f64], i: usize, j: usize| -> f64 {
             match i {
                 0 => (0..p).map(|k| gradient[k] * c[k * p + j]).sum(),
@@ -287,7 +287,7 @@ mod tests {
         assert!(agreement(&all, &one, &[0.0; 36], |_| true).is_none());
         let two = [one[0].clone(), side(AgreementMethod::Instrumental, &there, 0.01)];
         assert!(agreement(&all, &two, &[0.0; 36], |_| false).is_none());
-        // Zero variances are those of bounds.
+        // A zero variance means that the coordinate is at a bound.
         let held = [one[0].clone(), side(AgreementMethod::Instrumental, &there, 0.0)];
         assert!(agreement(&all, &held, &[0.0; 36], |_| true).is_none());
     }
@@ -295,7 +295,7 @@ mod tests {
     #[test]
     fn the_covariance_of_a_side_is_that_of_small_steps() {
         let operator = |x: &[f64]| FamilyOperator::new(Form::LeadLag, true, x).unwrap();
-        // For three directions, one of them the gain.
+        // Three directions, including the gain.
         let directions = [
             [0.2, 0.05, 0.01, 0.1, 0.0, 0.004],
             [0.0, -0.08, 0.03, 0.0, 0.2, 0.01],
@@ -350,8 +350,8 @@ mod tests {
 
     #[test]
     fn a_test_at_one_percent_has_one_percent() {
-        // Independent normal differences of three coordinates: a linear congruential generator
-        // (D. E. Knuth, MMIX) and the central limit of twelve.
+        // Independent normal differences of three coordinates: a linear congruential generator (D. E. Knuth, MMIX) and
+        // sums of twelve deviates (central limit theorem).
         let mut state = 11_u64;
         let mut normal = || {
             let mut sum = -6.0;
@@ -376,7 +376,7 @@ mod tests {
             let found = agreement(&all, &sides, &[0.0; 36], |i| i < 3).unwrap();
             doubted += usize::from(found.p_value < 0.01);
         }
-        // 40 of 4000, standard error 6.3; twelve uniform deviates have thinner tails.
+        // Expected: 40 of 4000, with a standard error of 6.3; sums of twelve uniform deviates have thinner tails.
         assert!((20..=60).contains(&doubted), "{doubted}");
     }
 }

@@ -6,9 +6,9 @@
 //! describing function as the source of starts for all forms.
 //!
 //! **B must cover the delay.** At 200 Hz the highest number of coefficients covers 0.3 s, and a smooth error, such as a
-//! sum of a few sinusoids, determines fewer coefficients than there are samples in the response of a person. The rate is
-//! then lowered ([`Record::decimated`]), so that fewer coefficients span the same time. Not earlier than necessary: in a
-//! closed loop the filter of the decimation, which needs later samples, makes e depend on later noise.
+//! sum of a few sinusoids, determines fewer coefficients than there are samples in the response of a person. The rate
+//! is then lowered ([`Record::decimated`]), so fewer coefficients span the same time. The rate is lowered no further
+//! than necessary: in a closed loop the decimation filter, which needs later samples, makes e depend on later noise.
 
 use hoid_model::{Channel, Complex64, Orders, Record, SampleTime, Structure, resampling::PASS};
 
@@ -36,7 +36,7 @@ const BAND_RAD_S: (f64, f64) = (0.5, 20.0);
 const POINTS: usize = 24;
 /// Duration of the impulse response that B can describe, s.
 const RESPONSE_S: f64 = 0.7;
-/// Shortest duration of B, s: that of a typical delay.
+/// Shortest duration of B, s: the duration of a typical delay.
 const SHORTEST_RESPONSE_S: f64 = 0.2;
 
 /// A frequency response without an assumption on the form of the operator.
@@ -77,7 +77,7 @@ impl ArxResponse {
         }
     }
 
-    /// Returns the response of u to e, from that to an error that is ahead by this time.
+    /// Converts the response of u to an error that is ahead by this time into the response of u to e.
     fn without_lead(mut self, lead_s: f64) -> Self {
         for point in &mut self.points {
             point.response *= Complex64::from_polar(1.0, point.omega_rad_s * lead_s);
@@ -95,7 +95,7 @@ impl ArxResponse {
         if high.innovations > NEARLY_NOISE_FREE {
             return None;
         }
-        // If there is noise, models whose regressors are a subset of those of the high-order model are skipped, since
+        // If there is noise, models that use only a subset of the regressors of the high-order model are skipped, since
         // their innovation variance cannot be smaller.
         let is_noise = high.innovations > SAFETY_FACTOR * NONE;
         let contained = |orders: &Orders| {
@@ -237,7 +237,8 @@ mod tests {
         simulated_operator::{Uniform, response_to},
     };
 
-    /// 60 s of a person with a long delay and an error that is a sum of twelve sinusoids, with a tenth of noise.
+    /// Returns a record of 60 s: a person with a long delay, an error that is a sum of twelve sinusoids, and 10 %
+    /// noise.
     fn record(truth: &FamilyOperator, ts: SampleTime) -> Record {
         let model = truth.zoh(ts).unwrap();
         let n = (60.0 / ts.s()) as usize;

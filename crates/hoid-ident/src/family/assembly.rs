@@ -223,7 +223,7 @@ impl<'a> Chosen<'_, 'a> {
         with_lines(self.prediction, fit, (lines?, &data), workspace)
     }
 
-    /// As [`have_separate_lines`].
+    /// Same as [`have_separate_lines`].
     fn have_separate_lines(&self) -> bool {
         let asked = self
             .channels
@@ -270,7 +270,8 @@ impl<'a> Chosen<'_, 'a> {
         figures.collect()
     }
 
-    /// Returns the operators of a form other than the best one, with errors computed like those of the best form.
+    /// Returns the operators of a form other than the best one, with errors computed in the same way as for the best
+    /// form.
     fn weighed(
         &self,
         of: &OtherForm<'a>,

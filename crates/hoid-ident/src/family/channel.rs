@@ -127,8 +127,8 @@ pub struct ChannelFit {
     pub preview_s: f64,
     /// The forms that were compared, including the absence of a response.
     pub forms: Vec<ChannelForm>,
-    /// Probability of a likelihood ratio at least as large as that of the best form if there is no response, corrected
-    /// for the number of forms.
+    /// Probability of a likelihood ratio at least as large as for the best form if there is no response, corrected for
+    /// the number of forms.
     pub p_value: f64,
     /// The response; `None` if none was found.
     pub response: Option<ChannelResponse>,

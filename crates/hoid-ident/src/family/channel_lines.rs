@@ -12,8 +12,8 @@
 //! `|u_k - sum_i Y_i x_ik|^2` over the runs, and from the same quantity in the bins next to the line; the two are
 //! combined as in [`super::lines`].
 //!
-//! The remnant also enters e, so that a single run would give a ratio of two noisy numbers; averaging over the runs
-//! before the division reduces this error.
+//! The remnant also enters e, so a single run would give a ratio of two noisy numbers; averaging over the runs before
+//! the division reduces this error.
 
 use std::sync::Arc;
 
@@ -90,7 +90,8 @@ pub(super) struct ChannelLines {
 
 impl ChannelLines {
     /// Finds the lines of the `exciting` channels and of the excitation in these records. The excitation is the given
-    /// channel or, if none is given, any channel with one of the common names. `None` if no signal has own lines.
+    /// channel or, if none is given, any channel with one of the common names. `None` if no signal has lines of its
+    /// own.
     pub fn of(
         records: &[Record],
         (channels, exciting): (&[String], &[String]),
@@ -267,7 +268,7 @@ pub(super) struct ChannelCriterion {
 /// The operator and its channels at the minimum of the criterion.
 #[derive(Debug, Clone)]
 pub(super) struct ChannelMinimum {
-    /// Coordinates of the operator, followed by those of the channels.
+    /// Coordinates of the operator, followed by the coordinates of the channels.
     pub coordinates: Vec<f64>,
     pub chi_squared: f64,
     /// Number of real equations, two per line.
@@ -468,7 +469,7 @@ impl ChannelCriterion {
         grid
     }
 
-    /// Returns the operators at x: that from the error to u, followed by those of the channels.
+    /// Returns the operators at x: the operator from the error to u, followed by the operators of the channels.
     fn operators(&self, x: &[f64]) -> Result<Vec<FamilyOperator>, ModelError> {
         let mut all = vec![self.layout.operator(x, 0)?];
         for channel in &self.layout.channels {

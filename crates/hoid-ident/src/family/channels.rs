@@ -63,7 +63,7 @@ pub(super) struct FurtherInputs<'s> {
     /// Values of each channel in each record.
     values: Vec<Vec<Vec<f64>>>,
     leads: Vec<usize>,
-    /// The records before truncation by the preview, so that whole periods are kept; the trend of e and u is removed.
+    /// The records before truncation by the preview, so whole periods are kept; the trend of e and u is removed.
     whole: Vec<Record>,
 }
 

@@ -3,9 +3,9 @@
 //! Each form has a value of Akaike's criterion: `chi^2 + 2 p` at the lines of an excitation, or `n ln V/kappa + 2 p`
 //! from the prediction error, where kappa is the inflation of variances. With little noise Schwarz's criterion is used
 //! instead ([`super::comparison`]). Estimates are averaged over forms with weights that follow from the criterion
-//! ([`super::mixture`]). The reported parameters are those that the best form has. The best form is the simplest form
-//! within 2 of the smallest value, since a difference of up to 2 is no evidence against a form (K. P. Burnham and D. R.
-//! Anderson, *Model Selection and Multimodel Inference*, 2002, section 2.6).
+//! ([`super::mixture`]). The reported parameters are the parameters of the best form. The best form is the simplest
+//! form within 2 of the smallest value, since a difference of up to 2 is no evidence against a form (K. P. Burnham and
+//! D. R. Anderson, *Model Selection and Multimodel Inference*, 2002, section 2.6).
 
 use hoid_model::Form;
 

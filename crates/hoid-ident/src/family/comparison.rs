@@ -1,12 +1,11 @@
 //! Comparison of the candidate forms, the basis of their weights in [`super::choice`].
 //!
 //! If an excitation was recorded, the forms are compared at its lines, otherwise by their prediction errors. All forms
-//! share one inflation kappa, so that a form does not profit from a large kappa of its own. Without lines, the noise model
+//! share one inflation kappa, so a form does not profit from a large kappa of its own. Without lines, the noise model
 //! biases the prediction errors: the best form is chosen as with lines, but its evidence against the other forms is
-//! reduced ([`bias_of_evidence`]). With little noise
-//! ([`super::low_noise`]) one form is assumed to be true, and a parameter costs Schwarz's `ln n` (G. Schwarz, *Annals
-//! of Statistics* 6 (1978) 461-464) instead of Akaike's 2. A form with undetermined parameters counts only if all forms
-//! have undetermined parameters.
+//! reduced ([`bias_of_evidence`]). With little noise ([`super::low_noise`]) one form is assumed to be true, and a
+//! parameter costs Schwarz's `ln n` (G. Schwarz, *Annals of Statistics* 6 (1978) 461-464) instead of Akaike's 2. A form
+//! with undetermined parameters counts only if all forms have undetermined parameters.
 
 use hoid_model::{FamilyOperator, Form, operator_family::Coordinate};
 use hoid_numerics::statistics::upper_median;
@@ -87,7 +86,7 @@ impl Comparison {
 }
 
 /// Excludes the quadratic form if it is equivalent to the lead with a droop. The lead with a droop is the quadratic
-/// form with real zeros, so that both forms can converge to the same operator, which must count only once.
+/// form with real zeros, so both forms can converge to the same operator, which must count only once.
 fn count_once(counting: &mut [Option<f64>], tried: &[Tried<'_>]) {
     let place = |form: Form| tried.iter().position(|t| t.form == form);
     if let (Some(quadratic), Some(droop)) = (place(Form::QuadraticIntegral), place(Form::LeadDroop))
@@ -98,8 +97,8 @@ fn count_once(counting: &mut [Option<f64>], tried: &[Tried<'_>]) {
     }
 }
 
-/// Keeps only the forms that fit equally well. Without noise, the residual of a wrong form is many times larger than
-/// that of the right form, whatever the wrong form determines. Sums of squares below `equal` count as equal.
+/// Keeps only the forms that fit equally well. Without noise, a wrong form has a residual many times larger than the
+/// right form, whichever parameters it determines. Sums of squares below `equal` count as equal.
 fn keep_best_fits(counting: &mut [Option<f64>], tried: &[Tried<'_>], equal: f64) {
     let squares = |i: usize| {
         let fit = tried[i].fit.as_ref().ok();
@@ -167,7 +166,7 @@ fn common_inflation(tried: &[Tried<'_>]) -> f64 {
     upper_median(&mut all).unwrap_or(1.0)
 }
 
-/// True if the forms are compared by prediction errors alone, so that the noise model biases the comparison.
+/// True if the forms are compared by prediction errors alone, so the noise model biases the comparison.
 fn compares_biased(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> bool {
     tried.len() > 1 && prediction.little_noise.is_none() && tried.iter().all(|t| t.lines.is_none())
 }
@@ -175,9 +174,10 @@ fn compares_biased(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> bool {
 /// Returns the ratio of the mean squared error of the response, which includes the bias by the noise model, to its
 /// variance, averaged over the band of manual control.
 ///
-/// In a closed loop without lines, an error of the noise model biases the estimate ([`super::sensitivity`]), and a wrong
-/// form may fit better than the right one because it compensates for that error. The likelihood ratio of two forms is a
-/// squared distance in units of the errors, so that errors that are larger by the bias reduce it by the same ratio.
+/// In a closed loop without lines, an error of the noise model biases the estimate ([`super::sensitivity`]), and a
+/// wrong form may fit better than the right one because it compensates for that error. The likelihood ratio of two
+/// forms is a squared distance in units of the errors; if the bias enlarges the errors, this ratio decreases
+/// accordingly.
 fn bias_of_evidence(
     front: &Tried<'_>,
     prediction: &Prediction<'_>,

@@ -54,10 +54,11 @@ impl Covariances {
 
     /// Adds the squared bias `d d'`, where d is the difference from another estimate.
     ///
-    /// The prediction error fit is biased if its noise model is wrong. No scatter between runs shows this bias, but an
-    /// estimate without that noise model does. The errors are then computed from the mean squared error, variance plus
-    /// squared bias, with d as the bias. The full `d d'` is used, and not `d d'/3`, which would apply to a true value
-    /// anywhere between the two estimates, since only one of them is biased. Elements at a bound remain unchanged.
+    /// The prediction error fit is biased if its noise model is wrong. The scatter between runs does not show this
+    /// bias, but an estimate without that noise model does. The errors are then computed from the mean squared error,
+    /// variance plus squared bias, with d as the bias. The full `d d'` is used, and not `d d'/3`, which would apply to
+    /// a true value anywhere between the two estimates, since only one of them is biased. Elements at a bound remain
+    /// unchanged.
     ///
     /// The errors are linearised, but the other estimate may be far along a ridge of the criterion, for example if gain
     /// and lag increase together. The linearised change `J d`, where J is the gradient of the response, is then not the
@@ -162,7 +163,7 @@ fn responding(fit: &PredictionFit<'_>, other: &[f64], differences: &[(usize, f64
     )
 }
 
-/// As [`responding`], for two operators and the differences `d` of these coordinates.
+/// Like [`responding`], for two operators and the differences `d` of these coordinates.
 fn explaining(here: &FamilyOperator, there: &FamilyOperator, coordinates: &[usize], d: &[f64]) -> Option<Vec<f64>> {
     let q = coordinates.len();
     let (mut total, mut linear) = (Linearisation::empty(q), 0.0);
@@ -252,7 +253,7 @@ fn add_lines_part(covariance: &mut [f64], factor: f64, fit: &PredictionFit<'_>, 
         DMatrix::from_row_slice(p, p, inverse),
         DMatrix::from_row_slice(p, p, &l),
     );
-    // The product is symmetric, so that the storage order does not matter.
+    // The product is symmetric, so the storage order does not matter.
     let part = &inverse * l * &inverse;
     covariance
         .iter_mut()
@@ -310,7 +311,8 @@ mod tests {
 
     #[test]
     fn a_bias_along_a_ridge_is_that_of_the_responses() {
-        // Two leads and a lag, of which K T_L^2/T_I alone is well known in the band: a pilot on an integrator.
+        // Two leads and a lag, for which only K T_L^2/T_I is well known in the band: a pilot who controls an
+        // integrator.
         let coordinates = Form::Lead2Lag.coordinates(true);
         let of = |gain: f64, lead_s: f64, lag_rate: f64| {
             let x: Vec<f64> = (coordinates.iter())
@@ -334,7 +336,7 @@ mod tests {
         };
         let there = of(0.0094, 2.72, 0.001);
         let found = explaining(&here, &there, &all, &d(&there)).unwrap();
-        // Sums of squares over the band, relative to the response: explained, linear and there.
+        // Sums of squares over the band, relative to the response: explained, linear and actual.
         let (mut explained, mut linear, mut actual) = (0.0, 0.0, 0.0);
         for k in 0..200 {
             let omega = 0.35 * (16.0_f64 / 0.35).powf(f64::from(k) / 199.0);
@@ -350,7 +352,7 @@ mod tests {
             "{explained} {actual}"
         );
         assert!(linear > 25.0 * actual, "{linear} {actual}");
-        // What is near stays as it is.
+        // A small difference is not changed.
         let near = of(0.045, 1.27, 0.8);
         assert_eq!(explaining(&here, &near, &all, &d(&near)), None);
     }

@@ -20,7 +20,7 @@ use crate::{Termination, diagnostics::residuals::ResidualMeasures};
 const LARGEST_REDUCED_CHI_SQUARED: f64 = 3.0;
 /// Significance level of two tests: agreement between methods, and the form against a free model.
 const LEVEL: f64 = 0.01;
-/// Relative excess of the loss over that of a free model above which a rejected form is reported.
+/// Relative excess of the loss over the loss of a free model above which a rejected form is reported.
 const LARGEST_EXCESS_LOSS: f64 = 0.01;
 /// Relative error of the response, at the frequency with the smallest error, above which the response counts as
 /// unknown.
@@ -179,7 +179,7 @@ struct OfSomeForms<'a> {
 }
 
 impl<'a> OfSomeForms<'a> {
-    /// Returns such parameters, those of the same forms together.
+    /// Returns these parameters, grouped by the forms that have them.
     fn all(parameters: &'a [Parameter], weighed: &[WeighedForm]) -> Vec<Self> {
         let mut all: Vec<Self> = Vec::new();
         let is_open = |p: &&Parameter| !p.determined && p.interval.is_some_and(|(low, high)| low * high > 0.0);
@@ -409,7 +409,7 @@ mod tests {
             parameter("K_e", &[]),
             parameter("T_L", &[Form::Lead, Form::LeadLag]),
             parameter("K_e_dot", &[]),
-            // It is open for another reason: more likely than not, the person has it.
+            // This parameter is undetermined for another reason; the forms that have it are more likely than not.
             parameter("tau_e", &[Form::Lead, Form::Lag]),
         ];
         let messages: Vec<String> = OfSomeForms::all(&all, &weighed)

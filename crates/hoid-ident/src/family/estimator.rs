@@ -69,12 +69,12 @@ impl FamilyEstimator {
         self.fit_with_response(records, described)
     }
 
-    /// As [`FamilyEstimator::fit`], but with a given describing function or the reason why there is none. The
+    /// Like [`FamilyEstimator::fit`], but with a given describing function or the reason why there is none. The
     /// describing function may, for example, come from other spans of the same runs, or include a time offset that is
     /// not a whole number of samples.
     ///
     /// # Errors
-    /// As [`FamilyEstimator::fit`].
+    /// Same as [`FamilyEstimator::fit`].
     pub fn fit_with_response(
         &self,
         records: &[Record],
@@ -158,7 +158,7 @@ impl FamilyEstimator {
     /// whether the channel and another signal are excited at separate lines.
     ///
     /// # Errors
-    /// As [`FamilyEstimator::fit`].
+    /// Same as [`FamilyEstimator::fit`].
     pub fn responds_to(&self, records: &[Record], channel: SeenChannel) -> Result<(ChannelFit, bool), IdentError> {
         let asked = [channel.clone()];
         let with_channel = Self {

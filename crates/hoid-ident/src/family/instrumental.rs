@@ -18,8 +18,8 @@
 //! auxiliary operator gives a consistent estimate, and the instruments from a fixed auxiliary operator are optimal
 //! except for the error of this operator.
 //!
-//! With free polynomials the method is less robust: the lag is below the lines and the resonance above them, so that
-//! the poles are not determined and move to the unit circle. Here the prior prevents this.
+//! With free polynomials the method is less robust: the lag is below the lines and the resonance above them, so the
+//! poles are not determined and move to the unit circle. Here the prior prevents this.
 //!
 //! **Assumptions.** If the excitation is independent of the noise, x is consistent for any D. The method shares the
 //! excitation with the fit at the lines, but neither its weights nor its need for whole periods. It shares the samples
@@ -361,7 +361,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         let p = x.len();
         let scale = variance * self.fit.inflation;
         let inner = |i: usize| self.limits()[i].0 < x[i] && x[i] < self.limits()[i].1;
-        // A coordinate at a bound is held: its row and column of A are those of the identity matrix.
+        // A coordinate at a bound is held: its row and column of A are replaced by those of the identity matrix.
         let held = DMatrix::from_fn(p, p, |i, j| match (inner(i) && inner(j), i == j) {
             (true, _) => a[(i, j)],
             (false, same) => f64::from(u8::from(same)),
@@ -434,13 +434,13 @@ mod tests {
         }
     }
 
-    /// The half of the squares of chi^2 with one degree of freedom that lies below the median.
+    /// Median of chi^2 with one degree of freedom.
     const MEDIAN_OF_CHI2: f64 = 0.455;
 
     #[test]
     fn the_truth_lies_within_its_errors() {
-        // Medians, as the first of these people has weak instruments (see above). The value for twelve values of chi^2
-        // has a standard error of 0.32 (1/(2 f sqrt(12)), f = 0.45 the density there).
+        // Medians are used because the first of these people has weak instruments (see above). The median of twelve
+        // values of chi^2 has a standard error of 0.32: 1/(2 f sqrt(12)), with the density f = 0.45 at the median.
         let mut squares = [Vec::new(), Vec::new()];
         for number in 0..12 {
             let (person, records) = person(number);
@@ -507,8 +507,8 @@ mod tests {
         let (_, z) = method.equation(&minimum, &d, &mut workspace).unwrap();
         let products = z.iter().flat_map(|a| z.iter().map(move |b| dot(a, b))).collect();
         let of_held = method.instruments_of(&minimum, &mut workspace).unwrap();
-        // The autoregression of the remainder of u is that of the fit except for what the prior
-        // moves, the instruments Psi except for the states before the record.
+        // The autoregression of the remainder of u equals the noise model of the fit except for the effect of the
+        // prior; the instruments equal Psi except for the states before the record.
         for (own, of_fit) in of_held.d.iter().zip(&d) {
             assert!((own - of_fit).abs() < 2e-3, "{:?} {d:?}", of_held.d);
         }

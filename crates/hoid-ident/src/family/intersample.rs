@@ -7,7 +7,7 @@
 //! | `auto` | smooth, with the delay for a held error | `(sin(x)/x)^2 e^{-jx}` | as for a held error |
 //!
 //! with `x = omega Ts/2` (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, 1997, sections 3.2 and 3.4).
-//! `foh` and `auto` are the same model with two definitions of its delay, so that no data can distinguish them. `zoh`
+//! `foh` and `auto` are the same model with two definitions of its delay, so no data can distinguish them. `zoh`
 //! differs from both by the factor `sin(x)/x`, which is 0.5 % below one at 20 rad/s and 60 Hz; only a recording without
 //! noise can show this ([`super::low_noise`]). If it does not, the difference between the two fits is part of the error
 //! bars ([`super::sensitivity`]).
@@ -117,7 +117,7 @@ mod tests {
                     let found = polynomial::value(&model.b, backward) / polynomial::value(&f, backward)
                         * backward.powi(model.nk as i32);
                     let expected = operator.response(omega) * course.response(omega, ts);
-                    // Aliases of a hold are proportional to omega Ts, those of linear interpolation to its square.
+                    // The aliases are proportional to omega Ts for a hold, and to its square for linear interpolation.
                     let aliases = match course {
                         Intersample::Zoh => 0.2 * omega * ts.s(),
                         Intersample::Auto | Intersample::Foh => 2.0 * (omega * ts.s()).powi(2),

@@ -174,7 +174,7 @@ mod tests {
     #[test]
     fn the_lines_take_away_what_a_wrong_noise_model_adds() {
         let truth = FamilyOperator::new(Form::Lead, true, &TRUTH).unwrap();
-        // The remnant for white: biased in the loop.
+        // If the remnant is modelled as white, the fit in the loop is biased.
         let fitted = |excitation: Option<&str>, nd: usize| {
             let estimator = FamilyEstimator {
                 forms: vec![Form::Lead],
@@ -190,7 +190,7 @@ mod tests {
         };
         let (biased, with_lines) = (fitted(None, 0), fitted(Some("f_t"), 0));
         assert!(with_lines < 0.7 * biased, "{with_lines} {biased}");
-        // With the right noise there is nothing to take away.
+        // With the right noise model there is no bias to remove.
         let (alone, with_lines) = (fitted(None, 6), fitted(Some("f_t"), 6));
         assert!(with_lines < 1.3 * alone + 0.01, "{with_lines} {alone}");
     }

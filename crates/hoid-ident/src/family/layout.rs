@@ -1,9 +1,9 @@
 //! Layout of eta: the coordinates of an operator and the coefficients of its noise model.
 //!
-//! `eta = [coordinates.., of channels.., c_1 .. c_nc, d_1 .. d_nd]`: the coordinates of the operator, those of further
-//! inputs, and the coefficients of the noise model `v = (C/D) eps`. A coordinate that is individual to each record
-//! occurs once per record; the coordinates of channels and the noise model are common to all records. All channels
-//! share the neuromuscular part of the operator.
+//! `eta = [coordinates.., of channels.., c_1 .. c_nc, d_1 .. d_nd]`: the coordinates of the operator, the coordinates
+//! of the further inputs, and the coefficients of the noise model `v = (C/D) eps`. A coordinate that is individual to
+//! each record occurs once per record; the coordinates of channels and the noise model are common to all records. All
+//! channels share the neuromuscular part of the operator.
 
 use std::ops::Range;
 

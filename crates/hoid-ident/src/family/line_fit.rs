@@ -126,7 +126,7 @@ pub(super) fn line_fit(
         .flatten();
     let by_lines = criterion.covariance(&found);
     let covariance = by_lines.clone().map(|by_lines| match by_runs {
-        // All replications use the same prior, so that their scatter does not include its contribution.
+        // All replications use the same prior, so their scatter does not include its contribution.
         Some(mut covariance) => {
             add_open_part(&mut covariance, 1.0, &criterion.penalty, &found.coordinates, &by_lines);
             covariance

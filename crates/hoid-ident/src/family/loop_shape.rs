@@ -4,7 +4,7 @@
 //! The open loop is `L = Y Y_c`, where Y is the sampled response of the estimate and Y_c is exact. The errors follow
 //! from the covariance of the real and imaginary part of `dL/L = dY/Y`. A crossing of `|L| = 1` and the phase at this
 //! crossing change as in [`super::open_loop`]. A crossing of the negative real axis changes by
-//! `d omega = -Im(dL/L)/Im(d ln L/d omega)`, so that the gain margin changes by
+//! `d omega = -Im(dL/L)/Im(d ln L/d omega)`, so the gain margin changes by
 //! `-(20/ln 10) (Re(dL/L) + Re(d ln L/d omega) d omega)` dB.
 //!
 //! An unstable closed loop can become stable only if L passes through -1 at some frequency. The squared distance of L
@@ -200,7 +200,7 @@ fn distance_from_the_limit(
 mod tests {
     use super::*;
 
-    /// 2.5/s after a gain with a neuromuscular resonance at 9 rad/s: |L| is one at three frequencies.
+    /// The element 2.5/s with a gain and a neuromuscular resonance at 9 rad/s: |L| is one at three frequencies.
     fn resonant(omega: f64) -> Complex64 {
         let s = Complex64::new(0.0, omega);
         Complex64::from_polar(1.0, -0.15 * omega) * 81.0 / (s * s + s + 81.0)

@@ -35,7 +35,7 @@ const MORE_STARTS: usize = 4;
 const ROUNDS: usize = 2;
 /// Ratio of the residual powers for two intersample behaviours below which the difference is decisive. For a continuous
 /// error neither model is right: the hold has the relative error `x^2/6` and linear interpolation `x^2/3` with
-/// `x = omega Ts/2`, so that the ratio of the residual powers is only 1/4.
+/// `x = omega Ts/2`, so the ratio of the residual powers is only 1/4.
 const DECISIVE_RATIO: f64 = 0.02;
 /// Ratio of the residual power of a form to the smallest residual power, above which the search may have ended in
 /// another minimum.
@@ -262,13 +262,13 @@ mod tests {
         FamilyOperator::new(Form::Lead, true, &X).unwrap()
     }
 
-    /// 25 s at 40 Hz of [`record_of`].
+    /// Returns 25 s of [`record_of`] at 40 Hz.
     fn record(model: &HeldFamily, noise: f64) -> Record {
         record_of(model, SampleTime::new(0.025).unwrap(), (200, 1000), noise)
     }
 
-    /// An error that is not zero in the mean, with this much white noise of u, started away from rest, `before` samples
-    /// before the record of `n`, and with a level of u.
+    /// Returns a record of `n` samples: an error with a nonzero mean, this much white noise on u, and a level of u. The
+    /// run starts `before` samples before the record, away from rest.
     fn record_of(model: &HeldFamily, ts: SampleTime, (before, n): (usize, usize), noise: f64) -> Record {
         let mut random = Uniform(7);
         let mut uniform = || random.between(-0.5, 0.5);
@@ -310,7 +310,7 @@ mod tests {
             (held.intersample, held.delay_if_straight_s(0)),
             (Intersample::Zoh, None)
         );
-        // Straight lines, of a delay that is half a sample longer than this model shows.
+        // A piecewise linear error; the delay is half a sample longer than this model shows.
         let straight = fitted(record(&truth().interpolate(ts).unwrap(), 0.0));
         assert!(worst(&straight, 0.243 + 0.0125) < 1e-10);
         assert_eq!(
@@ -337,7 +337,8 @@ mod tests {
         assert!(fit.noise_free.is_none() && fit.run_to_run > 0.0);
     }
 
-    /// A lead makes up for the hold: its two values differ by more than the noise allows for each.
+    /// A lead compensates for the hold: its values for the two intersample behaviours differ by more than the errors
+    /// due to noise.
     #[test]
     fn both_courses_of_the_error_are_within_the_errors_if_both_fit() {
         let ts = SampleTime::new(0.025).unwrap();
@@ -396,7 +397,7 @@ mod tests {
         );
     }
 
-    /// The mean of e that is removed becomes a ramp in u, as large as u itself.
+    /// Removing the mean of e causes a ramp in u that is as large as u itself.
     #[test]
     fn an_integration_of_an_error_with_a_mean_is_found() {
         let ts = SampleTime::new(0.005).unwrap();

@@ -181,7 +181,7 @@ mod tests {
         assert_eq!(Mixture::of(&[], 8), None);
     }
 
-    /// Two forms three errors apart: mean and variance by hand, the interval by its own probability.
+    /// Two forms that are three standard errors apart: mean and variance by hand, the interval from its probability.
     #[test]
     fn forms_that_differ_widen_the_error() {
         let many = 1_000_000;

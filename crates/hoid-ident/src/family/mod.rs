@@ -1,10 +1,10 @@
 //! Operators of recorded people: the family of operators, with robust errors.
 //!
 //! `u = Y e + (C/D) eps`, where Y is an operator of the family ([`hoid_model::operator_family`]). Three differences
-//! between people and a simulation affect the parameters. People integrate slow errors, so that the operator needs a
-//! lag. Their remnant does not have the spectrum of a first-order filter, so that the noise model must be flexible.
-//! They also vary, so that error bars must be based on the scatter between runs. Parameters that the data do not
-//! determine are reported as undetermined.
+//! between people and a simulation affect the parameters. People integrate slow errors, so the operator needs a lag.
+//! Their remnant does not have the spectrum of a first-order filter, so the noise model must be flexible. They also
+//! vary, so error bars must be based on the scatter between runs. Parameters that the data do not determine are
+//! reported as undetermined.
 //!
 //! 1. If a periodic excitation was recorded, the describing function is computed at its lines ([`crate::frequency`]),
 //!    and each form is fitted to it ([`LineFit`]). Together with the response of a high-order ARX model this supplies
@@ -32,7 +32,7 @@
 //! | `assembly` | assembly of the result from the searches of the forms |
 //! | `estimated` | the operator of a record with its errors |
 //! | `result` | [`FamilyFit`] |
-//! | `parameter` | a parameter with its interval, its prior share, and a flag if it is determined |
+//! | `parameter` | a parameter with its interval, its prior share, and whether the data determine it |
 //! | `prior` | prior knowledge of people |
 //! | `coordinates` | bounds and starting values of coordinates |
 //! | `lines`, `line_fit` | the lines with their variances; the operator fitted to the lines |

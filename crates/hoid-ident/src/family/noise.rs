@@ -158,13 +158,13 @@ mod tests {
         let all = [series(4000), series(3000)];
         let products = NoiseProducts::new(&all, 8);
         let fit = products.fit(2).unwrap();
-        // Standard errors of about 0.7/sqrt(7000).
+        // The standard errors are about 0.7/sqrt(7000).
         assert!(
             (fit.d[0] + 1.5).abs() < 0.03 && (fit.d[1] - 0.7).abs() < 0.03,
             "{fit:?}"
         );
         assert!((fit.loss - 1.0 / 12.0).abs() < 0.01);
-        // Akaike's criterion never takes too few, and what it takes too many of gains little.
+        // Akaike's criterion never selects too low an order, and excess coefficients reduce the loss only slightly.
         let order = products.best_order(0..=8, Penalty::Akaike).unwrap();
         let gained = 1.0 - products.fit(order).unwrap().loss / fit.loss;
         assert!(order >= 2 && gained < 0.003, "{order} {gained}");
@@ -172,11 +172,11 @@ mod tests {
 
     #[test]
     fn a_mixed_model_is_found_by_two_regressions() {
-        // The series of above as innovations' response: v = w + 0.6 w(t-1), w the autoregression.
+        // A moving average of the series above: v = w + 0.6 w(t-1), where w is the autoregression.
         let w = series(8000);
         let v: Vec<f64> = (1..w.len()).map(|t| w[t] + 0.6 * w[t - 1]).collect();
         let found = hannan_rissanen(&[v], (1, 2), 24).unwrap();
-        // Standard errors of some 0.01.
+        // The standard errors are about 0.01.
         for (value, truth) in found.iter().zip([0.6, -1.5, 0.7]) {
             assert!((value - truth).abs() < 0.05, "{found:?}");
         }

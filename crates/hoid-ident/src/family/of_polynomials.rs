@@ -4,9 +4,9 @@
 //! The poles determine the lag and the neuromuscular system ([`super::pole_reading`]).
 //!
 //! Apart from its poles, the exact model of an operator ([`FamilyOperator::zoh`]) has only a gain, leads and a delay,
-//! often fewer parameters than B has coefficients, so that estimated polynomials do not exactly correspond to an
-//! operator. The conversion finds the operator whose exact model M(x) is closest to the response H of the polynomials
-//! over the band of manual control,
+//! often fewer parameters than B has coefficients, so estimated polynomials do not exactly correspond to an operator.
+//! The conversion finds the operator whose exact model M(x) is closest to the response H of the polynomials over the
+//! band of manual control,
 //!
 //! `min_x sum_j |H(omega_j) - M(omega_j, x)|^2 / |H(omega_j)|^2`.
 //!
@@ -83,7 +83,7 @@ impl Fit {
     /// in the simplest exact or else the closest form.
     ///
     /// # Errors
-    /// As [`family_of_polynomials`].
+    /// Same as [`family_of_polynomials`].
     pub fn family_operator(&self, form: Option<Form>) -> Result<FamilyConversion, NotConvertible> {
         family_of_polynomials(self.model(), self.covariance(), form)
     }
@@ -280,7 +280,7 @@ impl<'a> Nearest<'a> {
                     other => self.reading.coordinate(*other),
                 })
                 .collect();
-            // The response is linear in the gain, so that the best gain is computed directly.
+            // The response is linear in the gain, so the best gain is computed directly.
             let (mut cross, mut power) = (0.0, 0.0);
             for (point, m) in self.points.iter().zip(self.responses(&start)?) {
                 let weight = point.response.norm_sqr().recip();
@@ -455,8 +455,8 @@ mod tests {
         assert_eq!(found.real_poles.len(), 1);
         assert_eq!(found.real_poles[0].role, PoleRole::Lag);
         assert!((found.real_poles[0].rate - 0.12).abs() < 1e-6);
-        // An overdamped neuromuscular system: three real poles, of which a lead of .6 s next to a
-        // slow lag leaves one reading. Any reading has the same response: the first that is exact.
+        // An overdamped neuromuscular system has three real poles; with a lead of .6 s next to a slow lag, one
+        // assignment is exact. Any exact assignment has the same response, and the first one is used.
         let x = [5.0, 0.6, 0.12, 11.0_f64.ln(), 1.3_f64.ln(), 0.137];
         let overdamped = FamilyOperator::new(Form::LeadLag, true, &x).unwrap();
         let found = family_of_polynomials(&exact(&overdamped), None, None).unwrap();
@@ -468,7 +468,7 @@ mod tests {
 
     #[test]
     fn errors_are_those_of_the_coefficients() {
-        // Each coefficient moved by a small step: the coordinates move as dx/dtheta reports.
+        // Each coefficient is changed by a small step; the coordinates change as dx/dtheta predicts.
         let operator = FamilyOperator::new(Form::LeadLag, true, &LEAD_LAG).unwrap();
         let model = exact(&operator);
         let n = model.theta().len();
@@ -501,7 +501,7 @@ mod tests {
     #[test]
     fn what_is_no_operator_is_refused() {
         let refused = |m: &PolynomialModel, form| family_of_polynomials(m, None, form).unwrap_err().to_string();
-        // Four poles, an unstable one, a negative one, no delay.
+        // Four poles, an unstable pole, a negative pole, and no delay.
         let four = polynomials(9, &[0.1, 0.1], &[-0.5, 0.2, 0.0, 0.01]);
         assert!(refused(&four, None).contains("one to three poles, found 4"));
         assert!(refused(&polynomials(9, &[0.1], &[-1.2]), None).contains("not stable"));

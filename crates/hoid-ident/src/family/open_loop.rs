@@ -82,7 +82,7 @@ impl LoopMeasures {
         }
     }
 
-    /// Returns the measures with the standard errors and intervals for the person instead of those for these runs.
+    /// Returns the measures with the standard errors and intervals for the person instead of for these runs.
     #[must_use]
     pub fn as_of_person(self) -> Self {
         let [crossover, margin] = self.of_person;
@@ -284,13 +284,14 @@ mod tests {
         let element = ContinuousTransferFunction::new(&[1.0], &[1.0, 0.0]).unwrap();
         let found = loop_measures(&gain, None, &element, (SampleTime::new(1e-4).unwrap(), AUTO)).unwrap();
         assert!((found.crossover_rad_s.value - 2.0).abs() < 1e-3);
-        // 90 deg less the delay and 2 zeta/omega of the neuromuscular part.
+        // 90 deg minus the phase lags of the delay and of the neuromuscular part (2 zeta/omega).
         let expected = 90.0 - (2.0_f64 * (0.1 + 0.014)).to_degrees();
         assert!((found.phase_margin_deg.value - expected).abs() < 0.1);
     }
 
-    /// 20 e^{-.2 j omega}/(j omega) crosses at 20 rad/s with 90 deg less 229: -139, and one with a delay of .6 s at
-    /// 10 rad/s with 90 less 344: the principal value of both lies within 180 deg.
+    /// 20 e^{-.2 j omega}/(j omega) crosses over at 20 rad/s with a margin of 90 - 229 = -139 deg. A loop with a delay
+    /// of .6 s crosses over at 10 rad/s with 90 - 344 = -254 deg. The principal values of both margins are within 180
+    /// deg.
     #[test]
     fn a_margin_below_zero_is_followed_round() {
         for (gain, delay) in [(20.0, 0.2), (10.0, 0.6), (2.0, 0.1)] {
@@ -340,7 +341,7 @@ mod tests {
                 "{scale}: {found:?}"
             );
         }
-        // A step: still between the ends.
+        // For a step the root is still between the ends.
         let step = zero_between(|x| if x < 0.3 { 1.0 } else { -3.0 }, (0.0, 1.0), (1.0, -3.0));
         assert!((step - 0.3).abs() < 1e-6, "{step}");
     }

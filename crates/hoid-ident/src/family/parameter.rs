@@ -1,8 +1,8 @@
 //! A reported parameter: its interval, its prior share, and whether the data determine it.
 //!
 //! Estimates are nearly normally distributed in the coordinates of the family, but not in the parameters: for a long
-//! lag, the error of `1/T_I` is symmetric, but that of T_I is not. Intervals are therefore computed in the coordinates
-//! and then transformed. If an interval of `1/T_I` includes zero, the intervals of T_I and K have no upper limit.
+//! lag, `1/T_I` has a symmetric error, but T_I does not. Intervals are therefore computed in the coordinates and then
+//! transformed. If an interval of `1/T_I` includes zero, the intervals of T_I and K have no upper limit.
 //!
 //! **Determined** means determined by the data. The posterior variance must be at most half of the prior variance
 //! ([`Parameter::prior_share`]), the parameter must not be at a bound of the search range, and its interval must
@@ -19,8 +19,8 @@ use super::mixture::{Component, Mixture, widened};
 
 /// Total weight of the forms with a parameter up to which the parameter counts as undetermined.
 const LEAST_WEIGHT: f64 = 0.5;
-/// Name of the gain, which in forms with a lag is the gain at zero frequency and in other forms that in the band, and
-/// the total weight of the forms with the same meaning up to which it counts as undetermined.
+/// Name of the gain (at zero frequency in forms with a lag, in the band in other forms), and the total weight of the
+/// forms with the same meaning up to which it counts as undetermined.
 pub(super) const DC_GAIN: &str = "K";
 const LEAST_WEIGHT_OF_DC_GAIN: f64 = 0.95;
 /// Largest ratio of the posterior to the prior variance of a determined parameter.
@@ -62,7 +62,7 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// Returns the parameter with the standard error and interval for the person instead of those for these runs.
+    /// Returns the parameter with the standard error and interval for the person instead of for these runs.
     #[must_use]
     pub fn as_of_person(&self) -> Self {
         let (estimate, interval) = widened(self.estimate(), self.interval, self.standard_error_person);
@@ -141,7 +141,7 @@ impl Parameter {
             standard_error_person: Mixture::of(&of_person, clusters)?.estimate.standard_error,
             interval,
             prior_share: share(&|p| p.prior_share),
-            // The parameter is not determined if the forms without it are more likely than those with it.
+            // The parameter is not determined if the forms without it are more likely than the forms with it.
             determined: total > LEAST_WEIGHT && share(&|p| f64::from(p.determined)) > 0.5 && one_sign && known,
             averaged_over: each.iter().map(|(form, ..)| *form).collect(),
             ..front.clone()
@@ -396,8 +396,7 @@ mod tests {
         assert!((low - 1.0 / 0.24).abs() < 1e-12 && (high - 1.0 / 0.16).abs() < 1e-12);
         let k = of(&all, "K");
         assert!(k.determined && (k.value - 25.0).abs() < 1e-12);
-        // Relative errors .04 and .1.
-        // Each of the two reaches its own way: K is low where K/T_I is low and 1/T_I is high.
+        // The relative errors are .04 and .1. K is lowest where K/T_I is low and 1/T_I is high.
         let (low, high) = k.interval.unwrap();
         let below = ((5.0_f64 / 4.6).ln().powi(2) + (0.24_f64 / 0.2).ln().powi(2)).sqrt();
         let above = ((5.4_f64 / 5.0).ln().powi(2) + (0.2_f64 / 0.16).ln().powi(2)).sqrt();
@@ -435,16 +434,16 @@ mod tests {
         };
         let both = averaged([0.75, 0.25]);
         assert!((both.value - 0.16).abs() < 1e-12 && both.determined);
-        // .75 .25 .04^2 more than the variance of each.
+        // The variance exceeds the variance in each form by .75 .25 .04^2.
         assert!((both.standard_error.unwrap() - (1e-4_f64 + 3e-4).sqrt()).abs() < 1e-12);
         assert_eq!(both.averaged_over, [Form::LeadLag, Form::Lead2]);
-        // Forms without it are the likelier ones.
+        // The forms without this parameter are more likely.
         assert!(!averaged([0.2, 0.2]).determined);
         assert_eq!(Parameter::averaged(&[(Form::LeadLag, 1.0, tau)], 8).as_ref(), Some(tau));
         assert_eq!(Parameter::averaged(&[], 8), None);
     }
 
-    /// T_I of a pure integration has no error: it is not part of the mean, but the interval is open above.
+    /// T_I of a pure integration has no error. It is not part of the mean, but the interval has no upper limit.
     #[test]
     fn a_parameter_at_a_bound_in_a_form_with_weight_is_in_the_interval() {
         let known = known(0.2, 0.02);
@@ -477,7 +476,7 @@ mod tests {
         }
         let ratio = of(&all, "K_over_T_I");
         assert!(ratio.determined && ratio.interval.unwrap() == (4.6, 5.4));
-        // The damping is the prior, the frequency is not.
+        // The prior determines the damping ratio, the data determine the frequency.
         assert!(!of(&all, "zeta_nm").determined && of(&all, "omega_nm").determined);
         // At the bound: a pure integration.
         let at_bound = known(1e-3, 0.02);

@@ -4,9 +4,9 @@
 //! behaviour of the error. The criterion of the general model ([`crate::criterion`]) is used as a function of the
 //! coordinates of the family. A prior is added to the sum of squares as `kappa sigma^2 sum_i (g_i - m_i)^2/s_i^2`. Here
 //! sigma^2 is the innovation variance, and kappa is the ratio of the variances from clusters (runs, or blocks of runs)
-//! to those for white residuals. People vary in ways that no stationary noise describes, so that their samples contain
-//! less information than as many samples of a simulation (M. Ribatet, D. Cooley and A. C. Davison, *Statistica Sinica*
-//! 22 (2012) 813-845, the magnitude adjustment).
+//! to the variances for white residuals. People vary in ways that no stationary noise describes, so their samples
+//! contain less information than as many samples of a simulation (M. Ribatet, D. Cooley and A. C. Davison, *Statistica
+//! Sinica* 22 (2012) 813-845, the magnitude adjustment).
 
 use hoid_model::{
     SampleTime,

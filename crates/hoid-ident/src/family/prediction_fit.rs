@@ -91,7 +91,7 @@ impl PredictionFit<'_> {
     }
 
     /// Returns the indices in eta of the elements that are not fixed, including those at a bound. Their uncertainty
-    /// contributes to that of other elements, since the true value need not be at the bound.
+    /// contributes to the uncertainty of other elements, since the true value need not be at the bound.
     pub fn not_fixed(&self) -> Vec<usize> {
         let limits = &self.criterion.limits;
         (0..limits.len()).filter(|&i| limits[i].0 < limits[i].1).collect()

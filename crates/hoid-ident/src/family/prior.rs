@@ -2,7 +2,7 @@
 //!
 //! A short tracking record carries little information about the neuromuscular system, whose resonance is above the
 //! excited frequencies. A weak prior keeps the parameters in the range of people, and has almost no effect if the data
-//! determine them. A positive parameter x has a log-normal prior, `ln x ~ N(ln centre, spread)`, so that the spread is
+//! determine them. A positive parameter x has a log-normal prior, `ln x ~ N(ln centre, spread)`, so the spread is
 //! relative. In the criterion the prior is an additional measurement of the parameter (a maximum a posteriori estimate;
 //! L. Ljung, *System Identification*, 1999, section 7.4).
 //!
@@ -163,8 +163,8 @@ impl OperatorPrior {
 
     /// Returns the shift in the logarithm of an estimate that is due to the prior of this parameter, with all other
     /// priors unchanged. Two normally distributed measurements of x with the fractions 1 - w and w of the information
-    /// have the mean `x = (1 - w) x_data + w m`, so that `x - x_data = w (m - x)/(1 - w)`. `None` if the parameter has
-    /// no prior, or is determined by the prior alone.
+    /// have the mean `x = (1 - w) x_data + w m`, so `x - x_data = w (m - x)/(1 - w)`. `None` if the parameter has no
+    /// prior, or is determined by the prior alone.
     pub fn pull(&self, parameter: &Parameter) -> Option<f64> {
         let name = parameter.name.split('[').next();
         let entry = self.entries.iter().find(|e| Some(e.parameter.as_str()) == name)?;
@@ -310,7 +310,7 @@ mod tests {
         ];
         assert!(none.iter().all(|p| OperatorPrior::population().pull(p).is_none()));
 
-        // And of two fits, to first order.
+        // Also for two fits, to first order.
         let (population, task) = (Population::default(), Task::default());
         let kind = RemnantKind::BroadBand;
         let person = Person::draw(

@@ -112,8 +112,8 @@ impl<'p> ResponseCriterion<'p> {
     }
 
     /// Returns the different minima in which searches from the points of a grid end, best first; empty if all searches
-    /// fail. chi^2 has local minima in delay and poles, so that the search runs from the best point of each delay, with
-    /// its best gain.
+    /// fail. chi^2 has local minima in delay and poles, so the search runs from the best point of each delay, with its
+    /// best gain.
     pub fn minima(&self, search: &SearchOptions, grid: Grid) -> Vec<ResponseMinimum> {
         let mut starts: Vec<(f64, Vec<f64>)> =
             coordinates::start_grid(self.form, self.neuromuscular, &self.limits, grid)
@@ -196,7 +196,7 @@ impl<'p> ResponseCriterion<'p> {
     }
 
     /// Returns the root mean square, over the points, of the relative difference between the responses at two places;
-    /// infinite if one of them is no operator.
+    /// infinite if one of them is not an operator.
     pub fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
         let of = |x: &[f64]| FamilyOperator::new(self.form, self.neuromuscular, x);
         let (Ok(a), Ok(b)) = (of(a), of(b)) else {
@@ -367,7 +367,7 @@ mod tests {
 
     #[test]
     fn the_errors_are_those_of_repeated_measurements() {
-        // 400 measurements with a fixed seed: a standard deviation is known to 3.5 %.
+        // 400 measurements with a fixed seed: the standard deviations are accurate to 3.5 %.
         let mut state = 5_u64;
         let mut uniform = move || {
             state = state

@@ -137,7 +137,7 @@ pub struct FamilyFit {
     #[serde(default)]
     pub course_is_known: bool,
     /// Time in s by which e was advanced when the sampling frequency was lowered, because the new hold is longer than
-    /// that of the recording.
+    /// the hold of the recording.
     #[serde(default)]
     pub lead_s: f64,
     /// Power of the residual relative to the power of u if the residual is not noise; `None` if there is noise.
@@ -199,7 +199,7 @@ impl FamilyFit {
         LoopMeasures::averaged(&each.into_iter().flatten().collect::<Vec<_>>(), self.clusters)
     }
 
-    /// As [`Self::loop_measures`], for the best form only.
+    /// Like [`Self::loop_measures`], for the best form only.
     pub fn loop_measures_in_front(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let of = self.operator(record);
         self.measured(&of.operator, of.covariance.as_deref(), element)

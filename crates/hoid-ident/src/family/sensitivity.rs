@@ -12,8 +12,8 @@
 //! the band of manual control, and thus crossover and margin.
 //!
 //! With little noise, both intersample behaviours of the error may fit. They differ by `sin(x)/x`, which a lead can
-//! replace, so that the parameters differ by more than their errors. If the records do not show the behaviour, the fit
-//! with the other one counts in the same way.
+//! replace, so the parameters differ by more than their errors. If the records do not show the behaviour, the fit with
+//! the other one counts in the same way.
 //!
 //! **Without lines** the differences do not show the whole bias: above the band of the forcing function, e consists
 //! mainly of remnant, and all noise models share most of the bias. The squared differences are therefore multiplied by

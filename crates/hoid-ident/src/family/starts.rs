@@ -1,18 +1,18 @@
 //! Starts of the searches for the operator, and the orders of its noise model.
 //!
-//! The loss of the prediction error has local minima in delay, leads, lags and poles, so that a search finds the operator
+//! The loss of the prediction error has local minima in delay, leads, lags and poles, so a search finds the operator
 //! only from a start in its valley. Each form has these starts:
 //!
 //! 1. **At the lines**, if there are lines: the form fitted to the describing function.
 //! 2. **From the response of a high-order ARX model** ([`super::arx_response`]): minima of
 //!    `chi^2 = sum_j 2 |H_j - Y(j omega_j)|^2 / v_j`, searched from the best grid point of each delay, with a prior and
 //!    without one. With a prior the search avoids minima far from people; without one it finds a person far from them.
-//!    The errors of H are correlated between frequencies, which chi^2 ignores, so that its least minimum need not belong
-//!    to the operator. The minima are therefore ranked by their prediction error
-//!    `n ln V + sum_i (g_i - m_i)^2/s_i^2`, where V is the innovation variance of an autoregression of `u - Y e`, and
-//!    the best of them that differ in their responses are starts.
+//!    The errors of H are correlated between frequencies, which chi^2 ignores, so its least minimum need not belong to
+//!    the operator. The minima are therefore ranked by their prediction error `n ln V + sum_i (g_i - m_i)^2/s_i^2`,
+//!    where V is the innovation variance of an autoregression of `u - Y e`, and the best of them that differ in their
+//!    responses are starts.
 //!
-//! The orders of the noise model are those of the start with the least prediction error.
+//! The noise model has the orders of the start with the least prediction error.
 
 use hoid_model::Form;
 
@@ -64,8 +64,8 @@ impl FamilyEstimator {
         )
     }
 
-    /// Returns the fit of a form at the lines and the starting coordinates of its searches: those of the fit at the
-    /// lines, and the minima for the response of the ARX model that have the smallest prediction errors.
+    /// Returns the fit of a form at the lines and the starting coordinates of its searches: the coordinates of the fit
+    /// at the lines, and the minima for the response of the ARX model that have the smallest prediction errors.
     pub(super) fn start(
         &self,
         form: Form,

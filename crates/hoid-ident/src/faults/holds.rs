@@ -1,12 +1,12 @@
 //! Stretches in which a channel is constant: frozen channels, dropouts and idle stretches.
 //!
 //! A *hold* is a run of equal values. A channel in full precision has no holds except at its largest or smallest value
-//! (a rail, which is treated separately), so that [`FROZEN`] equal samples already count as frozen. A quantised channel
-//! or a resting hand has holds in normal operation. Such a hold is frozen if it lasts at least [`RESTING_S`] and
-//! [`LONGER`] times the length that nine of ten holds do not exceed, and if the other channel moves by more than half
-//! of its deviation in the meantime. Holds at the [rest](super::rest) of a stick are compared only with each other. A
-//! hold is a dropout if the channel jumps to its value and back, each time by more than twice the change that 999 of
-//! 1000 changes do not exceed.
+//! (a rail, which is treated separately), so [`FROZEN`] equal samples already count as frozen. A quantised channel or a
+//! resting hand has holds in normal operation. Such a hold is frozen if it lasts at least [`RESTING_S`] and [`LONGER`]
+//! times the length that nine of ten holds do not exceed, and if the other channel moves by more than half of its
+//! deviation in the meantime. Holds at the [rest](super::rest) of a stick are compared only with each other. A hold is
+//! a dropout if the channel jumps to its value and back, each time by more than twice the change that 999 of 1000
+//! changes do not exceed.
 //!
 //! *Idle* is a stretch of [`IDLE_S`] or more in which both e and u stay within [`IDLE_RANGE`] of their deviations in
 //! each half second, such as before the start or after the end of a run. This does not happen while a person tracks,
@@ -170,14 +170,14 @@ mod tests {
     fn a_stick_in_its_dead_zone_is_not_frozen() {
         let e = autoregressive(9000, 1);
         let zone = |v: &f64| v - v.clamp(-4.0, 4.0);
-        // Slow, as a hand is.
+        // Slow, like a hand.
         let slow = autoregressive(1125, 2).into_iter().flat_map(|v| [zone(&v); 8]);
         let mut u: Vec<f64> = slow.collect();
         assert!(frozen(&u, Some(&e), 0.01).is_empty());
-        // Released for five seconds, as people do.
+        // The stick is released for five seconds, which is normal.
         u[3000..3500].fill(0.0);
         assert!(frozen(&u, Some(&e), 0.01).is_empty());
-        // Held at a value without a hand, and for most of a minute.
+        // Held at a value other than the rest, and at the rest for most of a minute.
         u[1000..1400].fill(2.125);
         u[3900..8900].fill(0.0);
         let found = frozen(&u, Some(&e), 0.01);

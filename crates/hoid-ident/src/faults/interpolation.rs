@@ -8,7 +8,7 @@
 //! `G delta = -g`, `G_ij = sum_t a(t-s-i) a(t-s-j)`, `g_i = sum_t a(t-s-i) eps(t)`
 //!
 //! With the Cholesky factor L of G and `y = L^-1 g`, the sum of squares falls by `|y|^2`. L and y for fewer samples are
-//! the first rows of L and y for more samples, so that one pass gives the decrease for every m.
+//! the first rows of L and y for more samples, so one pass gives the decrease for every m.
 
 use super::autoregression::Autoregression;
 
@@ -119,7 +119,7 @@ mod tests {
             };
             let least = at(&delta);
             assert!((before - least - found.fall(m)).abs() < 1e-9 * before, "{start} {m}");
-            // The innovations are those of the changed channel.
+            // The innovations equal the innovations of the changed channel.
             let mut changed = x.clone();
             delta.iter().enumerate().for_each(|(i, d)| changed[start + i] += d);
             assert!((squares(&ar.residuals(&changed)) - least).abs() < 1e-9 * before);

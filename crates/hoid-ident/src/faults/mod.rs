@@ -1,8 +1,8 @@
 //! Faults of recorded data, which are detected by documented statistics and bridged or cut out before a fit.
 //!
-//! A prediction error estimator uses every sample: one sample of e that is off by 20 deviations enters the criterion
-//! through the operator with more weight than a thousand good samples. The files of this folder detect and repair
-//! faults:
+//! A prediction error estimator uses every sample: one sample of e that is off by 20 standard deviations enters the
+//! criterion through the operator with more weight than a thousand good samples. The files of this folder detect and
+//! repair faults:
 //!
 //! | file | fault | statistic |
 //! |---|---|---|

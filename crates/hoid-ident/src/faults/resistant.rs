@@ -144,7 +144,7 @@ mod tests {
             let others = (0..clean.len()).filter(|t| *t != 1700 && off(*t) > 0.0).count();
             assert!(others <= 4, "{size}: {others} others moved");
         }
-        // Where the sample ends does not depend on how far it was off.
+        // The limited value does not depend on the size of the error.
         assert!(
             (held[1] - held[2]).abs() < 0.1 && (held[0] - held[1]).abs() < 1.0,
             "{held:?}"

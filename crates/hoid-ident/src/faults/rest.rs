@@ -6,8 +6,8 @@
 //!
 //! The rest is the most frequent value, if it makes up at least [`SHARE`] of the samples, is reached at least
 //! [`VISITS`] times, and is at least [`ALONE`] times as frequent as any other value. The levels of a quantised channel
-//! have similar frequencies, and a channel that stops stops only once. The largest and the smallest value of the
-//! channel cannot be the rest.
+//! have similar frequencies, and a frozen channel stops only once. The largest and the smallest value of the channel
+//! cannot be the rest.
 
 use std::ops::Range;
 

@@ -1,13 +1,12 @@
 //! A record without slow components, for a second opinion on a fit.
 //!
 //! A step or a drift of a sensor cannot be seen from neighbouring samples, and it is not removed with a constant level.
-//! The person does not follow it, so that e has power at low frequencies to which u does not respond; the estimated
-//! gain is then too low and its error bars are too small. The least-squares line and the cosines
-//! `cos(pi k (t + 1/2)/N)`, `k = 1 .. 2 T/`[`PERIOD_S`] (all components slower than that period) are removed from both
-//! channels by the same linear operation, so that the dynamics from e to u are preserved. A second fit lacks the
-//! information of low frequencies. If nothing is wrong, it differs from the first fit by chance with the variance
-//! `var' - var` (J. A. Hausman, *Econometrica* 46 (1978) 1251-1271); if it differs by more, slow components dominate
-//! the first fit.
+//! The person does not follow it, so e has power at low frequencies to which u does not respond; the estimated gain is
+//! then too low and its error bars are too small. The least-squares line and the cosines `cos(pi k (t + 1/2)/N)`,
+//! `k = 1 .. 2 T/`[`PERIOD_S`] (all components slower than that period) are removed from both channels by the same
+//! linear operation, so the dynamics from e to u are preserved. A second fit lacks the information of low frequencies.
+//! If nothing is wrong, it differs from the first fit by chance with the variance `var' - var` (J. A. Hausman,
+//! *Econometrica* 46 (1978) 1251-1271); if it differs by more, slow components dominate the first fit.
 
 use std::f64::consts::PI;
 

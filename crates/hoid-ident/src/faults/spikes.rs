@@ -306,9 +306,9 @@ mod tests {
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].samples, 2000..2001);
         assert!((found[0].size - 30.0).abs() < 3.0, "{found:?}");
-        // The bridge is the sample within what one innovation does.
+        // The bridged value equals the original sample within the effect of one innovation.
         assert!((faulty[2000] - clean[2000]).abs() < 2.0);
-        // The same through the dynamics of the channel: a push.
+        // The same change through the dynamics of the channel is a push.
         let mut pushed = clean;
         let (mut one, mut two) = (30.0, 0.0);
         for v in &mut pushed[2000..] {

@@ -15,7 +15,7 @@ pub fn autoregressive(n: usize, seed: u64) -> Vec<f64> {
         (one, two) = (v, one);
         v
     };
-    // After the start from rest.
+    // Omits the transient after the start from rest.
     for _ in 0..100 {
         next();
     }

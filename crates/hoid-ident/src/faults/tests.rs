@@ -1,4 +1,4 @@
-//! Injected faults in simulated runs, and runs without any.
+//! Tests with faults injected into simulated runs, and with runs without faults.
 
 use hoid_model::{
     Channel, Fault, FaultAction, FaultHandling, FaultKind, Record, SampleTime, Severity,
@@ -20,7 +20,7 @@ fn run(condition: Condition, seed: u64) -> Record {
     simulator.run(seed, false).unwrap()
 }
 
-/// The same record with other signals.
+/// Returns the record with changed signals.
 fn with(record: &Record, change: impl FnOnce(&mut Vec<f64>, &mut Vec<f64>)) -> Record {
     let (mut e, mut u) = (record.input().to_vec(), record.output().to_vec());
     change(&mut e, &mut u);
@@ -94,7 +94,7 @@ fn one_sample_of_the_error_is_found_and_bridged() {
         assert!((fault.size - (30.0 - clean.input()[place])).abs() < 0.1, "{fault}");
         assert!((found.segments[0].input()[place] - clean.input()[place]).abs() < 0.05);
         assert_eq!(found.findings[0].severity, Severity::Note);
-        // Reported and not repaired.
+        // The faults are reported and not repaired.
         let told = repair(&record, FaultHandling::Report).unwrap();
         assert_eq!(told.segments[0].input(), record.input());
         assert_eq!(told.findings[0].severity, Severity::Doubt);
@@ -164,7 +164,7 @@ fn time_in_milliseconds_is_not_determined() {
     .unwrap();
     let found = repaired(&record);
     assert_eq!(kinds(&found.faults), [FaultKind::TimeUnit]);
-    // A person who waits for 50 samples has not been idle for 500 s.
+    // A wait of 50 samples is not reported as an idle stretch of 500 s.
     let waits = with(&record, |e, u| {
         e[400..450].fill(0.0);
         u[400..450].fill(0.0);

@@ -8,8 +8,8 @@
 //! | runs | the records, regardless of their number of periods, if there are three or more; otherwise the periods of the records |
 //! | delay | the delay of a gain-lead-delay model fitted to the lines: it is used to unwrap the phase, and is removed from the phase before margins are interpolated |
 //!
-//! Records are used as runs if possible. The remnant of neighbouring periods is one signal, so that periods of one run
-//! are not independent, and the scatter within one run does not contain the variation of a person from day to day.
+//! Records are used as runs if possible. The remnant of neighbouring periods is one signal, so periods of one run are
+//! not independent, and the scatter within one run does not contain the variation of a person from day to day.
 
 use hoid_model::{ContinuousTransferFunction, Detrend, Record, Verdict, uncertainty::Estimate};
 

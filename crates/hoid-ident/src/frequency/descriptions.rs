@@ -101,8 +101,8 @@ fn several_runs_are_described_by_default() {
     within(margins.crossover_rad_s, 1.5635);
     within(margins.phase_margin_deg, 76.67);
     assert_eq!(found.verdict.level, VerdictLevel::Trustworthy, "{}", found.verdict);
-    // The phase goes from a lead to far beyond one turn. It has no jumps, and each phase differs from its principal
-    // value by whole turns.
+    // The phase runs from a lead to a lag of more than one turn. It has no jumps, and each phase differs from its
+    // principal value by whole turns.
     let phases = found.phases_deg();
     for (phase, line) in phases.iter().zip(&function.lines) {
         let turns = (phase.value - line.phase_deg().value) / 360.0;
@@ -272,7 +272,7 @@ fn what_cannot_be_described_is_refused() {
         ..DescriptionOptions::default()
     };
     assert!(message(&[bare], &named).contains("one of e, u"));
-    // The span is not whole periods: this is reported for the channel that exists.
+    // The span is not a whole number of periods; this is reported for the channel that exists.
     let half = record(PERIOD * 5 / 4, excitation, excitation);
     assert!(message(&[half], &options).contains("whole periods"));
     let twice = record(PERIOD, excitation, |k| 2.0 * excitation(k));

@@ -265,7 +265,7 @@ mod tests {
         assert!((chance_coherence(2).unwrap() - 0.95).abs() < 1e-15);
         let ten = chance_coherence(10).unwrap();
         assert!(((1.0 - ten).powi(9) - 0.05).abs() < 1e-15);
-        // One line: the probability is that of the line itself.
+        // For a single line, the probability is that of the line itself.
         for (n, c) in [(2, 0.3), (5, 0.6), (10, ten)] {
             let expected = (1.0_f64 - c).powi(n - 1);
             let found = probability_by_chance(&[c], n as usize).unwrap();

@@ -32,7 +32,7 @@ pub struct Excitation {
 /// Criteria for finding the lines of a channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineSearch {
-    /// Period T in s; if `None`, the shortest period of which all found lines are harmonics.
+    /// Period T in s; if `None`, the shortest period that has all found lines as harmonics.
     pub period_s: Option<f64>,
     /// Minimum amplitude of a line relative to the largest line. Default 0.01.
     pub least_amplitude: f64,
@@ -275,8 +275,7 @@ mod tests {
             let refused = Excitation::found_in(&reference(samples, 0.0), "e", &search);
             assert!(matches!(refused, Err(IdentError::NotWholePeriods { .. })));
         }
-        // The lines of two periods taken for those of one of twice the length would be harmonics
-        // too; the other way round not.
+        // With twice the period, the lines would also be harmonics; this is refused.
         let wrong = LineSearch {
             period_s: Some(40.96),
             ..LineSearch::default()

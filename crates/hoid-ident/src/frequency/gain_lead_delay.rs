@@ -1,11 +1,11 @@
 //! Gain, lead and delay of `M = K (T_L s + 1) e^{-s tau}` from a describing function.
 //!
 //! The criterion is `sum_k w_k |M(j omega_k)/H_k - 1|^2`. Errors are relative to the describing function, since
-//! otherwise its largest values would dominate. For a given tau the model is linear in K and K T_L, so that the
-//! criterion reduces to a function of tau (G. H. Golub and V. Pereyra, SIAM J. Numerical Analysis 10 (1973) 413-432);
-//! it is scanned over the range of delays, and its lowest point is refined. Without a lead, and with a single
-//! integrator as controlled element, this is the crossover model of McRuer and Jex (1967). The delay includes all phase
-//! lag for which the model has no other term, such as the lag of the neuromuscular system.
+//! otherwise its largest values would dominate. For a given tau the model is linear in K and K T_L, so the criterion
+//! reduces to a function of tau (G. H. Golub and V. Pereyra, SIAM J. Numerical Analysis 10 (1973) 413-432); it is
+//! scanned over the range of delays, and its lowest point is refined. Without a lead, and with a single integrator as
+//! controlled element, this is the crossover model of McRuer and Jex (1967). The delay includes all phase lag for which
+//! the model has no other term, such as the lag of the neuromuscular system.
 //!
 //! Standard errors come from the jackknife over runs, with fixed weights (`ratio.rs`).
 

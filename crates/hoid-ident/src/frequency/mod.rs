@@ -1,9 +1,9 @@
 //! Describing functions: the response of a human operator at the lines of a periodic excitation, without a model.
 //!
 //! Let `E_i, U_i` be the Fourier coefficients of e and u at a line in run i. `H_i = U_i/E_i` is the describing function
-//! of that run. The remnant n, `U = H E + N`, is fed back through the loop, so that the mean of the ratios is biased;
-//! the bias increases as E decreases. Let D_i be the coefficient of the forcing function or the disturbance, which is
-//! not related to the remnant. The estimate
+//! of that run. The remnant n, `U = H E + N`, is fed back through the loop, so the mean of the ratios is biased; the
+//! bias increases as E decreases. Let D_i be the coefficient of the forcing function or the disturbance, which is not
+//! related to the remnant. The estimate
 //!
 //! `H = sum_i U_i D_i* / sum_i E_i D_i*`
 //!

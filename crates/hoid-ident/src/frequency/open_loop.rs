@@ -190,8 +190,8 @@ struct PhaseCrossover {
 }
 
 impl PhaseCrossover {
-    /// Of the crossings at which the phase falls through -180 deg, returns the crossing with the magnitude nearest to
-    /// 1; `None` if there is no such crossing.
+    /// Returns the crossing at which the phase falls through -180 deg with the magnitude nearest to 1; `None` if there
+    /// is no such crossing.
     fn of(omega_rad_s: &[f64], response: &[Complex64], delay_s: f64) -> Option<Self> {
         let of_pair = |(w, l): (&[f64], &[Complex64])| {
             let by_delay = |omega: f64| Complex64::from_polar(1.0, -delay_s * omega);
@@ -234,7 +234,7 @@ mod tests {
 
     #[test]
     fn a_straight_line_is_crossed_where_it_is() {
-        // k/s with a phase that is straight over log omega: exact by interpolation.
+        // k/s with a phase that is linear over log omega, for which the interpolation is exact.
         let omega: [f64; 4] = [0.3, 1.0, 4.0, 11.0];
         let phase = |w: f64| -100.0 - 30.0 * w.ln();
         let response: Vec<Complex64> = omega
@@ -244,7 +244,7 @@ mod tests {
         let found = Crossover::of(&omega, &response, 0.0).unwrap();
         assert!((found.omega_rad_s - 2.5).abs() < 1e-12);
         assert!((found.phase_margin_deg - (180.0 + phase(2.5))).abs() < 1e-10);
-        // Around the negative axis, and beyond.
+        // Rotated about the origin across the negative axis.
         let turned: Vec<Complex64> = response.iter().map(|l| l * Complex64::from_polar(1.0, -1.2)).collect();
         let found = Crossover::of(&omega, &turned, 0.0).unwrap();
         assert!((found.phase_margin_deg - (180.0 + phase(2.5) - 1.2_f64.to_degrees())).abs() < 1e-10);
@@ -266,7 +266,7 @@ mod tests {
 
     #[test]
     fn the_gain_margin_is_where_the_phase_falls_through_the_negative_axis() {
-        // 4/s after 0.3 s: -180 deg at pi/0.6, where the gain is 4 * 0.6/pi.
+        // 4/s with a delay of 0.3 s: -180 deg at pi/0.6, where the gain is 4 * 0.6/pi.
         let omega = [0.7, 3.0, 9.0, 14.0];
         let response: Vec<Complex64> = omega
             .iter()
@@ -276,7 +276,7 @@ mod tests {
         let found = PhaseCrossover::of(&omega, &response, 0.3).unwrap();
         assert!((found.omega_rad_s - at).abs() < 1e-12);
         assert!((found.gain_margin_db + 20.0 * (4.0 / at).log10()).abs() < 1e-12);
-        // Without the delay the phase is straight over log omega, from 3 to 9 rad/s.
+        // If the delay is not removed, the phase is interpolated linearly over log omega from 3 to 9 rad/s.
         let straight = PhaseCrossover::of(&omega, &response, 0.0).unwrap();
         let part = (0.5 * std::f64::consts::PI - 0.9) / 1.8;
         assert!((straight.omega_rad_s - 3.0 * 3.0_f64.powf(part)).abs() < 1e-12);

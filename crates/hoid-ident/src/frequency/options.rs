@@ -24,8 +24,8 @@ pub enum Realisation {
     /// Each record is one run, regardless of its number of periods.
     #[default]
     Record,
-    /// Each period of each record is one run, so that a single record has a spread. The remnants of neighbouring
-    /// periods are assumed to be independent.
+    /// Each period of each record is one run, so a single record has a spread. The remnants of neighbouring periods are
+    /// assumed to be independent.
     Period,
 }
 

@@ -1,6 +1,6 @@
 //! A ratio of sums over runs, `H = sum a_i / sum b_i`, and its standard error.
 //!
-//! To first order `dH = sum (a_i - H b_i) / sum b_i` with independent terms, so that the variance is
+//! To first order `dH = sum (a_i - H b_i) / sum b_i` with independent terms, so the variance is
 //! `sigma^2 = n/(n-1) sum |a_i - H b_i|^2 / |sum b_i|^2`. A region without linearisation follows from the mean of
 //! `a_i - H b_i`, which has the expectation zero only at the true H: n times its square over the sample variance has
 //! the F distribution with 2 and 2(n - 1) degrees of freedom for circular normal errors. The values of H that F does
@@ -114,7 +114,7 @@ mod tests {
         let without: Vec<Option<f64>> = (0..4).map(|i| Some(ratio.value(Some(i)).im)).collect();
         assert!((jackknife(expected.value, &without).standard_error.unwrap() - error).abs() < 1e-15);
         assert_eq!(jackknife(1.0, &[Some(1.0), None]).standard_error, None);
-        // For a complex mean, |dH|^2 <= F sigma^2: F(2, 6) is exceeded by 5 % at 5.143.
+        // For a complex mean, |dH|^2 <= F sigma^2: F(2, 6) exceeds 5.143 with a probability of 5 %.
         let (centre, radius) = ratio.confidence_disc(0.95).unwrap();
         assert!((centre - ratio.value(None)).norm() < 1e-14 && (radius / error - 5.143_f64.sqrt()).abs() < 1e-4);
         let zero = Complex64::new(0.0, 0.0);

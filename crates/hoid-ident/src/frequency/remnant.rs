@@ -1,10 +1,10 @@
 //! The remnant in u: its power at non-excited frequencies.
 //!
-//! Over whole periods the response to the excitation has no power between its lines, so that all power there is
-//! remnant. Bin k of a window of N samples gives the one-sided density `|U_k|^2/2 / (2 pi/(N Ts))` per rad/s, with a
-//! relative standard error of 1 (chi-square with two degrees of freedom). The mean of m values, from n runs and
-//! neighbouring bins, has a relative standard error of `1/sqrt(m)` (J. S. Bendat and A. G. Piersol, *Random Data*,
-//! 2010, section 8.5.4).
+//! Over whole periods the response to the excitation has no power between its lines, so all power there is remnant. Bin
+//! k of a window of N samples gives the one-sided density `|U_k|^2/2 / (2 pi/(N Ts))` per rad/s, with a relative
+//! standard error of 1 (chi-square with two degrees of freedom). The mean of m values, from n runs and neighbouring
+//! bins, has a relative standard error of `1/sqrt(m)` (J. S. Bendat and A. G. Piersol, *Random Data*, 2010, section
+//! 8.5.4).
 //!
 //! The lines also contain remnant. The remnant at the lines is estimated from the density at neighbouring frequencies:
 //! `noise ratio = power of the remnant / var(u)` estimates P_n of eq. 43, whereas the share at non-excited frequencies

@@ -153,7 +153,7 @@ fn error_bars_hold_what_they_say() {
     }
     let unbounded: usize = without_bound.iter().sum();
     let checks = experiments as usize * squares.len();
-    // An unbounded region is the outside of a circle far from H, so that the true value is in it.
+    // An unbounded region is the outside of a circle far from H, so the true value is in it.
     let coverage = (inside + unbounded) as f64 / checks as f64;
     println!("coverage {coverage} of {checks} circles, without bound {without_bound:?}");
     // The checks are nearly independent, with a standard error of 0.0077. The region may be unbounded only where the

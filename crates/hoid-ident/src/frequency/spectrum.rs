@@ -17,7 +17,7 @@ pub(crate) fn coefficients(values: &[f64]) -> Vec<Complex64> {
     let transform = RealFftPlanner::<f64>::new().plan_fft_forward(n);
     let mut input = values.to_vec();
     let mut output = vec![Complex64::new(0.0, 0.0); n / 2 + 1];
-    // Both buffers have the lengths that the transform expects, so that there is no error.
+    // Both buffers have the lengths that the transform expects, so there is no error.
     let _ = transform.process(&mut input, &mut output);
     let scale = 2.0 / n as f64;
     for x in &mut output {
@@ -54,7 +54,7 @@ mod tests {
                     7 => expected,
                     _ => Complex64::new(0.0, 0.0),
                 };
-                // Rounding of some ten additions in a row.
+                // Rounding error of about ten successive additions.
                 assert!((c - expected).norm() < 1e-13, "{n} {k}: {c}");
             }
         }

@@ -37,7 +37,7 @@ mod tests {
 
     #[test]
     fn unwrapped_phase_of_a_delay_is_a_line() {
-        // 0.9 s of delay and 1 rad/s steps: 52 deg a step, far beyond one round.
+        // A delay of 0.9 s and steps of 1 rad/s: 52 deg per step, and many turns in total.
         let phases: Vec<(f64, f64)> = (1..200)
             .map(|k| {
                 let omega = f64::from(k);
@@ -47,7 +47,8 @@ mod tests {
         for (phase, (omega, _)) in unwrapped_deg(&phases, 0.9).iter().zip(&phases) {
             assert!((phase + (0.9 * omega).to_degrees()).abs() < 1e-9);
         }
-        // A step of 8 rad/s turns by 413 deg: with a delay that is wrong by 0.3 s, it still follows.
+        // A step of 8 rad/s changes the phase by 413 deg; the unwrapping remains right with an error of 0.3 s in the
+        // delay.
         let coarse: Vec<(f64, f64)> = phases.iter().copied().step_by(8).collect();
         for (phase, (omega, _)) in unwrapped_deg(&coarse, 0.6).iter().zip(&coarse) {
             assert!((phase + (0.9 * omega).to_degrees()).abs() < 1e-9);

@@ -129,7 +129,7 @@ mod tests {
         assert_eq!(parts.iter().map(|p| p.first).collect::<Vec<_>>(), [100, 300, 500]);
         assert!(parts.iter().all(|p| p.samples == 200 && p.periods == 1));
         assert_eq!(Window::of_span(&r, None, None, 2.5).unwrap().periods, 4);
-        // 10/3 s are 333.3 samples: three periods are the whole record.
+        // 10/3 s are 333.3 samples; three periods fill the whole record.
         assert_eq!(Window::of_span(&r, None, None, 10.0 / 3.0).unwrap().periods, 3);
         let message = Window::of_span(&r, None, None, 3.0).unwrap_err().to_string();
         assert!(
@@ -152,7 +152,7 @@ mod tests {
             periods: 1,
         };
         let reference = w.coefficients(&at(0.0), 0.0);
-        // The last one reaches beyond the record, and is a phase alone.
+        // The last shift exceeds the record and is applied as a phase alone.
         for shift in [1.0, 0.37, -0.6, 12.25, -3.0, 150.0] {
             for (a, b) in w.coefficients(&at(shift), shift).iter().zip(&reference) {
                 assert!((a - b).norm() < 1e-12, "{shift}");

@@ -70,7 +70,7 @@ pub(crate) struct Polynomials {
     pub jacobian: Vec<[f64; SLOTS]>,
 }
 
-/// Returns the orders of the Box-Jenkins model of which the grey box is a special case.
+/// Returns the orders of the Box-Jenkins model that contains the grey box as a special case.
 pub(crate) fn orders(order: usize, nk: usize) -> Orders {
     Orders {
         na: 0,
@@ -361,7 +361,7 @@ mod tests {
         let eta = [1.0, 2.0, 3.0, 4.0, 5.0, 0.1, 0.2];
         assert_eq!(mixed.of_record(&eta, 1), [2.0, 3.0, 4.0, 5.0, 0.2, 0.0]);
         assert_eq!(mixed.longest_nk().unwrap(), 61);
-        // One record: nothing is individual.
+        // With one record, no parameter is individual.
         assert_eq!(layout(1, 1, &[], &["K_e"]).unwrap().names[0], "K_e");
     }
 
@@ -385,7 +385,7 @@ mod tests {
                     let scale = exact.jacobian.iter().map(|r| r[j].abs()).fold(0.0, f64::max);
                     for i in 0..up.len() {
                         let difference = (up[i] - down[i]) / (2.0 * h);
-                        // Truncation h^2 and rounding eps/h.
+                        // Truncation error h^2 and rounding error eps/h.
                         assert!(
                             (exact.jacobian[i][j] - difference).abs() < 1e-7 * scale,
                             "m {order} {constraint} row {i} column {j}: {} and {difference}",

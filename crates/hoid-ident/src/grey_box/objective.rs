@@ -1,9 +1,9 @@
 //! The prediction error criterion as a function of the physical parameters.
 //!
 //! For each record the polynomials follow from eta, `theta = theta(eta)` with `J = d theta/d eta`. Then
-//! `psi_eta = psi J`, so that `psi_eta' eps = J' psi' eps` and `psi_eta' psi_eta = J' psi' psi J`, each summed over the
-//! records. nk changes with tau_e, but the first residual that counts does not change, so that the loss is a function
-//! of eta only.
+//! `psi_eta = psi J`, so `psi_eta' eps = J' psi' eps` and `psi_eta' psi_eta = J' psi' psi J`, each summed over the
+//! records. nk changes with tau_e, but the first residual that counts does not change, so the loss is a function of eta
+//! only.
 
 use std::{fmt, ops::Range, sync::Arc};
 
@@ -437,7 +437,7 @@ mod tests {
                 let data = signals.iter().map(|(e, u)| Data::new(e, u)).collect();
                 let criterion = PhysicalCriterion::new(layout, data, initial, first);
                 let mut eta = criterion.layout.spread(&[0.3, 0.05, 12.0, 0.4, 0.2837, 0.05]);
-                // Individual parameters apart from each other.
+                // The individual parameters differ from record to record.
                 for (i, value) in eta.iter_mut().enumerate() {
                     *value *= 1.0 + 0.01 * i as f64;
                 }
@@ -452,7 +452,7 @@ mod tests {
                     };
                     let difference = -(value(1.0) - value(-1.0)) / (4.0 * h);
                     let scale = (at.gram[i * eta.len() + i] * at.sum_of_squares).sqrt();
-                    // Truncation h^2 and rounding 1e-16/1e-5, of the scale of the gradient.
+                    // Truncation error h^2 and rounding error 1e-16/1e-5, relative to the scale of the gradient.
                     assert!(
                         (at.descent[i] - difference).abs() < 1e-7 * scale,
                         "m {order} {initial:?} {}: {} and {difference}",
@@ -478,7 +478,7 @@ mod tests {
                 .sum_of_squares
         };
         let (before, there, after) = (loss(0.3 - 1e-9), loss(0.3), loss(0.3 + 1e-9));
-        // 1e-9 s times a relative slope of some 10/s.
+        // 1e-9 s times a relative slope of about 10/s.
         assert!(
             (before / there - 1.0).abs() < 1e-7 && (after / there - 1.0).abs() < 1e-7,
             "{before} {there} {after}"

@@ -106,7 +106,7 @@ impl GreyBoxFit {
     /// methods of the fit, a larger index refers to the last record.
     ///
     /// # Errors
-    /// [`NotConvertible::ZeroGain`] if K_e is zero, so that there is no T_L.
+    /// [`NotConvertible::ZeroGain`] if K_e is zero, so there is no T_L.
     pub fn operator(&self, record: usize) -> Result<OperatorEstimate, NotConvertible> {
         let record = self.known(record);
         let slots = self.layout.of_record(&self.eta, record);

@@ -2,7 +2,7 @@
 //!
 //! 1. `grid`: first, delays every 0.04 s over their range with a typical neuromuscular system; then, at the best of
 //!    these delays, frequencies and damping ratios in the range of human operators. The residual is affine in K_e and
-//!    K_e_dot, so that these are eliminated at each point; the noise model has a single fixed T_n. The points with the
+//!    K_e_dot, so these are eliminated at each point; the noise model has a single fixed T_n. The points with the
 //!    smallest loss are starts.
 //! 2. `box-jenkins`: the operator that corresponds to a Box-Jenkins fit at the delay of the best grid point, if such an
 //!    operator exists.

@@ -3,8 +3,7 @@
 //! Input and output are filtered by the same moving average over K samples and decimated by K. At low frequencies the
 //! system between them stays the same, with its poles raised to the power K. On these records the search is completed
 //! from a few points of the pole grid, at about 1/K of the cost. The K-th roots of the resulting poles are the start of
-//! the search on the original records. The delay becomes a fraction of a sample, so that B has one additional
-//! coefficient.
+//! the search on the original records. The delay becomes a fraction of a sample, so B has one additional coefficient.
 //!
 //! The result is only a start. It is poor for a system that is fast compared with K samples; for such a system other
 //! starts are tried as well.
@@ -43,8 +42,8 @@ const SLOW: f64 = 1.3;
 pub(crate) struct SlowPoles {
     /// Polynomials F, best first. Empty if the records are too short, or if the model has poles outside F.
     pub f: Vec<Vec<f64>>,
-    /// True if all poles of the best F are slow compared with the averaging, so that the averaged records determine F
-    /// nearly as well as the original records do.
+    /// True if all poles of the best F are slow compared with the averaging, so the averaged records determine F nearly
+    /// as well as the original records do.
     pub complete: bool,
 }
 
@@ -274,7 +273,7 @@ mod tests {
         for (a, b) in back.iter().zip(&f[1..]) {
             assert!((a - b).abs() < 1e-9);
         }
-        // A pole on the negative axis and one at the origin have no root that is a model.
+        // A pole on the negative axis and a pole at the origin have no root that gives a model.
         assert!(root_of_poles(&[0.5], 8).is_none());
         assert!(root_of_poles(&[-0.5, 0.0], 8).is_none());
     }

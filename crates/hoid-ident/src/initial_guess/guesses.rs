@@ -217,7 +217,7 @@ mod tests {
     use super::*;
     use crate::criterion::{Data, first_residual};
 
-    /// `u = (B/F) q^-1 e + v` with noise of its own poles, the input white.
+    /// Returns white e, and `u = (B/F) q^-1 e + v`, where v is noise with separate poles.
     fn record(n: usize, noise: f64) -> (Vec<f64>, Vec<f64>) {
         let mut state = 11_u64;
         let mut draw = || {
@@ -260,8 +260,8 @@ mod tests {
         let refined = steiglitz_mcbride(&criterion, arx.clone(), &mut workspace).unwrap();
         let reduced = reduced_arx(&criterion, &mut workspace).unwrap();
         let off = |f: &[f64]| (f[0] + 1.5).abs().max((f[1] - 0.7).abs());
-        // The equation error and Steiglitz and McBride, who take the noise for 1/A and for white,
-        // pay for its colour; a model that has room for its poles does not.
+        // The equation error assumes the noise spectrum of 1/A, and Steiglitz and McBride assume white noise; coloured
+        // noise biases both. A model with additional poles for the noise is not biased.
         assert!(off(&arx) > 0.05 && off(&refined) > 0.05, "{arx:?} {refined:?}");
         assert!(off(&reduced) < 0.02, "{reduced:?}");
         let starts = initial_guesses(&criterion, SampleTime::HUNDREDTH, &mut workspace);

@@ -12,7 +12,7 @@ const OWN_PART: f64 = 1e-10;
 const PAST: usize = 256;
 
 /// Returns the signal with an artificial past, and the length of this past. The past is the signal reflected at its
-/// first sample and faded in, so that simulations start without a jump.
+/// first sample and faded in, so simulations start without a jump.
 pub(super) fn with_past(x: &[f64]) -> (Vec<f64>, usize) {
     let length = PAST.min(x.len().saturating_sub(1));
     let fade = |k: usize| 0.5 + 0.5 * (std::f64::consts::PI * k as f64 / (length + 1) as f64).cos();

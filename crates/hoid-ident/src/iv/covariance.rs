@@ -47,7 +47,7 @@ pub(super) fn covariance(
 ) -> Option<Vec<f64>> {
     let p = z.len();
     let (d, lambda) = coloured_noise(residual, p);
-    // The columns are scaled to unit length, so that the units of the parameters have no effect on the inverse.
+    // The columns are scaled to unit length, so the units of the parameters have no effect on the inverse.
     let length = |column: &Vec<f64>| dot(column, column).sqrt();
     let (of_z, of_phi): (Vec<f64>, Vec<f64>) = (z.iter().map(length).collect(), phi.iter().map(length).collect());
     let k: Columns = z
@@ -110,8 +110,8 @@ mod tests {
         let gram = DMatrix::from_fn(2, 2, |i, j| dot(&z[i], &z[j]));
         let expected = gram.try_inverse().unwrap() / 12.0;
         for i in 0..2 {
-            // The spectrum of 5000 samples at one frequency, by an autoregression of order 30: 1
-            // standard error is 11 %.
+            // The spectrum of 5000 samples at one frequency, from an autoregression of order 30, has a standard error
+            // of 11 %.
             let ratio = found[3 * i] / expected[(i, i)];
             assert!((0.6..1.6).contains(&ratio), "{ratio}");
         }
@@ -126,7 +126,7 @@ mod tests {
             let found = covariance(&z, &z, |_| true, std::slice::from_ref(&residual)).unwrap()[0];
             let response = 1.0 / (1.0 - 2.0 * 0.9 * w.cos() + 0.81);
             let expected = response / 12.0 / dot(&z[0], &z[0]);
-            // As above, 6 %.
+            // Here the standard error is 6 %.
             assert!((0.75..1.3).contains(&(found / expected)), "{w}: {}", found / expected);
         }
     }

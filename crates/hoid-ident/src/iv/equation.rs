@@ -86,7 +86,7 @@ pub(crate) struct Equation {
 }
 
 impl<'a> IvProblem<'a> {
-    /// Creates the problem for these orders, of which na or nf must be zero.
+    /// Creates the problem for these orders; na or nf must be zero.
     pub fn new(orders: &Orders, data: Vec<Data<'a>>, sources: Vec<Source<'a>>) -> Self {
         let letter = if orders.na > 0 { 'a' } else { 'f' };
         let poles = orders.na + orders.nf;
@@ -167,7 +167,7 @@ impl<'a> IvProblem<'a> {
         };
         let free = self.initial_state_responses(filter);
         // 1/(C F) starts at rest at the first row, whereas the true filter does not. The difference is a free response,
-        // which is projected out of all columns, so that the estimate does not depend on the unknown past.
+        // which is projected out of all columns, so the estimate does not depend on the unknown past.
         let all = equation.phi.iter_mut().chain(&mut equation.z).chain([&mut equation.y]);
         all.for_each(|column| eliminate(&free, column));
         equation
@@ -306,8 +306,8 @@ impl<'a> IvProblem<'a> {
     /// # Errors
     /// [`IdentError::SingularInstruments`] if there is no unique solution.
     pub fn solve(&self, equation: &Equation) -> Result<Vec<f64>, IdentError> {
-        // Z = Q T with regular T, so that Z' Phi theta = Z' y and Q' Phi theta = Q' y have the same solution. The
-        // second form avoids the condition number of Z.
+        // Z = Q T with regular T, so Z' Phi theta = Z' y and Q' Phi theta = Q' y have the same solution. The second
+        // form avoids the condition number of Z.
         let q = self.basis(&equation.z)?;
         let mut product: Vec<f64> = equation
             .phi

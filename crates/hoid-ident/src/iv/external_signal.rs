@@ -9,11 +9,11 @@
 //! filters cover the memory of a loop of several seconds, for which a finite impulse response would need hundreds of
 //! lags. The expansion is always stable, and for a sum of sinusoids it is the projection on their lines.
 //!
-//! The sum depends only on f_t, so that noise can affect it only through the weights. Components of the noise at the
-//! lines of f_t enter the weights, and their effect is considerable if noise and f_t are both slow. Therefore the
-//! record is divided into blocks, and the instruments of a block are computed with weights from the other blocks, whose
-//! noise is independent of the noise in this block (split-sample instruments, J. D. Angrist and A. B. Krueger, *J.
-//! Business Econ. Stat.* 13 (1995) 225-235). Poor weights then increase the variance but cause no bias.
+//! The sum depends only on f_t, so noise can affect it only through the weights. Components of the noise at the lines
+//! of f_t enter the weights, and their effect is considerable if noise and f_t are both slow. Therefore the record is
+//! divided into blocks, and the instruments of a block are computed with weights from the other blocks, whose noise is
+//! independent of the noise in this block (split-sample instruments, J. D. Angrist and A. B. Krueger, *J. Business
+//! Econ. Stat.* 13 (1995) 225-235). Poor weights then increase the variance but cause no bias.
 //!
 //! Instruments from an external signal were proposed by M. Gilson, H. Garnier, P. C. Young and P. Van den Hof, *IET
 //! Control Theory Appl.* 5 (2011) 1147-1154; their construction uses the known controller, which for a human operator
@@ -98,7 +98,7 @@ pub(super) fn noise_free<'a>(external: &[&[f64]], data: &[Data<'a>]) -> Vec<Sour
     (0..BLOCKS)
         .map(|k| {
             let block = k * samples / BLOCKS..(k + 1) * samples / BLOCKS;
-            // The weights come from the other blocks. The noise of this block does not affect them, so that it is not
+            // The weights come from the other blocks. The noise of this block does not affect them, so it is not
             // correlated with the instrument.
             let weights = weights_of_others(&basis, &whole, &target, block.clone()).unwrap_or_else(|| whole.clone());
             let sum = combination(&basis, &weights, samples);
@@ -118,7 +118,7 @@ fn weights_of_others(basis: &[Vec<f64>], whole: &[f64], target: &[f64], block: R
     for i in 0..p {
         let inside = &basis[i][block.clone()];
         // The normal equations are the equations of all samples minus the equations of the block. The basis is
-        // orthonormal over all samples, so that its Gram matrix is the identity.
+        // orthonormal over all samples, so its Gram matrix is the identity.
         right[i] -= dot(inside, &target[block.clone()]);
         for j in 0..p {
             let unit = if i == j { 1.0 + RIDGE } else { 0.0 };
@@ -190,12 +190,12 @@ mod tests {
     #[test]
     fn filters_are_orthonormal() {
         let mut impulse = vec![0.0; 4000];
-        // After the samples from which the artificial past is computed.
+        // The impulse comes after the samples from which the artificial past is computed.
         impulse[300] = 1.0;
         let columns = laguerre(&[&impulse], 0.9, 12);
         for (i, a) in columns.iter().enumerate() {
             for (j, b) in columns.iter().enumerate() {
-                // 0.9^4000 is beyond rounding.
+                // 0.9^4000 is below rounding.
                 assert!((dot(a, b) - f64::from(u8::from(i == j))).abs() < 1e-12, "{i} {j}");
             }
         }

@@ -170,7 +170,7 @@ fn of_noise_free_parts(problem: &IvProblem<'_>) -> Result<Vec<f64>, IdentError> 
     let driving: Vec<&[f64]> = delayed.iter().map(Vec::as_slice).collect();
     let outputs: Vec<&[f64]> = problem.data.iter().map(|d| d.u).collect();
     // In a closed loop e contains noise. The parts of e and u that follow the noise-free input contain no noise, so
-    // that least squares on these parts is consistent, apart from the error of the expansion.
+    // least squares on these parts is consistent, apart from the error of the expansion.
     let clean = following(&driving, &outputs);
     let data = clean.iter().zip(&source.inputs).map(|(u, e)| Data::new(e, u)).collect();
     let parts = problem.of(data, Vec::new());

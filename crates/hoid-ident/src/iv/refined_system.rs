@@ -1,9 +1,9 @@
 //! A system from refined instrumental variables, as a start for the prediction error method.
 //!
 //! The iteration of RIV-BJ ([`super::refined`]) is run with instruments from the measured input and an autoregressive
-//! noise model, so that it contains no search. It need not converge, because a start only has to be near the minimum.
-//! In an open loop it is consistent for any noise. In a closed loop it is biased to the extent that the input follows
-//! the noise, like every start based on the input alone.
+//! noise model, so it contains no search. It need not converge, because a start only has to be near the minimum. In an
+//! open loop it is consistent for any noise. In a closed loop it is biased to the extent that the input follows the
+//! noise, like every start based on the input alone.
 
 use super::{
     algorithm::IterationLimits,

@@ -1,6 +1,6 @@
 //! The inverse of an information matrix, and the detection of parameters that it does not determine.
 //!
-//! `psi' psi` is scaled to a unit diagonal, so that units have no effect, and inverted by means of its eigenvalues. An
+//! `psi' psi` is scaled to a unit diagonal, so units have no effect, and inverted by means of its eigenvalues. An
 //! eigenvalue that is zero except for rounding belongs to a combination of parameters that the data do not determine,
 //! and its eigenvector identifies these parameters.
 

@@ -1,8 +1,8 @@
 //! Linear least squares by Householder QR with column pivoting.
 //!
-//! Solves `min |y - X theta|^2` for a tall X stored by columns. Columns are first scaled to unit length, so that the
-//! rank does not depend on units. At each step the column with the largest remainder is chosen. The rank is the number
-//! of diagonal elements of R above `tolerance |R_11|`. Source: P. Businger and G. H. Golub, *Numer. Math.* 7 (1965)
+//! Solves `min |y - X theta|^2` for a tall X stored by columns. Columns are first scaled to unit length, so the rank
+//! does not depend on units. At each step the column with the largest remainder is chosen. The rank is the number of
+//! diagonal elements of R above `tolerance |R_11|`. Source: P. Businger and G. H. Golub, *Numer. Math.* 7 (1965)
 //! 269-276.
 
 use nalgebra::{DMatrix, DVector};
@@ -156,8 +156,8 @@ impl LeastSquares {
         x
     }
 
-    /// Returns a description of the linearly dependent columns by name, each with the columns of which it is a
-    /// combination.
+    /// Returns a description of the linearly dependent columns by name, each with the columns that it is a combination
+    /// of.
     pub fn describe_dependence(&self, names: &[String]) -> String {
         let p = self.columns();
         let sentences: Vec<String> = (self.rank..p)
@@ -274,8 +274,7 @@ mod tests {
         for i in 0..3 {
             for j in 0..3 {
                 let product: f64 = (0..3).map(|k| dot(columns[i], columns[k]) * inverse[k * 3 + j]).sum();
-                // Units of the columns differ by 1e6; relative to that the identity holds to
-                // rounding.
+                // The units of the columns differ by 1e6; relative to these units the identity holds to rounding.
                 let scale = (dot(columns[i], columns[i]) / dot(columns[j], columns[j])).sqrt();
                 assert!((product / scale - f64::from(u8::from(i == j))).abs() < 1e-12);
             }

@@ -190,7 +190,7 @@ pub(crate) struct Lagged<'a> {
 /// Returns the symmetric matrix of the products of all columns, by rows.
 ///
 /// A column that is not a shift of the previous column is multiplied by all columns. In each remaining pair both
-/// columns are shifts, so that their product follows from the product of the two columns before them.
+/// columns are shifts, so their product follows from the product of the two columns before them.
 pub(crate) fn gram(columns: &[Lagged<'_>]) -> Vec<f64> {
     with_four_lanes(Gram(columns))
 }
@@ -309,8 +309,8 @@ impl ResidualProducts {
         }
     }
 
-    /// Adds the sums for the residuals `y - sum_k factors_k x_k`, of which only one stretch at a time is in memory. The
-    /// first column is y.
+    /// Adds the sums for the residuals `y - sum_k factors_k x_k`; only one stretch of the residuals is in memory at a
+    /// time. The first column is y.
     pub fn add(&mut self, columns: &[Lagged<'_>], factors: &[f64]) {
         with_four_lanes(Residuals {
             columns,

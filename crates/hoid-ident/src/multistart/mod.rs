@@ -1,4 +1,4 @@
-//! Searches from several starts by reverse communication: the caller evaluates the criterion, so that the searches for
+//! Searches from several starts by reverse communication: the caller evaluates the criterion, so the searches for
 //! several records can run in parallel lanes.
 //!
 //! | module | contents |

@@ -5,8 +5,8 @@
 //! unless it is predicted to end lower.
 //!
 //! The searches do not evaluate the criterion themselves: they return the theta at which they need its linearisation
-//! and continue when they receive it (reverse communication), so that the searches for several records can run in
-//! parallel lanes ([`crate::pem::batched`]).
+//! and continue when they receive it (reverse communication), so the searches for several records can run in parallel
+//! lanes ([`crate::pem::batched`]).
 
 use hoid_model::Orders;
 

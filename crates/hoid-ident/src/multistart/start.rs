@@ -41,7 +41,7 @@ impl Start {
         Self::to_be_found(label, [&vec![0.0; o.nb + o.nd], f].concat(), left)
     }
 
-    /// Creates a start with some unknown polynomials `left`, of which the last is computed next.
+    /// Creates a start with some unknown polynomials `left`; the last of these is computed next.
     pub fn to_be_found(label: &str, theta: Vec<f64>, left: Vec<Block>) -> Self {
         Self {
             label: label.to_owned(),
@@ -65,7 +65,7 @@ impl Start {
     }
 
     /// Updates the next unknown polynomial from the linearisation at theta. The residual is affine in B and in D, so
-    /// that one least-squares step computes either polynomial while the others are fixed.
+    /// one least-squares step computes either polynomial while the others are fixed.
     pub fn update(&mut self, o: &Orders, there: &Linearisation) {
         let Some(block) = self.left.pop() else { return };
         let (p, place) = (self.theta.len(), block.place(o));

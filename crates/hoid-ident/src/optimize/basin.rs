@@ -4,7 +4,7 @@ use super::objective::Minimum;
 use crate::linalg::least_squares::dot;
 
 /// True if a start with this loss is in the basin of a known minimum: its loss agrees with the quadratic model about
-/// the minimum, so that a search from the start would end in this minimum.
+/// the minimum, so a search from the start would end in this minimum.
 pub(crate) fn lies_in_basin(minimum: &Minimum, start: &[f64], sum_of_squares: f64) -> bool {
     let p = start.len();
     let delta: Vec<f64> = start.iter().zip(&minimum.theta).map(|(a, b)| a - b).collect();

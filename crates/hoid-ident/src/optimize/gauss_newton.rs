@@ -16,7 +16,7 @@ const NEAR: f64 = 1e-2;
 /// the sixteen digits.
 const ROUNDING: f64 = 1e-10;
 
-/// A search that is driven by its caller, so that several searches can run in parallel lanes.
+/// A search that is driven by its caller, so several searches can run in parallel lanes.
 pub(crate) struct GaussNewton<'s> {
     pub(super) objective: &'s dyn Objective,
     pub(super) options: &'s SearchOptions,
@@ -161,7 +161,7 @@ impl<'s> GaussNewton<'s> {
         self.at = there;
     }
 
-    /// Corrects the secant by a symmetric matrix of rank one, so that `(H + S) s = g - g'` for the last step s.
+    /// Corrects the secant by a symmetric matrix of rank one, so `(H + S) s = g - g'` for the last step s.
     fn learn(&mut self, there: &Linearisation) {
         let p = self.theta.len();
         self.secant.resize(p * p, 0.0);
@@ -181,7 +181,7 @@ impl<'s> GaussNewton<'s> {
         let scale = |i: usize| there.gram[i * p + i];
         let size_of_step: f64 = (0..p).map(|i| scale(i) * step[i] * step[i]).sum();
         let size_of_missing: f64 = (0..p).map(|i| missing[i] * missing[i] / scale(i)).sum();
-        // The correction is nearly orthogonal to the step, so that rounding would dominate it.
+        // The correction is nearly orthogonal to the step, and rounding would dominate it.
         if along.is_nan() || along * along <= 1e-16 * size_of_step * size_of_missing {
             return;
         }

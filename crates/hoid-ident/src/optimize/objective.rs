@@ -60,8 +60,8 @@ impl Linearisation {
 }
 
 /// A sum of squares as a function of theta, with its derivatives: the interface between a search and a model. The
-/// search uses it as `dyn`, so that it is compiled once for all models; the cost of a call is negligible compared with
-/// a pass over a record.
+/// search uses it as `dyn`, so it is compiled once for all models; the cost of a call is negligible compared with a
+/// pass over a record.
 pub(crate) trait Objective {
     /// True if the predictor exists, i.e. if theta is finite and the polynomials are stable.
     fn is_feasible(&self, theta: &[f64]) -> bool;

@@ -53,7 +53,7 @@ fn noise_free_parameters_are_found_exactly() {
     let (e, u) = signals(500, 0.0);
     let end = run(&e, &u, &[0.1, 0.1, 0.0, -1.0, 0.3]).unwrap();
     assert_eq!(end.termination.reason, Reason::ExactFit);
-    // d1 is free without noise; the system is not.
+    // d1 is undetermined without noise; the system is determined.
     for (a, b) in [0, 1, 3, 4].map(|i| end.theta[i]).iter().zip([0.5, 0.2, -1.5, 0.7]) {
         assert!((a - b).abs() < 1e-10);
     }
@@ -62,7 +62,7 @@ fn noise_free_parameters_are_found_exactly() {
 #[test]
 fn the_gradient_vanishes_at_the_end() {
     let (e, u) = signals(2000, 0.1);
-    // A promise of tolerance V leaves cosines of sqrt(tolerance) at most, 1e-6 by default.
+    // At convergence with this tolerance, the cosines are at most sqrt(tolerance), 1e-6 by default.
     for (tolerance, left) in [(1e-12, 1e-6), (1e-15, 3.2e-8)] {
         let options = SearchOptions {
             tolerance,
@@ -157,7 +157,7 @@ fn limits_are_kept_and_fixed_parameters_stay() {
     };
     let end = descend(&fixed, SearchMethod::Automatic, 200);
     assert_eq!(end.theta[1], 4.0);
-    // Stationary in x with y = 4: 200 x (x^2 - 4) = 1 - x, on the side of the start.
+    // Stationary in x with y = 4: 200 x (x^2 - 4) = 1 - x, on the same side as the start.
     assert!((end.theta[0] + 1.99812).abs() < 1e-4, "{}", end.theta[0]);
     let slope = end.at.descent[0] / end.at.gram[0].sqrt();
     assert!(slope.abs() < 1e-6);
@@ -201,7 +201,7 @@ fn unstable_starts_are_refused_and_limits_are_told() {
 #[test]
 fn the_secant_saves_steps_where_the_model_is_wrong_and_ends_in_the_same_place() {
     let (e, u) = signals(3000, 0.4);
-    // One pole where two are needed, and white noise where it is coloured.
+    // One pole instead of the two that are needed, and white noise instead of coloured noise.
     let orders = Orders {
         nb: 2,
         nf: 1,
@@ -234,8 +234,7 @@ fn the_secant_saves_steps_where_the_model_is_wrong_and_ends_in_the_same_place() 
     assert!(with.termination.converged() && without.termination.converged());
     let (few, many) = (with.termination.iterations, without.termination.iterations);
     assert!(3 * few <= 2 * many, "{few} steps with the secant, {many} without");
-    // A relative decrease of 1e-12 that is left is 1e-6 of the length of theta in units of the
-    // residuals.
+    // A remaining relative decrease of 1e-12 corresponds to 1e-6 of the length of theta in units of the residuals.
     for i in 0..3 {
         let error = (without.at.sum_of_squares / (3000.0 * without.at.gram[4 * i])).sqrt();
         assert!((with.theta[i] - without.theta[i]).abs() < 1e-4 * error);

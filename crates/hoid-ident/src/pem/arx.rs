@@ -4,12 +4,12 @@
 //! In each record, the residuals start at the first sample for which phi lies inside the record (eq. 5.33), or zeros
 //! replace the samples before the record.
 //!
-//! **Solution.** The columns are shifts of two signals, so that `Phi' Phi` takes a few passes over the record, a tenth
-//! of the cost of an orthogonal factorisation. The solution of the normal equations has an error of
-//! `cond(Phi' Phi) eps`; one step of refinement with the residuals themselves,
-//! `theta + (Phi' Phi)^-1 Phi' (y - Phi theta)`, squares this factor (A. Bjorck, *Numerical Methods for Least Squares
-//! Problems*, 1996, sec. 2.9.3). If the regressors are too close to linear dependence for this, if the fit is exact, if
-//! u has a level, or if zeros precede the record, QR with column pivoting determines the rank and the solution.
+//! **Solution.** The columns are shifts of two signals, so `Phi' Phi` takes a few passes over the record, a tenth of
+//! the cost of an orthogonal factorisation. The solution of the normal equations has an error of `cond(Phi' Phi) eps`;
+//! one step of refinement with the residuals themselves, `theta + (Phi' Phi)^-1 Phi' (y - Phi theta)`, squares this
+//! factor (A. Bjorck, *Numerical Methods for Least Squares Problems*, 1996, sec. 2.9.3). If the regressors are too
+//! close to linear dependence for this, if the fit is exact, if u has a level, or if zeros precede the record, QR with
+//! column pivoting determines the rank and the solution.
 
 use hoid_model::{Orders, SampleTime, Structure};
 use nalgebra::{DMatrix, DVector};

@@ -88,7 +88,7 @@ impl FitSettings {
         }
     }
 
-    /// True if the criterion is a plain sum of squares, without constraints, priors, a required stability or another
+    /// True if the criterion is a plain sum of squares, without constraints, priors, a stability requirement or another
     /// loss.
     pub fn is_unconstrained(&self) -> bool {
         self.constraints.is_empty() && self.priors.is_empty() && self.loss == Loss::Quadratic && !self.stable

@@ -7,7 +7,7 @@
 //!
 //! **Conditions.** Records of some hundred samples have many minima. A model with more coefficients than the operator
 //! (nb, nf > 2, nc > 0, nd > 4) has many minima for longer records too; in this case the first few steps use only a
-//! part of the record, so that their cost does not depend on its length.
+//! part of the record, so their cost does not depend on its length.
 
 use super::{constraints::ConstrainedCriterion, fit_settings::FitSettings};
 use crate::{

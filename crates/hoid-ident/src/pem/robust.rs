@@ -3,16 +3,16 @@
 //! Huber's loss ([`Loss`](crate::Loss)) with the threshold k is minimised by iteratively reweighted least squares (P.
 //! J. Huber, *Robust Statistics*, 1981, section 7.8): the weights `w = min(1, k/|r|)` of a search are computed from the
 //! residuals r of the previous search, in units of the scale s. Each round lowers the loss. The scale is the median
-//! absolute residual of the previous round divided by 0.6745; it is kept constant after [`SCALES`] rounds, so that the
+//! absolute residual of the previous round divided by 0.6745; it is kept constant after [`SCALES`] rounds, so the
 //! rounds converge.
 //!
 //! A bounded loss bounds the weight of a residual but not the effect of a sample on the regressors. A single wrong
 //! sample of e remains in the response of the operator for seconds: its residuals are large although theta is correct,
-//! so that theta becomes biased (F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw and W. A. Stahel, *Robust Statistics*,
-//! 1986, section 6.3: the influence is the product of the influence of the residual and the influence of position). To
-//! bound the influence of position as well, the estimator first limits each sample of e and u by its neighbours
-//! ([`crate::faults::resistant`]); in a normal channel one sample in 16 000 is changed, so that the efficiency of the
-//! loss is retained.
+//! so theta becomes biased (F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw and W. A. Stahel, *Robust Statistics*, 1986,
+//! section 6.3: the influence is the product of the influence of the residual and the influence of position). To bound
+//! the influence of position as well, the estimator first limits each sample of e and u by its neighbours
+//! ([`crate::faults::resistant`]); in a normal channel one sample in 16 000 is changed, so the efficiency of the loss
+//! is retained.
 //!
 //! The covariance is `s^2 kappa (psi' psi)^-1`, `kappa = mean(rho'^2) / mean(rho'')^2`, with the unweighted psi (Huber,
 //! eq. 7.6.8, for residuals that are independent of the gradient).
@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn gaussian_residuals_lose_five_per_cent_of_efficiency() {
-        // Sums of twelve uniform numbers are normal to a per cent.
+        // Sums of twelve uniform numbers are normal to within 1 %.
         let mut state = 3_u64;
         let mut uniform = || {
             state = state
@@ -241,7 +241,7 @@ mod tests {
         let fit = |record: Record| box_jenkins(HUBER).fit(&[record]).unwrap().operator().unwrap();
         let before = fit(clean.clone());
         for of_input in [true, false] {
-            // However far it is off: the influence is bounded.
+            // The influence is bounded for any size of the error.
             for value in [3.0, 30.0, 3e4] {
                 let after = fit(with_sample(&clean, of_input, value));
                 for ((name, _, a), (_, _, b)) in before.rows().iter().zip(after.rows()) {
@@ -260,8 +260,8 @@ mod tests {
 
     #[test]
     fn clean_records_lose_five_per_cent_of_efficiency() {
-        // The squares are efficient, so that var(robust) = var(squares) + var(difference) (J. A.
-        // Hausman, Econometrica 46 (1978) 1251-1271).
+        // The squares are efficient, so var(robust) = var(squares) + var(difference) (J. A. Hausman, Econometrica 46
+        // (1978) 1251-1271).
         let (mut squares, mut count) = (0.0, 0.0);
         for replication in 10..26 {
             let record = [simulated(replication)];
@@ -273,14 +273,13 @@ mod tests {
             }
         }
         let efficiency = 1.0 / (1.0 + squares / count);
-        // 16 runs of some three independent directions: standard error 0.011.
+        // 16 runs with about three independent directions each: the standard error is 0.011.
         assert!((efficiency - 0.95).abs() < 0.033, "{efficiency}");
     }
 
     #[test]
     fn what_cannot_be_held_is_fitted_as_it_is() {
-        // A constant error has no neighbours that carry information about it, and no response to
-        // find.
+        // The neighbours of a sample carry no information about a constant error, and there is no response to find.
         let clean = simulated(2);
         let e = Channel::new("e", "", vec![1.0; clean.len()]);
         let u = Channel::new("u", "", clean.output().to_vec());

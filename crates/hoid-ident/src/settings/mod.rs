@@ -27,7 +27,7 @@
 //! ```
 //!
 //! A value is written as on the command line: `256`, `true`, `0.2..0.4`, `b0=256,f=inf`. Typed values from a plan or
-//! from Python are first converted to this form, so that each type has a single parser ([`Value`]).
+//! from Python are first converted to this form, so each type has a single parser ([`Value`]).
 
 mod batch_option;
 mod declare;

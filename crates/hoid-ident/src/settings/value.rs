@@ -267,7 +267,7 @@ choices!(Stable { "predictor" = Stable::Predictor, "noise" = Stable::PredictorAn
 mod tests {
     use super::*;
 
-    /// A written value is read back unchanged.
+    /// A value that is written and parsed again is unchanged.
     fn returns<V: Value + PartialEq + std::fmt::Debug>(text: &str, value: V) {
         assert_eq!(V::read(text), Ok(value));
         let read = V::read(text).ok().and_then(|v| v.text()).unwrap_or_default();

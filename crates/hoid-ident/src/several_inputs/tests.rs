@@ -12,7 +12,8 @@ impl Random {
     }
 }
 
-/// `u = (.5 + .2 q^-1) q^-2/(1 - .7 q^-1) e + .3 q^-1/(1 - .9 q^-1) r + (1 + .4 q^-1)/(1 - .8 q^-1) eps`.
+/// Returns a record of `u = (.5 + .2 q^-1) q^-2/(1 - .7 q^-1) e + .3 q^-1/(1 - .9 q^-1) r + (1 + .4 q^-1)/(1 - .8 q^-1)
+/// eps`.
 fn record(n: usize, noise: f64, seed: u64) -> Record {
     let mut random = Random(seed);
     let mut input = || -> Vec<f64> { (0..n).map(|_| random.next()).collect() };
@@ -47,7 +48,7 @@ fn box_jenkins() -> SeveralInputs {
 
 #[test]
 fn two_systems_and_their_noise_are_found() {
-    // 40 records: a mean of squared errors over standard errors of one, within 4 of its standard errors.
+    // 40 records: the mean square of the errors, in standard errors, is one to within 4 of its standard errors.
     let truth = [0.5, 0.2, 0.4, -0.8, -0.7, 0.3, -0.9];
     let (mut squares, mut count) = (0.0, 0.0);
     for seed in 1..=40 {
@@ -170,7 +171,7 @@ fn what_has_no_meaning_is_refused() {
     late.inputs[1].1.nk = 400;
     let needs = said(late);
     assert!(needs.contains("needs more than 401"), "{needs}");
-    // Enough for the coefficients of one input, and too few for those of both.
+    // Enough samples for the coefficients of one input, but too few for those of two inputs.
     let few = [record(14, 0.1, 1)];
     let too_few = box_jenkins().fit(&few);
     assert!(matches!(too_few, Err(IdentError::TooFewSamples { .. })), "{too_few:?}");

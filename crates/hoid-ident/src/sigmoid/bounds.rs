@@ -23,8 +23,8 @@ const ENDS: f64 = 0.05;
 pub(crate) const FASTEST: f64 = 2.0;
 /// Largest admissible rate times the sample time.
 const FASTEST_GIVEN: f64 = 10.0;
-/// Smallest rate times the time span: 8 to 92 % of the change fill the span (2 ln 12 = 5.0), so that the change can
-/// hardly be distinguished from a line.
+/// Smallest rate times the time span: 8 to 92 % of the change fill the span (2 ln 12 = 5.0), so the change can hardly
+/// be distinguished from a line.
 const SLOWEST: f64 = 5.0;
 
 /// Quantities that determine the bounds.

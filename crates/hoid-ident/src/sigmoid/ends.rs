@@ -29,7 +29,8 @@ pub struct NamedEstimate {
 pub struct ChangedOperator {
     /// The operator itself, without standard errors.
     pub operator: FamilyOperator,
-    /// Parameters of the operator: those of the numerator, products such as K_e T_L, and those that do not change.
+    /// Parameters of the operator: the parameters of the numerator, products such as K_e T_L, and the parameters that
+    /// do not change.
     pub parameters: Vec<NamedEstimate>,
 }
 
@@ -145,7 +146,7 @@ impl ThetaEstimate<'_> {
             .map(|(parameter, gradient)| {
                 let (mut whole, beside) = of(&gradient);
                 let mut value = parameter.value;
-                // omega_nm and zeta_nm are elements of theta, so that no logarithm is involved.
+                // omega_nm and zeta_nm are elements of theta, so no logarithm is involved.
                 let own = match (parameter.coordinate, self.layout.neuromuscular_indices) {
                     (Some(Coordinate::LogOmega), Some([omega, _])) => Some(omega),
                     (Some(Coordinate::LogZeta), Some([_, zeta])) => Some(zeta),

@@ -36,8 +36,7 @@ impl SigmoidChange {
     /// data do not determine.
     pub fn fit(&self, records: &[Record]) -> Result<SigmoidFit, IdentError> {
         let sample_time = common_sample_time(records)?;
-        // The regressions that compute and rank the starts do not estimate a level, so that the means are removed for
-        // them.
+        // The regressions that compute and rank the starts do not estimate a level, so the means are removed for them.
         let off_level = self.level.then(|| without_level(records));
         let off_level = off_level.as_deref().unwrap_or(records);
         let guess = match self.start {
@@ -53,7 +52,7 @@ impl SigmoidChange {
             };
             ordered.fit_from(records, (sample_time, off_level), guess.as_deref())
         };
-        // Exact data do not determine a noise model, so that the first order is sufficient.
+        // Exact data do not determine a noise model, so the first order is sufficient.
         let is_exact = |fit: &SigmoidFit| fit.termination().reason == Reason::ExactFit;
         let chosen = order
             .filter(|nd| self.nd.is_none() && *nd > DEFAULT_NOISE)

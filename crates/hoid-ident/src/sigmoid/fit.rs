@@ -337,8 +337,8 @@ impl SigmoidFit {
     /// Returns the unweighted one-step-ahead residuals of a record, with its initial state estimated.
     ///
     /// # Errors
-    /// [`IdentError::MixedSampling`] if the sample time differs from that of the fit, [`IdentError::TooFewSamples`] if
-    /// the record is too short.
+    /// [`IdentError::MixedSampling`] if the record has another sample time than the fit, [`IdentError::TooFewSamples`]
+    /// if the record is too short.
     pub fn residuals(&self, record: &Record) -> Result<Series, IdentError> {
         self.errors_of(self.layout, &self.theta, record)
     }

@@ -15,9 +15,9 @@
 //! error bars would be too small on one side of the change and too large on the other.
 //!
 //! **Test for a change.** The same model without a change is fitted to the same records with the same weights:
-//! `LR = n ln(V_0/V_1)`. Without a change t_M and G have no meaning, so that LR does not have a chi-square distribution
-//! (R. B. Davies, *Biometrika* 74 (1987) 33-43). The decision is by the BIC, `LR > q ln n` for q additional parameters,
-//! of which a gain and a lead have four.
+//! `LR = n ln(V_0/V_1)`. Without a change t_M and G have no meaning, so LR does not have a chi-square distribution (R.
+//! B. Davies, *Biometrika* 74 (1987) 33-43). The BIC decides: there is a change if `LR > q ln n` for q additional
+//! parameters (four for a gain and a lead).
 //!
 //! | module | contents |
 //! |---|---|

@@ -3,8 +3,8 @@
 //! If the gain of the remnant changes, the standard deviation of the innovations changes as well:
 //! `sigma(t) = sigma_1 + (sigma_2 - sigma_1) s(t)`, where s is the sigmoid of the gains without the delay. Given the
 //! residuals, sigma_1 and sigma_2 minimise `sum of ln sigma(t) + eps(t)^2/(2 sigma(t)^2)` (Fisher scoring). The
-//! residuals are then weighted by 1/sigma(t), and fit and levels are estimated in turn. Source: R. J. Carroll and D.
-//! Ruppert, *Transformation and Weighting in Regression*, 1988, ch. 3.
+//! residuals are then weighted by 1/sigma(t), and fit and levels are estimated alternately. Source: R. J. Carroll and
+//! D. Ruppert, *Transformation and Weighting in Regression*, 1988, ch. 3.
 
 use crate::linalg::least_squares::dot;
 
@@ -73,8 +73,8 @@ pub(crate) fn levels(residuals: &[Vec<f64>], shares: &[Vec<f64>]) -> Option<[f64
     (ratio >= SMALLEST_RATIO).then_some(sigma)
 }
 
-/// Returns weights `1/sigma(t)`, scaled to the geometric mean 1 over all residuals, so that the weighted sum of squares
-/// can replace the sum of squares in the likelihood.
+/// Returns weights `1/sigma(t)`, scaled to the geometric mean 1 over all residuals, so the weighted sum of squares can
+/// replace the sum of squares in the likelihood.
 pub(crate) fn weights(sigma: [f64; 2], shares: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let level = |share: f64| sigma[0] + (sigma[1] - sigma[0]) * share;
     let count: usize = shares.iter().map(Vec::len).sum();
@@ -89,8 +89,7 @@ pub(crate) fn weights(sigma: [f64; 2], shares: &[Vec<f64>]) -> Vec<Vec<f64>> {
 mod tests {
     use super::*;
 
-    /// Numbers with the moments of a normal distribution: equal shares at +-1 have the mean square
-    /// 1.
+    /// Residuals with the variance of normal noise: equal shares of +1 and -1 have the mean square 1.
     fn record(sigma: [f64; 2]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
         let shares: Vec<f64> = (0..400).map(|t| f64::from(t / 2) / 199.0).collect();
         let eps = shares
@@ -118,7 +117,7 @@ mod tests {
         let weights = weights(levels(&eps, &shares).unwrap(), &shares);
         let sum: f64 = weights[0].iter().map(|w| w.ln()).sum();
         assert!(sum.abs() < 1e-9);
-        // What is weighted has the same size throughout.
+        // The weighted residuals have the same size throughout.
         let sizes: Vec<f64> = eps[0].iter().zip(&weights[0]).map(|(e, w)| (e * w).abs()).collect();
         assert!(sizes.iter().all(|s| (s / sizes[0] - 1.0).abs() < 1e-8));
     }

@@ -7,15 +7,14 @@
 //!
 //! because the delay follows the gains. For a gain and a lead, w is `K_e(t - tau) y_0(t) + K_e_dot(t - tau) y_1(t)`,
 //! with y_0 the response of `omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}`. All y_i have the same F and the same
-//! state, which the numerator does not affect, so that y_i = (B_i/F) q^-nk e is always valid
-//! ([`super::unit_operator`]). With the gain k and the shape m of the numerator, `n = k m(x)`
-//! ([`hoid_model::Form::shape`]),
+//! state, which the numerator does not affect, so y_i = (B_i/F) q^-nk e is always valid ([`super::unit_operator`]).
+//! With the gain k and the shape m of the numerator, `n = k m(x)` ([`hoid_model::Form::shape`]),
 //!
 //! `dw/dk = sum_i m_i y_i`,  `dw/dx_j = k sum_i (dm_i/dx_j) y_i`.
 //!
 //! **Initial states.** The state of the operator at the start of a record is unknown and has as many elements as there
 //! are poles. Any state can be reached from rest by the same number of held errors before it. These errors are the
-//! unknowns, so that the same filters give the responses to them and all derivatives. For a gain and a lead the errors
+//! unknowns, so the same filters give the responses to them and all derivatives. For a gain and a lead the errors
 //! precede the record. For other forms they immediately precede the first residual, where the response of a fast pole
 //! has not yet decayed and remains distinguishable from the other responses. They enter eps linearly and are eliminated
 //! exactly for each theta, as in [`crate::criterion::initial_state_responses`]: `eps = (I - Q Q') eps_0`, psi is

@@ -2,7 +2,7 @@
 //!
 //! A prior of a positive parameter x, `ln x ~ N(m, s)`, is added to the squared residuals as `sigma^2 (ln x - m)^2/s^2`
 //! ([`crate::family::OperatorPrior`]); the prior of T_L applies before and after the change. sigma^2 is the innovation
-//! variance of the fit; fit and sigma^2 are computed in turn.
+//! variance of the fit; fit and sigma^2 are computed alternately.
 
 use super::{
     layout::{Element, Layout},

@@ -68,8 +68,7 @@ pub(crate) fn profile_likelihood_interval(
     let options = SearchOptions {
         method: SearchMethod::LevenbergMarquardt,
         max_iterations: 30,
-        // The statistic is n times the relative change of the loss, so that it is accurate to a thousandth of the
-        // quantile.
+        // The statistic is n times the relative change of the loss, so it is accurate to a thousandth of the quantile.
         tolerance: 1e-3 * quantile / n,
     };
     let (low, high) = criterion.limits[place];

@@ -1,5 +1,5 @@
-//! Fit with different noise levels before and after the change. Fit and levels are estimated in turn until the ratio of
-//! the levels converges. The residuals are weighted by the inverse of the noise level at their time
+//! Fit with different noise levels before and after the change. Fit and levels are estimated alternately until the
+//! ratio of the levels converges. The residuals are weighted by the inverse of the noise level at their time
 //! ([`super::noise_level`]).
 
 use super::{
@@ -22,8 +22,8 @@ const CONVERGED: f64 = 1e-6;
 /// Negligible relative change of the loss: it changes the log-likelihood of 10000 residuals by 0.005.
 const NEGLIGIBLE: f64 = 1e-6;
 
-/// Estimates fit and noise levels in turn and returns the minimum and the levels. The levels are `None` if they cannot
-/// be determined, such as for residuals that are only rounding errors.
+/// Estimates fit and noise levels alternately and returns the minimum and the levels. The levels are `None` if they
+/// cannot be determined, such as for residuals that are only rounding errors.
 ///
 /// # Errors
 /// [`IdentError::NoFiniteLoss`] if a search fails.

@@ -18,8 +18,8 @@ pub struct Correlation {
     pub bound_99: f64,
 }
 
-/// Number of samples that are processed for all lags before the next samples, so that the samples remain in the
-/// processor cache.
+/// Number of samples that are processed for all lags before the next samples, so the samples remain in the processor
+/// cache.
 const BLOCK: usize = 8192;
 
 /// Returns `sum_t x(t) y(t - k)` for each lag k, over all t for which both samples exist; x and y have the same length.
@@ -115,7 +115,7 @@ mod tests {
                 .filter(|t| inside(*t))
                 .map(|t| x[t as usize] * y[(t - lag) as usize])
                 .sum();
-            // Rounding of some ten thousand terms.
+            // Rounding error of about ten thousand terms.
             assert!((found - plain).abs() < 1e-11, "lag {lag}: {found} and {plain}");
         }
     }
@@ -133,7 +133,7 @@ mod tests {
         let x = centred(x);
         let own = autocorrelation(&x, 50);
         let outside = own.values.iter().filter(|v| v.abs() > own.bound_99).count();
-        // 50 values at 1 %: more than four outside has probability 1e-4.
+        // 50 values, each outside with probability 1 %: more than four are outside with probability 1e-4.
         assert!(outside <= 4, "{outside}");
         // y leads x by seven samples: x(t) = y(t - 7).
         let y: Vec<f64> = x[7..].to_vec();

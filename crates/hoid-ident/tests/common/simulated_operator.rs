@@ -1,8 +1,8 @@
-//! Random numbers from a seed, and u of an operator without noise: for tests and studies of the batch estimators.
+//! Random numbers from a seed, and u of an operator without noise, for tests and studies of the batch estimators.
 
 use hoid_model::operator_family::HeldFamily;
 
-/// Uniform numbers from a linear congruence.
+/// Uniform random numbers from a linear congruential generator.
 pub struct Uniform(pub u64);
 
 impl Uniform {
@@ -18,7 +18,7 @@ impl Uniform {
         self.between(low.ln(), high.ln()).exp()
     }
 
-    /// A sum of twelve: normal except for its tails, variance one.
+    /// Returns a sum of twelve uniform numbers: normal except for its tails, variance one.
     pub fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.between(0.0, 1.0)).sum::<f64>() - 6.0
     }

@@ -1,15 +1,14 @@
-//! Own starts reach the global minimum on short records of textbook systems.
+//! Tests that the automatic starts reach the global minimum on short records of textbook systems.
 //!
-//! **Experiment.** Random systems ([`systems`]) are fitted with their own orders from the own
-//! starts, and next to it from the true parameters and from random starts. The lowest loss of all
-//! is the reference; the own starts reach it where their loss is at most 1e-6 (relative) above it.
+//! **Experiment.** Random systems ([`systems`]) are fitted with their true orders from the automatic starts and, for
+//! comparison, from the true parameters and from random starts. The smallest of these losses is the reference; the
+//! automatic starts reach it if their relative loss above it is at most 1e-6.
 //!
-//! **What does not count.** Short records often have their lowest loss at a model that carries no
-//! information about the system: a root of C or F on the unit circle (farther out than 1 - 1e-4),
-//! where the estimated initial state of that root removes a trend or a sinusoid from the record; or
-//! common factors, a zero of B next to a root of F or a root of C next to one of D (closer than
-//! 0.01), where the parameters of both are not determined. Where the reference is such a minimum,
-//! the system is counted apart.
+//! **Excluded cases.** For short records the lowest loss is often at a model that carries no information about the
+//! system. Such a model has a root of C or F on the unit circle (farther out than 1 - 1e-4), where the estimated
+//! initial state of this root removes a trend or a sinusoid from the record, or it has common factors: a zero of B
+//! close to a root of F, or a root of C close to a root of D (closer than 0.01), where the parameters of both are
+//! undetermined. If the reference is such a minimum, the system is counted separately.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod systems;
@@ -21,9 +20,9 @@ use hoid_model::{Complex64, Structure, polynomial, polynomial_model::monic};
 use rayon::prelude::*;
 use systems::System;
 
-/// Largest relative loss above the reference at which it is reached.
+/// Largest relative loss above the reference at which the reference counts as reached.
 const REACHED: f64 = 1e-6;
-/// Radius from which on a root lies on the unit circle.
+/// Modulus above which a root counts as being on the unit circle.
 const ON_CIRCLE: f64 = 1.0 - 1e-4;
 /// Distance below which two roots cancel each other.
 const CANCELS: f64 = 0.01;
@@ -32,7 +31,7 @@ const CANCELS: f64 = 0.01;
 struct Outcome {
     number: u64,
     own: Option<Fit>,
-    /// For the true parameters and the random starts.
+    /// Best fit from the true parameters and the random starts.
     lowest: Option<Fit>,
     own_s: f64,
 }
@@ -70,7 +69,8 @@ impl Outcome {
         }
     }
 
-    /// Relative loss of the own starts above the reference; not positive where they are the lowest.
+    /// Returns the relative loss of the automatic starts above the reference; not positive if their loss is the
+    /// smallest.
     fn above(&self) -> f64 {
         let loss = |fit: &Option<Fit>| fit.as_ref().map_or(f64::INFINITY, Fit::loss);
         loss(&self.own) / loss(&self.lowest) - 1.0
@@ -80,7 +80,7 @@ impl Outcome {
         self.above() <= REACHED
     }
 
-    /// True if the reference is a minimum that counts.
+    /// True if the reference is not an excluded case.
     fn counts(&self) -> bool {
         let reference = if self.above() <= 0.0 { &self.own } else { &self.lowest };
         reference.as_ref().is_some_and(is_regular)
@@ -102,7 +102,8 @@ fn is_regular(fit: &Fit) -> bool {
     fit.termination().reason != Reason::Border && inside && apart(&b, &f) && apart(&c, &d)
 }
 
-/// Number of systems that count, that are reached among them, and the same of those counted apart.
+/// Returns the number of systems that are not excluded and the number of these whose reference is reached, followed by
+/// the same numbers for the excluded systems.
 fn study(numbers: std::ops::Range<u64>, restarts: usize) -> [usize; 4] {
     let began = Instant::now();
     let outcomes: Vec<Outcome> = numbers

@@ -1,9 +1,9 @@
-//! Random Box-Jenkins systems with short records in an open loop.
+//! Random Box-Jenkins systems with short open-loop records.
 //!
-//! Systems with the orders of textbooks: nb = 3, nf = 2, nk = 1 .. 3, nc and nd 0 .. 2, 300 samples.
-//! Half of the systems have two real poles, most of them slow (0.8 to 0.99), half a pair; the noise
-//! has any colour with roots up to 0.95. The ratio of the variances of noise-free output and noise
-//! lies between 1 and 10, and the input is white, band-limited or a binary sequence of steps.
+//! Systems with the orders of textbooks: nb = 3, nf = 2, nk = 1 .. 3, nc and nd 0 .. 2, 300 samples. Half of the
+//! systems have two real poles, most of them slow (0.8 to 0.99), and half have a pair of complex poles; the noise has
+//! any colour, with roots up to 0.95. The ratio of the variances of noise-free output and noise lies between 1 and 10,
+//! and the input is white, band-limited or a binary sequence of steps.
 
 use hoid_core::filter::{divide_in_place, fir, multiply};
 use hoid_model::{Channel, Complex64, Orders, Record, SampleTime, polynomial};
@@ -11,10 +11,10 @@ use hoid_sim::RunSeed;
 
 /// Samples of a record.
 const SAMPLES: usize = 300;
-/// Samples before it.
+/// Samples before the record.
 const RUN_IN: usize = 500;
 
-/// A system, what was recorded of it, and random numbers for the caller that continues with it.
+/// A system, its record, and random numbers for further use by the caller.
 pub struct System {
     pub orders: Orders,
     pub theta: Vec<f64>,
@@ -22,16 +22,16 @@ pub struct System {
     pub draw: Draw,
 }
 
-/// Uniform numbers (S. Vigna's SplitMix64).
+/// Uniform random numbers (S. Vigna's SplitMix64).
 pub struct Draw(u64);
 
 impl Draw {
-    /// The random stream with a number.
+    /// Creates the random stream with this seed.
     pub fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5851_f42d_4c95_7f2d)
     }
 
-    /// Uniform from `low` to `high`.
+    /// Returns a uniform number between `low` and `high`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -40,12 +40,12 @@ impl Draw {
         low + (high - low) * ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// One of 0 .. n - 1.
+    /// Returns one of the integers 0 .. n - 1.
     pub fn one_of(&mut self, n: usize) -> usize {
         ((self.between(0.0, 1.0) * n as f64) as usize).min(n - 1)
     }
 
-    /// A polynomial of the system's kind: two poles.
+    /// Returns a polynomial with two poles: two real poles, most of them slow, or a pair.
     pub fn slow_or_pair(&mut self) -> Vec<f64> {
         if self.between(0.0, 1.0) < 0.5 {
             let slow = self.between(0.8, 0.99);
@@ -56,7 +56,7 @@ impl Draw {
         }
     }
 
-    /// A polynomial of the noise.
+    /// Returns a polynomial of the noise model.
     pub fn noise(&mut self, order: usize) -> Vec<f64> {
         match order {
             0 => Vec::new(),
@@ -68,7 +68,7 @@ impl Draw {
 }
 
 impl System {
-    /// The system of this number.
+    /// Returns the system with this number.
     pub fn numbered(number: u64) -> Self {
         let mut draw = Draw::new(number);
         let orders = Orders {
@@ -116,7 +116,7 @@ impl System {
         }
     }
 
-    /// A random start: poles and noise of the system's kind, B by least squares.
+    /// Returns a random start: poles and noise of the same kind as in the system, and B by least squares.
     pub fn random_start(&mut self) -> Vec<f64> {
         let o = self.orders;
         let f = self.draw.slow_or_pair();
@@ -125,7 +125,7 @@ impl System {
         [b, c, d, f].concat()
     }
 
-    /// B by least squares for given poles.
+    /// Returns B by least squares for given poles.
     fn least_squares(&self, f: &[f64]) -> Vec<f64> {
         let o = self.orders;
         let columns: Vec<Vec<f64>> = (0..o.nb)
@@ -144,7 +144,7 @@ impl System {
     }
 }
 
-/// White, after two equal poles, or steps to +1 and -1 that last 5 to 20 samples.
+/// Returns white noise, white noise filtered by two equal poles, or steps between +1 and -1 that last 5 to 20 samples.
 fn input(draw: &mut Draw, mut white: Vec<f64>) -> Vec<f64> {
     match draw.one_of(3) {
         0 => {}

@@ -1,13 +1,12 @@
-//! Refined instrumental variables on recorded people.
+//! Refined instrumental variables on recordings of people.
 //!
-//! The recordings lie in the directory that `HOID_HUMAN_DATA` names; without it the test reports it
-//! and passes.
+//! The recordings are in the directory given by `HOID_HUMAN_DATA`; without it the test prints a message and passes.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 use hoid_ident::{Estimator, InstrumentalVariable, Instruments, IvMethod};
 use hoid_model::{Channel, Orders, Record, SampleTime, Structure};
 
-/// The trials of a person and plant: e = r - y, paired with the u of the row after it.
+/// Returns the trials of a person and a controlled element: e = r - y, paired with the u of the next row.
 fn trials(cell: &str) -> Option<Vec<Record>> {
     let dir = std::env::var_os("HOID_HUMAN_DATA")?;
     let mut files: Vec<_> = std::fs::read_dir(dir)
@@ -51,8 +50,8 @@ fn trial(text: &str) -> Record {
     .unwrap()
 }
 
-/// A method that reports convergence is not worse than the prediction error method by much: on the
-/// border of stability it once was, by half of the loss.
+/// An iteration that reports convergence must not have a much larger loss than the prediction error method; on the
+/// border of stability its loss was once larger by half.
 #[test]
 #[ignore = "minutes; prints the table of all cells"]
 fn what_has_converged_predicts_well() {

@@ -127,7 +127,7 @@ impl HeldLoop {
         let (e, u) = match (&self.motion, &mut state.motion) {
             (Some(motion), Some(felt)) => {
                 let answer = motion.output(felt);
-                // y = f - e, so that both direct responses depend on e.
+                // y = f - e, so both direct responses depend on e.
                 let known = known + answer.known + answer.tap * inputs.target;
                 let tap = tap - answer.tap;
                 let rest = inputs.target - of_state - direct * (known + inputs.remnant + inputs.disturbance);

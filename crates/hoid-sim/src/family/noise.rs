@@ -91,8 +91,7 @@ impl Shaped {
 /// Returns the white sequence w of a part, with its pulses and intermittence but without its dependence on u.
 pub(super) fn driving(part: &RemnantPart, run: RunSeed, index: u64, ts_s: f64, samples: usize) -> Vec<f64> {
     let mut w = if index == 0 {
-        // The first part uses the same deviates as `Simulator`, so that a remnant of one part equals that of
-        // `Simulator`.
+        // The first part uses the same deviates as `Simulator`, so a remnant of one part is the same as in `Simulator`.
         run.white_noise(samples)
     } else {
         run.white_noise_of(STREAMS + 4 * index, samples)

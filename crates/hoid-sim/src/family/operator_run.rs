@@ -85,8 +85,8 @@ impl FamilyOperatorRun {
     }
 
     /// Restores the state that [`FamilyOperatorRun::saved`] returned for an operator with the same scenario and run, so
-    /// that it continues with bit-identical results. Returns false, without any change, if the numbers belong to
-    /// another operator.
+    /// it continues with bit-identical results. Returns false, without any change, if the numbers belong to another
+    /// operator.
     pub fn restore(&mut self, saved: &[f64]) -> bool {
         let Some((&[k, n], rest)) = saved.split_first_chunk::<2>() else {
             return false;
@@ -139,7 +139,7 @@ mod tests {
         scenario
     }
 
-    /// An operator whose delay and element change, with every kind of remnant and a stick that walks.
+    /// Returns a scenario in which delay and element change, with every kind of remnant and a random walk of the stick.
     fn busy() -> FamilyScenario {
         let person = |k: f64, tau_e_s: f64| [k, 0.5, 3.0, 11.0_f64.ln(), 0.25_f64.ln(), tau_e_s];
         let of = |k, tau_e_s| state(Form::LeadLag, true, &person(k, tau_e_s), [&[1.0], &[1.0, 0.0]]);
@@ -198,14 +198,15 @@ mod tests {
         scenario
     }
 
-    /// A gain with a delay of a fraction of a sample only.
+    /// Returns a scenario with a gain and a delay of a fraction of a sample only.
     fn quick(samples: f64) -> FamilyScenario {
         let mut scenario = task(state(Form::Gain, false, &[1.5, 0.01 * samples], [&[1.0], &[1.0, 0.0]]));
         scenario.remnant = vec![RemnantPart::new(RemnantShape::White, 0.1)];
         scenario
     }
 
-    /// For the error of a run from its run-in on, the operator gives the control of the run to the last bit.
+    /// For the error of a run from its run-in on, the control of the operator is bit-identical to the control of the
+    /// run.
     #[test]
     fn the_operator_of_a_run_gives_its_control() {
         let integrating = state(Form::Lag, false, &[1.5, 0.0, 0.1437], [&[1.0], &[1.0]]);
@@ -222,7 +223,7 @@ mod tests {
         }
     }
 
-    /// An operator continues in another one, also after the end of its scenario.
+    /// A saved operator continues in another operator, also after the end of its scenario.
     #[test]
     fn a_saved_operator_goes_on_with_the_same_digits() {
         let new = || FamilyOperatorRun::new(FamilySimulator::new(&busy()).unwrap(), SEED, 0.0).unwrap();

@@ -269,7 +269,7 @@ impl FamilySimulator {
     /// Only parameters that are finite throughout are included.
     ///
     /// # Errors
-    /// As [`FamilySimulator::run`].
+    /// Same as [`FamilySimulator::run`].
     pub fn run_with_truth(&self, run: RunSeed, keep_run_in: bool) -> Result<Record, SimError> {
         let mut record = self.run(run, keep_run_in)?;
         let first = self.samples() - record.len();

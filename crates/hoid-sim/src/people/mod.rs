@@ -1,9 +1,9 @@
 //! Virtual people: operators drawn from the family, and their runs.
 //!
 //! A person is an operator of the family with parameters from published ranges, a realistic remnant, and a stick that
-//! drifts. The task is that of recorded experiments: to keep the output at zero against a multi-sine disturbance at the
-//! input of `1/s`, `1/(s(s+1))` or `1/s^2`, with 5 s of run-in and 40 s of measurement at 60 Hz. All true values are
-//! known. With [`Task::display`], people also respond to a displayed target.
+//! drifts. The task is the same as in recorded experiments: to keep the output at zero against a multi-sine disturbance
+//! at the input of `1/s`, `1/(s(s+1))` or `1/s^2`, with 5 s of run-in and 40 s of measurement at 60 Hz. All true values
+//! are known. With [`Task::display`], people also respond to a displayed target.
 //!
 //! ```
 //! use hoid_sim::people::{Person, Plant, Population, RemnantKind, Task};

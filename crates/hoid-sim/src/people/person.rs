@@ -78,7 +78,7 @@ pub struct Person {
 /// Run of a virtual person.
 #[derive(Debug, Clone)]
 pub struct PersonRun {
-    /// Operator and controlled element of this run; the same as those of the person if there is no spread between runs.
+    /// Operator and controlled element of this run; they are those of the person if there is no spread between runs.
     pub state: FamilyState,
     /// Response to the displayed target in this run.
     pub feedforward: Option<Feedforward>,

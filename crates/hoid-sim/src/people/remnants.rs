@@ -15,12 +15,12 @@ pub enum RemnantKind {
     Lag,
     /// Three Gaussian parts: broad band, peak and drift.
     BroadBand,
-    /// As `BroadBand`, with 80 % of the variance of the broad band proportional to the running mean square of u (memory
-    /// 1 s).
+    /// Like `BroadBand`, with 80 % of the variance of the broad band proportional to the running mean square of u
+    /// (memory 1 s).
     SignalDependent,
-    /// As `BroadBand`, with 80 % of the variance of the broad band in pulses, two per second on average.
+    /// Like `BroadBand`, with 80 % of the variance of the broad band in pulses, two per second on average.
     Pulsed,
-    /// As `BroadBand`, with the broad band on for 2 s and off for 2 s on average.
+    /// Like `BroadBand`, with the broad band on for 2 s and off for 2 s on average.
     Intermittent,
 }
 

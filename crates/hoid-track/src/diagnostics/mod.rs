@@ -25,7 +25,7 @@
 //! | `negative-lead` | K_e and K_e_dot have significantly opposite signs in more than a tenth of the rows |
 //! | `idle-head` | neither e nor u moves at the start of the record, which is excluded from the start span (a note) or part of it (a warning) |
 //! | `many-changes` | three or more declared changes, on average at least one per half minute |
-//! | `supposed` | the record does not determine omega_nm, zeta_nm or tau_e of the last row: its value is that of the prior, or one of several that predict u equally well (a note) |
+//! | `supposed` | the record does not determine omega_nm, zeta_nm or tau_e of the last row: its value comes from the prior, or is one of several that predict u equally well (a note) |
 //! | `last-row` | neither K_e nor K_e_dot is determined in the last row, regardless of the other rows |
 //! | `not-followed` | the last 16 or 30 s of the record disagree with the last row |
 //! | `structure` | past errors explain more of u than the operator of the last row does |

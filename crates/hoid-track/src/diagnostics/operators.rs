@@ -12,7 +12,7 @@ use crate::trace::Trace;
 /// The operator of one row, or the reason why the row has none.
 pub(super) type Operator = Result<OperatorEstimate, NotConvertible>;
 
-/// True if the orders or the form of the model are not those of an operator.
+/// True if the model does not have the orders or the form of an operator.
 pub(super) fn is_other(operator: &Operator) -> bool {
     matches!(
         operator,

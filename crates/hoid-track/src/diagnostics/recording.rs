@@ -95,15 +95,14 @@ impl Trace {
     }
 
     /// Compares the last few seconds of the record with the last row: the delay may have changed, or the estimate may
-    /// not have recovered. A step of a parameter ([`operator_step`]) gives a finding if its p-value, given the error of
-    /// the step and that of the row, is below [`UNLIKELY`]. For a delay in whole samples, the step must also exceed one
+    /// not have recovered. A step of a parameter ([`operator_step`]) gives a finding if its p-value, given the errors
+    /// of the step and of the row, is below [`UNLIKELY`]. For a delay in whole samples, the step must also exceed one
     /// and a half samples.
     pub(super) fn not_followed(&self, record: &Record) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self.operator(row).ok()?;
-        // If gain and lead approximate another form, their response differs from that of the estimate, so that they are
-        // not compared.
-        // The batch fits of the last seconds have one input.
+        // If gain and lead approximate another form, their response differs from the response of the estimate, so they
+        // are not compared. The batch fits of the last seconds have one input.
         if self.options().further.is_some() {
             return None;
         }

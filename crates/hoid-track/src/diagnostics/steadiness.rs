@@ -19,8 +19,8 @@ use crate::trace::Trace;
 const UNLIKELY_STEP: f64 = 0.03;
 const UNLIKELY_DRIFT: f64 = 0.01;
 const UNLIKELY_SWAY: f64 = 0.05;
-/// Lag of a second basis, s, for people with a long lag, whose response is that of an integrator. The basis that
-/// explains u better is used.
+/// Lag of a second basis, s, for people with a long lag, who respond like an integrator. The basis that explains u
+/// better is used.
 const LONG_LAG_S: f64 = 10.0;
 /// Time excluded at the start of the record and after a faulty span, s: the fast modes of the basis start at rest. The
 /// transient of its lag is estimated.

@@ -134,7 +134,7 @@ mod tests {
         simulator.run(seed, false).unwrap()
     }
 
-    /// The same record with an additional response to the error in u: `share` times K_e, `later` samples after the
+    /// Returns the record with an additional response to the error in u: `share` times K_e, `later` samples after the
     /// error.
     fn with_echo(record: &Record, share: f64, later: usize) -> Record {
         let e = record.input();

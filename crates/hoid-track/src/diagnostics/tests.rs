@@ -56,7 +56,7 @@ fn a_method_that_starts_itself_says_what_it_supposes() {
     assert_eq!(tracker.level(&tracker.operator()), VerdictLevel::Trustworthy);
 }
 
-/// A change without any difference.
+/// Returns a change in which no parameter differs.
 fn change() -> crate::Change {
     let same = [Estimate::fixed(1.0); 2];
     crate::Change {
@@ -74,7 +74,7 @@ fn change() -> crate::Change {
     }
 }
 
-/// An output of zero has no gain: the operator is not doubtful, there is none.
+/// An output of zero has no gain: there is no operator, which differs from a doubtful operator.
 #[test]
 fn an_output_that_is_zero_is_not_determined() {
     let record = simulated(Condition::C1);
@@ -86,7 +86,7 @@ fn an_output_that_is_zero_is_not_determined() {
     assert_eq!(verdict.level, VerdictLevel::NotDetermined, "{verdict}");
 }
 
-/// A trace with an operator in each row, as recursions in physical parameters have it.
+/// Returns a trace with an operator in each row, as from a recursion in physical parameters.
 fn in_the_operators_parameters(record: &Record, every: usize) -> Trace {
     let options = TrackOptions::default_for(Method::rpem(), 29)
         .with(&[("memory", "20s")])
@@ -96,7 +96,7 @@ fn in_the_operators_parameters(record: &Record, every: usize) -> Trace {
     trace
 }
 
-/// A trace of C1 with changed rows.
+/// Returns the kinds of the findings about a trace of C1 with changed rows.
 fn changed(change: impl FnOnce(&mut Trace)) -> Vec<&'static str> {
     let record = simulated(Condition::C1);
     let mut trace = in_the_operators_parameters(&record, 100);
@@ -134,7 +134,7 @@ fn each_size_of_the_trace_has_its_finding() {
         open(&mut last.k_e_dot);
     });
     assert_eq!(at_the_end, ["last-row"]);
-    // 81.92 s: three are many, two are not.
+    // The record has 81.92 s: three changes are many, two are not.
     for (count, expected) in [(2, vec![]), (3, vec!["many-changes"])] {
         let often = changed(|trace| trace.changes = vec![(40.0, change()); count]);
         assert_eq!(often, expected);
@@ -205,7 +205,7 @@ fn the_output_of_another_run_is_told() {
     assert!(!kinds(&judged(&record, &typical())).contains(&"no-answer"));
 }
 
-/// u is scaled after the person; the effect in the loop is another matter.
+/// u is scaled after the simulation, so the loop does not respond to the change of the gain.
 #[test]
 fn a_gain_that_drifts_and_one_that_sways_are_told() {
     let record = simulated(Condition::C1);
@@ -233,7 +233,7 @@ fn who_answers_like_a_gain_is_trustworthy_and_no_remedy_is_refused() {
     let verdict = lead_is_open(in_the_operators_parameters(&record, 10));
     let found = verdict.findings().iter().find(|f| f.kind == "undetermined-parameter");
     assert_eq!(found.map(|f| f.severity), Some(Severity::Note), "{verdict}");
-    // Without a memory, no longer one is advised.
+    // For a method without a memory length, a longer one is not recommended.
     assert!(
         !lead_is_open(track(&record, &typical(), 10).unwrap())
             .to_string()

@@ -131,9 +131,9 @@ impl Guard {
                 u: raw.values[1],
                 ..sample
             };
-            // e acts on u only after the delay, so that the current innovation does not contain the interpolated e. A
-            // tenth of a second of interpolated u affects an estimate less than it would if a bank created no
-            // hypotheses for that time.
+            // e acts on u only after the delay, so the current innovation does not contain the interpolated e. A tenth
+            // of a second of interpolated u affects an estimate less than it would if a bank created no hypotheses for
+            // that time.
             outcome = Some(if raw.moves {
                 recursion.step(taken)
             } else {

@@ -101,7 +101,7 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     upper_quantile(&mut values, share).unwrap_or(0.0)
 }
 
-/// Returns for each first difference whether it is larger than those of a constant signal.
+/// Returns for each first difference whether it is larger than for a constant signal.
 fn moving(signal: &[f64]) -> Vec<bool> {
     let sizes: Vec<f64> = signal.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     let mean = mean(&sizes);

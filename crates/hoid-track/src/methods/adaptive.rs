@@ -8,8 +8,9 @@
 //! none, some parameters, or an earlier fit, from whose estimate and covariance the recursion starts
 //! (`starting_point`).
 //!
-//! **Reported estimate.** Gain and lead whose response is nearest to that of the gains of the basis
-//! ([`AdaptiveFilter::operator`]). The polynomials are this operator after a zero-order hold, with the delay nk.
+//! **Reported estimate.** The recursion reports the gain and lead whose response is nearest to the response of the
+//! gains of the basis ([`AdaptiveFilter::operator`]). The polynomials are this operator after a zero-order hold, with
+//! the delay nk.
 
 mod starting_point;
 
@@ -196,7 +197,7 @@ impl AdaptiveRecursion {
         let supposed = DefaultOperator {
             point,
             spread: beginning.spread,
-            // An nd of 0 or 1 gives no information about the colour of the noise, so that the default order is used.
+            // An nd of 0 or 1 gives no information about the colour of the noise, so the default order is used.
             order: match setup.orders.nd {
                 0 | 1 => defaults::ORDER,
                 nd => nd,

@@ -113,7 +113,7 @@ impl Method {
     /// Returns the method with an option set from its text.
     ///
     /// # Errors
-    /// As [`Method::set`].
+    /// Same as [`Method::set`].
     pub fn with(mut self, name: &str, text: &str) -> Result<Self, IdentError> {
         self.set(name, text)?;
         Ok(self)

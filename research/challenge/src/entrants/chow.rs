@@ -3,10 +3,10 @@
 //!
 //! The statistic is `T = d' (C_now + C_before)^-1 d` with `d = H_now - H_before`; whitened residuals are limited to 3.5
 //! standard deviations of the fit to the earlier data. Without a change T would be chi-square distributed with two
-//! degrees of freedom if the remnant were white after the filter from the start span and the basis were that of the
+//! degrees of freedom if the remnant were white after the filter from the start span and the basis contained the
 //! operator. Since neither condition holds, T is divided by its average level, computed from the mean of its logarithm
-//! (for a chi-square variable `ln 2 - gamma`), and compared with [`THRESHOLD`]. After an alarm all data except those of
-//! the last 3 s are discarded. The reported response is estimated from the remaining data, at most 40 s.
+//! (for a chi-square variable `ln 2 - gamma`), and compared with [`THRESHOLD`]. After an alarm all data except the last
+//! 3 s are discarded. The reported response is estimated from the remaining data, at most 40 s.
 
 use std::collections::VecDeque;
 
@@ -28,8 +28,8 @@ const KEPT_BLOCKS: usize = 12;
 const AT_RAD_S: f64 = 2.5;
 const LIMIT: f64 = 3.5;
 /// Ratio of T to its level above which a change is declared, if it is exceeded in `PERSISTENCE` consecutive blocks. In
-/// runs 2 to 5 of the cases without a change (open seeds; 1.8 h), which are in no table, ratios of 6, 8, 12 and 25 are
-/// exceeded 32, 15, 9 and 5 times; without the cases with a missing and a silent span, 21, 5, 0 and 0 times.
+/// runs 2 to 5 of the cases without a change (open seeds; 1.8 h), which are not in any table, ratios of 6, 8, 12 and 25
+/// are exceeded 32, 15, 9 and 5 times; without the cases with a missing and a silent span, 21, 5, 0 and 0 times.
 const THRESHOLD: f64 = 10.0;
 const PERSISTENCE: usize = 4;
 /// Expectation of the logarithm of a chi-square variable with two degrees of freedom. The following constants are the

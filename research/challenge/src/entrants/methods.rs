@@ -1,7 +1,7 @@
 //! The methods of `hoid_track` with their default options.
 //!
 //! If the delay is given, it is used; otherwise it is selected on the start span over the default range of hoid, with
-//! the other orders unchanged. The response H is that of a row of the trace or of the tracker.
+//! the other orders unchanged. The response H comes from a row of the trace or from the tracker.
 
 use hoid_ident::{
     OrderRanges,
@@ -24,7 +24,7 @@ impl Entrant for OfMethod {
         let options = self.options(task)?;
         match task.record() {
             Some(record) if task.seam.is_none() => {
-                // There is a row every half second, so that the rows include all requested times.
+                // There is a row every half second, so the rows include all requested times.
                 let every = (0.5 / task.sample_time.s()).round() as usize;
                 let trace = track(&record, &options, every).map_err(|e| e.to_string())?;
                 let row = |t_s: &f64| ((t_s / task.sample_time.s() / every as f64 + 1e-6) as usize).max(1) - 1;
@@ -158,7 +158,7 @@ mod tests {
         )
     }
 
-    /// Processing sample by sample gives the same as a record.
+    /// Processing sample by sample gives the same result as processing a record.
     #[test]
     fn both_ways_say_the_same() {
         let task = task("change-K_e_dot-100");
@@ -179,8 +179,8 @@ mod tests {
         }
     }
 
-    /// In a loop with a small margin the error is nearly a sine, whose phase drifting gains fit as well as any delay: a
-    /// method whose gains drift from the start ends far from the operator.
+    /// In a loop with a small margin the error is nearly a sine, and drifting gains fit its phase as well as any delay
+    /// does: a method whose gains drift from the start converges far from the operator.
     #[test]
     fn a_loop_of_small_margin_leads_nobody_astray() {
         let case = cases().into_iter().find(|case| case.name == "change-omega-30").unwrap();

@@ -11,7 +11,8 @@ fn point() -> Point {
     }
 }
 
-/// Sums of the signals of a sine with cosine and sine, after it has settled: responses of the six.
+/// Returns the sums of the products of the six signals with a cosine and a sine after settling, which give their
+/// responses to a sine.
 fn responses_of_signals(basis: &mut Basis, omega: f64, ts: f64, of: &mut dyn FnMut(&Signals, f64, f64)) {
     let e = |k: i64| libm::sin(omega * k as f64 * ts);
     let delay = basis.delay() as i64;
@@ -38,8 +39,8 @@ fn filter_and_response_agree() {
             largest = largest.max((x[i] - (h[i][0] * sin + h[i][1] * cos)).abs());
         }
     });
-    // Aliases: the nearest are those of 2 pi/Ts -+ omega, (omega Ts/2 pi)^2 = 2.3e-5 of the hold, and
-    // .07 of what the poles let through of s^2 at 3 rad/s; the two make 3.2e-6, the rest a fifth of it.
+    // The nearest aliases are those of 2 pi/Ts -+ omega: (omega Ts/2 pi)^2 = 2.3e-5 of the response of the hold, of
+    // which the poles transmit .07 for s^2 at 3 rad/s. These two contribute 3.2e-6, the others a fifth of this.
     assert!(largest < 4e-6, "{largest}");
 }
 
@@ -64,8 +65,8 @@ fn derivatives_are_finite_differences() {
             }
         }
     });
-    // z_5 takes the delayed error from the straight line between samples, (omega Ts)^2/8 = 2e-4 of it
-    // at most, from which the others take away as much again.
+    // z_5 uses the delayed error interpolated linearly between samples, with an error of at most (omega Ts)^2/8 = 2e-4;
+    // the other signals that are subtracted from it contribute as much again.
     assert!(largest < 4e-4, "{largest}");
 }
 
@@ -119,7 +120,7 @@ fn one_that_has_moved_becomes_one_that_was_always_there() {
             }
         }
     }
-    // What is left: the second order of the delay's move in the slow mode.
+    // The remaining difference is the second-order effect of the change of the delay on the slow mode.
     assert!(largest < 1e-4 * size, "{largest} of {size}");
     assert!(here.moved(Point { omega: -1.0, ..there }, 0.0).is_none());
     assert!(here.moved(Point { lag: 2.0, ..there }, 0.0).is_none());

@@ -2,11 +2,11 @@
 //!
 //! In parallel with the live candidate, a second candidate, the trial, reads the stored record from its start,
 //! [`REPLAYED`] samples for each new sample, until it has caught up. Its basis is at the current estimate, its
-//! whitening filter is the noise model of the residuals, and its dispersion is that of the innovations of the live
+//! whitening filter is the noise model of the residuals, and its dispersion comes from the innovations of the live
 //! candidate. When the trial has caught up, it becomes the live candidate and the next trial starts. With a delay of a
-//! few seconds, the estimate is therefore that of a prediction-error method over all stored data, iterated as in a
-//! Gauss-Newton search (L. Ljung, *System Identification*, 1999, section 10.2), at a bounded cost per sample and with
-//! bit-identical results on every machine.
+//! few seconds, the estimate therefore equals the result of a prediction-error method over all stored data, iterated as
+//! in a Gauss-Newton search (L. Ljung, *System Identification*, 1999, section 10.2), at a bounded cost per sample and
+//! with bit-identical results on every machine.
 //!
 //! To escape local minima, every second trial starts from another point. It makes [`STAGES`] passes over the record,
 //! each from the result of the previous pass. It replaces the live candidate only if its evidence is better by
@@ -32,8 +32,8 @@ pub const REPLAYED: usize = 50;
 /// better by `TAKEOVER_NATS`.
 const STAGES: u64 = 3;
 const TAKEOVER_NATS: f64 = 3.0;
-/// Amount in nats by which the evidence of a trial from the estimate may be lower than that of the live candidate,
-/// since the trial starts with a wider prior.
+/// Amount in nats by which the evidence of a trial from the estimate may be lower than the evidence of the live
+/// candidate, since the trial starts with a wider prior.
 const TOLERATED_NATS: f64 = 20.0;
 /// Minimum number of samples for the first estimate, as a multiple of the order of the noise model.
 const MIN_ORDERS: u64 = 3;

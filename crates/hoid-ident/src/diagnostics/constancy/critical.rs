@@ -44,10 +44,10 @@ mod tests {
 
     #[test]
     fn the_tail_agrees_with_andrews_table() {
-        // D. W. K. Andrews, Econometrica 71 (2003) 395-397, p = 1, pi_0 = 0.15: 10, 5 and 1 %.
+        // D. W. K. Andrews, Econometrica 71 (2003) 395-397, p = 1, pi_0 = 0.15: the 10, 5 and 1 % points.
         for (level, c) in [(0.1, 7.12), (0.05, 8.68), (0.01, 12.16)] {
             let found = de_long(c, 0.15);
-            // The table is by simulation, the tail is asymptotic.
+            // The table comes from simulation; the tail is asymptotic.
             assert!((found / level - 1.0).abs() < 0.1, "{c}: {found}");
         }
     }

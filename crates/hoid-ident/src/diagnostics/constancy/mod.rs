@@ -16,7 +16,7 @@
 //!
 //! **V is the largest** of three variances. The first is the variance of the model, `sigma^2 R`. The second is the
 //! scatter of blocks of 2 s about the tested change, `sum (h_c - delta R_c)^2 n/(n-2)`, which is valid for any
-//! correlation within a block: the part of a person's remnant that the model does not explain is correlated over some
+//! correlation within a block: the part of a person's remnant that the model does not explain is correlated over a few
 //! tenths of a second (K.-Y. Liang and S. L. Zeger, *Biometrika* 73 (1986) 13-22; the scatter is taken about the
 //! change, since a change must not mask itself). The third is the median of this scatter over all A, since the scatter
 //! of a few blocks may be small by chance. Since people vary from run to run, `share^2 size^2 sum_runs (r'psi'v)^2` is

@@ -2,8 +2,8 @@
 //!
 //! The response is `u = sum b_i z_i + v` with columns `z_{i+1} = dz_i/dt`. A change of the gain has the direction b; a
 //! change of the delay has the direction `-db/dt`, i.e. `-b_i` at `z_{i+1}`. To first order, an increase of the lead is
-//! equivalent to a decrease of the delay by the same amount. The columns are nearly collinear, so that the b_i are too
-//! uncertain for a direction: for the directions, b is a combination of a few terms of a numerator.
+//! equivalent to a decrease of the delay by the same amount. The columns are nearly collinear, so the individual b_i
+//! are too uncertain to define a direction; for the directions, b is a combination of a few terms of a numerator.
 //!
 //! The scores come from least squares with known columns ([`crate::diagnostics::whitened`]); the test is the same as
 //! for fits. For a drift the regressor is multiplied by `t/T - 1/2`, for a periodic change by a sine with one of
@@ -45,8 +45,8 @@ pub struct Unsteady {
 pub struct ResponseBasis<'a> {
     /// Signals z_1, z_2, .. that span the response and its corrections; each is the derivative of the one before.
     pub columns: &'a [Vec<f64>],
-    /// Terms of the numerator, each as its coefficients of the signals. A change of the delay has the derivative of the
-    /// response as its direction, without that of the last signal, which is not available.
+    /// Terms of the numerator, each as its coefficients of the signals. The direction of a change of the delay is the
+    /// derivative of the response, without the derivative of the last signal, which is not available.
     pub terms: &'a [Vec<f64>],
     /// Time constant of the slowest mode, s. The transient of this mode at the start of a stretch is estimated.
     pub lag_s: f64,
@@ -90,7 +90,7 @@ struct ScoredStretch {
     residual: f64,
 }
 
-/// What the tests found in a stretch.
+/// Results of the tests of a stretch.
 struct TestedStretch {
     strongest: Vec<Unsteady>,
     /// Drift of the gain and of the delay over the stretch, and the length of the stretch in blocks.
@@ -114,8 +114,8 @@ impl ScoredStretch {
         columns.push(transient);
         let fit = Whitened::of(&columns, u, &rows, LIMIT)?;
         let p = columns.len() + 1;
-        // Gains of the numerator: the estimates of the coefficients of all signals would be too uncertain for a
-        // direction.
+        // The directions use the gains of the numerator terms, because the coefficients of the individual signals are
+        // too uncertain.
         let terms = DMatrix::from_fn(columns.len() + 1, basis.terms.len() + 2, |i, j| {
             match basis.terms.get(j) {
                 Some(term) => term.get(i).copied().unwrap_or(0.0),
@@ -198,9 +198,9 @@ impl ScoredStretch {
     }
 }
 
-/// Returns the more significant drift of the two that several stretches have in common: the mean rate of the stretches,
-/// weighted by their precision, as a change over all of them. Each stretch has its own response, so that what changes
-/// between two stretches is not part of it.
+/// Returns the more significant of the two drifts (of gain and delay) that several stretches have in common: the mean
+/// rate of the stretches, weighted by their precision, as a change over all of them. Each stretch has its own response,
+/// so changes between stretches are not part of the drift.
 fn common_drift(all: &[TestedStretch]) -> Option<Unsteady> {
     let blocks: usize = all.iter().map(|stretch| stretch.blocks).sum();
     let of = |i: usize| {
@@ -248,7 +248,7 @@ mod tests {
         }
     }
 
-    /// Signals z_1 and z_2, and u for this course of its gain, in 80 s.
+    /// Returns z_1, z_2 and u over 80 s, for this time course of the gain.
     fn run(seed: u64, gain: impl Fn(f64) -> f64) -> ([Vec<f64>; 2], Vec<f64>) {
         let mut seed = seed;
         let (mut z, mut u) = ([vec![0.0; N], vec![0.0; N]], vec![0.0; N]);
@@ -263,7 +263,7 @@ mod tests {
         (z, u)
     }
 
-    /// Changes found for this course of the gain of u.
+    /// Returns the changes found for this time course of the gain.
     fn of(seed: u64, gain: impl Fn(f64) -> f64) -> Vec<Unsteady> {
         let (z, u) = run(seed, gain);
         unsteady(&[basis(&z)], &u, slice::from_ref(&WHOLE), TS)
@@ -297,7 +297,7 @@ mod tests {
 
     #[test]
     fn who_is_steady_is_called_so() {
-        // For three courses and 100 people, each below its limit in less than one of a hundred.
+        // With three time courses and 100 people, each p-value is below its limit in fewer than one in a hundred.
         let told = (0..100)
             .map(|seed| of(1000 + seed, |_| 1.0))
             .filter(|found| found.iter().any(|found| found.p_value < 0.01))
@@ -316,7 +316,7 @@ mod tests {
         };
         let (mut shared, mut one) = (0, 0);
         for seed in 1..21 {
-            // It falls by 15 % in each half, and returns between them.
+            // The gain falls by 15 % in each half and returns to its initial value between the halves.
             let falls = |t: f64| 1.0 - 0.15 * (t / 40.0).fract();
             shared += usize::from(drift(&falls, seed) < 1e-3);
             let (z, u) = run(seed, falls);
@@ -336,7 +336,7 @@ mod tests {
             unsteady(&[basis(&other), basis(&z)], &u, slice::from_ref(&WHOLE), TS),
             alone
         );
-        // A transient of the lag from before the stretch changes nothing.
+        // A transient of the lag that started before the stretch does not affect the result.
         let early = |t: usize| 5.0 * (-(t as f64) * TS).exp();
         let decaying: Vec<f64> = u.iter().enumerate().map(|(t, u)| u + early(t)).collect();
         let with = unsteady(&[basis(&z)], &decaying, slice::from_ref(&WHOLE), TS);

@@ -103,7 +103,7 @@ mod tests {
         *,
     };
 
-    /// A regression on one column of ones: block c has ten residuals of this mean.
+    /// Regression on a column of ones; each block has ten residuals with the given mean.
     fn constancy(means: &[f64], variance: f64) -> Option<Stretch> {
         let blocks: Vec<ScoreBlock> = means
             .iter()
@@ -138,7 +138,7 @@ mod tests {
         means[3] = 8.0;
         let found = constancy(&means, 1.0).unwrap();
         assert_eq!((found.from, found.to), (30, Some(40)));
-        // The mean of all is 1.00625, of the others .007 and the standard error 1/sqrt 80.
+        // The mean of all blocks is 1.00625, the mean of the others is 0.007, and the standard error is 1/sqrt 80.
         let (all, others) = (8.05 / 8.0, 0.05 / 7.0);
         assert!(
             (found.moves[0].1 - (all - others) * 80.0_f64.sqrt()).abs() < 1e-9,

@@ -1,4 +1,4 @@
-//! Against full searches of models with a change, and over runs without one.
+//! Comparison with full searches over models with a change, and tests on runs without a change.
 
 use hoid_model::{
     Channel, Finding, Record, Structure,
@@ -32,7 +32,7 @@ fn box_jenkins(records: &[Record]) -> Fit {
     Estimator::new(Structure::BoxJenkins, orders).fit(records).unwrap()
 }
 
-/// u comes later by a given number of samples from `at` on.
+/// Delays u by this number of samples from `at` on.
 fn late(record: &Record, at: usize, by: usize) -> Record {
     let u: Vec<f64> = (0..record.len())
         .map(|t| record.output()[if t >= at { t - by } else { t }])
@@ -94,7 +94,7 @@ fn a_run_unlike_the_others_is_named_and_equal_runs_are_not() {
     assert!(words.contains("in record 3 compared with the others"), "{words}");
 }
 
-/// Numbers between -1/2 and 1/2.
+/// Uniform random numbers between -1/2 and 1/2.
 fn uniform(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed;
     move || {
@@ -105,8 +105,8 @@ fn uniform(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// A regression with two columns, the first coefficient larger by `jump` from the middle on; signals
-/// and noise with this memory.
+/// Regression on two columns; the first coefficient increases by `jump` in the middle. Signals and noise are
+/// first-order autoregressions with the coefficient `memory`.
 struct Regression {
     x: [Vec<f64>; 2],
     y: Vec<f64>,
@@ -131,7 +131,7 @@ impl Regression {
         Self { x, y }
     }
 
-    /// Coefficients of these columns by least squares.
+    /// Returns the least-squares coefficients of these columns.
     fn solved(&self, columns: &[&[f64]]) -> Vec<f64> {
         let gram: Vec<f64> = columns.iter().flat_map(|a| columns.iter().map(|b| dot(a, b))).collect();
         let right: Vec<f64> = columns.iter().map(|a| dot(a, &self.y)).collect();
@@ -171,7 +171,7 @@ fn the_change_is_the_coefficient_of_its_regressor() {
     let regression = Regression::new(5, 4000, 0.9, 0.8);
     let found = regression.strongest();
     assert!(found.at.abs_diff(2000) <= 200 && found.p_value < 1e-4, "{found:?}");
-    // Twin: least squares with the regressor of the change next to the others.
+    // Reference: least squares with the regressor of the change as an additional column.
     let behind: Vec<f64> = (0..4000)
         .map(|t| if t >= found.at { regression.x[0][t] } else { 0.0 })
         .collect();
@@ -181,7 +181,7 @@ fn the_change_is_the_coefficient_of_its_regressor() {
 
 #[test]
 fn constant_regressions_are_alarmed_no_more_often_than_the_level() {
-    // Correlated noise and regressors: scores have a memory of some ten samples.
+    // With correlated noise and regressors, the scores are correlated over about ten samples.
     for memory in [0.0, 0.9] {
         let runs = 400_u32;
         let alarms = (0..runs)
@@ -193,7 +193,7 @@ fn constant_regressions_are_alarmed_no_more_often_than_the_level() {
             })
             .count();
         let share = alarms as f64 / f64::from(runs);
-        // 5 % within three standard errors of 1.1 %.
+        // The share is 5 % within three standard errors of 1.1 %.
         assert!(share < 0.05 + 3.0 * 0.011, "memory {memory}: {share}");
     }
 }

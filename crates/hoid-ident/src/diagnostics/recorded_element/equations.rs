@@ -154,7 +154,8 @@ fn remove(column: &mut [f64], orthonormal: &[Vec<f64>]) {
 
 /// Least-squares solution of the loop equations of all records, for one delay.
 struct Solved {
-    /// Coefficients `a_0 .. a_{n-1}`, `b_0 .. b_m` of u, followed by those of the disturbances and of the targets.
+    /// Coefficients `a_0 .. a_{n-1}`, `b_0 .. b_m` of u, followed by the coefficients of the disturbances and of the
+    /// targets.
     theta: Vec<f64>,
     delay_s: f64,
     sum_of_squares: f64,

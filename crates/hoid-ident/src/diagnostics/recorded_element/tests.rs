@@ -7,8 +7,8 @@ use crate::diagnostics::whitened::stream;
 
 const TS_S: f64 = 0.02;
 
-/// A loop around `gain/(s(s + lag))` with a person of gain and lead after 0.2 s, their noise, a target of seven sines
-/// and a disturbance of seven others, which is recorded if `recorded`.
+/// Simulates a loop around `gain/(s(s + lag))`. The person has a gain, a lead, a delay of 0.2 s, and noise. The target
+/// is a sum of seven sines, the disturbance a sum of seven other sines; the disturbance is recorded if `recorded`.
 fn loop_of(gain: f64, lag: f64, late: usize, recorded: bool, seed: u64) -> Record {
     let n = 3000;
     let mut seed = seed;
@@ -30,7 +30,7 @@ fn loop_of(gain: f64, lag: f64, late: usize, recorded: bool, seed: u64) -> Recor
         for (signal, value) in signals.iter_mut().zip([e, u, r, d]) {
             signal.push(value);
         }
-        // Exact for an input that is held: w' = -lag w + gain v, y' = w.
+        // Exact for a held input: w' = -lag w + gain v, y' = w.
         let v = gain
             * k.checked_sub(late)
                 .map_or(0.0, |k| signals[1][k] + 0.02 * signals[3][k]);
@@ -69,7 +69,7 @@ fn the_element_of_the_loop_is_found_and_another_one_refuted() {
             assert_eq!(found.finding(&given).is_none(), found.is_given());
         }
     }
-    // Another order: a gain, and an integrator alone.
+    // Elements of other orders: a gain, and an integrator alone.
     let integrator = ContinuousTransferFunction::new(&[15.0], &[1.0, 0.0]).unwrap();
     assert!(
         !recorded_element(&[loop_of(90.0, 6.0, 0, true, 1)], &integrator, None)
@@ -83,7 +83,7 @@ fn several_records_have_one_element() {
     let records = [loop_of(30.0, 0.2, 0, true, 1), loop_of(30.0, 0.2, 0, true, 2)];
     let found = recorded_element(&records, &element(30.0, 0.2), Some("r")).unwrap();
     assert!(found.is_given() && found.element == element(30.0, 0.2), "{found:?}");
-    // Of two records with different elements no single one explains the signals.
+    // No single element explains the signals of two records with different elements.
     let two = [loop_of(90.0, 6.0, 0, true, 1), loop_of(30.0, 0.2, 0, true, 2)];
     assert_eq!(recorded_element(&two, &element(90.0, 6.0), None), None);
 }
@@ -100,7 +100,7 @@ fn a_delay_of_the_machine_is_part_of_its_element() {
     );
     let given = element(60.0, 6.0).with_delay(0.1).unwrap();
     assert_eq!(recorded_element(&record, &given, None).unwrap().finding(&given), None);
-    // One sample is the alignment of the recorder.
+    // A shift of one sample can be due to the recorder.
     let record = [loop_of(60.0, 6.0, 1, true, 4)];
     assert_eq!(
         recorded_element(&record, &element(60.0, 6.0), None)
@@ -112,7 +112,7 @@ fn a_delay_of_the_machine_is_part_of_its_element() {
 
 #[test]
 fn signals_that_were_not_recorded_leave_the_element_open() {
-    // The person answers the disturbance, so that u is not independent of it.
+    // The person responds to the disturbance, so u is not independent of it.
     let record = loop_of(90.0, 6.0, 0, false, 1);
     assert_eq!(recorded_element(&[record], &element(45.0, 6.0), None), None);
     let record = loop_of(90.0, 6.0, 0, true, 1);

@@ -15,7 +15,7 @@ fn operator(form: Form, head: &[f64], tau_s: f64) -> FamilyOperator {
     FamilyOperator::new(form, true, &[head, &tail].concat()).unwrap()
 }
 
-/// A person on 3/(s(s+1)), with a target and a disturbance on lines of their own.
+/// Scenario of a person who controls 3/(s(s+1)), with separate lines for target and disturbance.
 fn task(motion: Option<FamilyOperator>, share: f64) -> FamilyScenario {
     let state = FamilyState {
         operator: operator(Form::Lead, &[0.6, 0.5], 0.25),
@@ -51,7 +51,8 @@ fn run(scenario: &FamilyScenario, seed: u64) -> Record {
     FamilySimulator::new(scenario).unwrap().run(seed, false).unwrap()
 }
 
-/// The default is smooth with the delay; the model of a held input has a kink in the direct part of the canals.
+/// Fits these forms. With the default intersample behaviour the criterion is smooth in the delay; with a held input the
+/// direct part of the canals causes a kink.
 fn fit(records: &[Record], forms: &[Form], intersample: Intersample) -> FamilyFit {
     let mut channel = SeenChannel::new("y", ChannelRole::Motion);
     if !forms.is_empty() {
@@ -70,8 +71,8 @@ fn named<'p>(parameters: &'p [Parameter], name: &str) -> &'p Parameter {
     parameters.iter().find(|p| p.name == name).unwrap()
 }
 
-/// Over these seeds the form is that of the canals, and the parameters are those of the person: within their errors, or,
-/// where the search ends at a kink of the direct part and gives no errors, within 15 %.
+/// For these seeds the selected form is the canals, and the parameters agree with the simulated person: within their
+/// errors or, where the search ends at a kink of the direct part and gives no errors, within 15 %.
 #[test]
 fn the_response_of_the_canals_is_found() {
     let scenario = task(Some(operator(Form::Canals, &[GAIN], 0.18)), 0.1);
@@ -124,8 +125,8 @@ fn without_motion_there_is_no_response_to_it() {
     }
 }
 
-/// Without a remnant and from rest, the parameters are those of the simulation. If the record starts later, the state of
-/// the canals at its start is not known, and their gain is off by 1 %.
+/// Without a remnant and from rest, the parameters equal the simulated ones. If the record starts later, the state of
+/// the canals at its start is unknown, and the error of their gain is 1 %.
 #[test]
 fn without_noise_the_response_to_motion_is_exact() {
     let mut scenario = task(Some(operator(Form::Canals, &[GAIN], 0.18)), 0.0);

@@ -14,19 +14,19 @@ use crate::{
 
 const TS: f64 = 0.02;
 
-/// A normal deviate.
+/// Returns a normal deviate.
 fn normal(random: &mut ChaCha8Rng) -> f64 {
     let mut uniform = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
     (0..12).map(|_| uniform()).sum::<f64>() - 6.0
 }
 
-/// A sum of sines on these periods of 40 s.
+/// Returns a sum of sines with these numbers of periods in 40 s.
 fn sines(lines: &[u32], t: f64) -> f64 {
     let one = |(i, k): (usize, &u32)| (TAU * f64::from(*k) / 40.0 * t + 2.4 * i as f64 * i as f64).sin();
     lines.iter().enumerate().map(one).map(|x| 0.5 * x).sum()
 }
 
-/// A person on 4/s who sees e and r, `preview` samples of r ahead; 80 s.
+/// Simulates 80 s of a person who controls 4/s and sees e and r, with r shown `preview` samples ahead.
 fn run(operator: &FamilyOperator, target: Option<&FamilyOperator>, preview: usize, seed: u64) -> Record {
     let task = Task {
         preview,
@@ -37,11 +37,11 @@ fn run(operator: &FamilyOperator, target: Option<&FamilyOperator>, preview: usiz
 
 /// Responses of the person.
 struct Task {
-    /// Samples of the target that are shown ahead.
+    /// Number of samples by which the target is shown ahead.
     preview: usize,
     /// Amplitude of the disturbance, in the channel d.
     disturbance: f64,
-    /// Dead zone of the stick: half its width.
+    /// Half-width of the dead zone of the stick.
     dead_zone: f64,
 }
 

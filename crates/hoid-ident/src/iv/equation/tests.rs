@@ -23,7 +23,7 @@ const ORDERS: Orders = Orders {
 };
 const SYSTEM: [f64; 4] = [-1.5, 0.7, 1.0, 0.5];
 
-/// Output of the system in the middle of its life: nothing is at rest when the record starts.
+/// Returns input and output of the system, which is not at rest when the record starts.
 fn record() -> (Vec<f64>, Vec<f64>) {
     let x = white(600);
     let mut u = vec![0.0; 600];
@@ -50,7 +50,7 @@ fn without_noise_any_filter_and_any_instruments_give_the_system() {
         let equation = problem.equation(filter, &[-1.0, 0.3, 1.0, 1.0]);
         assert_eq!(equation.y.len(), problem.rows(filter.d.len()).iter().sum::<usize>());
         for (found, truth) in problem.solve(&equation).unwrap().iter().zip(SYSTEM) {
-            // The condition of these regressors is about 1e2.
+            // The condition number of these regressors is about 1e2.
             assert!((found - truth).abs() < 1e-11, "{found} {truth}");
         }
         assert!(equation.residual(&SYSTEM).iter().all(|r| r.abs() < 1e-12));
@@ -80,8 +80,8 @@ fn instruments_change_with_the_source_at_its_rows_alone() {
         ..Prefilter::default()
     };
     let (a, b) = (split.equation(filter, &SYSTEM), plain.equation(filter, &SYSTEM));
-    // 350 samples in the first record; sample 400 is number 50 of the second. 4 samples and one of
-    // D come before the rows.
+    // 350 samples in the first record; sample 400 is number 50 of the second. The first row comes after 4 samples, plus
+    // one for D.
     let change = (350 - 5) + (50 - 5);
     for (x, y) in a.z.iter().zip(&b.z) {
         assert_eq!(x[..change], y[..change]);

@@ -1,8 +1,8 @@
 //! Refined instrumental variable for `u = (B/F) q^-nk e + (C/D) eps` (P. C. Young, *Recursive
 //! Estimation and Time-Series Analysis*, 2nd ed. 2011, ch. 7).
 //!
-//! The equation is filtered with `D/(C F)` of the previous iteration, so that its noise is eps. In each iteration C and
-//! D are estimated from an ARMA model of `u - (B/F) q^-nk e`, by the prediction error method or, with nc = 0, by least
+//! The equation is filtered with `D/(C F)` of the previous iteration, so its noise is eps. In each iteration C and D
+//! are estimated from an ARMA model of `u - (B/F) q^-nk e`, by the prediction error method or, with nc = 0, by least
 //! squares.
 //!
 //! **Covariance.** B and F solve `Z' eps = 0`; C and D solve `psi' eps = 0`, where psi is the negative gradient of eps

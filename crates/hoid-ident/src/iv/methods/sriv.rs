@@ -2,7 +2,7 @@
 //! Jakeman, *Int. J. Control* 29 (1979) 1-30; P. C. Young, *Recursive Estimation and Time-Series
 //! Analysis*, 2nd ed. 2011, ch. 6).
 //!
-//! The equation `F u = B q^-nk e + F eps` is filtered with 1/F of the previous iteration, so that its noise is eps. The
+//! The equation `F u = B q^-nk e + F eps` is filtered with 1/F of the previous iteration, so its noise is eps. The
 //! estimate is also consistent for coloured eps; for white eps it has the smallest variance. The covariance takes the
 //! estimated colour into account.
 

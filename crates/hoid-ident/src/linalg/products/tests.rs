@@ -23,8 +23,8 @@ fn leading(columns: &[Vec<f64>]) -> Vec<Lagged<'_>> {
         .collect()
 }
 
-/// The product as it is defined: partial sums in turn, added in this order, then what lies after
-/// the last whole block.
+/// Returns the product by its definition: `count` partial sums, added in this order, and then the samples after the
+/// last whole block.
 fn in_partial_sums(x: &[f64], y: &[f64], count: usize) -> f64 {
     let mut sums = [0.0; 8];
     let whole = x.len() - x.len() % count;
@@ -36,7 +36,7 @@ fn in_partial_sums(x: &[f64], y: &[f64], count: usize) -> f64 {
     (s[0] + s[2]) + (s[1] + s[3]) + rest
 }
 
-/// Partial sums of the k-th of n products with one column: the last of an odd number has eight.
+/// Returns the number of partial sums of the k-th of n products with one column: eight for the last of an odd number.
 fn partial_sums(k: usize, n: usize) -> usize {
     if n % 2 == 1 && k + 1 == n { 8 } else { 4 }
 }
@@ -154,7 +154,7 @@ fn variance_is_that_around_the_mean_of_all_spans() {
         let (a, b) = x.split_at(cut);
         assert!((variance(&[a, b]) - plain).abs() < 1e-15);
     }
-    // A constant has none, however large it is.
+    // A constant has zero variance, however large it is.
     assert_eq!(variance(&[&[1e8; 64]]), 0.0);
 }
 

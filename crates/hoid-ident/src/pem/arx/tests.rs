@@ -18,8 +18,8 @@ fn orders(na: usize, nb: usize, nk: usize) -> Orders {
     }
 }
 
-/// By QR alone, which zeros before the record ask for: the same rows as data of their own, without
-/// their past.
+/// Returns the solution by QR, without normal equations. The residuals start at sample `first`, and the regressors use
+/// the samples before it.
 fn by_qr(orders: &Orders, data: &[Data<'_>], first: usize) -> (Vec<f64>, f64, Vec<f64>) {
     let p = orders.na + orders.nb;
     let mut columns: Vec<f64> = Vec::new();
@@ -43,7 +43,7 @@ fn normal_equations_give_what_qr_gives() {
     let cases = [
         (Condition::C1, orders(2, 2, 29), true),
         (Condition::C4, orders(2, 2, 40), true),
-        // More lags of slow signals are too close to dependence: QR solves them.
+        // More lags of slow signals are nearly linearly dependent, and QR solves them.
         (Condition::C2, orders(5, 4, 20), false),
         (Condition::C1, orders(0, 3, 29), false),
     ];
@@ -64,8 +64,7 @@ fn normal_equations_give_what_qr_gives() {
         );
         let found = regress(&orders, &data, 50).unwrap();
         let (theta, squares, inverse) = by_qr(&orders, &data, 50);
-        // Two ways of rounding, of regressors whose scaled normal matrix has a condition of up to
-        // 1e7.
+        // The two solutions differ by rounding; the scaled normal matrix has a condition number of up to 1e7.
         for (a, b) in found.theta.iter().zip(&theta) {
             assert!((a - b).abs() < 1e-11 * b.abs(), "{condition}: {a} and {b}");
         }
@@ -88,7 +87,7 @@ fn what_normal_equations_cannot_decide_is_left_to_qr() {
     let decide = |o: &Orders, e: &[f64], u: &[f64], first| by_normal_equations(o, &[Data::new(e, u)], first).is_some();
     let two = orders(1, 1, 1);
     assert!(decide(&two, &e, &u, 2));
-    // Zeros before the record, a silent input, dependent columns, an exact fit.
+    // Zeros before the record, a constant input, dependent columns, and an exact fit.
     assert!(!decide(&two, &e, &u, 0));
     assert!(!decide(&two, &vec![0.0; e.len()], &u, 2));
     assert!(!decide(
@@ -101,7 +100,7 @@ fn what_normal_equations_cannot_decide_is_left_to_qr() {
     assert!(!decide(&orders(0, 1, 1), &e, &exact, 2));
     let solved = regress(&orders(0, 1, 1), &[Data::new(&e, &exact)], 2).unwrap();
     assert!((solved.theta[0] - 0.5).abs() < 1e-15 && solved.sum_of_squares < 1e-25);
-    // Not finite: nothing is decided here either.
+    // Signals that are not finite are rejected as well.
     let mut broken = u.clone();
     broken[7] = f64::NAN;
     assert!(!decide(&two, &e, &broken, 2));

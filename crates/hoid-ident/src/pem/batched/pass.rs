@@ -7,9 +7,8 @@
 //!
 //! The columns of psi are shifts of `x_b`, `-v` and `-x_f`. A recursion over t has a latency per sample, which is
 //! hidden if eight records are processed in parallel. All signals of a span of samples are computed and multiplied
-//! before the next span, so that they remain in the first-level cache; only the record itself is read from slower
-//! memory. The first span covers the free responses, because the initial states must be known before w is filtered
-//! again.
+//! before the next span, so they remain in the first-level cache; only the record itself is read from slower memory.
+//! The first span covers the free responses, because the initial states must be known before w is filtered again.
 //!
 //! Every operation acts on each lane separately, and if one lane needs more samples than another, the shorter signal is
 //! padded with zeros. The result of a lane is therefore bitwise independent of the type of registers and of the other

@@ -11,12 +11,12 @@ use crate::{
     optimize::{Linearisation, Objective},
 };
 
-/// The fits of an estimator, in lanes alone.
+/// Returns the fits of an estimator in lanes.
 fn fit_each(estimator: &Estimator, records: &[&Record], path: InstructionSet) -> Option<Vec<Result<Fit, IdentError>>> {
     super::fit_each(&estimator.settings(), records, path)
 }
 
-/// Runs of C1, each with another remnant.
+/// Returns runs of C1, each with another remnant.
 fn runs(count: u64, samples: usize) -> Vec<Record> {
     let run = |replication: u64| {
         let mut scenario = Scenario::condition(Condition::C1);
@@ -50,7 +50,7 @@ fn orders(nb: usize, nd: usize, nf: usize, nk: usize) -> Orders {
     }
 }
 
-/// The criterion of each record in a lane, at a theta of its own.
+/// Returns the criterion of each record in a lane, each at its own theta.
 fn pass(o: Orders, records: &[Record], thetas: &[Vec<f64>], path: InstructionSet) -> Vec<(Linearisation, bool)> {
     let first = first_residual(&o, InitialState::Estimate);
     let mut lanes = Lanes::new(o, first, records[0].len(), path.lanes().unwrap());
@@ -73,7 +73,7 @@ fn all(there: &Linearisation) -> Vec<f64> {
     all
 }
 
-/// theta with poles somewhere near those of a person, different in each lane.
+/// Returns a theta with poles similar to those of a person, different in each lane.
 fn theta(o: &Orders, lane: usize) -> Vec<f64> {
     let shift = 0.003 * lane as f64;
     let mut theta: Vec<f64> = (0..o.nb).map(|j| 0.06 - 0.05 * j as f64 + shift).collect();
@@ -121,7 +121,7 @@ fn a_lane_has_the_criterion_of_its_record_alone() {
                 }
             };
             for (i, (a, b)) in all(&found).into_iter().zip(all(&alone)).enumerate() {
-                // Rounding of filters with poles near the circle, against the sizes of the columns.
+                // Rounding errors of filters with poles near the unit circle, relative to the sizes of the columns.
                 assert!(
                     (a - b).abs() <= 1e-11 * size(i),
                     "{o} lane {lane} number {i}: {a} for {b}"

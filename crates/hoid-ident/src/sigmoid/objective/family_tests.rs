@@ -4,7 +4,7 @@ use hoid_model::Form;
 
 use super::{tests::record, *};
 
-/// A change of each form that a person may make, all parameters away from special values.
+/// Returns a change of a plausible size for each form, with no parameter at a special value.
 fn theta(layout: &Layout) -> Vec<f64> {
     let mut theta = vec![0.0; layout.len()];
     for (i, [first, last]) in [[0.09, 0.07], [0.4, 0.9], [0.15, 0.3]]
@@ -57,7 +57,7 @@ fn gradient_agrees_with_finite_differences() {
     for layout in all() {
         let mut c = criterion(layout, &e, &u);
         let theta = theta(&layout);
-        // A prior is part of it.
+        // The criterion includes a prior.
         c.penalty = vec![Penalty {
             place: layout.delay,
             logarithmic: true,
@@ -82,7 +82,7 @@ fn gradient_agrees_with_finite_differences() {
             };
             let slope = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * h);
             let scale = (exact.gram[i * theta.len() + i] * exact.sum_of_squares).sqrt();
-            // Rounding over h, truncation h^4. The recursion of three poles near one loses digits by
+            // Rounding error divided by h, truncation error h^4. The recursion of three poles near one loses digits by
             // 1/|F(1)|, 1e5 here: 1e-11 of the loss.
             assert!(
                 (slope + 2.0 * exact.descent[i]).abs() < 1e-7 * scale,
@@ -114,7 +114,7 @@ fn the_initial_state_costs_nothing_without_noise() {
         cut.data[0].start_s = -0.3 + 3.0;
         let eps = cut.pass(theta, 0).unwrap().eps;
         let largest = eps.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        // Three states by three errors a sample apart: condition 1e5.
+        // Three states are determined by three errors one sample apart: the condition number is 1e5.
         assert!(largest < 1e-10 * size, "{layout:?}: {largest:e} of {size}");
     }
 }

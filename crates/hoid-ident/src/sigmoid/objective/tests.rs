@@ -2,7 +2,7 @@ use hoid_model::Form;
 
 use super::*;
 
-/// Places of a gain and a lead.
+/// Indices of a gain and a lead in theta.
 const K_E: [usize; 2] = [0, 1];
 const T_L: [usize; 2] = [2, 3];
 const MIDPOINT: usize = 4;
@@ -11,7 +11,7 @@ const ZETA: usize = 7;
 const DELAY: usize = 8;
 const NOISE: usize = 9;
 
-/// A record with a rate, a start away from rest and coloured noise.
+/// Returns a record with an initial state that is not at rest, a nonzero rate and coloured noise.
 pub(super) fn record(n: usize) -> (Vec<f64>, Vec<f64>) {
     let mut state = 7_u64;
     let mut noise = || {
@@ -72,7 +72,7 @@ fn gradient_agrees_with_finite_differences() {
                 };
                 let slope = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * h);
                 let scale = (exact.gram[i * theta.len() + i] * exact.sum_of_squares).sqrt();
-                // Rounding 1e-16 of the loss over h, truncation h^4.
+                // Rounding error of 1e-16 of the loss divided by h, truncation error h^4.
                 assert!(
                     (slope + 2.0 * exact.descent[i]).abs() < 1e-8 * scale,
                     "nd {nd} weighted {weighted} level {level} parameter {i}: {slope} and {}",
@@ -106,16 +106,15 @@ fn columns_are_the_derivatives_of_the_residuals_up_to_the_initial_states() {
         let (up, down) = (at(1.0), at(-1.0));
         let mut difference: Vec<f64> = up.iter().zip(&down).map(|(a, b)| (b - a) / (2.0 * h)).collect();
         let mut column = column;
-        // What moves with the basis of the initial states lies within that basis, up to the
-        // residual at its start.
+        // The change of the basis of the initial states lies within this basis, except for the contribution of the
+        // residual at the start.
         project(&mut difference);
         project(&mut column);
         let apart: Vec<f64> = difference.iter().zip(&column).map(|(a, b)| a - b).collect();
         let (size, error) = (dot(&column, &column).sqrt(), dot(&apart, &apart).sqrt());
-        // Kaufman's approximation leaves out a term of the size of the residual's share in the
-        // moved basis.
+        // Kaufman's approximation omits a term of the size of the residual's share in the changed basis.
         assert!(error < 0.05 * size, "parameter {i}: {error} of {size}");
-        // After the initial transient nothing is left out.
+        // After the initial transient no term is omitted.
         let late = |x: &[f64]| dot(&x[800..], &x[800..]).sqrt();
         assert!(late(&apart) < 1e-5 * size, "parameter {i}: {} of {size}", late(&apart));
     }
@@ -123,7 +122,7 @@ fn columns_are_the_derivatives_of_the_residuals_up_to_the_initial_states() {
 
 #[test]
 fn the_initial_state_costs_nothing_without_noise() {
-    // A record cut out of a longer one, its past unknown, is still fitted to rounding.
+    // A record cut out of a longer one has an unknown past, but is still fitted to rounding accuracy.
     let (e, _) = record(2000);
     let silence = vec![0.0; 2000];
     let whole = criterion(&e, &silence, 0);
@@ -148,7 +147,7 @@ fn the_initial_state_costs_nothing_without_noise() {
         "{:e}",
         eps.iter().fold(0.0_f64, |m, x| m.max(x.abs()))
     );
-    // A state that was not estimated would show.
+    // If the state were not estimated, this would be visible.
     assert!(u[300].abs() > 1e-3);
 }
 

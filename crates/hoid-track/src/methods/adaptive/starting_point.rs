@@ -211,7 +211,7 @@ fn remnant(fit: &FittedOperator, sample_time: SampleTime) -> Option<Lags> {
 struct Nearest {
     /// Responses of the operator, after a zero-order hold, at each frequency.
     responses: Vec<hoid_model::operator_family::FamilyResponse>,
-    /// Responses of the basis at each frequency, divided by that of the operator.
+    /// Responses of the basis at each frequency, divided by the response of the operator.
     basis: Vec<[Complex64; GAINS]>,
 }
 
@@ -320,7 +320,7 @@ mod tests {
     use super::*;
     use crate::{Method, TrackOptions, Tracker};
 
-    /// A fit of a form with correlated errors of some percent.
+    /// Returns a fit of a form, with correlated errors of a few percent.
     fn fitted(form: Form, x: &[f64]) -> FittedOperator {
         let p = x.len();
         let size = |i: usize| 0.03 * x[i].abs().max(0.3);
@@ -343,7 +343,7 @@ mod tests {
         Tracker::new(&options, None, SampleTime::HUNDREDTH)
     }
 
-    /// Before the first sample gain and phase are those of the fit, with its errors.
+    /// Before the first sample, gain and phase and their errors equal those of the fit.
     #[test]
     fn the_estimate_begins_at_the_fit_with_its_errors() {
         for (form, x, near) in [
@@ -375,9 +375,9 @@ mod tests {
                     (response.phase_deg(), along(|r| r.im).to_degrees()),
                 ] {
                     let ratio = found.standard_error.unwrap() / expected;
-                    // An unknown lag makes the phase uncertain, which the gains cannot represent at low frequencies,
-                    // where this uncertainty is small compared with that of the gain; at other frequencies they carry a
-                    // little more information than the fit.
+                    // At low frequencies the gains cannot represent the uncertainty of the phase that an unknown lag
+                    // causes, which is small there compared with the uncertainty of the gain; at other frequencies they
+                    // carry slightly more information than the fit.
                     assert!((ratio > 0.9 || omega < 1.0) && ratio < 1.5, "{form} {omega}: {ratio}");
                 }
             }

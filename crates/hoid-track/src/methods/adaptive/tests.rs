@@ -1,4 +1,4 @@
-//! On simulated people whose operator is a gain and a lead, which is in the span of the basis.
+//! Tests on simulated people whose operator is a gain and a lead, which the basis contains.
 #![allow(clippy::unwrap_used)]
 
 use hoid_model::{
@@ -41,8 +41,8 @@ fn a_change_of_the_person_is_followed() {
     assert!((last.k_e_dot.value - 0.084).abs() < 0.02, "{last:?}");
 }
 
-/// T_L after a change over the truth, rows from 9 s after it on, the mean of four runs. With the covariance of all
-/// hypotheses in one quotient it was .76.
+/// Ratio of the estimated to the true T_L, from 9 s after a change on, averaged over four runs. A single quotient with
+/// the covariance of all hypotheses gave .76.
 #[test]
 fn the_lead_after_a_change_is_not_too_short() {
     let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
