@@ -4,32 +4,30 @@
 //! HOID_HUMAN_DATA=DIR HOID_PILOT_DATA=DIR cargo run --release -p hoid-evidence --example recorded_design
 //! ```
 //!
-//! A cell is a person with an element (and an axis). Each run is identified alone, with one form for each element. From
-//! one run come the person, the lines (Fourier coefficients of the recorded disturbance or target) and the remnant, its
-//! share of the variance of u at non-excited frequencies; `hoid design` predicts the errors of a run of this length. The scatter is the
-//! standard deviation of the estimates of the other runs, which contains the person's variation from run to run: it is
-//! also compared with `sqrt(error^2 + w^2)`, where w is 13 % of each quantity (of the margin, as if the gain varied). The
-//! gain of the people with a disturbance varied by that in the median, so that the pilots are the test of it.
-//! The standard deviation of n values is divided by its expectation, `c_4 = 1 - 1/(4 (n - 1))` of the true one.
+//! A cell is a person with an element (and an axis). Each run is identified alone, with one form for each element and
+//! without a prior. One run provides the person, the lines (Fourier coefficients of the recorded disturbance or target)
+//! and the share of the remnant in the variance of u, which is the share at non-excited frequencies; `hoid design`
+//! predicts the errors of a run of this length. The scatter is the standard deviation of the estimates of the other runs,
+//! divided by `c_4 = 1 - 1/(4 (n - 1))`. It contains the person's variation from run to run, so it is also compared with
+//! the error for the person, which includes the default variation [`RUN_TO_RUN`]. This default is the median over the
+//! people with a disturbance of the variation of the crossover, `sqrt(scatter^2 - error^2)`; the pilots are an independent
+//! test. Quantities with an error above half of their value are excluded.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::{env, fs, path::Path};
 
-use hoid::design::experiment::{Enters, Expected, Forcing, Remnant, Task, expected};
+use hoid::design::experiment::{Enters, Forcing, RUN_TO_RUN, Remnant, Task, expected};
 use hoid_evidence::{
     pilots::{self, FROM_S},
     task::median,
 };
-use hoid_ident::family::FamilyEstimator;
+use hoid_ident::family::{FamilyEstimator, OperatorPrior};
 use hoid_model::{
     Channel, Complex64, FamilyOperator, FamilyState, Form, Record, SampleTime,
     forcing::{ForcingFunction, Sinusoid},
 };
 
 const QUANTITIES: [&str; 4] = ["crossover", "phase_margin", "K", "tau_e"];
-
-/// Variation from run to run, relative to the quantity.
-const RUN_TO_RUN: f64 = 0.13;
 
 /// A run with the lines of what excites it.
 struct Run {
@@ -76,6 +74,7 @@ impl Run {
     fn operator(&self, form: Form) -> Option<FamilyOperator> {
         let estimator = FamilyEstimator {
             forms: vec![form],
+            prior: OperatorPrior::none(),
             ..FamilyEstimator::default()
         };
         let fit = estimator.fit(std::slice::from_ref(&self.record)).ok()?;
@@ -98,9 +97,9 @@ impl Cell {
         }
     }
 
-    /// Prints ratios of scatter to prediction, and returns those of all quantities, without and with the variation from run
-    /// to run.
-    fn ratios(&self) -> Vec<[f64; 2]> {
+    /// Prints the medians for each quantity, and returns the ratios of scatter to both predictions and the variation from
+    /// run to run: for each quantity, a value for each run.
+    fn ratios(&self) -> Vec<Vec<[f64; 3]>> {
         let fitted: Vec<Option<FamilyOperator>> = self.runs.iter().map(|run| run.operator(self.form)).collect();
         let values: Vec<Option<[f64; 4]>> = fitted
             .iter()
@@ -115,51 +114,50 @@ impl Cell {
             let Ok(found) = expected(&task, &forcing, length_s) else {
                 continue;
             };
+            let found = found.with_run_to_run(RUN_TO_RUN, 1);
             let others = values
                 .iter()
                 .enumerate()
                 .filter(|(j, _)| *j != k)
                 .filter_map(|(_, v)| *v);
             let others: Vec<[f64; 4]> = others.collect();
-            let varied = self.run_to_run(operator);
             for (q, ratios) in all.iter_mut().enumerate() {
-                let error = error_of(&found, QUANTITIES[q], self.form);
+                let name = match QUANTITIES[q] {
+                    "K" if self.form == Form::Lead => "K_e",
+                    name => name,
+                };
+                let one = found.quantity(name).unwrap();
+                let (Some(error), Some(person)) = (one.estimate.standard_error, one.standard_error_person) else {
+                    continue;
+                };
+                if error > 0.5 * one.estimate.value.abs() {
+                    continue;
+                }
                 let scatter = deviation(others.iter().map(|v| v[q]).filter(|v| v.is_finite()).collect());
-                ratios.push([scatter / error, scatter / error.hypot(varied[q])]);
+                let excess = (scatter.powi(2) - error.powi(2)) / one.size.powi(2);
+                ratios.push([scatter / error, scatter / person, excess.signum() * excess.abs().sqrt()]);
             }
         }
         let share = median(self.runs.iter().map(|run| run.off_lines));
-        print!(
-            "{:18} {:2} runs, share of the remnant {share:.2}:",
-            self.name,
-            all[0].len()
-        );
-        for (name, ratios) in QUANTITIES.iter().zip(&all) {
-            let of = |part: usize| median(ratios.iter().map(|r| r[part]));
-            print!("  {name} {:.2} ({:.2})", of(0), of(1));
-        }
-        println!();
-        all.concat()
+        print!("{:18} share of the remnant {share:.2}:", self.name);
+        print_medians(&all);
+        all
     }
 
     fn state(&self, operator: &FamilyOperator) -> FamilyState {
         self.task(operator.clone(), 0.2).state
     }
+}
 
-    /// Standard deviations that the variation of gain and delay from run to run makes.
-    fn run_to_run(&self, operator: &FamilyOperator) -> [f64; 4] {
-        let own = quantities(&self.state(operator));
-        let mut coordinates = operator.coordinates().to_vec();
-        coordinates[0] *= 1.0 + RUN_TO_RUN;
-        let more = FamilyOperator::new(operator.form(), operator.has_neuromuscular(), &coordinates).unwrap();
-        let more = quantities(&self.state(&more));
-        [
-            RUN_TO_RUN * own[0],
-            (more[1] - own[1]).abs(),
-            RUN_TO_RUN * own[2],
-            RUN_TO_RUN * own[3],
-        ]
+fn print_medians(all: &[Vec<[f64; 3]>]) {
+    for (name, ratios) in QUANTITIES.iter().zip(all) {
+        let [runs, person, variation] = [0, 1, 2].map(|part| median(ratios.iter().map(|r| r[part])));
+        print!(
+            "  {name} {runs:.2} ({person:.2}, variation {variation:.2}, n = {})",
+            ratios.len()
+        );
     }
+    println!();
 }
 
 fn quantities(state: &FamilyState) -> [f64; 4] {
@@ -171,11 +169,6 @@ fn quantities(state: &FamilyState) -> [f64; 4] {
         operator.coordinates()[0],
         operator.tau_e_s(),
     ]
-}
-
-fn error_of(found: &Expected, name: &str, form: Form) -> f64 {
-    let name = if name == "K" && form == Form::Lead { "K_e" } else { name };
-    found.estimate(name).and_then(|e| e.standard_error).unwrap_or(f64::NAN)
 }
 
 fn deviation(values: Vec<f64>) -> f64 {
@@ -264,13 +257,17 @@ fn main() {
         ("people", human.map(|folder| people(Path::new(&folder)))),
         ("pilots", pilots::folder().map(|folder| pilots_of(&folder))),
     ];
+    println!("medians of scatter/error of the run (scatter/error for the person, variation from run to run)");
     for (name, cells) in groups {
-        let all: Vec<[f64; 2]> = cells.into_iter().flatten().flat_map(|cell| cell.ratios()).collect();
-        let of = |part: usize| median(all.iter().map(|r| r[part]));
-        println!(
-            "{name}: scatter/predicted {:.2} in the median, {:.2} with the variation from run to run",
-            of(0),
-            of(1)
-        );
+        let mut all = vec![Vec::new(); QUANTITIES.len()];
+        for cell in cells.into_iter().flatten() {
+            for (all, own) in all.iter_mut().zip(cell.ratios()) {
+                all.extend(own);
+            }
+        }
+        print!("{name}, all runs:  ");
+        print_medians(&all);
+        let [runs, person] = [0, 1].map(|part| median(all.iter().flatten().map(|r| r[part])));
+        println!("{name}, all quantities: {runs:.2} ({person:.2})");
     }
 }
