@@ -11,7 +11,7 @@ use crate::{controlled_element::ControlledElement, errors::Outcome, names};
 
 /// Designs an experiment and returns it as JSON.
 #[pyfunction]
-#[pyo3(signature = (people, *, condition, controlled_element, form, wanted, disturbance, remnant, length, runs, lines, spacing, band, shelf, limits, against, difference, statistics, display, seed))]
+#[pyo3(signature = (people, *, condition, controlled_element, form, wanted, disturbance, remnant, length, runs, lines, spacing, band, shelf, limits, against, difference, run_to_run, statistics, display, seed))]
 #[allow(clippy::too_many_arguments)]
 pub fn design(
     py: Python<'_>,
@@ -31,18 +31,18 @@ pub fn design(
     limits: (Option<f64>, Option<f64>),
     against: Option<&str>,
     difference: Option<&str>,
-    statistics: (f64, f64, Option<String>, f64),
+    run_to_run: f64,
+    statistics: (f64, f64, Option<String>),
     display: &str,
     seed: u64,
 ) -> Outcome<String> {
-    let (power, alpha, between_people, run_to_run) = statistics;
+    let (power, alpha, between_people) = statistics;
     let sought = |text: &str| -> Outcome<DifferenceRequest> {
         Ok(DifferenceRequest {
             sought: text.parse()?,
             power,
             alpha,
             between_people: between_people.as_deref().map(Between::of_text),
-            run_to_run,
         })
     };
     let request = DesignRequest {
@@ -70,6 +70,7 @@ pub fn design(
             band_rad_s: band,
             shelf,
             most_rms: [limits.0, limits.1],
+            run_to_run,
             seed,
         },
         runs,

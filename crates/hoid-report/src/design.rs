@@ -99,7 +99,7 @@ const MOST_RUNS: usize = 200;
 pub fn runs_figure(design: &ExperimentDesign) -> String {
     let last = (2 * design.runs_needed).max(design.runs).clamp(FEWEST_RUNS, MOST_RUNS);
     let runs: Vec<f64> = (1..=last).map(|runs| runs as f64).collect();
-    let of_one = |expected: &Expected| expected.scaled((design.runs as f64).sqrt());
+    let of_one = |expected: &Expected| expected.clone().scaled((design.runs as f64).sqrt());
     let falling = |error: f64| runs.iter().map(|n| error / n.sqrt()).collect::<Vec<f64>>();
     let mut errors: Vec<Curve> = Vec::new();
     let mut people = vec![("", &design.expected, LineKind::Line)];

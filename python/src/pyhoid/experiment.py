@@ -36,6 +36,8 @@ class ExperimentDesign(Written):
         self.length: float = found["length_s"]
         #: Number of runs needed for the accepted errors of all requested quantities.
         self.runs_needed: int = found["runs_needed"]
+        #: Standard deviation of one person from run to run, relative to the quantity.
+        self.run_to_run: float = found["run_to_run"]
         #: Ratio of peak to rms of the forcing function.
         self.crest_factor: float = found["crest_factor"]
         #: Each line: omega_rad_s, amplitude, phase_rad, and the response of the person with its errors.
@@ -56,11 +58,11 @@ class ExperimentDesign(Written):
 
     @property
     def errors(self) -> dict[str, float]:
-        """Standard error of each quantity over all runs, by name.
+        """Standard error of each quantity for the person over all runs, by name.
 
         >>> designed.errors["crossover"]
         """
-        return {row["quantity"]: row["standard_error"] for row in self._parameters}
+        return {row["quantity"]: row["standard_error_person"] for row in self._parameters}
 
     def to_dataframe(
         self,
@@ -144,7 +146,7 @@ class ExperimentDesign(Written):
     def __repr__(self) -> str:
         runs = f"{self.runs} run{'s' if self.runs != 1 else ''} of {self.length:g} s"
         rows = [
-            f"{r['quantity']}: {r['value']:.4g} ± {r['standard_error']:.2g} {r['unit']}"
+            f"{r['quantity']}: {r['value']:.4g} ± {r['standard_error_person']:.2g} {r['unit']}"
             for r in self._parameters
         ]
         return "\n".join([f"Expected errors of {runs}", *(row.rstrip() for row in rows)])
@@ -162,6 +164,7 @@ def _rows(found: Mapping[str, Any]) -> list[dict[str, Any]]:
             "quantity": name,
             "value": _number(one["value"]),
             "standard_error": _number(one["standard_error"]),
+            "standard_error_person": _number(one["standard_error_person"]),
             "unit": unit,
         }
         for name, unit, one in named
@@ -182,7 +185,7 @@ def design(
     power: float = 0.8,
     alpha: float = 0.05,
     between_people: float | str | PathLike[str] | None = None,
-    run_to_run: float = 0.06,
+    run_to_run: float = 0.13,
     condition: str | None = None,
     form: str | None = None,
     disturbance: bool = False,
@@ -217,11 +220,13 @@ def design(
         unit of the quantity, or ``"crossover=10%"`` of its value.
     power, alpha : float
         Probability of finding the difference, and significance level of the test.
-    between_people, run_to_run : float
-        Relative standard deviations of the difference between people, and of a person from run to run.
-        The first may be a file that contains it: a comparison as JSON, the result of a group with several
-        conditions, or a ``population.json``. By default it comes from ``people`` if they provide it;
-        otherwise it is 0.1.
+    between_people : float, str or path
+        Relative standard deviation of the difference between people, or a file that contains it: a
+        comparison as JSON, the result of a group with several conditions, or a ``population.json``. By
+        default it comes from ``people`` if they provide it; otherwise it is 0.1.
+    run_to_run : float
+        Relative standard deviation of one person from run to run. It is part of the errors for the person,
+        which determine the number of runs.
     condition : str
         Name of the condition, for a group with several conditions.
     form : str
@@ -281,7 +286,8 @@ def design(
         limits=(max_rms_e, max_u),
         against=None if against is None else fspath(against),
         difference=None if difference is None else ",".join(_assignments(difference)),
-        statistics=(power, alpha, None if between_people is None else str(between_people), run_to_run),
+        statistics=(power, alpha, None if between_people is None else str(between_people)),
+        run_to_run=run_to_run,
         display=display,
         seed=seed,
     )

@@ -1,27 +1,27 @@
-//! Errors that a design predicts for recorded people from one run, compared with the scatter of their other runs.
+//! Errors that a design predicts for recorded people from one run, against the scatter of their other runs.
 //!
 //! ```sh
 //! HOID_HUMAN_DATA=DIR HOID_PILOT_DATA=DIR cargo run --release -p hoid-evidence --example recorded_design
 //! ```
 //!
-//! A cell is a person with an element (and an axis). Each run is identified alone, with one form for each element. One
-//! run gives the operator, the lines (Fourier coefficients of the recorded disturbance or target) and the remnant, its
-//! share of the variance of u at non-excited frequencies; from these `hoid design` predicts the errors of a run of this
-//! length. The scatter is the standard deviation of the estimates of the other runs, which contains the person's
-//! variation from run to run. It is therefore also compared with `sqrt(error^2 + w^2)`, where w is 13 % of each
-//! quantity (for the margin, as if the gain varied). This is the median variation of the gain of the people with a
-//! disturbance, so the pilots are an independent test. The standard deviation of n values is divided by its expectation
-//! relative to the true value, `c_4 = 1 - 1/(4 (n - 1))`.
+//! A cell is a person with an element (and an axis). Each run is identified alone, with one form for each element and
+//! without a prior. One run provides the person, the lines (Fourier coefficients of the recorded disturbance or target)
+//! and the share of the remnant in the variance of u, which is the share at non-excited frequencies; `hoid design`
+//! predicts the errors of a run of this length. The scatter is the standard deviation of the estimates of the other runs,
+//! divided by `c_4 = 1 - 1/(4 (n - 1))`. It contains the person's variation from run to run, so it is also compared with
+//! the error for the person, which includes the default variation [`RUN_TO_RUN`]. This default is the median over the
+//! people with a disturbance of the variation of the crossover, `sqrt(scatter^2 - error^2)`; the pilots are an independent
+//! test. Quantities with an error above half of their value are excluded.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::{env, fs, path::Path};
 
-use hoid::design::experiment::{Enters, Expected, Forcing, Remnant, Task, expected};
+use hoid::design::experiment::{Enters, Forcing, RUN_TO_RUN, Remnant, Task, expected};
 use hoid_evidence::{
     pilots::{self, FROM_S},
     task::median,
 };
-use hoid_ident::family::FamilyEstimator;
+use hoid_ident::family::{FamilyEstimator, OperatorPrior};
 use hoid_model::{
     Channel, Complex64, FamilyOperator, FamilyState, Form, Record, SampleTime,
     forcing::{ForcingFunction, Sinusoid},
@@ -29,10 +29,7 @@ use hoid_model::{
 
 const QUANTITIES: [&str; 4] = ["crossover", "phase_margin", "K", "tau_e"];
 
-/// Variation from run to run, relative to the quantity.
-const RUN_TO_RUN: f64 = 0.13;
-
-/// A run with the lines of its excitation.
+/// A run with the lines of what excites it.
 struct Run {
     record: Record,
     lines: Vec<Sinusoid>,
@@ -50,7 +47,7 @@ struct Cell {
 }
 
 impl Run {
-    /// Builds the run from a record, over whole periods of these frequencies.
+    /// Of records over whole periods of these frequencies.
     fn new(record: Record, exciting: &[f64], omegas: &[f64]) -> Self {
         let ts = record.sample_time().s();
         let coefficient = |values: &[f64], omega: f64| -> Complex64 {
@@ -77,6 +74,7 @@ impl Run {
     fn operator(&self, form: Form) -> Option<FamilyOperator> {
         let estimator = FamilyEstimator {
             forms: vec![form],
+            prior: OperatorPrior::none(),
             ..FamilyEstimator::default()
         };
         let fit = estimator.fit(std::slice::from_ref(&self.record)).ok()?;
@@ -99,9 +97,9 @@ impl Cell {
         }
     }
 
-    /// Prints ratios of scatter to prediction, and returns the ratios of all quantities, without and with the variation
-    /// from run to run.
-    fn ratios(&self) -> Vec<[f64; 2]> {
+    /// Prints the medians for each quantity, and returns the ratios of scatter to both predictions and the variation from
+    /// run to run: for each quantity, a value for each run.
+    fn ratios(&self) -> Vec<Vec<[f64; 3]>> {
         let fitted: Vec<Option<FamilyOperator>> = self.runs.iter().map(|run| run.operator(self.form)).collect();
         let values: Vec<Option<[f64; 4]>> = fitted
             .iter()
@@ -116,51 +114,50 @@ impl Cell {
             let Ok(found) = expected(&task, &forcing, length_s) else {
                 continue;
             };
+            let found = found.with_run_to_run(RUN_TO_RUN, 1);
             let others = values
                 .iter()
                 .enumerate()
                 .filter(|(j, _)| *j != k)
                 .filter_map(|(_, v)| *v);
             let others: Vec<[f64; 4]> = others.collect();
-            let varied = self.run_to_run(operator);
             for (q, ratios) in all.iter_mut().enumerate() {
-                let error = error_of(&found, QUANTITIES[q], self.form);
+                let name = match QUANTITIES[q] {
+                    "K" if self.form == Form::Lead => "K_e",
+                    name => name,
+                };
+                let one = found.quantity(name).unwrap();
+                let (Some(error), Some(person)) = (one.estimate.standard_error, one.standard_error_person) else {
+                    continue;
+                };
+                if error > 0.5 * one.estimate.value.abs() {
+                    continue;
+                }
                 let scatter = deviation(others.iter().map(|v| v[q]).filter(|v| v.is_finite()).collect());
-                ratios.push([scatter / error, scatter / error.hypot(varied[q])]);
+                let excess = (scatter.powi(2) - error.powi(2)) / one.size.powi(2);
+                ratios.push([scatter / error, scatter / person, excess.signum() * excess.abs().sqrt()]);
             }
         }
         let share = median(self.runs.iter().map(|run| run.off_lines));
-        print!(
-            "{:18} {:2} runs, share of the remnant {share:.2}:",
-            self.name,
-            all[0].len()
-        );
-        for (name, ratios) in QUANTITIES.iter().zip(&all) {
-            let of = |part: usize| median(ratios.iter().map(|r| r[part]));
-            print!("  {name} {:.2} ({:.2})", of(0), of(1));
-        }
-        println!();
-        all.concat()
+        print!("{:18} share of the remnant {share:.2}:", self.name);
+        print_medians(&all);
+        all
     }
 
     fn state(&self, operator: &FamilyOperator) -> FamilyState {
         self.task(operator.clone(), 0.2).state
     }
+}
 
-    /// Returns the standard deviations caused by the variation of gain and delay from run to run.
-    fn run_to_run(&self, operator: &FamilyOperator) -> [f64; 4] {
-        let own = quantities(&self.state(operator));
-        let mut coordinates = operator.coordinates().to_vec();
-        coordinates[0] *= 1.0 + RUN_TO_RUN;
-        let more = FamilyOperator::new(operator.form(), operator.has_neuromuscular(), &coordinates).unwrap();
-        let more = quantities(&self.state(&more));
-        [
-            RUN_TO_RUN * own[0],
-            (more[1] - own[1]).abs(),
-            RUN_TO_RUN * own[2],
-            RUN_TO_RUN * own[3],
-        ]
+fn print_medians(all: &[Vec<[f64; 3]>]) {
+    for (name, ratios) in QUANTITIES.iter().zip(all) {
+        let [runs, person, variation] = [0, 1, 2].map(|part| median(ratios.iter().map(|r| r[part])));
+        print!(
+            "  {name} {runs:.2} ({person:.2}, variation {variation:.2}, n = {})",
+            ratios.len()
+        );
     }
+    println!();
 }
 
 fn quantities(state: &FamilyState) -> [f64; 4] {
@@ -174,11 +171,6 @@ fn quantities(state: &FamilyState) -> [f64; 4] {
     ]
 }
 
-fn error_of(found: &Expected, name: &str, form: Form) -> f64 {
-    let name = if name == "K" && form == Form::Lead { "K_e" } else { name };
-    found.estimate(name).and_then(|e| e.standard_error).unwrap_or(f64::NAN)
-}
-
 fn deviation(values: Vec<f64>) -> f64 {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
@@ -186,7 +178,7 @@ fn deviation(values: Vec<f64>) -> f64 {
     square.sqrt() / (1.0 - 0.25 / (n - 1.0))
 }
 
-/// Returns the people with a disturbance: two periods of 20 s at 60 Hz, u one row later.
+/// People with a disturbance: two periods of 20 s at 60 Hz, u one row later.
 fn people(folder: &Path) -> Vec<Cell> {
     const PRIMES: [f64; 11] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0];
     let mut cells = Vec::new();
@@ -228,7 +220,7 @@ fn people(folder: &Path) -> Vec<Cell> {
     cells
 }
 
-/// Returns the pilots without a change: one period of 81.92 s of a target, with the elements as they ran.
+/// Pilots without a change: one period of 81.92 s of a target; the elements as they ran.
 fn pilots_of(folder: &Path) -> Vec<Cell> {
     const LINES: [f64; 10] = [3.0, 5.0, 8.0, 13.0, 22.0, 34.0, 53.0, 86.0, 139.0, 229.0];
     let omegas = LINES.map(|m| m * std::f64::consts::TAU / 81.92);
@@ -265,13 +257,17 @@ fn main() {
         ("people", human.map(|folder| people(Path::new(&folder)))),
         ("pilots", pilots::folder().map(|folder| pilots_of(&folder))),
     ];
+    println!("medians of scatter/error of the run (scatter/error for the person, variation from run to run)");
     for (name, cells) in groups {
-        let all: Vec<[f64; 2]> = cells.into_iter().flatten().flat_map(|cell| cell.ratios()).collect();
-        let of = |part: usize| median(all.iter().map(|r| r[part]));
-        println!(
-            "{name}: scatter/predicted {:.2} in the median, {:.2} with the variation from run to run",
-            of(0),
-            of(1)
-        );
+        let mut all = vec![Vec::new(); QUANTITIES.len()];
+        for cell in cells.into_iter().flatten() {
+            for (all, own) in all.iter_mut().zip(cell.ratios()) {
+                all.extend(own);
+            }
+        }
+        print!("{name}, all runs:  ");
+        print_medians(&all);
+        let [runs, person] = [0, 1].map(|part| median(all.iter().flatten().map(|r| r[part])));
+        println!("{name}, all quantities: {runs:.2} ({person:.2})");
     }
 }

@@ -45,6 +45,10 @@ pub struct DesignArgs {
     /// Number of runs [default: the number needed for --for, else 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub runs: Option<u32>,
+    /// Run-to-run standard deviation of one person, as a fraction of the quantity (for phase margin: of the gain that
+    /// causes it)
+    #[arg(long, value_name = "PART", default_value_t = RUN_TO_RUN)]
+    pub run_to_run: f64,
     /// Lines per forcing function
     #[arg(long, value_name = "N", default_value_t = 10)]
     pub lines: usize,
@@ -78,14 +82,10 @@ pub struct DesignArgs {
     /// Two-sided significance level of the test
     #[arg(long, value_name = "P", default_value_t = ALPHA, requires = "difference")]
     pub alpha: f64,
-    /// Standard deviation of the difference across people, as a fraction of the quantity (for phase margin: of the gain
-    /// that causes it), or a file that contains it: output of `hoid compare --json`, the result of a group with several
+    /// Standard deviation of the difference across people, as a fraction like --run-to-run, or a file that contains it: output of `hoid compare --json`, the result of a group with several
     /// conditions, or a population.json [default: from --people if available, else .1]
     #[arg(long, value_name = "PART|FILE", requires = "difference")]
     pub between_people: Option<Between>,
-    /// Run-to-run standard deviation of one person, as a fraction like --between-people
-    #[arg(long, value_name = "PART", default_value_t = RUN_TO_RUN, requires = "difference")]
-    pub run_to_run: f64,
     /// Display of the task: compensatory (error only), pursuit (target and output), preview (also the future target).
     /// For the last two, a target and a disturbance with different lines are designed, to separate the responses to
     /// error and target

@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use hoid::design::experiment::{
-    Between, DesignRequest, Designing, DifferencePlan, DifferenceRequest, Enters, Expected, ExperimentDesign, Remnant,
+    Between, DesignRequest, Designing, DifferencePlan, DifferenceRequest, Enters, Expected, ExpectedQuantity,
+    ExperimentDesign, Remnant,
 };
-use hoid::model::{numbers::DASH, uncertainty::Estimate};
+use hoid::model::numbers::DASH;
 use hoid::report::{PaperTable, design_figure, runs_figure};
 use serde_json::Value;
 
@@ -70,6 +71,7 @@ fn request(args: &DesignArgs) -> DesignRequest {
             band_rad_s: args.band,
             shelf: args.shelf,
             most_rms: [args.max_rms_e, args.max_u],
+            run_to_run: args.run_to_run,
             seed: args.seed,
         },
         runs: args.runs.map(|runs| runs as usize),
@@ -80,7 +82,6 @@ fn request(args: &DesignArgs) -> DesignRequest {
             power: args.power,
             alpha: args.alpha,
             between_people: args.between_people.clone(),
-            run_to_run: args.run_to_run,
         }),
     }
 }
@@ -139,10 +140,11 @@ fn page(found: &ExperimentDesign, verbose: bool) -> String {
     }
     page.push_str(&format!(
         "\nThe forcing function, crest factor {:.2}\n{}\n\
-         The errors follow from the information in these lines for a person with the assumed parameters in every run; \
-         variation from run to run adds to them.\n",
+         The error of the runs follows from the information in these lines. The error for the person also contains their \
+         variation of {:.0} % from run to run (--run-to-run).\n",
         found.crest_factor,
-        lines(found)
+        lines(found),
+        100.0 * found.run_to_run
     ));
     for reason in found.verdict.reasons().chain(found.verdict.notes()) {
         page.push_str(&format!("- {reason}\n"));
@@ -151,19 +153,6 @@ fn page(found: &ExperimentDesign, verbose: bool) -> String {
         page.push_str(&text::settings(&found.settings));
     }
     page
-}
-
-/// Returns crossover, margin and parameters with their units.
-fn quantities(e: &Expected) -> Vec<(String, &'static str, Estimate)> {
-    let mut all = vec![
-        ("crossover (rad/s)".to_owned(), "crossover", e.crossover_rad_s),
-        ("phase margin (deg)".to_owned(), "phase_margin", e.phase_margin_deg),
-    ];
-    all.extend(e.parameters.iter().map(|p| match p.unit {
-        "" => (p.name.to_owned(), p.name, p.estimate),
-        unit => (format!("{} ({unit})", p.name), p.name, p.estimate),
-    }));
-    all
 }
 
 fn errors(found: &ExperimentDesign) -> Rows {
@@ -175,24 +164,36 @@ fn errors(found: &ExperimentDesign) -> Rows {
             .map(|o| (format!("with {}", o.name), &o.expected)),
     ];
     let others: Vec<(String, &Expected)> = others.into_iter().flatten().collect();
-    let mut header = vec!["", "value", "error", "relative"];
+    let mut header = vec!["", "value", "error of the runs", "for the person", "relative"];
     header.extend(others.iter().map(|(name, _)| name.as_str()));
     let mut rows = text::table(&header);
-    for (label, name, estimate) in quantities(&found.expected) {
-        let error = estimate.standard_error.unwrap_or(f64::NAN);
+    for q in &found.expected.quantities {
+        let error = |error: Option<f64>| error.map_or_else(String::new, text::significant);
         let mut cells = vec![
-            label,
-            text::significant(estimate.value),
-            text::significant(error),
-            relative(error / estimate.value.abs()),
+            label(q),
+            text::significant(q.estimate.value),
+            error(q.estimate.standard_error),
+            error(q.standard_error_person),
+            relative(q.standard_error_person.unwrap_or(f64::NAN) / q.estimate.value.abs()),
         ];
         cells.extend(others.iter().map(|(_, e)| {
-            let error = e.estimate(name).and_then(|e| e.standard_error);
-            error.map_or_else(String::new, text::significant)
+            let other = e.estimate(q.name).and_then(|e| e.standard_error);
+            error(other)
         }));
         rows.add_row(cells);
     }
     rows
+}
+
+fn label(q: &ExpectedQuantity) -> String {
+    let name = match q.name {
+        "phase_margin" => "phase margin",
+        name => name,
+    };
+    match q.unit {
+        "" => name.to_owned(),
+        unit => format!("{name} ({unit})"),
+    }
 }
 
 fn relative(error: f64) -> String {

@@ -8,7 +8,9 @@ use hoid_model::{
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
-use super::{DesignedLine, DifferencePlan, Enters, Expected, ExpectedResponse, RequestedQuantity, Task};
+use super::{
+    DesignedLine, DifferencePlan, Enters, Expected, ExpectedQuantity, ExpectedResponse, RequestedQuantity, Task,
+};
 
 /// Expected errors for another person, or for another forcing function of the same duration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -49,6 +51,8 @@ pub struct ExperimentDesign {
     pub response_to_target: Vec<ExpectedResponse>,
     /// Ratio of peak to rms of the forcing function; of two forcing functions, the larger ratio.
     pub crest_factor: f64,
+    /// Standard deviation of one person from run to run, relative to the quantity.
+    pub run_to_run: f64,
     /// Expected errors from all runs, for the typical person.
     pub expected: Expected,
     /// Expected errors for the other people, with the same forcing function.
@@ -88,6 +92,7 @@ impl ExperimentDesign {
         set("runs", json!(self.runs));
         set("length_s", json::number(self.length_s));
         set("runs_needed", json!(self.runs_needed));
+        set("run_to_run", json::number(self.run_to_run));
         set("crest_factor", json::number(self.crest_factor));
         for (key, value) in of_expected(&self.expected) {
             set(&key, value);
@@ -159,17 +164,27 @@ fn of_named(one: &NamedExpected) -> Value {
 }
 
 fn of_expected(e: &Expected) -> Map<String, Value> {
-    let parameter = |p: &super::ExpectedParameter| {
-        let mut one = json::named(p.name, &p.estimate);
-        one["unit"] = json!(p.unit);
+    let with_person = |mut one: Value, q: &ExpectedQuantity| {
+        one["standard_error_person"] = json::optional(q.standard_error_person);
         one
     };
+    let (mut of_loop, mut parameters) = (Map::new(), Vec::new());
+    for q in &e.quantities {
+        let key = match q.name {
+            "crossover" => "crossover_rad_s",
+            "phase_margin" => "phase_margin_deg",
+            name => {
+                let mut one = with_person(json::named(name, &q.estimate), q);
+                one["unit"] = json!(q.unit);
+                parameters.push(one);
+                continue;
+            }
+        };
+        of_loop.insert(key.to_owned(), with_person(json::estimate(&q.estimate), q));
+    }
     let mut map = Map::new();
-    map.insert("parameters".to_owned(), e.parameters.iter().map(parameter).collect());
-    map.insert(
-        "open_loop".to_owned(),
-        json!({"crossover_rad_s": json::estimate(&e.crossover_rad_s), "phase_margin_deg": json::estimate(&e.phase_margin_deg)}),
-    );
+    map.insert("parameters".to_owned(), Value::Array(parameters));
+    map.insert("open_loop".to_owned(), Value::Object(of_loop));
     map.insert("rms_e".to_owned(), json::number(e.rms_e));
     map.insert("rms_u".to_owned(), json::number(e.rms_u));
     map

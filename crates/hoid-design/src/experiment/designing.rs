@@ -13,7 +13,8 @@ use std::f64::consts::TAU;
 use nalgebra::DVector;
 
 use super::{
-    DesignError, Enters, Expected, Forcing, RequestedQuantity, Task,
+    DesignError, Enters, Expected, Forcing, RUN_TO_RUN, RequestedQuantity, Task,
+    difference::check_spread,
     information::Loop,
     joint::Quantity,
     lines::{are_separate_lines, crest_factor, multiples, set_phases},
@@ -39,6 +40,8 @@ pub struct Designing {
     pub shelf: f64,
     /// Largest rms of e and of u; if neither is limited, the forcing function has an rms of one.
     pub most_rms: [Option<f64>; 2],
+    /// Standard deviation of one person from run to run, relative to the quantity.
+    pub run_to_run: f64,
     /// Seed of the search for phases. Different seeds give different phases of the same lines, so that people do not
     /// learn the signal.
     pub seed: u64,
@@ -54,6 +57,7 @@ impl Default for Designing {
             band_rad_s: (0.2, 18.0),
             shelf: 0.2,
             most_rms: [None; 2],
+            run_to_run: RUN_TO_RUN,
             seed: 0,
         }
     }
@@ -79,6 +83,7 @@ impl Designing {
     /// [`DesignError`] as for [`super::expected`], if a requested quantity does not exist, or if the band has no room
     /// for the lines.
     pub fn run(&self, task: &Task, points: &[Enters]) -> Result<Designed, DesignError> {
+        check_spread("spread from run to run", self.run_to_run)?;
         let least = (self.band_rad_s.0 * self.period_s / TAU).ceil();
         let largest = (self.band_rad_s.1 * self.period_s / TAU).floor();
         if !(least >= 1.0 && largest > least && largest < 1e5) {
@@ -131,7 +136,9 @@ impl Designing {
             flat.extend(own.into_iter().map(|line| (enters, line)));
         }
         let forcing = Forcing::new(flat)?;
-        let expected = all.expected(&forcing, self.period_s)?;
+        let expected = all
+            .expected(&forcing, self.period_s)?
+            .with_run_to_run(self.run_to_run, 1);
         Ok(Designed {
             crest_factor: crest,
             periods: periods(&expected, &self.wanted),
@@ -185,9 +192,9 @@ mod tests {
         let designed = Designing::default().run(&task, &[Enters::Target]).unwrap();
         let text = super::super::expected(&task, &reference(), 81.92).unwrap();
         let sum = |of: &Expected| -> f64 {
-            of.parameters
-                .iter()
-                .map(|p| (p.estimate.standard_error.unwrap() / p.estimate.value).powi(2))
+            let parameters = of.quantities.iter().skip(2);
+            parameters
+                .map(|q| (q.estimate.standard_error.unwrap() / q.estimate.value).powi(2))
                 .sum()
         };
         println!(
@@ -201,7 +208,7 @@ mod tests {
         assert!((designed.forcing.function(Enters::Target).unwrap().rms_deg() - 1.0).abs() < 1e-9);
         assert_eq!(designed, Designing::default().run(&task, &[Enters::Target]).unwrap());
         // The shelf above the crossover, and no dominant line.
-        let crossover = designed.expected.crossover_rad_s.value;
+        let crossover = designed.expected.estimate("crossover").unwrap().value;
         let amplitudes = |beyond: bool| -> Vec<f64> {
             let all = designed.forcing.sinusoids(Enters::Target).into_iter();
             let of = all.filter(|l| (l.omega_rad_s > crossover) == beyond);

@@ -30,7 +30,7 @@ use hoid_model::{Complex64, FamilyOperator, forcing::Sinusoid, uncertainty::Esti
 use nalgebra::{DMatrix, DVector};
 
 use super::{
-    DesignError, Enters, Expected, ExpectedParameter, Forcing, Remnant, Task,
+    DesignError, Enters, Expected, ExpectedQuantity, Forcing, Remnant, Task,
     joint::{Joint, Quantity},
     task::SAMPLE_S,
 };
@@ -181,16 +181,18 @@ impl<'a> Loop<'a> {
             true => Estimate::with_variance(q.value, (&covariance * &q.gradient).dot(&q.gradient)),
             false => Estimate::fixed(q.value),
         };
-        let parameter = |q: &Quantity| ExpectedParameter {
-            name: q.name,
-            unit: q.unit,
-            estimate: estimate(q),
+        let quantity = |q: &Quantity| {
+            let estimate = estimate(q);
+            ExpectedQuantity {
+                name: q.name,
+                unit: q.unit,
+                estimate,
+                size: q.size,
+                standard_error_person: estimate.standard_error,
+            }
         };
-        let [crossover, margin] = self.margins();
         Ok(Expected {
-            parameters: self.joint.parameters(self.task).iter().map(parameter).collect(),
-            crossover_rad_s: estimate(&crossover),
-            phase_margin_deg: estimate(&margin),
+            quantities: self.all_quantities().iter().map(quantity).collect(),
             rms_e,
             rms_u,
         })
@@ -243,33 +245,34 @@ impl<'a> Loop<'a> {
 
     /// Returns the quantities that can be requested.
     pub fn quantities(&self) -> Vec<Quantity> {
-        let parameters = self.joint.parameters(self.task).into_iter();
-        let parameters = parameters.filter(|q| q.value.is_finite() && q.size != 0.0);
-        self.margins().into_iter().chain(parameters).collect()
+        let mut all = self.all_quantities();
+        all.retain(|q| q.value.is_finite() && q.size != 0.0);
+        all
     }
 
-    /// Returns the absolute derivative of the phase margin in deg with respect to the logarithm of the gain.
-    pub fn margin_by_gain_deg(&self) -> f64 {
-        let [_, margin] = self.margins();
-        // The first coordinate is the gain.
-        let gain = self.task.state.operator.coordinates().first();
-        gain.map_or(f64::NAN, |gain| (margin.gradient[0] * gain).abs())
+    /// Returns crossover, margin and all parameters, of which one may be infinite.
+    fn all_quantities(&self) -> Vec<Quantity> {
+        let parameters = self.joint.parameters(self.task);
+        self.margins().into_iter().chain(parameters).collect()
     }
 
     /// Returns the crossover frequency and the phase margin.
     fn margins(&self) -> [Quantity; 2] {
         let [(crossover, of_crossover), (margin, of_margin)] = self.margin_gradients(&self.task.state.operator);
-        let quantity = |name, unit, value: f64, gradient: &DVector<f64>, scale| Quantity {
+        let quantity = |name, unit, value: f64, gradient: &DVector<f64>, [scale, size]: [f64; 2]| Quantity {
             name,
             unit,
             value,
             gradient: self.joint.feedback(gradient.as_slice()),
             scale,
-            size: scale,
+            size,
         };
+        // The first coordinate is the gain.
+        let gain = self.task.state.operator.coordinates().first();
+        let by_gain_deg = gain.map_or(f64::NAN, |gain| (of_margin[0] * gain).abs());
         [
-            quantity("crossover", "rad/s", crossover, &of_crossover, crossover),
-            quantity("phase_margin", "deg", margin, &of_margin, 1.0),
+            quantity("crossover", "rad/s", crossover, &of_crossover, [crossover; 2]),
+            quantity("phase_margin", "deg", margin, &of_margin, [1.0, by_gain_deg]),
         ]
     }
 
@@ -364,7 +367,7 @@ pub(super) mod tests {
         let of = |task: &Task, length| expected(task, &forcing, length).unwrap();
         let (one, four) = (of(&task(0.2), 81.92), of(&task(0.2), 4.0 * 81.92));
         let error = |e: &Estimate| e.standard_error.unwrap();
-        for (a, b) in one.parameters.iter().zip(&four.parameters) {
+        for (a, b) in one.quantities.iter().zip(&four.quantities) {
             assert!(
                 (error(&a.estimate) / error(&b.estimate) - 2.0).abs() < 1e-9,
                 "{}",
@@ -377,11 +380,12 @@ pub(super) mod tests {
         };
         let tenth = Forcing::new(forcing.lines().iter().map(smaller).collect()).unwrap();
         let tenth = expected(&task(0.2), &tenth, 81.92).unwrap();
-        assert!((error(&tenth.crossover_rad_s) / error(&one.crossover_rad_s) - 1.0).abs() < 1e-9);
+        let error_of = |of: &Expected, name| error(&of.estimate(name).unwrap());
+        assert!((error_of(&tenth, "crossover") / error_of(&one, "crossover") - 1.0).abs() < 1e-9);
         assert!((one.rms_e / tenth.rms_e - 10.0).abs() < 1e-9);
         // p/(1 - p): .5 is four times .2, twice the error.
         let louder = of(&task(0.5), 81.92);
-        assert!((error(&louder.phase_margin_deg) / error(&one.phase_margin_deg) - 2.0).abs() < 1e-9);
+        assert!((error_of(&louder, "phase_margin") / error_of(&one, "phase_margin") - 2.0).abs() < 1e-9);
     }
 
     #[test]

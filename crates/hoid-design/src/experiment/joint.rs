@@ -33,7 +33,8 @@ pub(super) struct Quantity {
     pub gradient: DVector<f64>,
     /// Unit of the accepted error: the value of the quantity, or one.
     pub scale: f64,
-    /// Size to which the error is relative if all parameters have the same weight.
+    /// Size to which variation is relative, and the error if all parameters have the same weight: the value; for the
+    /// phase margin its derivative with respect to the logarithm of the gain.
     pub size: f64,
 }
 

@@ -5,7 +5,7 @@
 //! | [`DesignRequest`] | a question about an experiment, and its answer, an [`ExperimentDesign`] with its JSON and its files (`files`) |
 //! | [`People`] | people for whom the experiment is designed: the population (`adapted`), one person, or a group (`group_people`) |
 //! | [`Task`], [`Forcing`] | person, controlled element and remnant; lines with their points of entry |
-//! | [`expected`](fn@expected) | standard errors from the information of the lines (`information`), for the responses to error and target (`joint`, `feedforward`) |
+//! | [`expected`](fn@expected) | standard errors from the information of the lines (`information`) and the variation from run to run, for the responses to error and target (`joint`, `feedforward`) |
 //! | [`Designing`] | most informative amplitudes and frequencies of the lines within limits (`search`) |
 //! | [`crest_factor`] | lines without common harmonics, and their phases (`lines`) |
 //! | [`Against`] | another forcing function for comparison |
@@ -40,10 +40,11 @@ pub use answer::{ExperimentDesign, NamedExpected};
 pub use between::Between;
 pub use designing::{Designed, Designing};
 pub use difference::{
-    ALPHA, BETWEEN_PEOPLE, DifferencePlan, DifferenceRequest, POWER, RUN_TO_RUN, RunsAndPeople, TargetDifference,
+    ALPHA, BETWEEN_PEOPLE, DifferencePlan, DifferenceRequest, POWER, RunsAndPeople, TargetDifference,
 };
 pub use error::DesignError;
-pub use expected::{Expected, ExpectedParameter, has_absolute_error};
+pub use expected::{Expected, ExpectedQuantity, has_absolute_error};
+pub use hoid_ident::diagnostics::RUN_TO_RUN;
 pub use information::expected;
 pub use lines::crest_factor;
 pub use people::People;

@@ -72,7 +72,7 @@ impl DesignRequest {
             });
         }
         let length_s = self.designing.period_s * runs as f64;
-        let all_runs = expected(&task, &designed.forcing, length_s)?;
+        let all_runs = self.expected(&task, &designed.forcing, runs)?;
         let all = Loop::of(&task)?;
         let lines = all.designed_lines(&designed.forcing, self.designing.period_s, runs)?;
         let [response, response_to_target] = all.responses(&designed.forcing, length_s)?;
@@ -82,7 +82,7 @@ impl DesignRequest {
         let against = against.map(|other| self.compared(other, &task, runs)).transpose()?;
         let difference = self.difference.as_ref();
         let difference = difference
-            .map(|sought| sought.plan((&task, &self.people), &designed.expected, self.runs))
+            .map(|sought| sought.plan(&self.people, (&designed.expected, self.designing.run_to_run), self.runs))
             .transpose()?;
         Ok(ExperimentDesign {
             worst: worst(&people, &self.designing.wanted).cloned(),
@@ -93,6 +93,7 @@ impl DesignRequest {
             length_s: self.designing.period_s,
             runs,
             runs_needed: designed.periods,
+            run_to_run: self.designing.run_to_run,
             wanted: self.designing.wanted.clone(),
             display: self.display,
             lines,
@@ -141,9 +142,8 @@ impl DesignRequest {
     ) -> Vec<NamedExpected> {
         let mut all = Vec::new();
         for person in others {
-            let length_s = self.designing.period_s * runs as f64;
             let found = self.task(person, feedforward);
-            match found.and_then(|task| expected(&task, forcing, length_s)) {
+            match found.and_then(|task| self.expected(&task, forcing, runs)) {
                 Ok(found) => all.push(NamedExpected {
                     name: person.name.clone(),
                     runs_needed: self.runs_needed(&found, runs),
@@ -155,9 +155,15 @@ impl DesignRequest {
         all
     }
 
+    /// Returns the expected errors from a number of runs.
+    fn expected(&self, task: &Task, forcing: &Forcing, runs: usize) -> Result<Expected, DesignError> {
+        let found = expected(task, forcing, self.designing.period_s * runs as f64)?;
+        Ok(found.with_run_to_run(self.designing.run_to_run, runs))
+    }
+
     fn compared(&self, other: &Against, task: &Task, runs: usize) -> Result<NamedExpected, DesignError> {
         let forcing = other.forcing(self.points())?;
-        let found = expected(task, &forcing, self.designing.period_s * runs as f64)?;
+        let found = self.expected(task, &forcing, runs)?;
         Ok(NamedExpected {
             name: other.name(),
             runs_needed: self.runs_needed(&found, runs),
@@ -166,7 +172,7 @@ impl DesignRequest {
     }
 
     fn runs_needed(&self, all_runs: &Expected, runs: usize) -> usize {
-        periods(&all_runs.scaled((runs as f64).sqrt()), &self.designing.wanted)
+        periods(&all_runs.clone().scaled((runs as f64).sqrt()), &self.designing.wanted)
     }
 
     fn settings(&self, task: &Task) -> Vec<Setting> {
@@ -209,6 +215,7 @@ impl DesignRequest {
             Setting::new("band", format!("{}..{}", d.band_rad_s.0, d.band_rad_s.1))
                 .given(d.band_rad_s != of.band_rad_s),
             number("shelf", d.shelf, of.shelf),
+            number("run_to_run", d.run_to_run, of.run_to_run),
             Setting::new("seed", d.seed.to_string()).given(d.seed != of.seed),
             limit("max_rms_e", d.most_rms[0]),
             limit("max_u", d.most_rms[1]),
@@ -227,7 +234,6 @@ impl DesignRequest {
                 number("power", of.power, default.power),
                 number("alpha", of.alpha, default.alpha),
                 Setting::new("between_people", between.to_string()).given(of.between_people.is_some()),
-                number("run_to_run", of.run_to_run, default.run_to_run),
             ]);
         }
         all
@@ -258,8 +264,8 @@ fn worst<'a>(people: &'a [NamedExpected], wanted: &[RequestedQuantity]) -> Optio
     let of = |person: &NamedExpected| -> f64 {
         let e = &person.expected;
         if wanted.is_empty() {
-            let names = e.parameters.iter().map(|p| p.name);
-            let relative = names
+            let parameters = e.quantities.iter().skip(2).map(|q| q.name);
+            let relative = parameters
                 .filter(|name| !has_absolute_error(name))
                 .filter_map(|name| e.error(name));
             return relative.filter(|r| r.is_finite()).map(|r| r * r).sum();
@@ -325,7 +331,7 @@ mod tests {
         }
         .run()
         .unwrap();
-        let error = design.expected.estimate("tau_f").unwrap().standard_error.unwrap();
+        let error = design.expected.error("tau_f").unwrap();
         let of_one_fewer = error * (design.runs as f64 / (design.runs as f64 - 1.0)).sqrt();
         assert!(error <= 0.02 && of_one_fewer > 0.02, "{error} in {} runs", design.runs);
     }

@@ -3,7 +3,7 @@
 use hoid_model::{Finding, Record, Verdict, uncertainty::OperatorEstimate};
 
 use super::{
-    constancy::{Constancy, DEFAULT_RUN_TO_RUN, Direction, physical_blocks},
+    constancy::{Constancy, Direction, RUN_TO_RUN, physical_blocks},
     operator::{delay_finding, gain_findings, pole_findings, search_finding},
     residuals::ResidualMeasures,
 };
@@ -116,7 +116,7 @@ impl GreyBoxFit {
             blocks: &blocks,
             directions: &of_operator.map(direction).collect::<Vec<_>>(),
             variance: self.innovation_variance(),
-            run_to_run: DEFAULT_RUN_TO_RUN,
+            run_to_run: RUN_TO_RUN,
             sample_time_s: layout.sample_time.s(),
         };
         Some(constancy.findings())

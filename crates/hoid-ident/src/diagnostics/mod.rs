@@ -48,7 +48,7 @@ pub mod second_opinion;
 mod sigmoid;
 mod whitened;
 
-pub use constancy::{Course, ResponseBasis, Unsteady, unsteady};
+pub use constancy::{Course, RUN_TO_RUN, ResponseBasis, Unsteady, unsteady};
 pub use loop_response::{LoopResponse, answer};
 pub use no_response::{Response, response};
 pub use operator::{gain_findings, is_open, leads_backwards, neuromuscular_finding, pole_findings};

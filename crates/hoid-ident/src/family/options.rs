@@ -6,6 +6,7 @@ use hoid_model::{Detrend, Form, operator_family::Coordinate};
 use super::{channel::SeenChannel, intersample::Intersample, prior::OperatorPrior};
 use crate::{
     IdentError, InitialState, SearchOptions,
+    diagnostics::RUN_TO_RUN,
     order_selection::{NamedOrders, range_text},
     settings::{BatchOption, BatchOptions, Bounds, Kind, Setting},
     shared_options as shared,
@@ -43,8 +44,7 @@ pub struct FamilyEstimator {
     /// Coordinates that are individual to each record; all other coordinates are common to all records.
     pub individual: Vec<Coordinate>,
     /// Relative variation of a person's gain from run to run. For fewer than five records it is added to the error
-    /// bars, since blocks of these records cannot show it. Default 0.06; in repeated runs of three people, estimates
-    /// that omit one person at a time were between 4 and 9 %.
+    /// bars, since blocks of these records cannot show it. Default [`RUN_TO_RUN`].
     pub run_to_run: f64,
     /// Trend that is removed from e and u of each record before the fit, because an operator with a lag integrates an
     /// offset. Default: the mean.
@@ -69,7 +69,7 @@ impl Default for FamilyEstimator {
             excitation: None,
             period_s: None,
             individual: Vec::new(),
-            run_to_run: 0.06,
+            run_to_run: RUN_TO_RUN,
             detrend: Detrend::Mean,
             initial_state: InitialState::Estimate,
             search: SearchOptions {

@@ -11,7 +11,7 @@ use hoid_model::{
 };
 
 use super::{
-    Constancy, DEFAULT_RUN_TO_RUN, Direction,
+    Constancy, Direction, RUN_TO_RUN,
     blocks::{ScoreBlock, Scores, score_blocks},
 };
 use crate::{
@@ -72,7 +72,7 @@ impl Fit {
             blocks: &blocks,
             directions: &self.directions(),
             variance: self.innovation_variance,
-            run_to_run: DEFAULT_RUN_TO_RUN,
+            run_to_run: RUN_TO_RUN,
             sample_time_s: ts.s(),
         };
         Some(constancy.findings())
