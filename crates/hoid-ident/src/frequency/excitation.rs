@@ -127,7 +127,7 @@ impl Excitation {
     /// or for a span that is not a whole number of periods; [`IdentError::NoExcitation`] for a constant channel;
     /// [`IdentError::NotWholePeriods`] if the span is not a whole number of the given periods.
     pub fn found_in(record: &Record, channel: &str, search: &LineSearch) -> Result<Self, IdentError> {
-        let values = channel_of(record, channel, "the excitation (--excitation)")?;
+        let values = channel_of(record, channel, EXCITATION_OPTION)?;
         if !(search.least_amplitude > 0.0 && search.least_amplitude <= 1.0) {
             return refuse(
                 "the smallest amplitude of a line",
@@ -202,9 +202,12 @@ pub(crate) fn greatest_common_divisor(a: usize, b: usize) -> usize {
     if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
 
+/// Name of the excitation in messages.
+pub(crate) const EXCITATION_OPTION: &str = "the excitation (--excitation)";
+
 /// Returns the values of a channel by its name. The error names the available channels; `what` describes the channel in
 /// the error.
-pub(super) fn channel_of<'r>(record: &'r Record, channel: &str, what: &str) -> Result<&'r [f64], IdentError> {
+pub(crate) fn channel_of<'r>(record: &'r Record, channel: &str, what: &str) -> Result<&'r [f64], IdentError> {
     match record.channel(channel) {
         Some(values) => Ok(values),
         None => {

@@ -58,7 +58,7 @@ mod simulated_runs;
 #[cfg(test)]
 mod synthetic_records;
 
-pub(crate) use excitation::greatest_common_divisor;
+pub(crate) use excitation::{EXCITATION_OPTION, channel_of, greatest_common_divisor};
 pub(crate) use window::Window;
 
 pub use describe::{DescribingFunction, Line, RunSummary, describe};
