@@ -312,7 +312,7 @@ mod tests {
         assert_eq!(bj.parameters(), 5);
         let arx = Structure::Arx.operator_orders(29);
         assert_eq!(arx.parameter_names(), ["a1", "a2", "b0", "b1"]);
-        // i0 of eq. 5.33, counted from 0.
+        // This is i0 of eq. 5.33, counted from 0.
         assert_eq!(arx.first_regressed_sample(), 30);
     }
 

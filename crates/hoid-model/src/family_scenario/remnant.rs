@@ -14,7 +14,7 @@
 //! | part | source |
 //! |---|---|
 //! | broad band, `1/(T_n s + 1)^m` | eq. 3 of the thesis; W. H. Levison, S. Baron and D. L. Kleinman, IEEE Trans. Man-Machine Systems 10 (1969) 101-108 |
-//! | peak near omega_nm | tremor that the neuromuscular loop passes: R. E. Magdaleno and D. T. McRuer, NASA CR-1757 (1971) |
+//! | peak near omega_nm | tremor in the pass band of the neuromuscular loop: R. E. Magdaleno and D. T. McRuer, NASA CR-1757 (1971) |
 //! | slow drift | `1/(T_n s + 1)` with T_n of many seconds |
 //! | signal-dependent | C. M. Harris and D. M. Wolpert, Nature 394 (1998) 780-784; Levison et al. for the scaling with the signals |
 //! | pulses | L. R. Young and J. L. Meiry, IEEE Trans. Automatic Control 10 (1965) 336-341; R. A. Hess, J. Guidance and Control 2 (1979) 221-227 |

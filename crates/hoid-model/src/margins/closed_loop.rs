@@ -28,7 +28,7 @@ const LOWEST: f64 = 1e-4;
 /// Deviation of the phase, in rad, from an integer number of half turns above which it is not attributed to rounding.
 const NO_HALF_TURN_RAD: f64 = 0.5;
 
-/// Returns the number of closed-loop poles in the right half plane for a loop with unit negative feedback. The loop
+/// Returns the number of closed-loop poles in the right half plane of a loop with unit negative feedback, which
 /// consists of a stable operator, given by its frequency response, and a controlled element.
 ///
 /// Returns `None` if this number cannot be determined: the response is not finite, `|L|` is not below one at
