@@ -2,9 +2,9 @@
 //! segment becomes a record.
 //!
 //! No data are invented, and each segment has its own initial states in a fit. However, the choice of the excluded
-//! samples depends on the recorded data: without the samples at saturation the largest responses are missing, which
-//! biases the estimate from the rest (the lead of C1, clipped at 1.5 standard deviations, by 9 %; if the clipped
-//! samples are included, the gain is 12 % too small).
+//! samples depends on the recorded data. Without the saturated samples, the largest responses are missing, which biases
+//! the estimate from the remaining samples: the lead of C1, clipped at 1.5 standard deviations, by 9 %. If the clipped
+//! samples are included, the gain is 12 % too small.
 
 use std::ops::Range;
 use std::path::Path;

@@ -8,10 +8,10 @@
 //! | [`Sparse::Linear`] | `x_i + (x_{i+1} - x_i) (t - t_i)/(t_{i+1} - t_i)`, for a signal that is smooth between samples |
 //! | [`Sparse::Drop`] | none: the row is left out |
 //!
-//! A held value is late on average by half the time between logged values. Rows before the first logged value and after
-//! the last one are cut. All values are computed before the rows and the span are cut, so that a row at the start of a
-//! span takes the value logged before the span. Text and infinite numbers do not count as missing values: they remain,
-//! and reading refuses them.
+//! On average, a held value is late by half the time between logged values. Rows before the first logged value and
+//! after the last one are cut. All values are computed before the rows and the span are cut, so that a row at the start
+//! of a span takes the value logged before the span. Text and infinite numbers do not count as missing values: they
+//! remain, and reading refuses them.
 
 use std::ops::Range;
 

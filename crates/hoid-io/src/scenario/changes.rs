@@ -1,5 +1,4 @@
-//! Changes of a scenario that commands and functions take in addition to it: the options of `hoid simulate` and
-//! `pyhoid.simulate`.
+//! Changes to a scenario that commands and functions accept: the options of `hoid simulate` and `pyhoid.simulate`.
 
 use hoid_model::{
     FamilyScenario, Feedforward, ModelError, SampleTime,
@@ -32,7 +31,7 @@ pub struct ScenarioChanges {
     pub disturbance: Option<f64>,
 }
 
-/// A change that a scenario cannot take.
+/// A change that is not possible for a scenario.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error("{option} {reason}")]
 pub struct ScenarioChangeError {
@@ -86,7 +85,8 @@ impl ScenarioChanges {
         Ok(scenario)
     }
 
-    /// Refuses the options of remnant and disturbance, which the file of an operator of the family defines itself.
+    /// Refuses the options of remnant and disturbance, because the scenario file of an operator of the family defines
+    /// both.
     fn of_family(&self, mut scenario: FamilyScenario) -> Result<FamilyScenario, ScenarioChangeError> {
         let remnant = "is for the remnant of the thesis; in a scenario with a form, the tables [[remnant]] specify the \
                        remnant";

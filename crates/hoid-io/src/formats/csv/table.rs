@@ -314,7 +314,7 @@ impl Rows<'_> {
     }
 }
 
-/// Number of lines with whose last cells the last number of the file is compared.
+/// Number of lines whose last cells are compared with the last number of the file.
 const COMPARED: usize = 8;
 
 /// Detects a truncated last number and returns a note; `None` unless the last line has no line end, its last cell is at

@@ -3,7 +3,7 @@
 //!
 //! The offset `o_k` to the recorder's clock was measured at times `c_k`. A line `o = b_0 + b_1 c` is fitted with
 //! Huber's loss by the alternating direction method of multipliers (Boyd et al., 2011, section 6.1.1), in units of 1e-4
-//! s, so that measurements over a busy network have little weight. Then each time stamp t is replaced by
+//! s; measurements over a busy network then have little weight. Then each time stamp t is replaced by
 //! `t + b_0 + b_1 t`. If the clock was reset, each part between resets has its own line. Finally, in a stream with a
 //! nominal rate, the time stamps between two breaks are replaced by their least-squares line over the sample index.
 //!

@@ -13,7 +13,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     let many = 1 << (10 + draw.below(7));
     let kind = *draw.one_of(&["double64", "int8", "string", "float32"]);
     match draw.below(8) {
-        // Missing channels, and samples.
+        // The stated numbers of channels and samples exceed the contents.
         0 => {
             chunk(&mut file, HEADER, &header(1, large, kind, "100", ""));
             chunk(&mut file, SAMPLES, &samples(&large.to_le_bytes(), &[0; 64]));
@@ -37,7 +37,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
                 &samples(&(count as u64).to_le_bytes(), &[0, 1, 0].repeat(count)),
             );
         }
-        // One byte each.
+        // Each sample takes one byte.
         4 => {
             let count = 8 * many;
             chunk(&mut file, HEADER, &header(1, 2, "int8", "1e-3", ""));
@@ -80,7 +80,7 @@ fn chunk(file: &mut Vec<u8>, tag: u16, content: &[u8]) {
     file.extend(content);
 }
 
-/// Samples of stream 1 after their number.
+/// A chunk of samples of stream 1, preceded by their number.
 fn samples(count: &[u8; 8], bytes: &[u8]) -> Vec<u8> {
     [&1_u32.to_le_bytes()[..], &[8], count, bytes].concat()
 }

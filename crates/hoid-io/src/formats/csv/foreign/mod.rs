@@ -97,7 +97,7 @@ mod tests {
         let text = "Name;Session 4\nDate;05.03.2024\n\nRate;50 Hz\nt;e;u\n0,00;1;2\n";
         let found = "#Name;Session 4\n#Date;05.03.2024\n\n#Rate;50 Hz\nt;e;u\n0,00;1;2\n";
         assert_eq!(plain(text), (found.to_owned(), 1));
-        // The line of a spreadsheet that states its separator, and a title followed by empty cells.
+        // A spreadsheet line that states the separator, and a title followed by empty cells.
         assert_eq!(plain("sep=;\r\nt;e\r\n0;1\r\n").0, "#sep=;\r\nt;e\r\n0;1\r\n");
         assert_eq!(plain("Run 1,,\nt,e,u\n0,1,2\n").0, "#Run 1,,\nt,e,u\n0,1,2\n");
         assert_eq!(plain("Rate,50,Hz\nt,e,u\n0,1,2\n").0, "#Rate,50,Hz\nt,e,u\n0,1,2\n");
