@@ -148,8 +148,8 @@ impl Recordings {
         ))
     }
 
-    /// Adds the findings of the recordings to a verdict. They come first, since faults of a recording may explain a
-    /// wrong result.
+    /// Adds the findings of the recordings to a verdict. They precede other findings, because faults of a recording may
+    /// explain a wrong result.
     pub fn judged(&self, verdict: Verdict) -> Verdict {
         let more = self.findings();
         if more.is_empty() {

@@ -32,8 +32,7 @@ impl Recordings {
         for (((name, record), account), origin) in one.zip(self.origins) {
             let steps = of == Of::System && steps_from_level_to_level(&record);
             let handling = match handling {
-                // The settling of a system after a step is not a sensor fault: it is reported, and the recording is not
-                // cut.
+                // Settling after a step is not a sensor fault, so it is reported and the recording is not cut.
                 FaultHandling::Bridge | FaultHandling::Cut if steps => FaultHandling::Report,
                 as_asked => as_asked,
             };
