@@ -1,13 +1,12 @@
 //! One quantity over time, and the range of its ordinate.
 //!
-//! An estimate that leaves its normal range for a moment (such as T_L where K_e nearly vanishes) must not compress the
-//! scale for all other values. The ordinate therefore covers the truth, the batch fits and the estimates between their
-//! 10 and 90 % quantiles. The ordinate extends beyond this range, by at most one and a half times the range on either
-//! side, to include the 1 and 99 % quantiles and the middle part of the bands. If a true value is known and at least
-//! one method is near it, methods that are far off do not determine the scale either: the ordinate ends at most two
-//! spans from the truth, where a span is the range of the truth or a quarter of its magnitude, and methods and batch
-//! fits beyond are ignored. Values outside the ordinate are cut off at the axes, and [`TracePanel::beyond`] counts
-//! them.
+//! An estimate that briefly leaves its normal range (such as T_L where K_e nearly vanishes) must not compress the scale
+//! for all other values. The ordinate therefore covers the truth, the batch fits and the estimates between their 10 and
+//! 90 % quantiles. The ordinate extends beyond this range, by at most one and a half times the range on either side, to
+//! include the 1 and 99 % quantiles and the middle part of the bands. If a true value is known and at least one method
+//! is near it, methods far from it do not determine the scale either: the ordinate ends at most two spans from the
+//! truth, where a span is the range of the truth or a quarter of its magnitude, and methods and batch fits beyond are
+//! ignored. Values outside the ordinate are cut off at the axes, and [`TracePanel::beyond`] counts them.
 
 use hoid_numerics::statistics::{finite_sorted, quantile, quantile_of};
 
@@ -192,7 +191,7 @@ pub(super) mod tests {
         }
         let with = panel(vec![curve(CurveKind::Estimate, values.clone())]);
         let (low, high) = with.range();
-        // At most one and a half ranges of the middle part below it, and a margin of 5 %.
+        // The ordinate extends below the middle part by at most one and a half times its range, plus a margin of 5 %.
         assert!(low > 0.3 && high < quiet.1 + 0.1, "{low} {high}");
         let expected = Beyond {
             method: 0,

@@ -1,4 +1,4 @@
-//! Coefficients by name, for all model structures: the poles of the operator are in A of an ARX model and in F of a
+//! Coefficients by name, for all model structures. The poles of the operator are in A of an ARX model and in F of a
 //! Box-Jenkins model.
 
 use hoid_ident::Fit;
