@@ -2,7 +2,7 @@
 //! writes the index page.
 //!
 //! Studies are stored in `studies/NAME`, figures and tables in `figures` and `tables`. An existing study is used
-//! unchanged, so that an interrupted reproduction can be continued.
+//! unchanged, so an interrupted reproduction can be continued.
 
 use std::{
     collections::BTreeSet,
@@ -164,7 +164,7 @@ pub fn reproduce(
     for name in ["figures", "tables"] {
         make_directory(&directory.join(name))?;
     }
-    // The items are collected by position, so that the page does not depend on the order in which they are drawn.
+    // The items are collected by position, so the page does not depend on the order in which they are drawn.
     let made: Vec<_> = chosen
         .par_iter()
         .map(|item| write(item, &studies, directory))
