@@ -25,7 +25,7 @@ const DRIFT: f64 = 0.005;
 const TRANSIENT_DRIFT: [f64; OPERATOR] = [0.05, 0.25, 0.2, 0.2];
 const TRANSIENT_TIME_CONSTANT_S: f64 = 3.0;
 /// Prior standard deviations of a relative change of omega_nm and of zeta_nm. A hypothesis that omega_nm and zeta_nm
-/// changed too is created every `NEUROMUSCULAR_EVERY` births; `NEUROMUSCULAR_ODDS` are the odds of this change against
+/// also changed is created every `NEUROMUSCULAR_EVERY` births; `NEUROMUSCULAR_ODDS` are the odds of this change against
 /// a change of the gains alone.
 const NEUROMUSCULAR: [f64; 2] = [0.25, 0.4];
 const NEUROMUSCULAR_EVERY: u32 = 4;
@@ -44,7 +44,7 @@ const RECENT_S: f64 = 4.0;
 
 /// Interval between proposals of other delays, in births. The following constants are the number of delays proposed,
 /// the odds of a change of the delay against a change of the gains alone, the standard deviation of that change in s,
-/// and the probability of a delay next to the likeliest.
+/// and the probability of a delay next to the likeliest delay.
 const DELAYS_EVERY: u32 = 4;
 const DELAYS_PROPOSED: usize = 8;
 const DELAY_ODDS: f64 = 1.0;
