@@ -256,7 +256,7 @@ fn details(found: &PolynomialAnswer<'_>) -> String {
     page.push_str(&text::quality(fit, &found.quality));
     page.push('\n');
     page.push_str(&text::roots(fit));
-    // Residuals of the size of rounding errors carry no information.
+    // Residuals of the size of rounding errors contain no information.
     if fit.covariance().is_some() {
         page.push_str(&text::residual_tests(found.files, &found.validations));
     }
