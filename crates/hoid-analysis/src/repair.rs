@@ -77,7 +77,7 @@ impl Recordings {
                 } else {
                     (format!("{name}{span}"), segment.labelled(label))
                 };
-                // Only the first segment carries the findings, so that each finding is reported once.
+                // Only the first segment has the findings, so each finding is reported once.
                 all.push_part(origin, name, segment, std::mem::take(&mut account));
             }
         }

@@ -1,5 +1,5 @@
 //! The controlled element over one tick, and the conversion of device positions to u. The page executes the same
-//! arithmetic operations in the same order (`page/src/plant.ts`), so that both give identical bits.
+//! arithmetic operations in the same order (`page/src/plant.ts`), so both give identical bits.
 //!
 //! At tick k, with the held input u from the device, disturbance d and target f,
 //!

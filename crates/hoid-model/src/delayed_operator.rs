@@ -56,7 +56,7 @@ pub fn delayed_operator(parameters: [f64; 5], sample_time: SampleTime) -> Result
 }
 
 /// As [`delayed_operator`], for a given number l of whole samples in the delay. Both ends of the interval
-/// `l Ts <= tau <= (l + 1) Ts` are included, so that the model and its derivatives are smooth functions of tau over the
+/// `l Ts <= tau <= (l + 1) Ts` are included, and the model and its derivatives are smooth functions of tau over the
 /// whole interval.
 ///
 /// # Errors
@@ -330,8 +330,8 @@ mod tests {
                 let scale = (0..5).map(|k| exact[k][j].abs()).fold(0.0, f64::max);
                 for i in 0..5 {
                     let difference = (up[i] - down[i]) / (2.0 * h);
-                    // Central differences: truncation h^2 and rounding eps/h against derivatives of
-                    // 1e-3 and more.
+                    // Central differences have a truncation error h^2 and a rounding error eps/h; the derivatives are
+                    // at least 1e-3.
                     assert!(
                         (exact[i][j] - difference).abs() < 1e-7 * scale + 1e-10,
                         "{p:?} row {i} by {}: {} and {difference}",

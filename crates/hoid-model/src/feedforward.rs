@@ -1,7 +1,7 @@
 //! Response of a person to a displayed target: `u = Y e + F f + remnant`.
 //!
-//! F has a form, gains and a delay of its own. F shares the neuromuscular system of the response to the error (M. M.
-//! van Paassen and M. Mulder, IFAC Man-Machine Systems, 1998; K. van der El et al., IEEE Trans. Cybernetics 46 (2016)
+//! F has its own form, gains and delay. F shares the neuromuscular system of the response to the error (M. M. van
+//! Paassen and M. Mulder, IFAC Man-Machine Systems, 1998; K. van der El et al., IEEE Trans. Cybernetics 46 (2016)
 //! 1199-1209); if this system changes over time, it also changes in F. The gains, times and delay of F may also change,
 //! with the sigmoid of the scenario.
 //!

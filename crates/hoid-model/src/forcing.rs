@@ -115,8 +115,8 @@ impl ForcingFunction {
         }
     }
 
-    /// Returns a disturbance for the target of Table 1, with a root mean square in deg: ten lines between those of the
-    /// target, so that the responses to target and error can be separated. Each amplitude is proportional to the
+    /// Returns a disturbance for the target of Table 1, with a root mean square in deg: ten lines between the lines of
+    /// the target, so that the responses to target and error can be separated. Each amplitude is proportional to the
     /// geometric mean of the amplitudes of the neighbouring lines of the target.
     ///
     /// # Errors

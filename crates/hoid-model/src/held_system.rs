@@ -17,7 +17,7 @@ use num_complex::Complex64;
 
 use crate::{ModelError, SampleTime};
 
-/// A rational transfer function after a zero-order hold. Its state is that of `1/den`; the numerator determines the
+/// A rational transfer function after a zero-order hold. It has the state of `1/den`; the numerator determines the
 /// output row C.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldSystem {

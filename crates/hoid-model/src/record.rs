@@ -2,7 +2,7 @@
 //!
 //! A [`Record`] contains the input of the person (the tracking error e), the output (the control u) and any other
 //! channel that was measured or simulated at the same samples. A record is checked when it is created: all channels
-//! have the same length and every sample is finite, so that later code need not check again.
+//! have the same length and every sample is finite, so later code need not check again.
 
 use crate::{ModelError, SampleTime};
 
@@ -163,7 +163,7 @@ impl Record {
 
     /// Time of sample `k` in s.
     pub fn time_s(&self, k: usize) -> f64 {
-        // The time is computed from the index and not by summation, so that no rounding error grows along the record.
+        // The time is computed from the index and not by summation, so rounding errors do not grow along the record.
         self.start_s + k as f64 * self.sample_time.s()
     }
 
@@ -238,7 +238,7 @@ impl Record {
     }
 
     /// Returns this record followed by another record, which starts one sample time after the last sample of this
-    /// record, so that the time of the boundary is known.
+    /// record, so the time of the boundary is known.
     ///
     /// Channels that only one of the two records has are omitted; label, names and units are those of the first record.
     ///

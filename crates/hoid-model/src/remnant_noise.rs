@@ -4,7 +4,7 @@
 //! with `D = (1 - p q^-1)^m`, `p = e^{-Ts/T_n}`, and `sigma = K_n g(T_n)`; C is the monic spectral factor of the
 //! numerator of the zero-order hold ([`crate::remnant`]). The derivatives follow from `dp/dT_n = p Ts/T_n^2` and from
 //! the derivative `-N_a/N_zeta` of a zero zeta of the numerator N with respect to `a = Ts/T_n`; the derivative of zeta
-//! also gives that of its mirror image `1/conj zeta`.
+//! also gives the derivative of its mirror image `1/conj zeta`.
 
 use crate::{
     ModelError, SampleTime,
@@ -124,7 +124,7 @@ mod tests {
                 for (slope, up, down) in pairs {
                     for ((s, u), d) in slope.iter().zip(up).zip(down) {
                         let difference = (u - d) / (2.0 * h);
-                        // The rounding error is that of coefficients up to 6 (1e-16; 1e-14 for the zeros of m = 4),
+                        // Coefficients up to 6 have a rounding error of 1e-16 (1e-14 for the zeros of m = 4), which is
                         // divided by h; the truncation error is (h/T_n)^2.
                         let bound = 2e-8 * difference.abs() + 5e-14 / h;
                         assert!((s - difference).abs() < bound, "m {m} T_n {t_n}: {s} and {difference}");

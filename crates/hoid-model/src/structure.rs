@@ -75,7 +75,7 @@ impl Structure {
         self.polynomials().contains('b')
     }
 
-    /// True if the residual is linear in theta, so that least squares gives the fit in one step: FIR, AR, ARX.
+    /// True if the residual is linear in theta (FIR, AR, ARX); least squares then gives the fit in one step.
     pub fn is_linear(self) -> bool {
         matches!(self, Self::Fir | Self::Ar | Self::Arx)
     }

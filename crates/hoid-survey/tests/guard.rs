@@ -123,7 +123,7 @@ fn a_restored_guard_goes_on_with_the_same_digits() {
             assert_eq!(first.is_paused(), second.is_paused());
             for k in stop..6700 {
                 let (e, u) = hostile(&record, k);
-                // NaN is replaced, so that outcomes can be compared.
+                // An innovation is never NaN, so outcomes can be compared.
                 let of =
                     |tracker: &mut Tracker| -> (Outcome, Option<GuardEvent>) { (tracker.step(e, u), tracker.event()) };
                 assert_eq!(of(&mut first), of(&mut second), "{} at {k}", method());

@@ -6,8 +6,8 @@
 //! therefore not mistaken for a gap. If a row then appears not to advance, the excess increment of a nearby row is
 //! undone. Ts is the least-squares slope, computed twice.
 //!
-//! Jitter is the deviation of the times from straight lines fitted to parts of up to 256 rows without a gap, so that
-//! slow drift does not count as jitter.
+//! Jitter is the deviation of the times from straight lines fitted to parts of up to 256 rows without a gap, so slow
+//! drift does not count as jitter.
 
 use std::borrow::Cow;
 

@@ -169,7 +169,7 @@ fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
 }
 
 /// Selects a trial from an array of structures, such as `trial(3).e`; the second value is true if a trial was selected
-/// or the array was requested, so that the rows need not be divided into trials.
+/// or the array was requested; the rows then need not be divided into trials.
 pub(crate) fn of_contents(
     mut contents: Contents,
     choice: Option<&TrialChoice>,

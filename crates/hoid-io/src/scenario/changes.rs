@@ -10,7 +10,7 @@ use thiserror::Error;
 
 use super::reading::AnyScenario;
 
-/// Values that replace those of a scenario; `None` keeps the value of the scenario.
+/// Values that replace the values of a scenario; `None` keeps the value of the scenario.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ScenarioChanges {
     /// Order m of the remnant filter.
@@ -143,8 +143,8 @@ fn feedforward(text: &str, neuromuscular: Option<(f64, f64)>) -> Result<Option<F
     Ok(Some(found))
 }
 
-/// Returns a disturbance with the lines of `known` and another root mean square; with the lines between those of the
-/// target of the thesis if `known` has no lines.
+/// Returns a disturbance with the lines of `known` and another root mean square. If `known` has no lines, the lines are
+/// between the lines of the target of the thesis.
 pub(super) fn disturbance(known: &ForcingFunction, rms_deg: f64) -> Result<ForcingFunction, ModelError> {
     let reference = ForcingFunction::reference_disturbance(rms_deg)?;
     let own = known.rms_deg();

@@ -35,7 +35,7 @@ pub(crate) struct Column {
     /// Rows whose value was not recorded but computed from other values of the column (`--sparse`), in increasing
     /// order.
     pub(crate) filled_rows: Vec<usize>,
-    /// True if the computed values are held, so that the signal is constant from each recorded value to the next.
+    /// True if the computed values are held, which makes the signal constant from each recorded value to the next.
     pub(crate) is_held: bool,
     /// Precision of the printed values; kept only for the time.
     pub(crate) precision: Precision,

@@ -1,8 +1,8 @@
 //! Dates and clock times in text, such as `2024-03-05T10:11:12.020Z`, `05.03.2024 10:11:12,02` or `10:11:12.5`.
 //!
 //! A clock time is counted in ns from the start of 1970 (from midnight if there is no date) in the proleptic Gregorian
-//! calendar. The year is taken to start on 1 March, so that the leap day is its last day: with `y` and `m` shifted in
-//! this way, the number of days is `365 y + y/4 - y/100 + y/400 + (153 m + 2)/5 + d` (H. Hinnant, *chrono-compatible
+//! calendar. The year is assumed to start on 1 March, which makes the leap day its last day: with `y` and `m` shifted
+//! in this way, the number of days is `365 y + y/4 - y/100 + y/400 + (153 m + 2)/5 + d` (H. Hinnant, *chrono-compatible
 //! low-level date algorithms*).
 
 use super::time_choice::Unit;

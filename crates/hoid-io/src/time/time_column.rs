@@ -104,7 +104,7 @@ pub(crate) fn is_time(name: &str) -> bool {
     column_role(name) != ColumnRole::Other
 }
 
-/// True if a column may be the time or a part of it, because of its name, its position or the choice of the user.
+/// True if a column may be the time or a part of the time, because of its name, its position or the choice of the user.
 pub(crate) fn may_be_time(at: usize, name: &str, choice: Option<&TimeChoice>) -> bool {
     let last = name.to_lowercase();
     let last = last.rsplit(['.', '_', '/', ' ']).next().unwrap_or_default();

@@ -1,7 +1,7 @@
 //! Journal of a run in progress: each line is complete or absent.
 //!
 //! A line is complete if it has its line end. If a batch cannot be written completely, the write is undone: the files
-//! are truncated to the last complete batch, and the ticks of a batch count only once all three files contain them. A
+//! are truncated to the last complete batch, and the ticks of a batch count only when all three files contain them. A
 //! temporarily full disk therefore leaves no partial line before later lines; the run is ended and is *unverified*.
 //! After a power failure the files are used only up to the last complete line.
 //!

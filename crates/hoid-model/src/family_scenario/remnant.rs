@@ -8,8 +8,8 @@
 //! where g and h are normal, b = 1 with probability `lambda Ts` and 0 otherwise (Poisson pulses), and s is 1 or 0 (on
 //! or off) for exponentially distributed times with means `T_on` and `T_off`, `D = T_on/(T_on + T_off)`. The factor m
 //! is given by `m^2 = 1 - c + c r^2/E r^2`, where r^2 is the running mean square of u or of its rate and `E r^2` is its
-//! mean over the whole run. The factors of g(k) and h(k) are independent of g(k) and h(k), so that w is white with unit
-//! variance, and the filter alone determines the spectrum and the strength of the remnant.
+//! mean over the whole run. The factors of g(k) and h(k) are independent of g(k) and h(k). Therefore w is white with
+//! unit variance, and the filter alone determines the spectrum and the strength of the remnant.
 //!
 //! | part | source |
 //! |---|---|

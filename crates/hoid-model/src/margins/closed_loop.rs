@@ -184,7 +184,7 @@ impl<'a> Characteristic<'a> {
                 }
             }
         }
-        // From this frequency to infinity the argument approaches that of the limit without another turn.
+        // From this frequency to infinity, the argument approaches its limit without another turn.
         let limit = if tau == 0.0 && self.open_loop.num().len() == self.order + 1 {
             Complex64::new(1.0 + self.open_loop.num()[0], 0.0)
         } else {

@@ -4,7 +4,7 @@ use super::{form::Coordinate, operator::FamilyOperator};
 use crate::ModelError;
 
 impl FamilyOperator {
-    /// True if both operators have the same form, so that a transition between them exists.
+    /// True if both operators have the same form, which is required for a transition between them.
     pub fn is_like(&self, other: &Self) -> bool {
         self.form() == other.form() && self.has_neuromuscular() == other.has_neuromuscular()
     }

@@ -135,7 +135,7 @@ impl FamilyOperator {
     /// Returns the dynamics of the poles and the delay over one sample.
     fn held_poles(&self, variables: &[Dual], sample: usize, ts: f64) -> HeldPoles {
         let delay = variables[variables.len() - 1];
-        // Time is in samples, so that the entries of all matrices are of moderate size.
+        // Time is in samples, which keeps the entries of all matrices at moderate size.
         let delta = delay.scaled(1.0 / ts) - Dual::constant(sample as f64);
         let denominator = self.denominator_by_samples(variables, ts);
         let order = self.order();

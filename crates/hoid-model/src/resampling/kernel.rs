@@ -11,8 +11,8 @@
 //! around c.
 //!
 //! At integer t this is a linear-phase FIR filter whose delay is compensated; at other t it interpolates, with the same
-//! frequency response. The weights for each t are divided by their sum, so that a constant is unchanged. A is
-//! [`DESIGN_DB`], which exceeds the documented attenuation [`STOP_DB`] by a margin.
+//! frequency response. The weights for each t are divided by their sum, so a constant is unchanged. A is [`DESIGN_DB`],
+//! which exceeds the documented attenuation [`STOP_DB`] by a margin.
 
 use std::f64::consts::PI;
 
@@ -59,7 +59,7 @@ impl Kernel {
 
     /// Returns a kernel with a pass band up to 0.8 `ratio` and a stop band from 1.2 `ratio`, where `ratio` is the new
     /// Nyquist frequency relative to the old one; the attenuation is 6 dB at `ratio`. Aliases fall between 0.8 and 1 of
-    /// the new Nyquist frequency, where they replace the part of the spectrum that the filter has removed, so that the
+    /// the new Nyquist frequency, where they replace the part of the spectrum that the filter has removed, so the
     /// spectrum of noise has no gap. `None` if the filter would be longer than `longest` on each side.
     pub fn folding(ratio: f64, longest: usize) -> Option<Self> {
         let half = half_length(2.0 * (1.0 - PASS) * ratio);

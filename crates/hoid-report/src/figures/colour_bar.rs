@@ -97,7 +97,7 @@ impl ColourScale {
                 None,
             ));
         }
-        // The name is vertical, so that a subscript extends further to the right.
+        // The name is vertical, so a subscript extends further to the right.
         let x = scene.width - 9.0;
         scene.add(draw::centred(x, top + 0.5 * height, marked(name), Some(-90.0)));
     }

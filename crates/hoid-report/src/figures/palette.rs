@@ -1,5 +1,5 @@
 //! The colours of all figures: the hue represents the method, the shade its level (noise, sample time, memory length),
-//! and black the truth.
+//! and black the true values.
 //!
 //! The hues are those of Okabe and Ito (*Color Universal Design*, 2008). The shades of one hue are evenly spaced in
 //! lightness `L*` (CIE 1976), light for the lowest level and dark for the highest, so their order is preserved in

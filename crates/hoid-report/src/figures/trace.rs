@@ -284,7 +284,7 @@ mod tests {
         let whole = trace_panels("a", "t", &grid(values.clone()));
         values[100] = f64::NAN;
         values[200] = f64::INFINITY;
-        // A row between two gaps is drawn as well.
+        // A row between two gaps is also drawn.
         values[202] = f64::NAN;
         let broken = trace_panels("a", "t", &grid(values));
         assert_eq!((paths(&whole), paths(&broken)), (1, 4));

@@ -174,7 +174,7 @@ impl VirtualExperiment {
         let of_run = deviates(1 + cell * 1_000_000 + run);
         let mut reason = String::new();
         for draw in 0..MOST_DRAWS {
-            // The deviates of the run are replaced in each draw, those of the subject in every tenth draw.
+            // The deviates of the run are replaced in each draw, the deviates of the subject in every tenth draw.
             let (s, r) = (&of_subject[6 * (draw / 10)..], &of_run[6 * draw..]);
             let factor = |i: usize| (self.between_subjects * s[i] + self.between_runs * r[i]).exp();
             let mut scenario = Scenario::condition(condition);

@@ -66,7 +66,7 @@ pub struct Cell {
     pub axes: Vec<Axis>,
     /// The scenario, ready to be simulated.
     pub resolved: ResolvedScenario,
-    /// Number of replications: that of the plan, or one if there is no remnant.
+    /// Number of replications: the number in the plan, or one if there is no remnant.
     pub replications: u64,
 }
 

@@ -1,8 +1,8 @@
 //! Padé approximation of a delay by a rational function (H. Padé 1892; K. Ogata, *Modern Control Engineering*).
 //!
 //! `e^(-tau s) ≈ Q(-tau s)/Q(tau s)`, `Q(x) = sum_k c_k x^k`, `c_k = (2n - k)! n!/((2n)! k! (n - k)!)`, for order n.
-//! The approximation is all-pass, and its phase is close to that of the delay up to about `omega tau = n`. Each order
-//! adds a state and a pole. tau appears in the coefficients, so it can be estimated and can change.
+//! The approximation is all-pass, and its phase is close to the phase of the delay up to about `omega tau = n`. Each
+//! order adds a state and a pole. tau appears in the coefficients, so it can be estimated and can change.
 
 use hoid_model::SampleTime;
 use nalgebra::{DMatrix, DVector};
@@ -36,7 +36,7 @@ pub(super) fn delayed_second_order(
 ) -> (DMatrix<f64>, DVector<f64>) {
     let c = coefficients(order);
     let direct = if order.is_multiple_of(2) { 1.0 } else { -1.0 };
-    // All coefficients are divided by c_n tau^n, so that the leading coefficient of the denominator is 1.
+    // All coefficients are divided by c_n tau^n, which makes the leading coefficient of the denominator 1.
     let leading = c[order] * tau_s.powi(order as i32);
     let denominator = |k: usize| c[k] * tau_s.powi(k as i32) / leading;
     let numerator = |k: usize| {

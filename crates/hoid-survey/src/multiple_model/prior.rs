@@ -32,7 +32,8 @@ const NEUROMUSCULAR_EVERY: u32 = 4;
 const NEUROMUSCULAR_ODDS: f64 = 0.3;
 /// Crossover frequency, which scales K_e_dot relative to K_e, rad/s.
 const CROSSOVER_RAD_S: f64 = 2.0;
-/// Memory length of the innovation variance, s; `RETAINED_MEMORY_S` is the part of it that remains after a change.
+/// Memory length of the innovation variance, s; `RETAINED_MEMORY_S` is the part of this length that remains after a
+/// change.
 const LEVEL_MEMORY_S: f64 = 20.0;
 const RETAINED_MEMORY_S: f64 = 1.0;
 /// Number of birth intervals for which a hypothesis is kept regardless of its predictions.

@@ -142,7 +142,7 @@ fn without_excitation_the_last_theta_stays() {
         recursion.step(still);
     });
     assert_eq!(recursion.theta(), theta);
-    // The estimate then moves again.
+    // The estimate is then updated again.
     samples(&record).skip(2000).take(1000).for_each(|s| {
         recursion.step(s);
     });

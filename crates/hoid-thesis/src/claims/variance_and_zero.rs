@@ -4,7 +4,7 @@
 //! The *modified remnant noise variance* of the text is the variance of the innovation that drives 1/D. The reference
 //! value is the variance of the backward Euler form (eq. B.12), `sigma'^2 = (K_n (Ts/(Tn + Ts))^m)^2`. In the
 //! simulations of the text and in those of hoid, the remnant is held exactly over a sample. The innovations of an exact
-//! model therefore have a different variance, which is shown as well.
+//! model therefore have a different variance, which is also shown.
 
 use super::{
     claim::{Claim, Source, Theme},

@@ -110,7 +110,7 @@ mod tests {
         let [found, _] = method.transforms([&cosine, &cosine], omega, 2000, 0.01);
         let width = 8.0 / (omega * 0.01);
         let expected = Complex64::from_polar(0.5 * (std::f64::consts::TAU).sqrt() * width, 0.7);
-        // The envelope is truncated at 4 widths, which omits 6e-5 of it.
+        // Truncation of the envelope at 4 widths omits 6e-5 of its area.
         assert!((found / expected - 1.0).norm() < 2e-4, "{found} {expected}");
     }
 

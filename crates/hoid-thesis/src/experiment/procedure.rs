@@ -40,7 +40,7 @@ pub struct RecursiveTrace {
 /// The simulated operator of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {
-    /// Delay including that of the hold, samples.
+    /// Delay including the delay of the hold, samples.
     pub nk: usize,
     /// Operator at the start and at the end of the run.
     pub states: [State; 2],

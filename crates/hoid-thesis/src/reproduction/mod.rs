@@ -17,8 +17,8 @@
 //! | `run` | the whole reproduction in a directory | |
 //!
 //! Axes, cells and grouping follow the captions. The hue represents the method (ARX blue, Box-Jenkins vermillion) and
-//! the shade the noise level or the delay; dashed black lines are the truth. The data of each figure are available as a
-//! table.
+//! the shade the noise level or the delay; dashed black lines are the true values. The data of each figure are
+//! available as a table.
 
 mod averages;
 mod axes;

@@ -212,7 +212,7 @@ fn on_threads<R: Send>(jobs: Option<usize>, work: impl FnOnce() -> R + Send) -> 
     Ok(pool.install(work))
 }
 
-/// Returns the selected items and whether the claims are selected. An item is selected by its name, its plan, the runs
+/// Returns the selected items, and true if the claims are selected. An item is selected by its name, its plan, the runs
 /// it shares, or the letter of an appendix. With recorded people no claims are selected.
 fn chosen(all: Vec<Item>, wanted: &Reproduction) -> Result<(Vec<Item>, bool), ThesisError> {
     let only = &wanted.only;

@@ -25,7 +25,7 @@ pub enum Arrival {
     /// The next sample, after `missing` samples that must be filled in. If the gap is longer than [`LONGEST_GAP_S`],
     /// `left_out` is true and `missing` is limited to that length.
     Sample { missing: usize, left_out: bool },
-    /// A line whose time is not later than that of the last line.
+    /// A line whose time is not later than the time of the last line.
     Behind { last_s: f64 },
 }
 

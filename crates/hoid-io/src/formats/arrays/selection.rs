@@ -23,7 +23,7 @@ pub(crate) const TIMES: [&str; 2] = ["t", "time"];
 /// Unit of clock times, which are converted to seconds since the first clock time.
 pub(crate) const MOMENTS: &str = "s from the first";
 
-/// Maximum number of columns of a record; further columns are left out.
+/// Maximum number of columns of a record; further columns are omitted.
 const MOST_COLUMNS: usize = 1024;
 
 /// The arrays of a file as the source of the rows of a table, for messages.

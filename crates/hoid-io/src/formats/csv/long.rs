@@ -148,8 +148,7 @@ struct Text {
 }
 
 impl Text {
-    /// Reads the first lines like those of any other table; `None` unless the table contains only numbers with decimal
-    /// points.
+    /// Reads the first lines as for any other table; `None` unless the table contains only numbers with decimal points.
     fn head(&mut self, file: &str) -> io::Result<Option<Parsed>> {
         let mut bytes = self.bytes(0, HEAD)?;
         let Some(line) = bytes.iter().rposition(|byte| *byte == b'\n') else {

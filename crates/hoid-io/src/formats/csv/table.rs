@@ -374,8 +374,8 @@ fn header(
     Ok(names.into_iter().map(column).collect())
 }
 
-/// Makes names unique: columns with the same name are numbered by their position, so that each of them can be selected
-/// as a signal.
+/// Makes names unique: columns with the same name are numbered by their position, so each of them can be selected as a
+/// signal.
 fn with_unique_names(names: Vec<String>, notes: &mut Vec<String>) -> Vec<String> {
     let mut known: HashSet<&str> = HashSet::new();
     let named = names.iter().map(String::as_str).filter(|name| !name.is_empty());

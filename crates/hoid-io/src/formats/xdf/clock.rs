@@ -249,7 +249,7 @@ mod tests {
             (b0 + b1 * 1e5 - 3.0).abs() < 1e-9 && (b1 + 1e-4).abs() < 1e-11,
             "{b0} {b1}"
         );
-        // An outlier of 0.5 s moves the line by less than a ten-thousandth of the outlier.
+        // An outlier of 0.5 s shifts the line by less than a ten-thousandth of the outlier.
         offsets[7].1 += 0.5;
         let (b0, b1) = line(&offsets);
         assert!(

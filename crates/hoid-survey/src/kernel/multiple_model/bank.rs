@@ -3,7 +3,7 @@
 //! At each sample the probability of a hypothesis is multiplied by its predictive density of the innovation, and the
 //! probabilities are normalised. At every birth the likeliest hypothesis is the parent of new hypotheses:
 //!
-//! - **a change of the gains**, and at every few births a change of omega_nm and zeta_nm as well, with the prior
+//! - **a change of the gains**, and at every few births also a change of omega_nm and zeta_nm, with the prior
 //!   probability of such a change since the last birth;
 //! - **a neighbouring delay**, as an alternative that may have been true throughout: the hypothesis is as old as its
 //!   parent, and the variance of each parameter is increased by the error of this parameter that the difference in

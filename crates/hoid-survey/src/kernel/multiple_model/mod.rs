@@ -15,8 +15,8 @@
 //! filter of `eta = [K_e, K_e_dot, omega_nm, zeta_nm]` with its own innovation variance. Apart from a slow drift of the
 //! gains, which is faster in the first seconds of the hypothesis, nothing changes after its birth; its memory length
 //! therefore grows with its age. At regular intervals a hypothesis is born ([`bank`]): a copy of the likeliest
-//! hypothesis, with the covariance of a change added to that of its gains, an innovation variance based on few
-//! residuals, and the prior probability of a change since the last birth ([`prior`]). At every few births another
+//! hypothesis, with the covariance of a change added to the covariance of its gains, an innovation variance based on
+//! few residuals, and the prior probability of a change since the last birth ([`prior`]). At every few births another
 //! hypothesis is born in which omega_nm and zeta_nm may change too. At each sample the probability of a hypothesis is
 //! multiplied by its predictive density of the innovation. If the bank is full, the least likely of the hypotheses that
 //! are old enough is pruned. (M. Basseville and I. V. Nikiforov, *Detection of Abrupt Changes*, 1993, section 7.2; P.

@@ -85,7 +85,7 @@ impl<'a> Layout<'a> {
             let (before, _) = filled.split_at_checked(at)?;
             let found =
                 Self::below(before, mark, &rows, row).or_else(|| Self::commented(text, before, mark, &rows, row));
-            // A line of numbers above the header is a sample, which must not be left out.
+            // A line of numbers above the header is a sample, which must not be omitted.
             let is_sample = |(at, line): &(usize, &str)| {
                 let cells = mark.cells(line);
                 found.as_ref().is_some_and(|layout| layout.above.contains(at))

@@ -1,6 +1,6 @@
 //! Conversion of text from other programs to text that the table reader accepts.
 //!
-//! The conversion keeps the order of the lines, so that messages still refer to lines of the file.
+//! The conversion keeps the order of the lines, so messages still refer to lines of the file.
 //!
 //! | module | contents |
 //! |---|---|
@@ -114,7 +114,7 @@ mod tests {
             "#\n",
             "1,2\n3,4\n",
             "a\nb\n",
-            // A sample above a repeated header is not left out.
+            // A sample above a repeated header is not omitted.
             "0,1\n1,2\nt,e\n2,3\n3,4\n4,5\n",
             "t,e,u\n0,1\n1,2,3\n2,3,4\n3,4,5\n",
             "\"t\",\"e\"\n\"0,02\",\"0,81\"\n\"0,04\",\"0,82\"\n",
