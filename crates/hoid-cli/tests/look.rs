@@ -143,7 +143,8 @@ fn nothing_is_guessed_where_it_is_not_certain() {
     assert_eq!(code, 1);
 }
 
-/// Returns the number of samples, and the estimates with their standard errors, for the people of a group.
+/// Returns the number of samples (at 60 Hz) in the longest fitted span of a group, and the estimates of its first
+/// person with their standard errors.
 fn of_group(at: &Path, manifest: &str) -> (f64, Vec<(f64, f64)>) {
     fs::write(at.join("runs/group.toml"), manifest).unwrap();
     let _ = fs::remove_dir_all(at.join("out"));

@@ -307,7 +307,7 @@ macro_rules! life_of_a_unit {
         assert_eq!(unsafe { $deserialise(component, bytes.as_ptr(), size, &mut again) }, 0);
         // SAFETY: the component and the bytes are valid, and the place contains a state.
         assert_eq!(
-            // SAFETY: as above, one byte fewer.
+            // SAFETY: as above, but with one byte fewer.
             unsafe { $deserialise(component, bytes.as_ptr(), size - 1, &mut again) },
             3
         );

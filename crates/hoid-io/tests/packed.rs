@@ -91,7 +91,7 @@ fn sidecars_of_many_recordings() {
     let read = || read_record(&name, &options);
     let message = read().unwrap_err().to_string();
     assert!(message.contains("the first line holds numbers"), "{message}");
-    // JSON files of another task and of another kind, and a damaged one.
+    // JSON files of another task and of another kind, and a damaged JSON file.
     std::fs::write(desk.path("task-rest_physio.json"), json(10)).unwrap();
     std::fs::write(desk.path("task-track_stim.json"), json(20)).unwrap();
     std::fs::write(folder.join("sub-01_physio.json"), "{").unwrap();

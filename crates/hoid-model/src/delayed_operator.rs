@@ -298,7 +298,7 @@ mod tests {
                 }
             }
         }
-        // The reference task: nk = 29 at 0.28 s.
+        // In the reference task, a delay of 0.28 s gives nk = 29.
         let s1 = delayed_operator([0.09, 0.036, 11.25, 0.35, 0.28], ts()).unwrap();
         assert_eq!(s1.nk, 29);
         assert!((s1.b[0] - 0.0442765923).abs() < 5e-11 && (s1.b[1] + 0.0431823806).abs() < 5e-11);

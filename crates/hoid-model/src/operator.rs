@@ -302,7 +302,7 @@ mod tests {
                 let (up, down) = (at(up), at(down));
                 for i in 0..4 {
                     let difference = (up[i] - down[i]) / (2.0 * h);
-                    // Central differences: truncation h^2 and rounding eps/h, both below 1e-8 of
+                    // Central differences have a truncation error h^2 and a rounding error eps/h, both below 1e-8 of
                     // the column.
                     let scale = (0..4).map(|k| exact[k][j].abs()).fold(0.0, f64::max);
                     assert!(

@@ -122,7 +122,7 @@ fn fixed_and_bounded_coefficients_keep_their_word() {
     for (a, b) in loose.model().theta().iter().zip(free.model().theta()) {
         assert!((a - b).abs() < 1e-6);
     }
-    // Linear structures respect bounds as well.
+    // Linear structures also respect bounds.
     let mut arx = estimator(Structure::Arx);
     arx.constraints.insert("b1".into(), Constraint::Fixed(0.0));
     let fit = arx.fit(&[Truth::of(Structure::Arx).record(500, 0.5, 5)]).unwrap();

@@ -65,7 +65,7 @@ fn value(fit: &SigmoidFit, name: &str) -> Estimate {
     fit.parameter(name).unwrap().estimate
 }
 
-/// Returns an estimator that does not compute the profiles over t_M and G.
+/// Returns an estimator without likelihood intervals for t_M and G.
 fn quick() -> SigmoidChange {
     SigmoidChange {
         likelihood_intervals: false,

@@ -200,14 +200,14 @@ fn prewarped_tustin_is_exact_at_its_frequency() {
 #[test]
 fn matched_has_the_images_of_poles_and_zeros() {
     let sample_time = ts(0.1);
-    // 3 (s + 2) / ((s + 1) (s^2 + 2 s + 26)): one finite zero, two at infinity.
+    // 3 (s + 2) / ((s + 1) (s^2 + 2 s + 26)) has one finite zero and two zeros at infinity.
     let h = tf(&[3.0, 6.0], &polynomial::product(&[1.0, 1.0], &[1.0, 2.0, 26.0]));
     let d = discretise(&h, sample_time, Method::Matched).unwrap();
     for s in [Complex64::new(-1.0, 0.0), Complex64::new(-1.0, 5.0)] {
         let backward = (-s * 0.1).exp();
         assert!(polynomial::value(d.den(), backward).norm() < 1e-13);
     }
-    // Zeros at e^{-0.2} and -1, and one sample of delay.
+    // The discrete zeros are at e^{-0.2} and -1, and there is one sample of delay.
     assert_eq!(d.num()[0], 0.0);
     assert!(polynomial::value(d.num(), Complex64::new(0.2f64.exp(), 0.0)).norm() < 1e-15);
     assert!(polynomial::value(d.num(), Complex64::new(-1.0, 0.0)).norm() < 1e-15);

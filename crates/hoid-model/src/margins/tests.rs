@@ -72,7 +72,7 @@ fn both_states_of_the_reference() {
 
 #[test]
 fn crossover_model_in_closed_form() {
-    // K e^{-s tau}/s: omega_c = K, phase margin 90 deg - K tau, phase crossover pi/(2 tau).
+    // K e^{-s tau}/s has omega_c = K, the phase margin 90 deg - K tau and the phase crossover pi/(2 tau).
     for (k, tau) in [(1.0, 0.3), (3.0, 0.2), (0.05, 12.0), (2.0, 0.785)] {
         let h = delayed(&[k], &[1.0, 0.0], tau);
         let phase_crossover = PI / (2.0 * tau);
@@ -190,7 +190,7 @@ fn stability_with_delay_in_closed_form() {
         let found = Characteristic::new(&h).unwrap().zeros_in_right_half_plane();
         assert_eq!(found, Some(2 * pairs), "{product}");
     }
-    // k e^{-s tau}/(s - 1), tau = 0.5: stable for 1 < k < sqrt(1 + w^2) with atan w = w/2 (w =
+    // The loop with k e^{-s tau}/(s - 1) and tau = 0.5 is stable for 1 < k < sqrt(1 + w^2) with atan w = w/2 (w =
     // 2.331122370414423).
     let limit = (1.0 + 2.331122370414423f64.powi(2)).sqrt();
     for (k, stable) in [(0.9, false), (1.001, true), (limit - 1e-3, true), (limit + 1e-3, false)] {

@@ -75,7 +75,7 @@ fn first_order_is_an_autoregression() {
     assert!((exact.d[1] + (-1.0f64 / 6.0).exp()).abs() < 1e-15 && (exact.d[1] + 0.8465).abs() < 5e-5);
     let euler = filter.noise_model(ts(), RemnantDiscretisation::BackwardEuler).unwrap();
     assert!((euler.d[1] + 0.8571).abs() < 5e-5);
-    // A first-order process in closed form: variance (1 - alpha)^2/(1 - alpha^2).
+    // In closed form, a first-order process has the variance (1 - alpha)^2/(1 - alpha^2).
     let alpha: f64 = (-1.0f64 / 6.0).exp();
     let h = filter.discrete(ts(), RemnantDiscretisation::ZeroOrderHold).unwrap();
     assert!((variance(&h, 400) - (1.0 - alpha) / (1.0 + alpha)).abs() < 1e-14);

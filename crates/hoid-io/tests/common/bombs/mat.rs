@@ -13,7 +13,7 @@ pub const DOUBLE: u32 = 6;
 pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     let megabytes = 1 << (3 + draw.below(8));
     let bytes = megabytes * MEGABYTE;
-    // Stored types of numbers: 8 bytes, 4, 1.
+    // Types of stored numbers, with 8, 4 and 1 bytes.
     let (stored, size) = *draw.one_of(&[(9, 8), (7, 4), (2, 1), (1, 1)]);
     let class = *draw.one_of(&[DOUBLE, DOUBLE, CHARACTERS, 9, 5]);
     match draw.below(6) {

@@ -22,7 +22,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             chunk(&mut file, HEADER, &header(1, 2, kind, "100", ""));
             chunk(&mut file, SAMPLES, &samples(&u64::MAX.to_le_bytes(), &[0; 64]));
         }
-        // Texts of any length, and empty ones.
+        // Texts of any length, and empty texts.
         2 => {
             chunk(&mut file, HEADER, &header(1, 1, "string", "0", ""));
             let text = [&[0, 8][..], &large.to_le_bytes()].concat();
@@ -53,7 +53,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             chunk(&mut file, HEADER, &header(1, 2, kind, "100", &nested));
         }
         6 => (0..many as u32 / 4).for_each(|id| chunk(&mut file, HEADER, &header(id, 2, kind, "100", ""))),
-        // A jump of years between two samples, and the same in the clock offsets.
+        // A jump of years between two samples, and the same jump in the clock offsets.
         _ => {
             chunk(&mut file, HEADER, &header(1, 2, "int8", "1e6", ""));
             let at = |t: f64| [&[8][..], &t.to_le_bytes(), &[1, 2]].concat();
