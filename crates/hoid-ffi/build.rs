@@ -1,10 +1,10 @@
-//! Stack size in WebAssembly, which is 1 MB by default: the initialisation of a filter takes most of that.
+//! Sets the stack size in WebAssembly. The initialisation of a filter takes most of the default of 1 MB.
 
 #![allow(clippy::print_stdout)]
 
 use std::env;
 
-/// Bytes.
+/// Stack size in bytes.
 const STACK: u32 = 4 << 20;
 
 fn main() {

@@ -1,7 +1,7 @@
 //! Reliability of each answer of a result: the response, the crossover, the phase margin and each parameter.
 //!
-//! A finding against the data or the fit counts against all answers. In addition, an individual answer may be
-//! undetermined, such as a parameter that the data do not determine, or a crossover whose interval contains zero. The
+//! A finding against the data or the fit affects all answers. In addition, an individual answer may be undetermined,
+//! such as a parameter about which the data contain no information, or a crossover whose interval contains zero. The
 //! level of the result depends only on the requested answers: a result whose delay is undetermined is trustworthy if
 //! the crossover is requested, and not determined if the delay is requested. By default the response is requested, and
 //! an undetermined crossover or margin gives a warning.
@@ -101,7 +101,7 @@ fn answered(name: &str, why: Option<String>) -> Answered {
 /// An estimate with its 95 % interval.
 type Measured = (Estimate, Option<(f64, f64)>);
 
-/// Judges the crossover and the phase margin of a loop. Each is given with its interval, or as `None` if it does not
+/// Judges the crossover and the phase margin of a loop. Each is given with its interval; `None` means that it does not
 /// exist.
 fn of_loop(measures: [Option<Measured>; 2]) -> impl Iterator<Item = Answered> {
     let words = ["the crossover", "the phase margin"];
@@ -192,8 +192,7 @@ mod tests {
         assert_eq!(level(&["response"]), VerdictLevel::Trustworthy);
         assert_eq!(level(&["response", "tau_e"]), VerdictLevel::NotDetermined);
         assert_eq!(level(&["T_I"]), VerdictLevel::NotDetermined);
-        // A finding against the whole result counts against each answer; an undetermined answer counts only against
-        // itself.
+        // A finding against the whole result affects each answer; an undetermined answer affects only itself.
         let whole = Verdict::of(vec![Finding::doubt("leverage", "few samples")]);
         let asked = with_answers(whole, &answers, &["tau_e".to_owned()]);
         assert_eq!(of_answer(&asked, &answers[0]).level, VerdictLevel::Doubtful);

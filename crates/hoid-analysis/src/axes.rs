@@ -79,7 +79,7 @@ pub struct Coupling {
     pub input: String,
     /// p-value of the response, or the reason why it was not tested.
     pub p_value: Result<f64, String>,
-    /// Whether the response is significant.
+    /// True if the response is significant.
     pub responds: bool,
 }
 

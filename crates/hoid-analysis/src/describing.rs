@@ -1,10 +1,10 @@
 //! Estimation of a describing function and its verdict from recordings, which are repaired, decimated and cut to whole
 //! periods.
 //!
-//! For a periodic signal the offset of a channel is a phase shift. The offset is not removed by shifting rows, which
-//! would cost the last whole period, but by correcting the ratio at each line ([`without_offsets`]). The shift of the
-//! input by which decimation accounts for its longer hold is corrected in the same way, since a ratio of Fourier
-//! coefficients of samples involves no hold.
+//! For a periodic signal the offset of a channel is a phase shift. Shifting rows would cost the last whole period, so
+//! the offset is removed by correcting the ratio at each line ([`without_offsets`]). Decimation shifts the input to
+//! account for its longer hold; this shift is corrected in the same way, since a ratio of Fourier coefficients of
+//! samples involves no hold.
 //!
 //! [`without_offsets`]: crate::without_offsets
 

@@ -46,8 +46,8 @@ impl Excitation {
 }
 
 impl Recordings {
-    /// Computes the describing function of the recordings. If rows were cut for an offset, so that the periods are no
-    /// longer complete, the recordings are read again without the offset: for a periodic signal the offset is a phase
+    /// Computes the describing function of the recordings. If rows were cut for an offset, the periods are no longer
+    /// complete, and the recordings are read again without the offset: for a periodic signal the offset is a phase
     /// shift, which is corrected at the lines. Returns `None` if no excitation is requested.
     ///
     /// # Errors

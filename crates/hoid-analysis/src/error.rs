@@ -23,7 +23,7 @@ pub enum AnalysisError {
         /// Name of the second recording.
         second: String,
     },
-    /// A file without the requested columns, in which the signals have other names.
+    /// A file without the requested columns, whose signals have other names.
     #[error(transparent)]
     OtherColumns(Box<OtherColumns>),
     /// A column that is missing in one file but exists in another.

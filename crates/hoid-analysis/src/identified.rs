@@ -194,7 +194,7 @@ impl<F> Identified<F> {
         Ok(Validated { name, quality })
     }
 
-    /// True if the means of e and u were removed before the fit, so that each record has a level of its own.
+    /// True if the means of e and u were removed before the fit; each record then has a separate level.
     pub fn is_without_means(&self) -> bool {
         self.taken_out == Detrend::Mean
     }

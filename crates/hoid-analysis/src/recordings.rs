@@ -122,7 +122,7 @@ impl Recordings {
     }
 
     /// Returns a warning if the display showed a channel that is not an input of the model. `inputs` are the inputs of
-    /// the model besides the error.
+    /// the model other than the error.
     pub(crate) fn display_finding(&self, inputs: &[&str]) -> Option<Finding> {
         let first = self.records.first()?;
         let own = [first.input_channel(), Some(first.output_channel())];
@@ -148,8 +148,8 @@ impl Recordings {
         ))
     }
 
-    /// Adds the findings of the recordings to a verdict. They come first, since faults of a recording may explain a
-    /// wrong result.
+    /// Adds the findings of the recordings to a verdict. They precede other findings, because faults of a recording may
+    /// explain a wrong result.
     pub fn judged(&self, verdict: Verdict) -> Verdict {
         let more = self.findings();
         if more.is_empty() {

@@ -32,8 +32,7 @@ impl Recordings {
         for (((name, record), account), origin) in one.zip(self.origins) {
             let steps = of == Of::System && steps_from_level_to_level(&record);
             let handling = match handling {
-                // The settling of a system after a step is not a sensor fault: it is reported, and the recording is not
-                // cut.
+                // Settling after a step is not a sensor fault, so it is reported and the recording is not cut.
                 FaultHandling::Bridge | FaultHandling::Cut if steps => FaultHandling::Report,
                 as_asked => as_asked,
             };
@@ -78,7 +77,7 @@ impl Recordings {
                 } else {
                     (format!("{name}{span}"), segment.labelled(label))
                 };
-                // Only the first segment carries the findings, so that each finding is reported once.
+                // Only the first segment has the findings, so each finding is reported once.
                 all.push_part(origin, name, segment, std::mem::take(&mut account));
             }
         }

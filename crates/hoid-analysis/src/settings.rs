@@ -27,7 +27,7 @@ impl Setting {
         }
     }
 
-    /// Sets whether the user gave the value.
+    /// Sets the flag that the user gave the value.
     #[must_use]
     pub fn given(self, given: bool) -> Self {
         Self { given, ..self }

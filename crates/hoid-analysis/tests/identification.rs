@@ -1,4 +1,5 @@
-//! From recordings to a verdict: each rule with a recording that triggers it, and one that does not.
+//! From recordings to a verdict: each rule is tested with a recording that triggers it and with a recording that does
+//! not.
 #![allow(clippy::unwrap_used)]
 
 use std::{collections::BTreeMap, fs, path::Path};
@@ -15,7 +16,7 @@ use hoid_model::{
 };
 use hoid_sim::{RunSeed, Simulator};
 
-/// A run as recorded: e and u alone.
+/// A run as recorded, which contains only e and u.
 fn recorded(seed: u64, change: impl Fn(f64, f64) -> (f64, f64)) -> Record {
     let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
     let run = RunSeed {
@@ -38,7 +39,7 @@ fn clipped(seed: u64) -> Record {
     recorded(seed, |e, u| (e, u.clamp(-0.086, 0.086)))
 }
 
-/// One form and few orders of the noise: the choice is not tested here.
+/// Only one form and few noise orders are tried, because their selection is not tested here.
 fn quick() -> Identification {
     Identification {
         estimator: FamilyEstimator {
@@ -100,7 +101,7 @@ fn runs_that_are_no_two_runs_are_refused() {
     assert!(words.starts_with("run 1 and again hold the same samples"), "{words}");
     let nothing = quick().run(Recordings::default()).unwrap_err();
     assert!(matches!(nothing, AnalysisError::NoRecordings));
-    // Nothing moves: the estimator reports it.
+    // If the stick does not move, the estimator reports this.
     let resting = quick().run(Recordings::of_records([recorded(1, |e, _| (e, 0.0))]));
     assert!(matches!(resting.unwrap_err(), AnalysisError::Ident(_)));
     let short = record.span(0.0, 0.5).unwrap();
@@ -286,7 +287,7 @@ fn orders_of_polynomials_are_those_that_were_given_and_the_operators() {
     assert!(matches!(none.ranges(ts), Err(AnalysisError::Options { .. })));
 }
 
-/// The rule of a stick at its end holds in all estimators; a start of a search among several models in none.
+/// The rule for a stick at its end applies to all estimators.
 #[test]
 fn every_estimator_hears_of_the_recordings() {
     fn doubted<E: BatchEstimator>(estimator: E, record: &Record) {
@@ -318,7 +319,7 @@ fn every_estimator_hears_of_the_recordings() {
     );
 }
 
-/// A furnace sampled every 9 s, with a two-level input: no rule for people applies.
+/// A furnace sampled every 9 s with a two-level input: the rules for people do not apply.
 #[test]
 fn polynomials_are_judged_as_any_system() {
     let noise = |seed: u64| {
@@ -356,7 +357,7 @@ fn polynomials_are_judged_as_any_system() {
     }
 }
 
-/// e of one person and noise for u: nothing is trustworthy, and the verdict is about the requested answer.
+/// If u is noise that is unrelated to e, no answer is trustworthy, and the verdict refers to the requested answer.
 #[test]
 fn a_verdict_is_about_what_was_asked() {
     let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();

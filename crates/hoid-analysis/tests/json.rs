@@ -1,4 +1,4 @@
-//! Results as JSON and back, in Rust.
+//! Conversion of results to JSON and back.
 #![allow(clippy::unwrap_used)]
 
 use hoid_analysis::{
@@ -22,7 +22,7 @@ fn run(seed: u64) -> Record {
     simulator.run(run, false).unwrap().span(0.0, 50.0).unwrap()
 }
 
-/// The restored result equals the original.
+/// Returns the result and the result restored from its JSON, after checking that they are equal.
 fn back<E: BatchEstimator>(with: Identification<E>) -> (Identified<E::Fit>, Identified<E::Fit>)
 where
     E::Fit: BatchAnswer,
@@ -35,7 +35,7 @@ where
     assert_eq!(again.verdict, found.verdict);
     assert_eq!(again.settings, found.settings);
     assert!(again.data.records.is_empty());
-    // The printed text contains only JSON numbers: no state is lost by a program that writes it again.
+    // The printed text contains only JSON numbers, so a program that writes the JSON again does not change the state.
     let value: Value = serde_json::from_str(&text).unwrap();
     assert!(Identified::<E::Fit>::from_json(&value.to_string()).unwrap() == found);
     let other = Identified::<E::Fit>::from_json(&text.replacen("\"state\": \"", "\"state\": \"0", 1));

@@ -6,7 +6,8 @@ use std::{f64::consts::TAU, fs, path::PathBuf};
 use hoid_analysis::{AnalysisError, Look, LookOptions, Reading};
 use tempfile::TempDir;
 
-/// A target of period 10 s from 2 s to 22 s of 25 s, an output y = u/s by a control that is recorded a sample late.
+/// A record of 25 s with a target of period 10 s from 2 s to 22 s, and the output y = u/s of a control that is recorded
+/// one sample late.
 fn written(header: &str, columns: impl Fn(f64, f64, f64, f64) -> String) -> (TempDir, PathBuf) {
     let (ts, n) = (0.02, 1250);
     let sum = |t: f64, phase: f64| {
@@ -54,7 +55,7 @@ fn a_file_is_seen_as_a_whole() {
         "hoid identify 'my run.csv' --input Target-y --output 'Stick [V]' --from 2 --to 22 --offset u=1 \
          --excitation Target --controlled-element 1/s"
     );
-    // Known values are not searched for.
+    // Values given by the user are not searched for.
     let known = LookOptions {
         excitation: Some("none".to_owned()),
         from_s: Some(5.0),
@@ -106,7 +107,7 @@ fn a_reader_is_told_the_columns() {
         others.command(["track", "run.csv", "--input=e", "--output", "u", "--out", "t.csv"].map(str::to_owned)),
         "hoid track run.csv --out t.csv --input r-y --output u"
     );
-    // A typed name is kept.
+    // A name given by the user is kept.
     let mut typed = Reading::default();
     typed.options.output = "stick".parse().unwrap();
     assert!(matches!(refused(&typed), AnalysisError::Io(_)));

@@ -1,5 +1,5 @@
-//! `study`, `group` and `track` on 200 disks each that fill before the output is complete. The
-//! numbers of `research/notes/mutations.md`.
+//! Runs `study`, `group` and `track` on 200 disks each, which become full before the output is complete. The program
+//! prints the numbers of `research/notes/mutations.md`.
 //!
 //! `cargo xtask slow full-disks [ROUNDS] [SEED] [study|group|track]`, on Linux, as an administrator.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]

@@ -1,11 +1,10 @@
-//! Studies, groups and reproductions that are killed at random instants, or whose blocks are
-//! damaged between two kills, and then resumed: are their results the same, byte for byte? The
-//! numbers of the page `research/notes/mutations.md`.
+//! Kills studies, groups and reproductions at random instants, or damages their blocks between two kills, resumes them,
+//! and checks that their results have the same bytes. The program prints the numbers of the page
+//! `research/notes/mutations.md`.
 //!
-//! `cargo xtask slow kills [--kills N] [--damaged N] [--seed N] [--only study|group|reproduce] [--program FILE]`:
-//! the number of kills by SIGKILL, after which no program can clean up, and of damaged blocks.
-//! Instants and damage are drawn from the seed; the state of the program at an instant depends on
-//! the machine.
+//! `cargo xtask slow kills [--kills N] [--damaged N] [--seed N] [--only study|group|reproduce] [--program FILE]`: the
+//! arguments give the number of kills by SIGKILL, which prevents any clean-up, and of damaged blocks. Instants and
+//! damage are drawn from the seed; the state of the program at an instant depends on the machine.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../tests/common/draw.rs"]
@@ -24,7 +23,7 @@ use std::{
 use draw::Draw;
 use interrupted::{Bench, GROUP, REPRODUCE, STUDY, beside_this, compare, files};
 
-/// Kills of one run before it may finish.
+/// Number of kills of one run before it may finish.
 const IN_A_ROW: usize = 5;
 
 fn main() -> ExitCode {
@@ -51,11 +50,11 @@ fn main() -> ExitCode {
         }
         let begun = Instant::now();
         bench.whole(work, "whole");
-        // The duration of a run depends on the load of the machine: after a kill that came too late
-        // the next ones are earlier.
+        // The duration of a run depends on the load of the machine: after a kill that was too late, the following kills
+        // are earlier.
         let mut took = begun.elapsed();
         let expected = files(&bench.place(work, "whole"));
-        // The first works take the remainder of a division by three.
+        // The remainder of the division by three is assigned to the first works.
         let share = |all: usize, of: usize| all / of + usize::from(k < all % of);
         let (mut killed, mut runs) = (0, 0);
         while killed < share(kills, 3) {
@@ -120,7 +119,7 @@ fn kill(mut child: Child, after: Duration) -> bool {
     !child.wait().unwrap().success()
 }
 
-/// Damages one file of a block; returns the kind of damage, or none if there is no block yet.
+/// Damages one file of a block; returns the kind of damage, or `None` if there is no block yet.
 fn damage(parts: &Path, draw: &mut Draw) -> Option<&'static str> {
     let mut all: Vec<PathBuf> = fs::read_dir(parts).ok()?.map(|entry| entry.unwrap().path()).collect();
     all.retain(|path| !path.file_name().unwrap().to_str().unwrap().starts_with('.') && path.is_file());

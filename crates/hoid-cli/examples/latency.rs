@@ -1,9 +1,10 @@
-//! Response time of `hoid stream` to a sample, and its behaviour when readers stop, either side restarts, clocks jump
-//! and datagrams are hostile. The numbers of `research/notes/latency.md`.
+//! Measures the response time of `hoid stream` to a sample, and its behaviour if readers stop, either side restarts,
+//! clocks jump or datagrams are hostile. The program prints the numbers of `research/notes/latency.md`.
 //!
-//! `cargo xtask slow latency [--seconds N] [--seed N] [--program FILE] [--python FILE]`: each transport and rate for
-//! 600 s by default. Over LabStreamingLayer if the interpreter has pyhoid and pylsl, as that of `cargo xtask places`.
-//! It fails if a lost sample is not counted, or if one is lost although no side stopped; never for a response time.
+//! `cargo xtask slow latency [--seconds N] [--seed N] [--program FILE] [--python FILE]`: measures each transport and
+//! rate for 600 s by default, including LabStreamingLayer if the interpreter has pyhoid and pylsl, as the interpreter
+//! of `cargo xtask places` does. The program fails if a lost sample is not counted, or if a sample is lost although
+//! neither side stopped, but never because of a response time.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../tests/common/live/mod.rs"]
@@ -89,7 +90,7 @@ fn shown(time: Duration) -> String {
     format!("{:.2} ms", 1e3 * time.as_secs_f64())
 }
 
-/// The row of LabStreamingLayer, and the number of lost samples; or the reason why there is none.
+/// Returns the table row for LabStreamingLayer and the number of lost samples, or the reason why there is no row.
 fn over_lsl(python: PathBuf, rate_hz: usize, seconds: usize) -> Result<(String, usize), String> {
     let output = Command::new(python)
         .args(["-m", "places.pace", &rate_hz.to_string(), &seconds.to_string()])
@@ -104,18 +105,18 @@ fn over_lsl(python: PathBuf, rate_hz: usize, seconds: usize) -> Result<(String, 
     Ok((row.to_owned(), missing.parse().unwrap()))
 }
 
-/// Folder of the build profile of this example.
+/// Returns the folder of the build profile of this example.
 fn profile() -> PathBuf {
     let path = std::env::current_exe().unwrap();
     path.ancestors().nth(2).unwrap().to_owned()
 }
 
-/// The program built with this example.
+/// Returns the path of the program built with this example.
 fn beside_this() -> PathBuf {
     profile().join(format!("hoid{}", std::env::consts::EXE_SUFFIX))
 }
 
-/// The interpreter that the places or the tests have installed.
+/// Returns the interpreter installed by `cargo xtask places` or by the tests.
 fn interpreter() -> PathBuf {
     let of = |environment: &str| profile().join("../python").join(environment).join("bin/python");
     let found = ["venv-shipped", "venv"].map(of).into_iter().find(|path| path.exists());

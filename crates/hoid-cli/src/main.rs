@@ -1,5 +1,5 @@
-//! The command line `hoid`. Only this crate prints: results to standard output, everything else to
-//! standard error.
+//! The command-line program `hoid`. Only this crate prints: results to standard output, everything else to standard
+//! error.
 //!
 //! Exit codes: 0 for success; 1 if the data or the task give no result, or the result cannot be written; 2 for a usage
 //! error; 128 plus the number of the signal after a signal. `args` defines the arguments, `commands` contains one file

@@ -61,7 +61,7 @@ fn coloured(page: &str) -> String {
 const WIDTHS: (usize, usize) = (60, 110);
 
 /// Returns the width for wrapping in columns, limited to [`WIDTHS`]: the value of `COLUMNS`, otherwise the width of the
-/// terminal; `None` if neither is known, as for output to a file, whose lines are then not wrapped.
+/// terminal. Returns `None` if neither is known, as for output to a file; lines are then not wrapped.
 pub fn width() -> Option<usize> {
     let told = std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok());
     let asked = || {

@@ -1,4 +1,4 @@
-//! Converts the options of `hoid track` and `hoid stream` to those of the library.
+//! Converts the options of `hoid track` and `hoid stream` to options of the library.
 
 use std::path::Path;
 

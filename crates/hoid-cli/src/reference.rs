@@ -282,8 +282,7 @@ mod tests {
         );
     }
 
-    /// Every option of the registry of estimators is a flag of `hoid identify`, with its default if
-    /// clap knows one.
+    /// Every option of the registry of estimators is a flag of `hoid identify`, with the same default if clap has one.
     #[test]
     fn identify_has_the_options_of_the_registry() {
         let mut cli = Cli::command();
@@ -309,7 +308,7 @@ mod tests {
         }
     }
 
-    /// An option that is declared once is available wherever options are.
+    /// An option that is declared once is available in all interfaces.
     #[test]
     fn a_new_option_needs_no_other_edit() {
         let mut methods = registry();

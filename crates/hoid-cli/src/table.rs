@@ -215,7 +215,7 @@ mod tests {
         for kept in ["anna", "13.5\u{a0}±\u{a0}1.9", "margin", "(deg)", "range"] {
             assert!(narrow.contains(kept), "{kept}\n{narrow}");
         }
-        // There is no width at which a line is longer than the screen.
+        // At no width is a line longer than the screen.
         for width in 20..110 {
             let page = rows().on(Some(width));
             let is_table = page.contains('─');

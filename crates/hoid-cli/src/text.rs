@@ -504,7 +504,7 @@ pub fn candidates(choice: &Choice) -> String {
         let value = |f: &hoid::ident::order_selection::CandidateFigures| f.value(choice.criterion);
         value(a.1).total_cmp(&value(b.1))
     });
-    // A selection criterion that is not among the default columns gets a column of its own.
+    // A selection criterion that is not among the default columns gets a separate column.
     let decides = !matches!(choice.criterion, Criterion::Loss | Criterion::Aic | Criterion::Bic);
     let mut header = vec!["candidate", "loss", "AIC", "BIC", ""];
     if decides {

@@ -9,7 +9,7 @@ use common::{bad, good, json};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// A lead on 4/(s(s+1)) with a target on every second line; 60 Hz.
+/// A lead on 4/(s(s+1)) with a target that has every second line, at 60 Hz.
 const TASK: &str = r#"
 form = "lead"
 name = "axis"
@@ -36,7 +36,7 @@ share = 0.15
 /// Delay of the coupling, samples.
 const LAG: usize = 18;
 
-/// Columns of a simulated run.
+/// Returns the columns of a simulated run.
 fn run(at: &Path, lines: &str, seed: &str) -> Vec<[f64; 4]> {
     fs::write(at.join("task.toml"), TASK.replace("\"even\"", lines)).unwrap();
     good(
@@ -63,7 +63,7 @@ fn run(at: &Path, lines: &str, seed: &str) -> Vec<[f64; 4]> {
     rows.map(row).collect()
 }
 
-/// Two axes in a table, the control of x with a part of the error of y.
+/// Writes two axes to a table; the control of x contains a part of the error of y.
 fn two_axes(at: &Path, lines_of_y: &str, coupling: f64) {
     let (x, y) = (run(at, "\"even\"", "1"), run(at, lines_of_y, "2"));
     let mut text = "t,ex,ux,rx,ey,uy,ry\n".to_owned();
@@ -98,7 +98,7 @@ fn each_axis_has_its_operator_and_a_coupling_is_named() {
             );
         }
     }
-    // A coupling in one direction, and none in the other.
+    // There is a coupling in one direction only.
     assert_eq!(coupling(&found, 0)["responds"], true, "{}", coupling(&found, 0));
     assert_eq!(coupling(&found, 0)["input"], "ey");
     assert_eq!(coupling(&found, 1)["responds"], false, "{}", coupling(&found, 1));
@@ -109,7 +109,7 @@ fn each_axis_has_its_operator_and_a_coupling_is_named() {
         text.contains("Axis ex, ux") && text.contains("ey to ux") && text.contains("a response"),
         "{text}"
     );
-    // The result of an axis is that of its columns alone.
+    // The result of an axis equals the result for its columns alone.
     let alone = json(
         at.path(),
         &[

@@ -1,4 +1,4 @@
-//! Excessive numbers are reported at once, with their limit.
+//! Excessive numbers are reported at once, with the limit.
 #![allow(clippy::unwrap_used)]
 
 mod common;

@@ -1,4 +1,4 @@
-//! Simulation, conversion and margins as a user runs them.
+//! Simulation, conversion and margins from the command line.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -101,7 +101,7 @@ fn convert_goes_both_ways_and_says_what_does_not_convert() {
 fn convert_gives_the_operator_behind_three_poles_and_says_which_is_the_lag() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    // 25 (.6 s + 1)/(5 s + 1) with omega_nm = 12 rad/s, zeta_nm = .25, tau_e = .137 s.
+    // The operator is 25 (.6 s + 1)/(5 s + 1) with omega_nm = 12 rad/s, zeta_nm = .25 and tau_e = .137 s.
     let family = hoid::model::FamilyOperator::of_names(
         hoid::model::Form::LeadLag,
         &[
@@ -197,7 +197,7 @@ fn demo_writes_its_record_and_report() {
     }
 }
 
-/// A scenario of the family is simulated, and its margins are those of its loop.
+/// A scenario of the family is simulated, and the reported margins are those of its loop.
 #[test]
 fn a_person_of_the_family_is_simulated() {
     let directory = TempDir::new().unwrap();
@@ -219,7 +219,7 @@ fn a_person_of_the_family_is_simulated() {
         d,
         &["margins", "--scenario", "person.toml", "--state", "last", "--json"],
     );
-    // |Y P| = 1 at the crossover, by hand: K/T_I |0.6 jw + 1|/|jw + 0.2| |NM|/w.
+    // |Y P| = K/T_I |0.6 jw + 1|/|jw + 0.2| |NM|/w, computed by hand, is 1 at the crossover.
     let omega = initial["crossover_rad_s"].as_f64().unwrap();
     let lead = (0.36 * omega * omega + 1.0).sqrt() / (omega * omega + 0.04).sqrt();
     let ratio = omega / 11.0;

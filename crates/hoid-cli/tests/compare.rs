@@ -1,4 +1,4 @@
-//! Comparison of conditions, from the output of `hoid group --json`.
+//! Comparison of conditions from the output of `hoid group --json`.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -8,7 +8,7 @@ use std::fs;
 use common::{bad, good, hoid};
 use tempfile::TempDir;
 
-/// Three people in two conditions, one of them without a crossover in the second.
+/// Writes the results of three people in two conditions; one person has no crossover in the second condition.
 fn results() -> TempDir {
     let directory = TempDir::new().unwrap();
     let mut people = Vec::new();
@@ -102,13 +102,13 @@ fn mistakes_have_remedies() {
     }
     let (code, said) = bad(at, &["compare", "."]);
     assert!(code == 1 && said.contains("there is no group.toml"), "{said}");
-    // No person has a margin: that is reported, and nothing is determined.
+    // No person has a margin, so nothing is determined, and the message reports this.
     let output = hoid(at, &["compare", "results.json", "--of", "phase_margin"]);
     assert_eq!(output.status.code(), Some(1));
     assert!(String::from_utf8(output.stdout).unwrap().contains("without P03 in fo"));
 }
 
-/// The forms of the people on the two elements differ: their parameters are compared in a common form.
+/// People have different forms with the two elements, so their parameters are compared in a common form.
 #[test]
 fn recordings_are_analysed_and_compared_in_one_form() {
     let directory = TempDir::new().unwrap();
@@ -129,17 +129,17 @@ fn recordings_are_analysed_and_compared_in_one_form() {
         differences.iter().any(|d| d["quantity"] == quantity)
     };
     assert!(compared_of("T_L") && compared_of("crossover"), "{printed}");
-    // The crossover is that of the forms which are best for each.
+    // The crossover is computed with the best form for each element.
     let of_results: serde_json::Value =
         serde_json::from_str(&good(at, &["compare", "found/group", "--of", "crossover", "--json"])).unwrap();
     assert_eq!(of_results["differences"][0]["value"], object["differences"][0]["value"]);
-    // The results stay, and are used again.
+    // The results are kept and used again.
     let same = good(at, &compared);
     assert_eq!(same, printed);
     let of_group = hoid(at, &["compare", "found/group", "--of", "T_L"]);
     let message = String::from_utf8(of_group.stderr).unwrap();
     assert!(message.contains("form = \"lead-lag\""), "{message}");
-    // Without --out nothing stays behind.
+    // Without --out no files remain.
     let before = fs::read_dir(at).unwrap().count();
     good(at, &["compare", "runs/group.toml", "--of", "crossover"]);
     assert_eq!(fs::read_dir(at).unwrap().count(), before);

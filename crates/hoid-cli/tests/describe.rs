@@ -1,5 +1,4 @@
-//! `hoid describe` from the command line: simulated runs, signals known in closed form, and input
-//! that cannot be described.
+//! `hoid describe` from the command line: simulated runs, signals known in closed form, and refused input.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -10,7 +9,7 @@ use common::{bad, good, hoid, json};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// A record of 20 s periods at 10 Hz: `d` at five lines, `e = d`, u as given.
+/// Writes a record with periods of 20 s at 10 Hz: `d` has five lines, `e = d`, and u is given.
 fn write(at: &Path, name: &str, samples: usize, u: impl Fn(f64, usize) -> f64) {
     let mut text = String::from("t,e,u,d,r\n");
     for k in 0..samples {
@@ -28,7 +27,7 @@ fn excitation(t: f64) -> f64 {
         .sum()
 }
 
-/// A fixed pseudo-random sequence.
+/// Returns a value of a fixed pseudo-random sequence.
 fn rough(k: usize, stream: usize) -> f64 {
     (0.37 * (k * k) as f64 + (3 * stream) as f64).sin()
 }
@@ -68,7 +67,8 @@ fn simulated_runs_have_their_loop() {
         (found["runs"].as_array().unwrap().len(), &found["errors_between"]),
         (4, &Value::from("records"))
     );
-    // `hoid margins` of C1 without the half sample of the hold: 0.45 deg less than 76.67.
+    // The expected values are those of `hoid margins` for C1; the half sample of the hold reduces the phase margin by
+    // 0.45 deg from 76.67 deg.
     for (name, truth) in [("crossover_rad_s", 1.5635), ("phase_margin_deg", 76.2)] {
         let e = &found["open_loop"][name];
         let (value, error) = (number(&e["value"]), number(&e["standard_error"]));
@@ -89,14 +89,14 @@ fn simulated_runs_have_their_loop() {
     ] {
         assert!(number(&line[key]).is_finite(), "{key}");
     }
-    // A tenth of the variance is remnant by definition, some of it at the lines.
+    // By definition a tenth of the variance is remnant, some of which is at the lines.
     let remnant = &found["remnant"];
     let (share, ratio) = (
         number(&remnant["share"]["value"]),
         number(&remnant["noise_ratio"]["value"]),
     );
     assert!(share < ratio && (0.07..0.13).contains(&ratio), "{share} {ratio}");
-    // The same with automatic detection, as text.
+    // The result with automatic detection is the same, here as text.
     let page = good(at, &[&["describe", "-v"], &names[..], &options[2..]].concat());
     assert!(page.starts_with("Verdict: trustworthy\n"), "{page}");
     for text in [
@@ -106,7 +106,7 @@ fn simulated_runs_have_their_loop() {
     ] {
         assert!(page.contains(text), "{text}: {page}");
     }
-    // Three or more runs give errors between runs; a single one is doubtful.
+    // Three or more runs give errors between runs; the result of a single run is doubtful.
     let one = json(at, &["describe", "1.csv", "--json"]);
     assert_eq!(one["verdict"]["level"], "doubtful");
     assert_eq!(one["verdict"]["findings"][0]["kind"], "few-runs");
@@ -135,8 +135,8 @@ fn what_was_recorded_late_is_put_back() {
             .map(|(p, w)| p + (0.5 * w).to_degrees())
             .collect()
     };
-    // The span keeps its whole periods whatever the offset. 5 samples are the delay; the last line
-    // is shifted by 207 deg without a phase jump.
+    // The span keeps its whole periods regardless of the offset. The delay is 5 samples; the last line is shifted by
+    // 207 deg without a phase jump.
     for options in [&[][..], &["--from", "0", "--to", "60"], &["--from", "20"]] {
         for phase in phases(options) {
             assert!(phase.abs() < 1.0, "{options:?} {phase}");
@@ -158,7 +158,7 @@ fn what_was_recorded_late_is_put_back() {
     }
     let (code, message) = bad(at, &["describe", "run.csv", "--offset", "w=1"]);
     assert!(code == 2 && message.contains("no channel \"w\""), "{message}");
-    // Columns by name, as in identify.
+    // Columns are selected by name, as in `identify`.
     let by_name = [
         "describe",
         "run.csv",
@@ -256,7 +256,7 @@ fn what_cannot_be_described_is_said() {
             "{options:?} {found}: {message}"
         );
     }
-    // Given lines, at harmonics of the period: a missing one makes the result doubtful.
+    // The given lines are at harmonics of the period; a missing line makes the result doubtful.
     let lines = ["0.62831853", "1.57079633", "2.82743339"].join(",");
     let found = json(
         at,

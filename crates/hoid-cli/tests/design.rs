@@ -54,7 +54,7 @@ fn a_design_is_judged_and_runs() {
         .unwrap();
     assert!(tau["standard_error"].as_f64().unwrap() < of_text["standard_error"].as_f64().unwrap());
     assert!(fs::read_to_string(at.join("t.md")).unwrap().contains("| tau_e | 0.25"));
-    // The scenario contains the operator, and the lines are those of the design.
+    // The scenario contains the operator and the lines of the design.
     good(
         at,
         &["simulate", "--scenario", "design/scenario.toml", "--out", "run.csv"],
@@ -88,7 +88,7 @@ fn a_design_is_judged_and_runs() {
     assert!((error(&again["against"]) / error(&of_design) - 1.0).abs() < 1e-6);
 }
 
-/// People of the population, and the files of a design.
+/// The number of people for a difference is computed for the population, and the files of a design can be read.
 #[test]
 fn a_difference_has_its_people_and_the_files_are_readable() {
     let directory = TempDir::new().unwrap();
@@ -126,14 +126,14 @@ fn a_difference_has_its_people_and_the_files_are_readable() {
         assert!(at.join("design").join(name).exists(), "{name}");
     }
     assert!(fs::read_to_string(at.join("figure.svg")).unwrap().contains("rad/s"));
-    // The table of lines is a forcing function as the scenario is.
+    // The table of lines can be used as a forcing function, like the scenario.
     let against = |file: &str| {
         let all = [&arguments[..5], &["--json", "--against", file]].concat();
         json(at, &all)["against"]["rms_e"].as_f64().unwrap()
     };
     let (table, scenario) = (against("design/forcing.csv"), against("design/scenario.toml"));
     assert!((table / scenario - 1.0).abs() < 1e-9);
-    // The same seed is the same design, another has other phases.
+    // The same seed gives the same design; another seed gives other phases.
     let phase = |seed: &str| {
         let all = [&arguments[..3], &["--json", "--seed", seed]].concat();
         json(at, &all)["lines"][3]["phase_rad"].as_f64().unwrap()
@@ -141,7 +141,7 @@ fn a_difference_has_its_people_and_the_files_are_readable() {
     assert!(phase("1").to_bits() == phase("1").to_bits() && phase("1").to_bits() != phase("2").to_bits());
 }
 
-/// People of a group as it was printed, and its population.
+/// A design for the people of a group, from its printed result, and for its population.
 #[test]
 fn people_of_a_group_have_a_typical_and_a_worst_one() {
     let directory = TempDir::new().unwrap();
@@ -192,7 +192,7 @@ fn people_of_a_group_have_a_typical_and_a_worst_one() {
     assert!(found["worst"]["name"].is_string());
 }
 
-/// A target that is seen: both responses have errors, and the experiment runs and is identified.
+/// With a displayed target, both responses have expected errors, and the experiment can be simulated and identified.
 #[test]
 fn both_responses_to_a_target_that_is_seen_are_designed() {
     let directory = TempDir::new().unwrap();
@@ -235,7 +235,7 @@ fn both_responses_to_a_target_that_is_seen_are_designed() {
             "--json",
         ],
     );
-    // The gain of the response to the target, within four of the errors that were designed.
+    // The gain of the response to the target is within four of the expected standard errors.
     let named = |all: &serde_json::Value, name: &str| {
         let found = all.as_array().unwrap().iter().find(|p| p["name"] == name);
         found.unwrap().clone()
@@ -247,11 +247,11 @@ fn both_responses_to_a_target_that_is_seen_are_designed() {
         off < 4.0 * designed["standard_error"].as_f64().unwrap(),
         "{found} {designed}"
     );
-    // The same task, for the person who was identified.
+    // The same task is designed for the identified person.
     fs::write(at.join("fit.json"), fit.to_string()).unwrap();
     let again = json(at, &[&arguments[..], &["--people", "fit.json", "--json"]].concat());
     assert_eq!(named(&again["parameters"], "K_f")["value"], found["value"]);
-    // A pair of forcing functions is judged from a scenario, not from a table of one.
+    // A pair of forcing functions is evaluated from a scenario, because a table contains only one.
     let again = json(
         at,
         &[&arguments[..], &["--against", "design/scenario.toml", "--json"]].concat(),
@@ -259,7 +259,7 @@ fn both_responses_to_a_target_that_is_seen_are_designed() {
     assert!((again["against"]["rms_e"].as_f64().unwrap() / again["rms_e"].as_f64().unwrap() - 1.0).abs() < 1e-6);
 }
 
-/// The spread of a difference between people from a comparison, a group, and a population.
+/// The spread of a difference between people, from a comparison, a group and a population.
 #[test]
 fn the_spread_of_a_difference_is_that_of_the_people() {
     let directory = TempDir::new().unwrap();
@@ -328,7 +328,7 @@ fn the_spread_of_a_difference_is_that_of_the_people() {
         (spread(&bound) - 0.05).abs() < 1e-12 && of(&bound).starts_with("at most"),
         "{bound}"
     );
-    // The crossover is no parameter of a population.
+    // The crossover is not a parameter of a population.
     let all = ["design", "--controlled-element", "4/s", "--difference", "crossover=10%"];
     let (code, said) = bad(at, &[&all[..], &["--between-people", "population.json"]].concat());
     assert!(

@@ -1,4 +1,5 @@
-//! Faults of recorded data: no estimate deviates by more than four standard errors from the truth without a finding.
+//! Faults of recorded data: no estimate deviates by more than four standard errors from the true value without a
+//! finding.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -42,7 +43,7 @@ fn identified(d: &Path, how: &[&str]) -> Value {
     json_of_any_worth(d, &[&["identify", "c.csv", "--json"], how].concat())
 }
 
-/// Operator parameters with their values and standard errors.
+/// Returns the operator parameters with their values and standard errors.
 fn estimates(found: &Value) -> Vec<(String, f64, f64)> {
     let of = |name: &str, e: &Value| Some((name.to_owned(), e["value"].as_f64()?, e["standard_error"].as_f64()?));
     match found["parameters"][0]["determined"].as_bool() {
@@ -59,7 +60,8 @@ fn estimates(found: &Value) -> Vec<(String, f64, f64)> {
     }
 }
 
-/// Within four standard errors of the truth of C1, or not trustworthy.
+/// Checks that the estimates are within four standard errors of the true values of C1, or that the result is not
+/// trustworthy.
 fn right_or_said(found: &Value, what: &str) {
     let truth = [
         ("K_e", 0.09),
@@ -118,7 +120,7 @@ fn one_sample_of_a_good_record() {
             assert!((one - other).abs() < 0.1 * error, "{name} {one} {other}");
         }
     }
-    // By default as well, and on the page, in the report and in `info`.
+    // The fault is also found by default, and is shown on the page, in the report and in `info`.
     let found = identified(d, &["--form", "lead"]);
     assert_eq!(kinds(&found), ["spike"]);
     right_or_said(&found, "family");
@@ -185,7 +187,7 @@ fn wrong_units_wrong_columns_and_a_wrong_sign() {
     let found = identified(d, &[]);
     assert_eq!(found["verdict"]["level"], "not determined");
     assert_eq!(kinds(&found)[0], "time-unit");
-    // Polynomial models are used for any system, also a furnace: a note only.
+    // Polynomial models are used for any system, even a furnace, so there is only a note.
     let found = identified(d, &BOX_JENKINS);
     assert_eq!(found["verdict"]["level"], "trustworthy", "{found}");
     assert!(kinds(&found).contains(&"time-unit"), "{found}");
@@ -240,7 +242,7 @@ fn an_offset_is_estimated_and_biases_nothing() {
         for ((name, one, error), (_, other, _)) in estimates(&clean).iter().zip(estimates(&found)) {
             assert!((one - other).abs() < 0.01 * error, "{share}: {name} {one} {other}");
         }
-        // c changes by the constant added to u, minus the response to the constant added to e.
+        // c changes by the constant added to u minus the response to the constant added to e.
         let gain = estimates(&found).iter().find(|(name, ..)| name == "K_e").unwrap().1;
         let (by, (_, error)) = (level(&found).0 - level(&clean).0, level(&found));
         let added = share * of_u - gain * share * of_e;
@@ -248,7 +250,7 @@ fn an_offset_is_estimated_and_biases_nothing() {
             error > 0.0 && (by - added).abs() < 0.01 * added.abs().max(error),
             "{by} {added}"
         );
-        // Unchanged data: reported where relevant.
+        // If the data are used unchanged, the level is reported where relevant.
         let kept = identified(d, &[&BOX_JENKINS[..], &["--detrend", "mean"]].concat());
         assert!(kept["records"][0]["level"].is_null());
         let page = good(d, &[&["identify", "c.csv", "-v"], &BOX_JENKINS[..]].concat());
@@ -256,7 +258,7 @@ fn an_offset_is_estimated_and_biases_nothing() {
         let family = identified(d, &["--form", "lead"]);
         assert!(family["records"][0]["level"]["value"].is_number());
     }
-    // A simulated run contains its true values, and has no level.
+    // A simulated run, which contains its true values, has no level.
     let as_simulated = json(d, &[&["identify", "run.csv", "--json"], &BOX_JENKINS[..]].concat());
     assert!(as_simulated["records"][0]["level"].is_null());
 }

@@ -9,7 +9,7 @@ use tempfile::TempDir;
 
 use common::{bad, good};
 
-/// The head of a shared library for Linux, with the function names of that of hoid.
+/// Writes the header of a shared library for Linux with the function names of the library of hoid.
 fn library(folder: &TempDir) {
     let mut bytes = vec![0_u8; 64];
     bytes[..6].copy_from_slice(b"\x7fELF\x02\x01");
@@ -76,7 +76,7 @@ fn what_makes_no_unit_says_why() {
         (&["--method", "rpem", "--prior", "none"], "adaptive"),
         (&["--sample-time", "0"], "sample time"),
         (&["--operator", "nowhere.toml"], "nowhere.toml"),
-        // Its control would depend on the error of the same sample.
+        // The control of this operator would depend on the error of the same sample.
         (&["--operator", "quick.toml"], "tau_e"),
         (&["--operator", "C4", "--method", "rpem"], "--operator"),
         (&["--seed", "3"], "--operator"),

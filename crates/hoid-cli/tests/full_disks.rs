@@ -1,4 +1,4 @@
-//! A sample of the full disks of `cargo xtask slow full-disks`.
+//! A sample of the cases of `cargo xtask slow full-disks`.
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used)]
 

@@ -1,4 +1,4 @@
-//! A virtual experiment and its analysis, as a user runs them.
+//! A virtual experiment and its analysis from the command line.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -14,7 +14,7 @@ use tempfile::TempDir;
 
 use common::{bad, good, hoid, json};
 
-/// Two people, C1 and C3, two runs each.
+/// Simulates two people in C1 and C3 with two runs each.
 fn experiment() -> TempDir {
     let directory = TempDir::new().unwrap();
     let arguments = [
@@ -32,7 +32,7 @@ fn experiment() -> TempDir {
     ];
     let said = good(directory.path(), &arguments);
     assert!(said.contains("8 runs") && said.contains("truth.csv"), "{said}");
-    // A narrow range of the delay makes the test fast.
+    // A narrow range of delays makes the test fast.
     let manifest = directory.path().join("people/group.toml");
     let text = fs::read_to_string(&manifest).unwrap();
     assert!(text.contains("[analysis]\n"), "{text}");
@@ -71,7 +71,7 @@ fn a_virtual_experiment_is_analysed_and_reported() {
     let at = directory.path();
     let said = good(at, &["group", "people", "--out", "out", "--csv", "-v"]);
     assert!(said.starts_with("Verdict: "), "{said}");
-    // Failures and doubtful results come before the numbers.
+    // Failures and doubtful results precede the numbers.
     let at_operators = said.find("Operators").unwrap();
     assert!(
         said.find("C3 has no operator for the whole run").unwrap() < at_operators,
@@ -105,7 +105,7 @@ fn a_virtual_experiment_is_analysed_and_reported() {
         .filter(|name| name.starts_with("subject-"))
         .collect();
     assert_eq!(subjects.len(), 2);
-    // K_e_dot of C3 moves and settles in the table; that of C1 has no change.
+    // K_e_dot of C3 changes, and the table contains its settling time; in C1 nothing changes.
     let settling = fs::read_to_string(at.join("out/settling.csv")).unwrap();
     let of = |condition: &str| {
         settling
@@ -114,7 +114,7 @@ fn a_virtual_experiment_is_analysed_and_reported() {
             .count()
     };
     assert!(of("C3") > 0 && of("C1") == 0, "{settling}");
-    // Again: refused, and with --resume nothing is computed twice.
+    // A second run is refused, and with --resume nothing is computed twice.
     let (code, message) = bad(at, &["group", "people", "--out", "out"]);
     assert!(code == 1 && message.contains("--resume"), "{message}");
     let resumed = ["group", "people", "--out", "out", "--csv", "--resume"];
@@ -143,13 +143,14 @@ fn a_virtual_experiment_is_analysed_and_reported() {
                 measure["standard_error"].as_f64().unwrap(),
             );
             let end = |i: usize| measure["interval"][i].as_f64().unwrap();
-            // The posterior is a mixture over forms, so that it need not be symmetric.
+            // The posterior is a mixture over forms, so it need not be symmetric.
             assert!(error > 0.0 && end(0) < value && value < end(1), "{measure}");
             assert!(end(1) - end(0) > 2.0 * 1.96 * error, "{measure}");
         }
         assert!(person["verdict"]["level"].is_string());
     }
-    // In a column of 85 mm each subject has a figure, whose text of 13 px in 420 has 7.5 pt; on a page they are side by side.
+    // In a column of 85 mm each subject has a separate figure, whose text of 13 px in 420 px has 7.5 pt; on a page the
+    // subjects are next to each other.
     good(
         at,
         &[&resumed[..], &["--figure", "wide.svg", "--width", "170mm"]].concat(),
@@ -243,7 +244,7 @@ fn init_looks_at_the_files_and_says_what_it_saw() {
     assert_eq!(condition["controlled_element"].as_str(), Some("1/s"));
     assert_eq!(condition["offset_samples"].as_float(), Some(0.0));
     assert_eq!(manifest["read"]["input"].as_str(), Some("e"));
-    // Each is below its evidence.
+    // Each line follows its evidence.
     for (evidence, line) in [
         ("# the tracking error, by name", "input = "),
         ("# d has", "excitation = "),
@@ -315,7 +316,7 @@ fn a_manifest_is_made_from_names_and_mistakes_are_named() {
     }
     let joined = text.replace("subject = \"anna\"", "then = \"nothing.csv\"\nsubject = \"anna\"");
     fs::write(at.join("joined.toml"), joined).unwrap();
-    // All runs failed: no result, and the available information is written.
+    // If all runs fail, there is no result, but the available information is written.
     let output = hoid(at, &["group", "joined.toml", "--out", "joined", "--csv"]);
     let message = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(

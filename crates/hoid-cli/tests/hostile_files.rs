@@ -15,7 +15,7 @@ use tempfile::TempDir;
 
 use common::{bad, good, json};
 
-/// A simulated run as text.
+/// Returns a simulated run as text.
 fn run(directory: &Path) -> String {
     good(directory, &["simulate", "--condition", "C1", "--out", "c1.csv"]);
     fs::read_to_string(directory.join("c1.csv")).unwrap()
@@ -84,7 +84,7 @@ fn gains_without_units_are_not_in_degrees() {
         ("# units: e deg\n", None, None),
         ("# units: e deg\n", Some("u=V"), Some("V/deg")),
         ("", Some("e=mm,u=deg"), Some("deg/mm")),
-        // Any word is a unit, and is kept as given.
+        // Any word is accepted as a unit and kept unchanged.
         ("# units: e deg\n", Some("u=dog"), Some("dog/deg")),
     ] {
         let rest: String = text.lines().skip(1).map(|line| format!("{line}\n")).collect();

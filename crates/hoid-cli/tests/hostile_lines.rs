@@ -1,5 +1,5 @@
-//! Invalid lines of a stream: each that is not a comment gives one line of JSON, none ends the
-//! stream, and the following samples are tracked.
+//! Invalid lines of a stream: each line that is not a comment gives one line of JSON, no line ends the stream, and the
+//! following samples are tracked.
 #![allow(clippy::unwrap_used)]
 
 use std::{
@@ -64,7 +64,7 @@ fn counts(line: &[u8]) -> bool {
 }
 
 proptest! {
-    // Each case is a process.
+    // Each case runs a separate process.
     #![proptest_config(ProptestConfig { failure_persistence: None, rng_seed: RngSeed::Fixed(21), ..ProptestConfig::with_cases(12) })]
 
     #[test]
@@ -101,8 +101,8 @@ proptest! {
         let expected = hostile.iter().filter(|line| counts(line)).count() + good as usize;
         prop_assert_eq!(lines.len(), expected);
         let last = lines.last().unwrap();
-        // The method without a guard follows all numbers, however extreme (`--method physical`
-        // holds them back); other cells reach no estimate.
+        // The method without a guard uses all numbers, however extreme (`--method physical` holds them back); other
+        // cells do not affect any estimate.
         for (name, parameter) in last["parameters"].as_object().unwrap() {
             prop_assert!(parameter["value"].as_f64().is_some(), "{}: {}", name, parameter);
         }

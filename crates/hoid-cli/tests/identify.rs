@@ -1,4 +1,4 @@
-//! `identify` as a user runs it.
+//! `hoid identify` from the command line.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -66,7 +66,7 @@ fn identify_prints_the_json_of_the_contract() {
     assert_eq!(found["candidates"], serde_json::json!([]));
 }
 
-/// The first bytes of a file identify its format, and it has the requested width.
+/// The first bytes of a figure file identify its format, and the figure has the requested width.
 #[test]
 #[cfg(feature = "pdf-png")]
 fn a_figure_is_a_page_or_a_picture_as_its_name_says() {
@@ -79,11 +79,11 @@ fn a_figure_is_a_page_or_a_picture_as_its_name_says() {
     };
     let pdf = draw("bode.pdf");
     let text = String::from_utf8_lossy(&pdf);
-    // 85 mm are 240.9 pt.
+    // A width of 85 mm is 240.9 pt.
     assert!(pdf.starts_with(b"%PDF-") && text.contains("/MediaBox [0 0 240.9") && text.contains("/Font"));
     let png = draw("bode.png");
     assert!(png.starts_with(b"\x89PNG\r\n\x1a\n"));
-    // At 300 dots per inch; the width is in the first chunk.
+    // The resolution is 300 dots per inch; the first chunk contains the width.
     let width = u32::from_be_bytes(png[16..20].try_into().unwrap());
     assert!(width.abs_diff(1004) <= 4, "{width}");
 }
@@ -180,7 +180,7 @@ fn every_structure_and_method_runs_from_the_command_line() {
         assert_eq!(found["structure"], name);
         assert!(found["fit"]["vaf_prediction"].as_f64().unwrap() > 50.0, "{name}");
     }
-    // With an output only, no column e is needed.
+    // A model of an output alone requires no column e.
     let text = fs::read_to_string(d.join("c1.csv")).unwrap();
     fs::write(d.join("alone.csv"), text.replace(",e,", ",was_e,")).unwrap();
     for name in ["ar", "ma", "arma"] {
@@ -232,7 +232,7 @@ fn a_grey_box_gives_the_delay_an_error_bar_and_reports() {
     assert_eq!(found["candidates"].as_array().unwrap().len(), 2);
     let delay = &found["operator"]["tau_e"];
     let off = delay["value"].as_f64().unwrap() - 0.28;
-    // Four standard errors.
+    // The tolerance is four standard errors.
     assert!(off.abs() < 4.0 * delay["standard_error"].as_f64().unwrap(), "{delay}");
     assert!(found["remnant"]["T_n"]["standard_error"].is_number());
     let page = fs::read_to_string(d.join("out/report.html")).unwrap();
@@ -260,7 +260,7 @@ fn a_change_is_found_and_its_gains_are_written() {
     assert!((midpoint["value"].as_f64().unwrap() - 40.96).abs() < 3.0, "{midpoint}");
     let trace = fs::read_to_string(d.join("trace.csv")).unwrap();
     assert!(trace.contains("t,K_e,K_e_se,T_L,T_L_se,K_e_dot,K_e_dot_se"));
-    // 8192 rows after two comments and the header.
+    // There are 8192 rows after two comments and the header.
     assert_eq!(trace.lines().count(), 8195);
 }
 
@@ -389,7 +389,7 @@ fn several_records_start_validation_report_and_margins() {
     let crossover = &found["open_loop"]["crossover_rad_s"];
     let (value, error) = (&crossover["value"], &crossover["standard_error"]);
     let off = value.as_f64().unwrap() - 1.5635;
-    // Two records; five standard errors.
+    // There are two records; the tolerance is five standard errors.
     assert!(
         off.abs() < 0.1 && off.abs() < 5.0 * error.as_f64().unwrap(),
         "{crossover}"
@@ -407,8 +407,8 @@ fn several_records_start_validation_report_and_margins() {
     assert!(page.contains("<svg") && page.contains("again.csv"), "{}", page.len());
 }
 
-/// The gain of the loop is one at three frequencies with this element: stable at the lowest crossover, but not as a
-/// whole.
+/// With this element, the gain of the loop is one at three frequencies. The margin at the lowest crossover is positive,
+/// but the loop is unstable.
 #[test]
 fn a_loop_that_is_not_stable_is_a_doubt() {
     let directory = simulated();
@@ -447,7 +447,7 @@ fn a_loop_that_is_not_stable_is_a_doubt() {
     );
 }
 
-/// A simulation without noise gives its operator back, and reports that there is no noise.
+/// From a simulation without noise the exact operator is identified, and the result reports that there is no noise.
 #[test]
 fn a_simulation_without_noise_gives_its_operator_back() {
     let directory = TempDir::new().unwrap();
@@ -494,7 +494,8 @@ fn a_simulation_without_noise_gives_its_operator_back() {
     }
 }
 
-/// With noise at any share of the power of u from rounding to a thousandth the form is the same, and there is no doubt.
+/// With noise of any share of the power of u, from rounding errors to a thousandth, the form is the same, and there is
+/// no warning.
 #[test]
 fn a_simulation_with_little_noise_is_identified() {
     let directory = TempDir::new().unwrap();
@@ -519,7 +520,7 @@ fn a_simulation_with_little_noise_is_identified() {
             (&"lead".into(), &"trustworthy".into()),
             "{level}"
         );
-        // For a gain: 0.3 sqrt(share), plus rounding.
+        // For a gain the tolerance is 0.3 sqrt(share) plus rounding.
         let allowed = 0.3 * level.parse::<f64>().unwrap().sqrt();
         for (name, expected) in [("K_e", 0.09), ("K_e_dot", 0.036), ("tau_e", 0.28)] {
             let value = found["operator"][name]["value"].as_f64().unwrap();
@@ -528,8 +529,8 @@ fn a_simulation_with_little_noise_is_identified() {
     }
 }
 
-/// For an error logged at a tenth of its rate, one of the two delays is right, and so is that for the given intersample
-/// behaviour.
+/// If the error is logged at a tenth of its rate, one of the two reported delays is correct, as is the delay for the
+/// given intersample behaviour.
 #[test]
 fn the_course_between_samples_moves_the_delay_by_half_a_sample() {
     let directory = simulated();
@@ -544,7 +545,7 @@ fn the_course_between_samples_moves_the_delay_by_half_a_sample() {
         tau(&auto) + 0.005
     );
     assert_eq!(straight["intersample"]["tau_e_if_straight"], Value::Null);
-    // One model: the remaining value is the centre of the prior.
+    // There is only one model; the remaining difference is due to the centre of the prior.
     assert!((tau(&straight) - tau(&auto) - 0.005).abs() < 1e-4 && (tau(&held) - tau(&auto)).abs() < 1e-3);
     let text = good(
         d,
@@ -564,7 +565,8 @@ fn the_course_between_samples_moves_the_delay_by_half_a_sample() {
     assert!(code == 2 && words.contains("zoh"), "{words}");
 }
 
-/// Without the excitation, other forms may be as likely as the one that has K_e: its interval then has a condition.
+/// Without the excitation, other forms may be as likely as the form with K_e, so the interval of K_e is conditional on
+/// this form.
 #[test]
 fn a_parameter_of_a_form_that_is_not_settled_has_a_condition() {
     let directory = tempfile::tempdir().unwrap();

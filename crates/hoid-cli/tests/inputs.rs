@@ -1,4 +1,4 @@
-//! `hoid identify` of an operator who sees a target in addition to the error.
+//! `hoid identify` for an operator who sees a target in addition to the error.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -11,7 +11,7 @@ use tempfile::TempDir;
 
 const PURSUIT: &str = include_str!("../../../fixtures/scenario/pursuit.toml");
 
-/// Runs of the scenario with a display of the target f_t.
+/// Simulates runs of the scenario with a displayed target f_t.
 fn runs(at: &Path, scenario: &str, n: usize) -> Vec<String> {
     fs::write(at.join("task.toml"), scenario).unwrap();
     let of = |seed: usize| {
@@ -31,7 +31,7 @@ fn of<'v>(parameters: &'v Value, name: &str) -> &'v Value {
     all.iter().find(|p| p["name"] == name).unwrap()
 }
 
-/// Deviation of an estimate from the truth, in standard errors.
+/// Returns the deviation of an estimate from the true value, in standard errors.
 fn off(estimate: &Value, truth: f64) -> f64 {
     (estimate["value"].as_f64().unwrap() - truth) / estimate["standard_error"].as_f64().unwrap()
 }
@@ -71,7 +71,7 @@ fn both_responses_are_found_and_one_input_is_told_off() {
         let off = off(of(parameters, name), truth);
         assert!(off.abs() < 3.5, "{name} is off by {off} errors");
     }
-    // By hand: |2.2/omega| = 1, except for the neuromuscular system.
+    // Computed by hand: |2.2/omega| = 1, except for the effect of the neuromuscular system.
     let crossover = &two["open_loop"]["crossover_rad_s"];
     assert!(off(crossover, 2.236).abs() < 3.5, "{crossover}");
 
@@ -274,7 +274,7 @@ fn a_group_has_the_responses_to_further_inputs_of_each_person() {
     }
     let crossover = &person["open_loop"]["crossover_rad_s"];
     assert!(off(crossover, 2.2).abs() < 3.0, "{person}");
-    // One input would be wrong: its models are omitted, which is no failure.
+    // Models with one input would be wrong and are omitted, which does not count as a failure.
     let kinds = kinds(&group);
     assert!(kinds.contains(&"one-input-models".to_owned()), "{kinds:?}");
     assert!(!kinds.contains(&"fits-failed".to_owned()), "{kinds:?}");
@@ -343,7 +343,7 @@ fn a_recursion_tracks_both_responses() {
             .unwrap()
             > 0.0
     );
-    // The person responds to the target by K_d s: 6 dB an octave and 90 deg.
+    // The person responds to the target with K_d s: the gain increases by 6 dB per octave, and the phase is 90 deg.
     let response = channels[1]["response"].as_array().unwrap();
     let gain = |k: usize| &response[k]["gain_db"];
     let truth = 20.0 * (0.7 * 4.0_f64).log10();

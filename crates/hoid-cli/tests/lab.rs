@@ -1,4 +1,4 @@
-//! `hoid lab` in a program built without it.
+//! `hoid lab` in a program built without this feature.
 #![cfg(not(feature = "lab"))]
 #![allow(clippy::unwrap_used)]
 

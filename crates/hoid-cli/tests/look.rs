@@ -1,5 +1,5 @@
 //! Inspection of a file: `hoid info`, `hoid group init`, `identify`, `describe` and `track` find the same columns and
-//! the same span, and give the arguments to use.
+//! the same span, and show the arguments to use.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -10,8 +10,8 @@ use tempfile::TempDir;
 
 use common::{bad, good, hoid, json, wave, write};
 
-/// An operator with an integrator, recorded as time, r, y and u: two periods of 20 s, started 3 s before the first and
-/// stopped 1 s after the last.
+/// An operator with an integrator, recorded as time, r, y and u. The recording has two periods of 20 s; it starts 3 s
+/// before the first period and stops 1 s after the last.
 fn recorded() -> TempDir {
     let directory = TempDir::new().unwrap();
     let people = "simulate-group --people --subjects 1 --runs 1 --plants integrator --out people";
@@ -25,9 +25,9 @@ fn recorded() -> TempDir {
     assert_eq!(rows.len(), 2400);
     let mut csv = "time,r,y,u\n".to_owned();
     for k in 0..2640_usize {
-        // Columns t, e, u, d, y, with the last rows repeated at the start.
+        // The columns are t, e, u, d, y; the last rows are repeated at the start.
         let row = &rows[(k + 2400 - 180) % 2400];
-        // No target before the first period and after the last.
+        // There is no target before the first and after the last period.
         let (r, e) = (if !(180..2580).contains(&k) { 0.0 } else { row[3] }, row[1]);
         csv.push_str(&format!("{},{r},{},{}\n", k as f64 / 60.0, r - e, row[2]));
     }
@@ -40,7 +40,7 @@ fn words(line: &str) -> Vec<&str> {
     line.split(' ').collect()
 }
 
-/// The arguments of a displayed command.
+/// Returns the arguments of a displayed command.
 fn shown<'a>(text: &'a str, verb: &str) -> Vec<&'a str> {
     let at = text.find(&format!("hoid {verb} ")).unwrap();
     words(text[at..].lines().next().unwrap()).split_off(1)
@@ -81,7 +81,7 @@ fn one_file_has_one_reading() {
     );
     assert_eq!(manifest["conditions"]["so"]["excitation"].as_str(), Some("r"));
 
-    // Without the columns each command reports them, with arguments that can be used.
+    // If the columns are not given, each command reports them, with arguments that can be used.
     for (verb, more) in [
         ("identify", &[][..]),
         ("describe", &[]),
@@ -132,7 +132,7 @@ fn nothing_is_guessed_where_it_is_not_certain() {
         let look = json(at, &["info", file, "--json"])["look"].clone();
         assert!(look["next"].is_null(), "{look}");
         assert!(good(at, &["info", file]).contains("--input COLUMN --output COLUMN"));
-        // Named, they are read.
+        // If the columns are given, they are read.
         let columns = ["info", file, "--input", "y", "--output", "b"];
         assert!(!good(at, &columns).contains("not found"));
     }
@@ -143,7 +143,8 @@ fn nothing_is_guessed_where_it_is_not_certain() {
     assert_eq!(code, 1);
 }
 
-/// Samples, and estimates with their errors by name, for the people of a group.
+/// Returns the number of samples (at 60 Hz) in the longest fitted span of a group, and the estimates of its first
+/// person with their standard errors.
 fn of_group(at: &Path, manifest: &str) -> (f64, Vec<(f64, f64)>) {
     fs::write(at.join("runs/group.toml"), manifest).unwrap();
     let _ = fs::remove_dir_all(at.join("out"));
@@ -191,7 +192,7 @@ fn whole_periods_are_kept_under_an_offset() {
             assert!((one.1 - other.1).abs() <= 1e-6 * one.1, "{of_identify:?} {of_group:?}");
         }
     }
-    // If the file ends with the span, no further rows are available.
+    // If the file ends with the span, no additional rows are available.
     let whole = words("--input r-y --offset u=1 --json");
     let found = json(at, &[&["identify", "runs/A_so_1.csv"][..], &whole].concat());
     assert_eq!(found["records"][0]["samples"], 2639);

@@ -1,4 +1,4 @@
-//! The same recordings have the same verdict wherever they are identified.
+//! The same recordings have the same verdict in all commands that identify them.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -64,7 +64,7 @@ fn simulated(at: &Path, seed: usize) -> Rows {
     lines.take(ROWS).map(row).collect()
 }
 
-/// Two runs of each person, as files of a group.
+/// Writes two runs of each person as files of a group.
 fn people(at: &Path) {
     let runs = [simulated(at, 1), simulated(at, 2)];
     fs::create_dir(at.join("people")).unwrap();
@@ -122,7 +122,7 @@ fn a_group_finds_word_for_word_what_identify_finds() {
         let kinds = verdict["findings"].as_array().unwrap().iter();
         seen.extend(kinds.map(|finding| finding["kind"].as_str().unwrap().to_owned()));
     }
-    // The recordings do have the faults.
+    // This checks that the recordings have the faults.
     for kind in ["stick-at-its-end", "coarse", "faults"] {
         assert!(seen.contains(kind), "{kind}: {seen:?}");
     }

@@ -15,7 +15,7 @@ use hoid::model::numbers::with_uncertainty;
 
 use common::{bad, good, hoid, json, simulated};
 
-/// A simulated run `in.csv`, a group `g` of two runs, a plan.
+/// Returns a folder with a simulated run `in.csv`, a group `g` of two runs, and a plan.
 fn workplace() -> TempDir {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
@@ -104,7 +104,7 @@ fn places_that_take_nothing_are_known_before_the_work() {
     }
 }
 
-/// Each command that prints, with fast arguments.
+/// Returns each command that prints, with arguments for which it is fast.
 fn printing() -> Vec<Vec<&'static str>> {
     let mut identify = vec!["identify", "in.csv"];
     identify.extend(SETTLED);
@@ -171,7 +171,7 @@ fn printing() -> Vec<Vec<&'static str>> {
     ]
 }
 
-/// Exit code and standard error of a command with redirected output.
+/// Returns exit code and standard error of a command with redirected output.
 fn printed_into(directory: &Path, arguments: &[&str], out: Stdio) -> (Option<i32>, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args(arguments)
@@ -230,7 +230,7 @@ fn a_reader_that_leaves_early_ends_nothing_else() {
     assert!(rows.lines().count() > 8192);
 }
 
-/// A limit of the size of files, set by the shell of the test.
+/// The shell of the test sets a limit on the size of files.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_limit_of_the_size_of_files_leaves_them_whole() {
@@ -256,7 +256,7 @@ fn a_limit_of_the_size_of_files_leaves_them_whole() {
         assert!(message.contains("File too large"), "{command}: {message}");
     }
     assert_eq!(fs::read(d.join("in.csv")).unwrap(), kept);
-    // The file created by the shell exists, and no part.
+    // Only the file created by the shell is new; there is no partial file.
     assert_eq!(fs::read_dir(d).unwrap().count(), before + 1);
 }
 
@@ -289,7 +289,7 @@ structure = "arx"
 orders.nk = 29
 "#;
 
-/// True if a program started from here continues after its terminal is closed (`nohup`).
+/// True if programs started by this test continue after the terminal is closed (`nohup`).
 #[cfg(unix)]
 fn hang_up_is_ignored() -> bool {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -297,7 +297,7 @@ fn hang_up_is_ignored() -> bool {
     ignored.is_some_and(|mask| u64::from_str_radix(mask.trim(), 16).is_ok_and(|mask| mask & 1 == 1))
 }
 
-/// Each signal that ends a program, during writing: no partial output remains.
+/// After each signal that ends a program while it writes, no partial output remains.
 #[cfg(unix)]
 #[test]
 fn signals_end_with_their_code_and_leave_nothing() {
@@ -338,7 +338,7 @@ fn signals_end_with_their_code_and_leave_nothing() {
     }
 }
 
-/// Estimates with errors and intervals, for a paper, equal to those in the JSON.
+/// A table for a paper contains the same estimates, standard errors and intervals as the JSON.
 #[test]
 fn a_result_is_a_table_for_a_paper() {
     let directory = simulated();

@@ -7,7 +7,7 @@ use common::{bad, good, hoid, json};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Five runs of one virtual person on 1/s, who has a lag and a lead.
+/// Simulates five runs with the element 1/s of one virtual person, who has a lag and a lead.
 fn runs() -> TempDir {
     let directory = TempDir::new().unwrap();
     good(
@@ -69,7 +69,7 @@ fn a_person_is_found_by_default() {
     for name in ["T_L", "tau_e"] {
         let p = of(&found, name);
         let (low, high) = (p["interval"][0].as_f64().unwrap(), p["interval"][1].as_f64().unwrap());
-        // One person of a fixed seed; the values of a run differ from those of the first by a few percent.
+        // The person has a fixed seed; the values of a run differ from those of the first run by a few percent.
         let margin = 0.15 * true_value(name);
         assert!(
             low - margin < true_value(name) && true_value(name) < high + margin,
@@ -96,7 +96,7 @@ fn a_person_is_found_by_default() {
         assert!(!found[key].is_null(), "{key}");
     }
     assert!(found["forms"].as_array().unwrap().len() == 8);
-    // The element is 1/s: with ten times its gain, or with 1/s^2, the loop would be unstable.
+    // The element is 1/s; with ten times its gain, or with 1/s^2, the loop would be unstable.
     for wrong in ["10/s", "1/s^2", "0.001/s"] {
         let last = arguments.len() - 1;
         arguments[last] = wrong;
@@ -105,7 +105,7 @@ fn a_person_is_found_by_default() {
         let told = reasons.contains("unstable-loop") || reasons.contains("no-crossover");
         assert!(told && found["verdict"]["level"] != "trustworthy", "{wrong}: {reasons}");
     }
-    // The result is a prior for another fit.
+    // The result is used as a prior for another fit.
     std::fs::write(at.join("person.json"), found.to_string()).unwrap();
     let one = json(
         at,
@@ -170,7 +170,7 @@ fn what_nobody_answers_is_not_determined() {
     let found: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(found["verdict"]["level"], "not determined", "{}", found["verdict"]);
     assert_eq!(output.status.code(), Some(1));
-    // A person without a response, and one without data.
+    // A person without a response, and a person without data.
     std::fs::write(at.join("still.csv"), "t,e,u\n0,1,2\n0.1,1,2\n0.2,1,2\n").unwrap();
     let (code, message) = bad(at, &["identify", "still.csv"]);
     assert_eq!(code, 1, "{message}");
@@ -181,7 +181,7 @@ fn what_nobody_answers_is_not_determined() {
     assert_eq!(code, 1, "{message}");
     let (code, _) = bad(at, &["identify", "noise.csv", "--individual", "K_q"]);
     assert_eq!(code, 2);
-    // Without lines there is still a response to draw; a changing operator has none.
+    // Without lines, the figure shows the response; for a changing operator there is no figure.
     let output = hoid(at, &["identify", "noise.csv", "--figure", "a.svg"]);
     assert_eq!(output.status.code(), Some(1));
     assert!(std::fs::read_to_string(at.join("a.svg")).unwrap().starts_with("<svg"));

@@ -1,4 +1,5 @@
-//! Rates above 200 Hz: filtered and decimated automatically, stated in the result, with the same operator.
+//! At rates above 200 Hz, recordings are filtered and decimated automatically. The result states this, and the operator
+//! is the same.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -16,11 +17,11 @@ use tempfile::TempDir;
 
 use common::{bad, good, hoid, json};
 
-/// A run of C1, or of a person with an element, at the given rate in Hz.
+/// Simulates a run of C1, or of a person with an element, at the given rate in Hz.
 fn simulate(at: &Path, person: &str, hz: f64, seed: u64) -> String {
     let file = format!("{person}-{hz}-{seed}.csv");
     let (ts, seed) = (format!("{:?}", 1.0 / hz), seed.to_string());
-    // Four periods, or three where these are not whole samples of four.
+    // The measurement has four periods, or three if four periods are not a whole number of samples.
     let (measurement_s, run_in_s) = if ts == "0.003" { (60.0, 6.0) } else { (80.0, 8.0) };
     let toml = |form: &str, gains: &str, element: &str| {
         format!(
@@ -33,7 +34,7 @@ fn simulate(at: &Path, person: &str, hz: f64, seed: u64) -> String {
     let scenario = match person {
         "lead" => toml("lead", "K = 0.5\nT_L_s = 2.0", "1/s^2"),
         "gain" => toml("gain", "K = 3.0", "1/s"),
-        // With a remnant so smooth that nothing is determined at 1000 Hz.
+        // The remnant is so smooth that nothing is determined at 1000 Hz.
         "smooth" => toml("gain", "K = 3.0", "1/s")
             .replace(
                 "omega_nm_rad_s = 12.0\nzeta_nm = 0.3\ntau_e_s = 0.15",
@@ -63,7 +64,7 @@ fn pair(found: &Value) -> (f64, f64) {
 fn a_person_at_1000_hz_is_the_one_at_100_hz() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
-    // Person, element, true crossover, margin and delay.
+    // Each entry contains person, element, true crossover, margin and delay.
     for (person, element, truth) in [
         ("lead", "1/s^2", [1.1052, 52.97, 0.15]),
         ("gain", "1/s", [3.1805, 52.96, 0.15]),
@@ -136,7 +137,7 @@ fn lines_do_not_depend_on_the_rate() {
     assert_eq!(lines(&auto).len(), lines(&off).len());
     for (a, b) in lines(&auto).iter().zip(lines(&off)) {
         let distance = |name: &str| (a[name].as_f64().unwrap() - b[name].as_f64().unwrap()).abs();
-        // Without correcting the lead of the input, it would be .0045 s, 1 deg at 4 rad/s.
+        // Without the correction, the lead of the input would be .0045 s, which is 1 deg at 4 rad/s.
         assert!(distance("gain_db") < 0.02 && distance("phase_deg") < 0.1, "{a} {b}");
     }
     let page = good(at, &["describe", &file]);
@@ -246,7 +247,7 @@ fn a_stream_at_1000_hz_is_the_track() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let file = simulate(at, "lead", 1000.0, 1);
-    // With any verdict: 20 s are short.
+    // Any verdict is accepted, because 20 s are too short.
     hoid(at, &["track", &file, "--to", "20", "--out", "trace.csv"]);
     let text = fs::read_to_string(at.join(&file)).unwrap();
     let rows: Vec<&str> = text
@@ -271,7 +272,7 @@ fn a_stream_at_1000_hz_is_the_track() {
         .lines()
         .map(|line| serde_json::from_str(line).unwrap())
         .collect();
-    // One line per line, and only samples after the header.
+    // Each input line after the header is a sample and gives one output line.
     assert_eq!(answers.len(), rows.len() - 1);
     let last = &answers[answers.len() - 1];
     let decimated = &last["decimated"];
@@ -283,13 +284,13 @@ fn a_stream_at_1000_hz_is_the_track() {
     assert!((0.1..0.2).contains(&behind_s), "{behind_s}");
     let told = String::from_utf8(output.stderr).unwrap();
     assert!(told.contains("filtered and decimated by 10 to 100 Hz"), "{told}");
-    // For the same sample the digits are those of the trace.
+    // For the same sample, the digits equal those of the trace.
     let trace = fs::read_to_string(at.join("trace.csv")).unwrap();
     let mut table = trace.lines().filter(|line| !line.starts_with('#'));
     let names: Vec<&str> = table.next().unwrap().split(',').collect();
     let place = names.iter().position(|name| *name == "b0").unwrap();
     let value = last["parameters"]["b0"]["value"].as_f64().unwrap();
-    // The gains are constant within a block, so that it is the row of that time, not the first of its value.
+    // The gains are constant within a block, so the row is found by its time and not by its value.
     let at = last["t"].as_f64().unwrap() - behind_s;
     let row = table
         .map(|line| {

@@ -20,8 +20,7 @@ const FIT: [&str; 8] = [
     "run.csv",
 ];
 
-/// A simulated run, e in rad, u recorded two samples late, t from 100 s on; `row` modifies the
-/// rows.
+/// Writes a simulated run with e in rad, u recorded two samples late, and t from 100 s on; `row` modifies the rows.
 fn recorded(row: impl Fn(usize, [f64; 3]) -> Vec<[f64; 3]>) -> TempDir {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
@@ -104,7 +103,7 @@ fn what_is_done_is_told_in_every_form() {
         (&Value::from(2.0), &Value::from(2))
     );
     assert_eq!(found["warnings"], serde_json::json!([]));
-    // The same samples, up to the rounding of the factor.
+    // The samples are the same, up to rounding of the factor.
     for (a, b) in parameters(&found).iter().zip(parameters(&plain)) {
         assert!((a - b).abs() < 1e-7 * b.abs() + 1e-9, "{a} {b}");
     }
@@ -168,7 +167,7 @@ fn what_is_done_is_told_in_every_form() {
 
 #[test]
 fn trouble_is_shown_and_handled_only_as_asked() {
-    // Every five hundredth row is duplicated, 20 rows are missing, u is clipped.
+    // Every five hundredth row is duplicated, 20 rows are missing, and u is clipped.
     let directory = recorded(|k, [t, e, u]| {
         let values = [t, e, u.clamp(-0.15, 0.15)];
         match k {
@@ -266,7 +265,7 @@ fn wrong_preparations_are_told_in_the_users_words() {
     }
 }
 
-/// Eye and stick in files of their own, at 100 and 50 Hz: the message names a way that reads them.
+/// Eye and stick are in separate files, at 100 and 50 Hz; the message describes how to read them.
 #[test]
 fn two_files_at_two_rates_are_one_recording() {
     let directory = recorded(|k, [t, e, u]| {
@@ -293,7 +292,7 @@ fn two_files_at_two_rates_are_one_recording() {
     ] {
         assert!(message.contains(part), "{message}");
     }
-    // What the line of pandas writes.
+    // This is the file that the line of pandas code writes.
     write("joined.csv", "t,e,u", &|k, cells| {
         let u = if k.is_multiple_of(2) { cells[2] } else { "" };
         Some(format!("{},{},{u}", cells[0], cells[1]))
@@ -306,7 +305,7 @@ fn two_files_at_two_rates_are_one_recording() {
     };
     let (joined, whole) = (gain(&[&["joined.csv"], &advised[..]].concat()), gain(&["run.csv"]));
     assert!((joined / whole - 1.0).abs() < 0.03, "{joined} {whole}");
-    // Neither file alone, nor two runs without the column, is taken for such a pair.
+    // Neither a single file nor two runs without the column are mistaken for such a pair.
     let (_, alone) = bad(at, &["identify", "eye.csv"]);
     assert!(!alone.contains("pandas"), "{alone}");
 }

@@ -1,4 +1,5 @@
-//! `hoid reproduce --only experiment --recordings`: the experiment of the thesis on recorded people, here simulated ones.
+//! `hoid reproduce --only experiment --recordings`: the experiment of the thesis with recorded people, who are
+//! simulated here.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -17,7 +18,7 @@ const BY_RECORDINGS: [&str; 6] = [
     "--out",
 ];
 
-/// Recordings with an axis in their names, and the manifest that `hoid group init` makes of them.
+/// Writes recordings with an axis in their names, and their manifest by `hoid group init`.
 fn recorded(at: &Path) {
     let arguments = "simulate-group --subjects 2 --runs 1 --conditions C1,C4 --noise-level 0.02 --out recordings";
     good(at, &arguments.split(' ').collect::<Vec<_>>());
@@ -100,7 +101,7 @@ fn recorded_people_have_the_table_and_the_figures_of_the_text() {
         assert!(at.join(format!("out/figures/{name}-fixed-roll.svg")).exists(), "{name}");
     }
     assert!(page.contains("run 1 of S2 in fixed-roll: "), "{page}");
-    // The lead after the change is larger: T_L is .4, then 1.2 s, times what is the person's own.
+    // The lead is larger after the change: T_L is .4 s and then 1.2 s, multiplied by a factor of the person.
     let operators = fs::read_to_string(at.join("out/tables/operators.csv")).unwrap();
     let lead = |span: &str| -> f64 {
         let row = operators

@@ -1,5 +1,5 @@
-//! Output on the screen: the result first and on one page, details on request, remarks after it and
-//! once, at any width; help, completions and manual pages.
+//! Output on the screen: at any width, the result is first and fits on one page, details are shown on request, and each
+//! remark follows once. Also help, completions and manual pages.
 
 #![allow(clippy::unwrap_used)]
 
@@ -29,7 +29,7 @@ const FIT: [&str; 8] = [
     "nd=1",
 ];
 
-/// Standard output on a screen of the given width.
+/// Returns the standard output on a screen of the given width.
 fn at_width(directory: &Path, columns: &str, arguments: &[&str]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args(arguments)
@@ -143,7 +143,7 @@ fn mistakes_are_answered_with_what_was_meant() {
     assert!(code == 1 && message.contains("did you mean \"f_t\"?"), "{message}");
     let (code, message) = bad(d, &["simulate", "--condition", "C1", "--out", "none/x.csv"]);
     assert!(code == 1 && !message.contains(".part"), "{message}");
-    // Before any work, and without output files.
+    // The error is reported before any work, and no output files are written.
     fs::write(d.join("file"), "").unwrap();
     for arguments in [
         &["demo", "--out", "file/x"][..],
@@ -158,7 +158,7 @@ fn mistakes_are_answered_with_what_was_meant() {
     }
 }
 
-/// Typical files of users: other names, decimal commas, no units, t in ms.
+/// Typical files of users, with other names, decimal commas, no units, and t in ms.
 #[test]
 fn files_of_a_newcomer_are_read_or_answered_with_what_to_do() {
     let directory = simulated();
@@ -214,7 +214,7 @@ fn files_of_a_newcomer_are_read_or_answered_with_what_to_do() {
         page("mine.csv", &["--unit", "e=degrees,u=radians"]),
         page("mine.csv", &["--unit", "e=deg,u=rad"])
     );
-    // Columns other than e and u, and no units: six columns on 80.
+    // The columns have other names than e and u, and there are no units; six table columns fit into 80 characters.
     let info = at_width(d, "80", &["info", "mine.csv"]);
     assert!(info.contains(" column") && !info.contains("unit"), "{info}");
     assert!(info.lines().all(|line| line.chars().count() <= 80), "{info}");

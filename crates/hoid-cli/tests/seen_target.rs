@@ -47,7 +47,8 @@ fn value(estimate: &Value) -> f64 {
     estimate["value"].as_f64().unwrap()
 }
 
-/// Crossover and phase margin by hand: 1.5635 rad/s and 76.67 deg in C1, 2.7480 rad/s and 22.90 deg in C2.
+/// Crossover and phase margin, computed by hand, are 1.5635 rad/s and 76.67 deg in C1, and 2.7480 rad/s and 22.90 deg
+/// in C2.
 #[test]
 fn both_responses_are_found_within_their_errors() {
     let at = TempDir::new().unwrap();
@@ -103,7 +104,7 @@ fn without_noise_both_responses_are_exact() {
     }
 }
 
-/// The condition changes at 40.96 s, and the response to the target with it.
+/// At 40.96 s both the condition and the response to the target change.
 #[test]
 fn a_response_that_changes_is_found_in_both_halves() {
     let at = TempDir::new().unwrap();

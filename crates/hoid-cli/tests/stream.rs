@@ -18,8 +18,8 @@ use tempfile::TempDir;
 
 use common::{bad, good, json, physical};
 
-/// Far beyond the latency of a line, so that no test fails on a slow machine and a missing line
-/// does not block.
+/// Timeout for a line: much longer than its latency, so that no test fails on a slow machine, and a missing line does
+/// not block a test.
 const PATIENCE: Duration = Duration::from_secs(60);
 const AT_ONCE: [&str; 8] = [
     "--method", "rpem", "--nk", "29", "--orders", "nd=1", "--start", "nothing",
@@ -85,7 +85,7 @@ impl Stream {
         assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
     }
 
-    /// Waits for the end; returns the exit status, the remaining lines, and the messages.
+    /// Waits for the end of the stream; returns the exit status, the remaining lines, and the messages.
     fn end(mut self) -> (ExitStatus, Vec<String>, String) {
         drop(self.input.take());
         let begun = Instant::now();
@@ -126,7 +126,7 @@ fn answers(arguments: &[&str], text: &str) -> (Vec<Value>, String) {
     (lines, said)
 }
 
-/// A simulated run as text, and in `c.csv`.
+/// Returns a simulated run as text, and writes it to `c.csv`.
 fn simulated(directory: &Path, seed: &str) -> String {
     let text = good(
         directory,
@@ -183,7 +183,7 @@ fn simulate_into_stream_is_track() {
     assert!(lines[1998]["parameters"].is_null() && lines[1999]["parameters"]["b0"]["value"].is_f64());
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(said.contains("method: physical") && said.contains("nk=29"), "{said}");
-    // The same fit of the first 20 s, the same samples: the same numbers.
+    // With the same fit of the first 20 s and the same samples, the numbers are the same.
     simulated(d, "3");
     let tracked = json(
         d,
@@ -275,7 +275,7 @@ fn hostile_lines_are_told_and_counted_and_poison_nothing() {
         assert!(line["fault"].as_str().unwrap().contains(fault), "{line}");
         assert_eq!(line["skipped"], skipped, "{line}");
         assert!(line["innovation"].is_null());
-        // The estimate stays.
+        // The estimate stays constant.
         assert_eq!(line["parameters"], before["parameters"]);
     }
     // Blank lines and comments are ignored.
@@ -328,7 +328,7 @@ fn a_wild_value_and_a_hostile_span_are_told_in_their_lines() {
         "{events:?}"
     );
     assert!((span["from"].as_f64().unwrap() - 30.0).abs() < 0.2, "{span}");
-    // During the pause the estimate is constant, and the verdict is at most doubtful.
+    // During the pause the estimate is constant, and the verdict is never trustworthy.
     assert!((paused + 1..*restarted).all(|k| answers[k]["level"] != "trustworthy"));
     assert_eq!(answers[paused + 1]["parameters"], answers[restarted - 1]["parameters"]);
     let last = answers.last().unwrap();
@@ -356,7 +356,8 @@ fn an_idle_head_prolongs_the_warm_up() {
         .join("\n")
         + "\n";
     let (answers, said) = answers(&["--orders", "nd=1"], &all);
-    // The delay equals that of the run by itself within a sample: the warm-up ends some samples later.
+    // The delay agrees to within a sample with the delay for the run alone, because the warm-up ends some samples
+    // later.
     let nk = |said: &str| {
         said.split("nk=")
             .nth(1)
@@ -399,7 +400,7 @@ fn late_lines_are_bridged_and_lines_behind_are_dropped() {
     assert!(line["fault"].as_str().unwrap().contains("t is \"x\""), "{line}");
     assert_eq!((&line["skipped"], &line["dropped"]), (&3.into(), &2.into()));
     assert!(stream.ask(&row(54)).get("fault").is_none());
-    // A pause of a minute: ten seconds of it are filled.
+    // Ten seconds of a pause of one minute are filled.
     let line = stream.ask(&row(6054));
     assert!(line["fault"].as_str().unwrap().contains("10 s are bridged"), "{line}");
     assert_eq!(line["skipped"], 1003);
@@ -429,7 +430,7 @@ fn a_warm_up_that_fails_goes_on_until_there_is_something_to_fit() {
     let directory = TempDir::new().unwrap();
     let text = simulated(directory.path(), "1");
     let mut input = String::new();
-    // Silence, then the run: the silence is excluded, and the warm-up extends over the run.
+    // Constant signals precede the run; they are excluded, and the warm-up extends over the run.
     for _ in 0..600 {
         input.push_str("0,0\n");
     }
@@ -453,11 +454,11 @@ fn a_warm_up_that_fails_goes_on_until_there_is_something_to_fit() {
     let last = lines.last().unwrap();
     assert_eq!(last["operator"]["convertible"], true, "{last}");
     assert!(said.contains("started after"), "{said}");
-    // A stream that ends earlier reports it.
+    // A stream that ends during the warm-up reports this.
     let (lines, said) = answers(&arguments, "0.1,0.2\n0.2,0.1\n");
     assert_eq!(lines.len(), 2);
     assert!(said.contains("The warm-up did not end: 2 of 600"), "{said}");
-    // Faults within the warm-up: a short one is filled, a long one restarts it.
+    // A short fault within the warm-up is filled; a long fault restarts the warm-up.
     let mut input: String = (0..50).map(|k| format!("{},{}\n", wave(k).0, wave(k).1)).collect();
     input.push_str("nan,0\n0.1,0.2\n");
     let (lines, _) = answers(&arguments, &input);
@@ -498,7 +499,7 @@ fn a_reader_that_leaves_ends_the_stream_quietly() {
     let _ = input.write_all(b"0.1,0.2\n0.1,0.2\n");
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0));
-    // Only the settings.
+    // Only the settings are printed.
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(
         said.starts_with("started at once") && said.lines().count() == 1,
@@ -519,7 +520,7 @@ fn a_reader_that_leaves_ends_the_stream_quietly() {
 #[cfg(unix)]
 #[test]
 fn an_interrupt_ends_with_zero_and_whole_lines() {
-    // While it waits.
+    // The stream is interrupted while it waits for input.
     let mut stream = Stream::new(&AT_ONCE);
     stream.ask("0.1,0.2");
     stream.interrupt();
@@ -531,7 +532,7 @@ fn an_interrupt_ends_with_zero_and_whole_lines() {
     let (status, rest, said) = stream.end();
     assert_eq!(status.code(), Some(0));
     assert!(rest.is_empty() && said.contains("1 samples"), "{said}");
-    // During its computation.
+    // The stream is interrupted during a computation.
     let mut stream = Stream::new(&AT_ONCE);
     let mut input = stream.input.take().unwrap();
     let writer = thread::spawn(move || {

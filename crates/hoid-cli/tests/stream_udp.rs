@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod common;
-// The command of the study uses the rest of this module.
+// The study uses the rest of this module.
 #[cfg(unix)]
 #[allow(dead_code)]
 #[path = "common/live/mod.rs"]
@@ -38,7 +38,7 @@ fn told(stream: &Stream) -> Value {
     serde_json::from_slice(&stream.answer()).unwrap()
 }
 
-/// Lost, duplicated and late samples are detected by their sequence numbers, as by a column t.
+/// Lost, duplicated and late samples are detected from their sequence numbers, as from a column t.
 #[cfg(unix)]
 #[test]
 fn lost_samples_are_bridged_and_counted() {
@@ -52,7 +52,7 @@ fn lost_samples_are_bridged_and_counted() {
         udp.send(&as_struct(k, f64::NAN, 0.0, 0.0));
         udp.estimate();
     }
-    // A line requests its state.
+    // A line of text is answered with the state of the stream.
     udp.send(b"2.00,0.1,0.2");
     let line = told(&udp);
     assert_eq!((&line["skipped"], &line["dropped"]), (&5.into(), &2.into()), "{line}");
@@ -63,7 +63,7 @@ fn lost_samples_are_bridged_and_counted() {
     );
 }
 
-/// JSON objects, of one line or of several, are samples by the names of the channels, and answered by lines.
+/// JSON objects on one or several lines are samples with the names of the channels as keys, and are answered by lines.
 #[cfg(unix)]
 #[test]
 fn objects_of_json_are_samples() {
@@ -74,14 +74,14 @@ fn objects_of_json_are_samples() {
     let line = told(&udp);
     assert_eq!((&line["t"], &line["skipped"]), (&0.01.into(), &1.into()), "{line}");
     assert!(line["fault"].as_str().unwrap().contains("error is missing"), "{line}");
-    // One was lost.
+    // One sample was lost.
     udp.send(b"{\"t\": 0.03, \"error\": 0, \"stick\": 0}\n{\"t\": 0.04, \"error\": 0, \"stick\": 0}");
     let (first, second) = (told(&udp), told(&udp));
     assert_eq!((&first["skipped"], second["t"].as_f64()), (&2.into(), Some(0.04)));
     assert!(udp.end().contains("5 samples: 2 skipped"));
 }
 
-/// No external data end the stream or are mistaken for a sample.
+/// No external data end the stream, and none are mistaken for a sample.
 #[cfg(unix)]
 #[test]
 fn hostile_datagrams_are_counted() {
@@ -127,7 +127,7 @@ fn hostile_datagrams_are_counted() {
     assert!(udp.end().contains("4 samples"), "the others are none");
 }
 
-/// So few that the system keeps all of them under any load.
+/// There are so few samples that the system keeps all of them under any load.
 #[cfg(unix)]
 #[test]
 fn every_sample_at_a_rate_is_answered() {

@@ -51,7 +51,7 @@ fn a_study_that_was_killed_goes_on_to_the_same_bytes() {
     let at = directory.path();
     good(at, &["study", "run", "plan.toml", "--out", "whole"]);
     let mut killed = 0;
-    // Kills at several instants, whatever is being written.
+    // The study is killed at several instants, regardless of what it writes at that time.
     for wait_ms in [0, 35, 71, 13] {
         let mut child = Command::new(env!("CARGO_BIN_EXE_hoid"))
             .args([
@@ -75,7 +75,7 @@ fn a_study_that_was_killed_goes_on_to_the_same_bytes() {
             std::thread::sleep(Duration::from_millis(1));
         }
         std::thread::sleep(Duration::from_millis(wait_ms));
-        // SIGKILL: the program cannot clean up.
+        // After SIGKILL, the program cannot clean up.
         if child.kill().is_ok() && !child.wait().unwrap().success() {
             killed += 1;
         }
@@ -192,8 +192,8 @@ fn a_run_of_a_study_can_be_repeated_by_hand() {
         .iter()
         .find(|l| l[column("cell")] == "1" && l[column("replication")] == "1" && l[column("nd")] == "2.0")
         .unwrap();
-    // A study fits its runs together, which differs from a separate fit by rounding: less than 1e-7
-    // of a standard error, here of about 0.01.
+    // A study fits its runs together, so its results differ from a separate fit by rounding errors: by less than 1e-7
+    // of a standard error, which is about 0.01 here.
     let of_study = row[column("f1")].parse::<f64>().unwrap();
     assert!((of_study - value).abs() < 1e-9, "{of_study} {value}");
 }

@@ -1,4 +1,4 @@
-//! `identify` of systems other than operators, by polynomial models: exact data, a step test.
+//! `hoid identify` of systems other than operators by polynomial models: exact data and a step test.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -19,7 +19,7 @@ fn kinds(found: &Value) -> Vec<&str> {
     all.iter().map(|finding| finding["kind"].as_str().unwrap()).collect()
 }
 
-/// Noise of unit size, the same in every run.
+/// Returns noise of unit size, which is the same in every run.
 fn noise(t: usize) -> f64 {
     let mut x = (t as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -27,7 +27,7 @@ fn noise(t: usize) -> f64 {
     ((x >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) * 12_f64.sqrt()
 }
 
-/// A level and an initial transient in addition to the model: its coefficients are recovered.
+/// The data have a level and an initial transient in addition to the model, whose coefficients are recovered.
 #[test]
 fn exact_data_give_exact_coefficients() {
     let directory = TempDir::new().unwrap();
@@ -52,7 +52,8 @@ fn exact_data_give_exact_coefficients() {
     assert_eq!(kinds(&found), ["no-noise"]);
 }
 
-/// A furnace: rest, a step of 10 after 3 s, a dead time of .35 s, a lag of 1.5 s, a gain of 2, from a level of 13.5.
+/// A furnace at a level of 13.5, with a step of 10 after 3 s at rest, a dead time of .35 s, a lag of 1.5 s and a gain
+/// of 2.
 #[test]
 fn a_step_gives_gain_lag_and_level() {
     let directory = TempDir::new().unwrap();

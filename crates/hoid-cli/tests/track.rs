@@ -26,7 +26,7 @@ fn tracked(directory: &Path, more: &[&str]) -> Value {
     json(directory, &physical(&arguments))
 }
 
-/// Header and rows of a trace; an empty cell is NaN.
+/// Returns header and rows of a trace; an empty cell is NaN.
 fn trace(directory: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
     let text = fs::read_to_string(directory.join("trace.csv")).unwrap();
     let mut lines = text.lines().filter(|l| !l.starts_with('#'));
@@ -46,7 +46,7 @@ fn column(trace: &(Vec<String>, Vec<Vec<f64>>), name: &str) -> Vec<f64> {
     trace.1.iter().map(|row| row[place]).collect()
 }
 
-/// The result comes first: a file of its rows is written only if one is named.
+/// The result is printed in any case; its rows are written only if a file is given.
 #[test]
 fn no_trace_is_needed_for_an_answer() {
     let directory = simulated("C1");
@@ -73,7 +73,7 @@ fn a_start_fit_finds_the_operator_and_its_change() {
         found["orders"],
         serde_json::json!({"na": 0, "nb": 2, "nc": 0, "nd": 1, "nf": 2, "nk": 29})
     );
-    // The start fit equals that of identify, with the table of the search: nk 6..61, nd 1..4.
+    // The start fit equals the fit of `identify`, with the table of the search over nk 6..61 and nd 1..4.
     assert_eq!(found["start"]["candidates"].as_array().unwrap().len(), 224);
     assert_eq!(found["start"]["records"][0]["samples"], 2731);
     assert_eq!(found["start"]["operator"]["convertible"], true);
@@ -94,7 +94,7 @@ fn a_start_fit_finds_the_operator_and_its_change() {
     // Until the end of the start span the estimate is constant.
     let gain = column(&trace, "K_e");
     assert!((0..2730).all(|k| gain[k] == gain[0]) && gain[2800] != gain[0]);
-    // Before and long after the change of C4, within five standard errors.
+    // Before and long after the change of C4, the estimates are within five standard errors.
     for (k, truth) in [(3500, 0.036), (8191, 0.084)] {
         let (value, error) = (column(&trace, "K_e_dot")[k], column(&trace, "K_e_dot_se")[k]);
         assert!((value - truth).abs() < 5.0 * error, "{k}: {value} +- {error}");
@@ -106,7 +106,7 @@ fn a_start_fit_finds_the_operator_and_its_change() {
     assert_eq!(found["last"]["t"].as_f64().unwrap(), last[0]);
 }
 
-/// The run with its rows changed, in `c.csv`.
+/// Writes the run with changed rows to `c.csv`.
 fn changed(directory: &Path, change: &mut dyn FnMut(Vec<String>) -> Vec<String>) {
     let file = directory.join("c.csv");
     let text = fs::read_to_string(&file).unwrap();
@@ -203,7 +203,7 @@ fn the_page_reads_well() {
         assert!(page.contains(part), "{part:?} is not in:\n{page}");
     }
     assert_eq!(page.lines().filter(|l| l.contains('±')).count(), 8);
-    // A record without true values.
+    // The record has no true values.
     let text = fs::read_to_string(d.join("c.csv")).unwrap();
     let renamed = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"]
         .iter()
@@ -258,7 +258,7 @@ fn every_method_structure_and_way_of_forgetting_runs() {
         arguments.extend(case);
         let found = tracked(d, &arguments);
         let trace = trace(d);
-        // 3000 samples: every seventh and the last.
+        // Of 3000 samples, every seventh and the last are rows.
         assert_eq!(trace.1.len(), 429, "{case:?}");
         assert_eq!(found["rows"], 429);
         let names = found["last"]["parameters"].as_object().unwrap();
@@ -279,7 +279,7 @@ fn every_method_structure_and_way_of_forgetting_runs() {
     assert!(column(&trace(d), "tau_e_se").iter().all(|e| *e > 0.0));
 }
 
-/// The response columns of the last row: value and standard error by name.
+/// Returns value and standard error in the columns of a quantity in the last row.
 fn last_of(trace: &(Vec<String>, Vec<Vec<f64>>), name: &str) -> (f64, f64) {
     let of = |name: &str| *column(trace, name).last().unwrap();
     (of(name), of(&format!("{name}_se")))
@@ -306,11 +306,11 @@ fn the_default_needs_nothing_and_tells_the_loop() {
     assert_eq!(setting(&found, "start"), "the defaults for people");
     assert_eq!(setting(&found, "response at"), "1, 2.5 rad/s");
     let trace = trace(d);
-    // The first second gives the scale of the gains; then there are bands, which become narrower.
+    // The first second determines the scale of the gains; after that there are error bands, which become narrower.
     let errors = column(&trace, "gain_db@2.5_se");
     assert!(errors[..98].iter().all(|e| e.is_nan()) && errors[102] > 2.0 * errors[3000]);
     let crossover = column(&trace, "crossover_rad_s");
-    // The controlled element is that of the time before the change.
+    // The controlled element is the element before the change.
     assert!(crossover[3000..4000].iter().all(|w| (w - 1.56).abs() < 0.5));
     for name in ["crossover_rad_s", "phase_margin_deg"] {
         let (value, error) = last_of(&trace, name);
@@ -321,7 +321,7 @@ fn the_default_needs_nothing_and_tells_the_loop() {
     let without = column(&trace, "crossover_rad_s").iter().filter(|w| w.is_nan()).count();
     assert_eq!(found["rows_without_crossover"], without);
     assert!(without == 0 || found["no_crossover_reason"].is_string());
-    // Before the data carry information about the neuromuscular system, that is reported.
+    // As long as the data contain no information about the neuromuscular system, this is reported.
     let determined = column(&trace, "omega_nm_determined");
     assert!(determined[..300].iter().all(|v| *v == 0.0));
     assert!(determined[1500..].iter().all(|v| *v == 1.0));
@@ -391,7 +391,8 @@ fn a_person_is_followed_from_an_earlier_fit_of_them() {
     let known = trace(d);
     json(d, &["track", "c.csv", "--out", "trace.csv", "--json", "--at", "2.5"]);
     let default = trace(d);
-    // Available from the first sample on, and in the first seconds with smaller errors than without.
+    // The estimate is available from the first sample on, and its errors in the first seconds are smaller than without
+    // a prior.
     let (of_known, of_usual) = (column(&known, "gain_db@2.5_se"), column(&default, "gain_db@2.5_se"));
     assert!(of_known[0].is_finite() && of_usual[0].is_nan());
     assert!(
@@ -400,7 +401,7 @@ fn a_person_is_followed_from_an_earlier_fit_of_them() {
         of_known[150],
         of_usual[150]
     );
-    // K_e_dot is .036 s; the fit of the other run is close to it, and remains so.
+    // K_e_dot is .036 s; the fit of the other run is close to this value, and the estimate stays close.
     let (gain, error) = (column(&known, "K_e_dot"), column(&known, "K_e_dot_se"));
     let off = |k: usize| (gain[k] - 0.036).abs();
     assert!((0..gain.len()).all(|k| off(k) < 2.0 * error[k] && off(k) < 0.02));
@@ -457,7 +458,7 @@ fn memories_are_the_same_in_every_unit() {
     assert_eq!(rows(&["--memory-of", "b=256,d1=256,f=2.56s"]), samples);
     assert_ne!(rows(&[]), samples);
     assert_ne!(rows(&["--memory", "inf"]), samples);
-    // Another start from the same numbers: theta is updated from the first sample on.
+    // The recursion starts from the same numbers, but theta is updated from the first sample on.
     let given = rows(&[
         "--start",
         "b0=.044,b1=-.043,d1=-.85,f1=-1.91,f2=.92",
@@ -671,7 +672,7 @@ fn a_second_run_chooses_the_start_covariance() {
     );
     let (status, says) = bad(d, &with(&["--covariance", "0.1"]));
     assert!(status == 2 && says.contains("--covariance"), "{says}");
-    // Independent of P at the start.
+    // The result is independent of the initial P.
     let updated = json(d, &with(&["--json", "--update-covariance", "--covariance", "0.1"]));
     assert!(updated["covariance_choice"].is_null());
     assert!(setting(&updated, "covariance updated").contains("second.csv"));
@@ -744,7 +745,7 @@ fn the_methods_are_listed_without_a_record() {
     assert_eq!(all[0]["name"], "adaptive");
     assert_eq!(all[0]["default"], true);
     assert!(all.iter().all(|one| !one["structures"].as_array().unwrap().is_empty()));
-    // A record belongs to the command without it.
+    // The command without `--methods` requires a record.
     let (code, message) = bad(directory.path(), &["track"]);
     assert!(code == 2 && message.contains("RECORD"), "{message}");
     assert_eq!(bad(directory.path(), &["track", "c.csv", "--methods"]).0, 2);

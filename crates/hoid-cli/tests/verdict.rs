@@ -1,4 +1,4 @@
-//! Verdicts on results as shown to the user.
+//! Verdicts on results, as shown to the user.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -23,7 +23,7 @@ fn simulated(condition: &str) -> TempDir {
     directory
 }
 
-/// The same errors, with an independent output.
+/// Writes a run with the same errors and an independent output.
 fn without_response(directory: &Path) {
     let mut state = 11_u64;
     let mut draw = || {
@@ -177,7 +177,7 @@ fn a_trace_has_the_findings_of_its_start() {
     assert!(rls["start"]["verdict"]["level"].is_string());
 }
 
-/// Lines of a stream and its exit code.
+/// Returns the lines of a stream and its exit code.
 fn streamed(directory: &Path, more: &[&str]) -> (Vec<Value>, Option<i32>) {
     let output = Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args([

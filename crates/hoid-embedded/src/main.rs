@@ -6,7 +6,7 @@
 //! | `run.rs` | code common to all targets: input lines, filter, estimates |
 //! | `board.rs` | entry point, file access and output on a processor without an operating system, by semihosting |
 //!
-//! On the host it is an ordinary program, so that the results on both targets can be compared digit by digit
+//! On the host it is an ordinary program; the results on both targets can therefore be compared digit by digit
 //! (`cargo xtask embedded`). No memory is allocated; the filter is on the stack.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 

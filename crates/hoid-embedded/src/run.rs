@@ -129,7 +129,7 @@ mod tests {
     fn of(text: &str) -> Result<Vec<String>, &'static str> {
         let (mut rest, mut lines) = (text.as_bytes(), Vec::new());
         let read = |bytes: &mut [u8]| {
-            // In small parts, as they may arrive.
+            // The text is delivered in small parts, as input may arrive.
             let n = rest.len().min(bytes.len()).min(7);
             bytes[..n].copy_from_slice(&rest[..n]);
             rest = &rest[n..];

@@ -196,7 +196,7 @@ mod tests {
     use crate::{HOID_OK, hoid_last_error, session::Session};
 
     fn last() -> String {
-        // SAFETY: a text of this thread, and no call in between.
+        // SAFETY: the text belongs to this thread, and no call follows before it is read.
         let text = unsafe { CStr::from_ptr(hoid_last_error()) };
         text.to_str().unwrap().to_owned()
     }
@@ -208,23 +208,23 @@ mod tests {
         let mut trackers = [ptr::null_mut(), ptr::null_mut()];
         for place in &mut trackers {
             let session = Session::new(Some("rpem"), 0.01, Some("{\"nk\": 9}"), None).unwrap();
-            // SAFETY: a place on the stack.
+            // SAFETY: the pointer refers to the stack.
             unsafe { into_handle(session, place) }.unwrap();
         }
-        // SAFETY: made above.
+        // SAFETY: the tracker was created above.
         let status = unsafe { with_tracker_mut(trackers[0], |_| panic!("as planned")) };
         assert_eq!(status, HOID_PANIC);
         assert!(last().contains("as planned"), "{}", last());
-        // SAFETY: made above.
+        // SAFETY: the tracker was created above.
         let status = unsafe { with_tracker_mut(trackers[0], |_| Ok(())) };
         assert_eq!(status, HOID_BROKEN);
-        // SAFETY: made above.
+        // SAFETY: the tracker was created above.
         let status = unsafe { with_tracker(trackers[1], |_| Ok(())) };
         assert_eq!(status, HOID_OK);
         assert_eq!(guarded(|| panic!("{}", 7)), HOID_PANIC);
         assert!(last().ends_with('7'));
         for tracker in trackers {
-            // SAFETY: made above, taken back once.
+            // SAFETY: the tracker was created above and is taken back once.
             unsafe { free_handle(tracker) };
         }
         std::panic::set_hook(hook);
@@ -238,23 +238,23 @@ mod tests {
         let refused = unsafe { put(ptr::null_mut(), 1.0, "the pointer") }.unwrap_err();
         assert_eq!(refused.status, HOID_BAD_POINTER);
         let mut room = [0.0_f64; 2];
-        // SAFETY: one byte further is not written to.
+        // SAFETY: the pointer is misaligned, so nothing is written.
         let refused = unsafe { put(room.as_mut_ptr().wrapping_byte_add(1), 1.0, "the pointer") }.unwrap_err();
         assert!(refused.text.contains("aligned"));
         let mut count = 0;
-        // SAFETY: room for two.
+        // SAFETY: the memory has room for two values.
         let refused = unsafe { write_array(&[1.0, 2.0, 3.0], room.as_mut_ptr(), 2, &mut count, "the list") };
         assert_eq!(
             (refused.unwrap_err().status, count, room),
             (HOID_TOO_SMALL, 3, [0.0; 2])
         );
-        // SAFETY: nothing to be written to.
+        // SAFETY: no values are written; the pointer for the count is valid.
         let told = unsafe { write_array(&[1.0], ptr::null_mut(), 0, &mut count, "the list") };
         assert_eq!((told, count), (Ok(()), 1));
-        // SAFETY: ends with a zero.
+        // SAFETY: the string is null-terminated.
         let refused = unsafe { text(c"\xff".as_ptr(), "a") }.unwrap_err();
         assert_eq!(refused.status, HOID_BAD_TEXT);
-        // SAFETY: not read.
+        // SAFETY: the length is refused, so no bytes are read.
         let refused = unsafe { bytes(room.as_ptr().cast(), usize::MAX, "bytes") }.unwrap_err();
         assert_eq!(refused.status, HOID_TOO_SMALL);
     }

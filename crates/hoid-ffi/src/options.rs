@@ -4,7 +4,7 @@
 //! limits between which the order is searched during the warm-up); `criterion`; `start` (coefficients by name, or
 //! "nothing"); `largest`; `at`; `controlled_element` ("90/(s(s+6))", or a pair of coefficient lists); `decimate`
 //! ("auto", "off" or a factor; by default, rates above 200 Hz are decimated to about 100 Hz); `warm_up` in s; and the
-//! options of the method. The values of these options are those of the command line: a number, a string, true, a pair,
+//! options of the method. These options have the same values as on the command line: a number, a string, true, a pair,
 //! or values by name. `prior` may be a fit itself, as printed by `hoid identify --json`, or the name of its file.
 
 use std::{ops::RangeInclusive, path::Path};

@@ -80,7 +80,7 @@ mod tests {
     const AT_ONCE: &str =
         r#"{"nk": 29, "nd": 1, "start": {"b0": 0.04, "b1": -0.04, "d1": -0.8, "f1": -1.9, "f2": 0.92}}"#;
 
-    /// Samples until it is saved, and in all; under Miri a few will do.
+    /// Number of samples before saving, and total number; under Miri a few samples suffice.
     const TAKEN: [usize; 2] = if cfg!(miri) { [5, 8] } else { [1500, 2500] };
 
     fn samples() -> Vec<Sample> {
@@ -103,7 +103,7 @@ mod tests {
     fn a_saved_tracker_goes_on_with_the_same_digits() {
         let samples = samples();
         let [taken, all] = TAKEN;
-        // The second is an earlier name, as it is in what was saved under it.
+        // The second name is an earlier name of the method, as in older saved trackers.
         let of_bank = [
             ("adaptive", None, 0.01),
             ("population", None, 0.01),
@@ -159,7 +159,7 @@ mod tests {
             changed[place] ^= 0x40;
             refused(&changed);
         }
-        // With a true sum, the description still has to be one.
+        // Even with a valid checksum, the description must be valid.
         for (from, to) in [
             ("adaptive", "ldaptive"),
             ("\"orders\":[", "\"orders\":{"),

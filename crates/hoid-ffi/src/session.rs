@@ -259,7 +259,7 @@ mod tests {
         for ((name, unit, _), (name_c, unit_c)) in rows.into_iter().zip(OPERATOR) {
             assert_eq!((name, unit), (name_c.to_str().unwrap(), unit_c.to_str().unwrap()));
         }
-        // Each quantity alone is the one that is reported to have changed.
+        // If only one quantity changes, it is reported as the one that changed.
         for (i, name) in SHIFTED.into_iter().enumerate() {
             let fixed = [Estimate::fixed(1.0); 2];
             let mut change = Change {

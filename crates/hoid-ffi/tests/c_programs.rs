@@ -1,5 +1,5 @@
-//! The examples in C and C++, compiled by the available compiler and run without Rust: they give
-//! the same digits as the tracker in Rust.
+//! The examples in C and C++ are compiled by the available compiler and run without Rust. They give the same digits as
+//! the tracker in Rust.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
@@ -24,7 +24,7 @@ fn built(name: &str, with: &str, options: &[&str]) -> Option<(TempDir, PathBuf)>
     Some((folder, program))
 }
 
-/// Value and error of each, NaN if there is none.
+/// Returns value and standard error of each estimate; NaN if there is none.
 fn numbers(estimates: &[Option<Estimate>]) -> Vec<f64> {
     let pair = |e: &Option<Estimate>| {
         let value = e.map_or(f64::NAN, |e| e.value);
@@ -34,7 +34,7 @@ fn numbers(estimates: &[Option<Estimate>]) -> Vec<f64> {
     estimates.iter().flat_map(pair).collect()
 }
 
-/// The expected output of the example, from the tracker itself.
+/// Returns the expected output of the example, computed by the tracker in Rust.
 fn expected(record: &Record, options: &TrackOptions) -> Vec<Vec<f64>> {
     let mut tracker = Tracker::new(options, None, record.sample_time()).unwrap();
     let pairs = record.input().iter().zip(record.output());
@@ -93,14 +93,14 @@ fn the_example_in_c_gives_the_digits_of_rust() {
     let expected_rows = expected(&record, &with_element);
     let options = format!("{{\"controlled_element\": \"{ELEMENT}\"}}");
     let all: Vec<usize> = (0..17).collect();
-    // Saved, freed and restored in the middle.
+    // The tracker is saved, freed and restored in the middle of the run.
     let output = run(&program, &["adaptive", "0.01", &options, "4000"], &lines(&record));
     same(&good(&output), &expected_rows, &all);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(said.contains("after 8192 samples, 0 skipped"), "{said}");
 }
 
-/// Compiled with a substitute for Simulink's header: Simulink itself is not available.
+/// The S-function is compiled with a substitute for Simulink's header, because Simulink itself is not available.
 #[test]
 fn the_s_function_gives_the_digits_of_rust() {
     let stubs = format!("-I{}/tests/stubs", env!("CARGO_MANIFEST_DIR"));
@@ -116,7 +116,7 @@ fn the_s_function_gives_the_digits_of_rust() {
     assert!(!refused.status.success() && said.contains("adaptive"), "{said}");
 }
 
-/// Compiled with a substitute for DUECA's headers, likewise.
+/// The module is compiled with a substitute for DUECA's headers, because DUECA itself is not available.
 #[test]
 fn the_dueca_module_gives_the_digits_of_rust() {
     let stubs = format!("-I{}/tests/stubs/dueca", env!("CARGO_MANIFEST_DIR"));

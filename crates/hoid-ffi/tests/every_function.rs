@@ -1,5 +1,5 @@
-//! Calls every function that takes a pointer as C does, with few samples, so that Miri can interpret it
-//! (`cargo xtask miri`), which checks each read and write of memory.
+//! Calls every function that takes a pointer, as a C program would. Only few samples are used, so that Miri can
+//! interpret the program (`cargo xtask miri`) and check each read and write of memory.
 #![cfg_attr(miri, allow(stable_features))]
 #![cfg_attr(miri, feature(c_variadic))]
 #![allow(clippy::unwrap_used)]
@@ -17,7 +17,7 @@ use hoid_ffi::{
 };
 use hoid_io::fmu::{FmuKind, FmuStart, FmuVariable};
 
-/// Methods that are created at once and start with the first sample.
+/// Options with which a method is created at once and starts with the first sample.
 const AT_ONCE: &str = r#"{"nk": 3, "nd": 1, "start": {"b0": 0.04, "b1": -0.04, "d1": -0.8, "f1": -1.9, "f2": 0.92},
     "controlled_element": "90/(s(s+6))"}"#;
 const SAMPLES: usize = 2;
@@ -27,45 +27,45 @@ fn sample(k: usize) -> [f64; 2] {
 }
 
 fn read(text: *const c_char) -> String {
-    // SAFETY: a text of the library, which stays valid until the next call.
+    // SAFETY: the text belongs to the library and stays valid until the next call.
     let text = unsafe { CStr::from_ptr(text) };
     text.to_str().unwrap().to_owned()
 }
 
 type Lists<T> = unsafe extern "C" fn(*const HoidTracker, *mut T, usize, *mut usize) -> HoidStatus;
 
-/// Reads a list: first its length, then into uninitialised memory of exactly this length.
+/// Reads a list: first its length, and then its values into uninitialised memory of exactly this length.
 fn listed<T: Copy>(tracker: *const HoidTracker, of: Lists<T>) -> Vec<T> {
     let mut count = 0;
-    // SAFETY: a tracker; only the count is requested.
+    // SAFETY: the tracker is valid, and only the count is requested.
     assert_eq!(unsafe { of(tracker, ptr::null_mut(), 0, &mut count) }, HOID_OK);
     let mut list = Vec::<T>::with_capacity(count);
     if count > 0 {
         let mut small = Vec::<T>::with_capacity(count - 1);
-        // SAFETY: a tracker, and space as stated, which is too small.
+        // SAFETY: the tracker is valid, and the memory has the stated size, which is too small.
         let status = unsafe { of(tracker, small.as_mut_ptr(), count - 1, &mut count) };
         assert_eq!(status, HOID_TOO_SMALL);
     }
-    // SAFETY: a tracker, and space as stated.
+    // SAFETY: the tracker is valid, and the memory has the stated size.
     assert_eq!(unsafe { of(tracker, list.as_mut_ptr(), count, &mut count) }, HOID_OK);
-    // SAFETY: this many were written.
+    // SAFETY: this number of values was written.
     unsafe { list.set_len(count) };
     list
 }
 
-/// A value, into memory that was never written to.
+/// Reads a value into uninitialised memory.
 fn told<T>(tracker: *const HoidTracker, of: unsafe extern "C" fn(*const HoidTracker, *mut T) -> HoidStatus) -> T {
     let mut place = MaybeUninit::uninit();
-    // SAFETY: a tracker, and space for one.
+    // SAFETY: the tracker is valid, and the memory has room for one value.
     assert_eq!(unsafe { of(tracker, place.as_mut_ptr()) }, HOID_OK);
-    // SAFETY: it was written.
+    // SAFETY: the value was written.
     unsafe { place.assume_init() }
 }
 
 fn made(method: &str, options: &str) -> *mut HoidTracker {
     let (method, options) = (CString::new(method).unwrap(), CString::new(options).unwrap());
     let mut tracker = ptr::null_mut();
-    // SAFETY: texts that end with a zero, a place on the stack.
+    // SAFETY: the strings are null-terminated, and the pointer refers to the stack.
     let status = unsafe { hoid_tracker_new(method.as_ptr(), 0.01, options.as_ptr(), &mut tracker) };
     assert_eq!(status, HOID_OK, "{}", read(hoid_last_error()));
     tracker
@@ -79,16 +79,16 @@ fn a_tracker_by_every_function_of_the_header() {
     let mut outcome = MaybeUninit::<HoidOutcome>::uninit();
     for k in 0..SAMPLES {
         let [e, u] = sample(k);
-        // SAFETY: a tracker; the outcome may be null.
+        // SAFETY: the tracker is valid, and the outcome may be null.
         assert_eq!(unsafe { hoid_tracker_step(tracker, e, u, ptr::null_mut()) }, HOID_OK);
-        // SAFETY: a tracker, a place on the stack.
+        // SAFETY: the tracker is valid, and the pointer refers to the stack.
         let status = unsafe { hoid_tracker_update(tracker, e, u, 0.1, (k % 2) as i32, outcome.as_mut_ptr()) };
         assert_eq!(status, HOID_OK);
     }
-    // SAFETY: it was written.
+    // SAFETY: the value was written.
     assert_eq!(unsafe { outcome.assume_init() }.ready, 1);
 
-    // SAFETY: a tracker.
+    // SAFETY: the tracker is valid.
     assert_eq!(unsafe { hoid_tracker_ready(tracker) }, HOID_OK);
     let parameters = listed(tracker, hoid_tracker_parameters);
     let names: Vec<String> = parameters.iter().map(|one| read(one.name) + &read(one.unit)).collect();
@@ -96,76 +96,76 @@ fn a_tracker_by_every_function_of_the_header() {
     assert_eq!(listed(tracker, hoid_tracker_covariance).len(), 25);
     let mut list = [MaybeUninit::<HoidEstimate>::uninit(); 6];
     let (mut count, place) = (0, list.as_mut_ptr().cast());
-    // SAFETY: a tracker, and space as stated.
+    // SAFETY: the tracker is valid, and the memory has the stated size.
     let status = unsafe { hoid_tracker_operator(tracker, place, 6, &mut count) };
     assert!([HOID_OK, HOID_NOTHING].contains(&status));
-    // SAFETY: a tracker, and space as stated.
+    // SAFETY: the tracker is valid, and the memory has the stated size.
     let status = unsafe { hoid_tracker_open_loop(tracker, place, 6, &mut count) };
     assert!([HOID_OK, HOID_NOTHING].contains(&status));
-    // SAFETY: a tracker, and space as stated.
+    // SAFETY: the tracker is valid, and the memory has the stated size.
     let status = unsafe { hoid_tracker_response(tracker, 2.5, place, 6, &mut count) };
     assert_eq!((status, count), (HOID_OK, 2));
-    // SAFETY: two were written.
+    // SAFETY: two values were written.
     assert_eq!(read(unsafe { list[1].assume_init() }.name), "phase_deg");
     assert_eq!(read(hoid_level_name(told(tracker, hoid_tracker_level))), "doubtful");
     assert_eq!(told(tracker, hoid_tracker_counts).samples, 2 * SAMPLES as u64);
     assert_eq!(told(tracker, hoid_tracker_sample_time), 0.01);
     let mut change = MaybeUninit::uninit();
-    // SAFETY: a tracker, a place on the stack.
+    // SAFETY: the tracker is valid, and the pointer refers to the stack.
     assert_eq!(
-        // SAFETY: as above, space for a change.
+        // SAFETY: the tracker is valid, and the memory has room for a change.
         unsafe { hoid_tracker_change(tracker, change.as_mut_ptr()) },
         HOID_NOTHING
     );
     let mut odds = 0.0;
-    // SAFETY: a tracker, a place on the stack.
+    // SAFETY: the tracker is valid, and the pointer refers to the stack.
     let status = unsafe { hoid_tracker_change_log_odds(tracker, &mut odds) };
     assert_eq!(status, HOID_NOTHING);
     assert!(read(hoid_last_error()).contains("multiple-model"));
 
     let mut length = 0;
-    // SAFETY: only the length is requested.
+    // SAFETY: the tracker is valid, and only the length is requested.
     let status = unsafe { hoid_tracker_save(tracker, ptr::null_mut(), 0, &mut length) };
     assert_eq!(status, HOID_OK);
     let mut bytes = Vec::<u8>::with_capacity(length);
-    // SAFETY: space for this many.
+    // SAFETY: the tracker is valid, and the memory has room for this number of bytes.
     let status = unsafe { hoid_tracker_save(tracker, bytes.as_mut_ptr(), length, &mut length) };
     assert_eq!(status, HOID_OK);
-    // SAFETY: this many were written.
+    // SAFETY: this number of values was written.
     unsafe { bytes.set_len(length) };
     let mut second = ptr::null_mut();
-    // SAFETY: a slice, a place on the stack.
+    // SAFETY: the bytes are a slice, and the pointer refers to the stack.
     let status = unsafe { hoid_tracker_restore(bytes.as_ptr(), length, &mut second) };
     assert_eq!(status, HOID_OK);
     drop(bytes);
     for t in [tracker, second] {
-        // SAFETY: a tracker; the outcome may be null.
+        // SAFETY: the tracker is valid, and the outcome may be null.
         assert_eq!(unsafe { hoid_tracker_step(t, 0.5, 0.5, ptr::null_mut()) }, HOID_OK);
     }
     let digits = |tracker| listed(tracker, hoid_tracker_covariance).into_iter().map(f64::to_bits);
     assert!(digits(tracker).eq(digits(second)));
     for t in [tracker, second, ptr::null_mut()] {
-        // SAFETY: made above, freed once; null is allowed.
+        // SAFETY: the handle was created above and is freed once; null is allowed.
         unsafe { hoid_tracker_free(t) };
     }
 }
 
-/// The message of a status belongs to its thread, and two threads have one tracker each.
+/// The message of a status belongs to its thread; each of two threads has its own tracker.
 #[test]
 fn threads_with_a_tracker_each() {
     let tracked = |names: &'static str| {
         let tracker = made("rpem", AT_ONCE);
         let mut odds = 0.0;
-        // SAFETY: a tracker of this thread.
+        // SAFETY: the tracker belongs to this thread.
         let status = unsafe { hoid_tracker_change_log_odds(tracker, &mut odds) };
         assert_eq!(status, HOID_NOTHING);
         let wrong = CString::new(names).unwrap();
         let mut place = ptr::null_mut();
-        // SAFETY: texts that end with a zero or null, a place on the stack.
+        // SAFETY: the strings are null or null-terminated, and the pointer refers to the stack.
         let status = unsafe { hoid_tracker_new(wrong.as_ptr(), 0.01, ptr::null(), &mut place) };
         assert_eq!((status, place.is_null()), (HOID_BAD_OPTION, true));
         assert!(read(hoid_last_error()).contains(names));
-        // SAFETY: made above, freed once.
+        // SAFETY: the tracker was created above and is freed once.
         unsafe { hoid_tracker_free(tracker) };
     };
     std::thread::scope(|scope| {
@@ -178,12 +178,12 @@ fn threads_with_a_tracker_each() {
 #[test]
 fn a_fit_that_is_none_is_refused() {
     let mut tracker = ptr::null_mut();
-    // SAFETY: texts that end with a zero, a place on the stack.
+    // SAFETY: the strings are null-terminated, and the pointer refers to the stack.
     let status = unsafe { hoid_tracker_from_fit(c"{}".as_ptr(), 0.01, c"{}".as_ptr(), &mut tracker) };
     assert_eq!((status, tracker.is_null()), (HOID_BAD_OPTION, true));
 }
 
-/// A unit by one of the interfaces: the arguments of its functions differ, their effect does not.
+/// A unit, used through one of the interfaces: the functions have different arguments, but the same effect.
 struct Unit {
     variables: Vec<FmuVariable>,
 }
@@ -193,7 +193,7 @@ impl Unit {
         u32::try_from(self.variables.iter().position(|v| v.name == name).unwrap()).unwrap()
     }
 
-    /// References of the variables of a type.
+    /// Returns the references of the variables of a type.
     fn of_type(&self, like: &FmuStart) -> Vec<u32> {
         let same = |v: &FmuVariable| std::mem::discriminant(&v.start) == std::mem::discriminant(like);
         let each = (0..).zip(&self.variables).filter(|(_, v)| same(v));
@@ -209,19 +209,19 @@ fn unit() -> Unit {
 
 macro_rules! with_a_count {
     ($function:ident, $component:expr, $references:expr, $n:expr, $values:expr) => {
-        // SAFETY: a component, and lists of the stated length.
+        // SAFETY: the component is valid, and the lists have the stated length.
         unsafe { $function($component, $references.as_ptr(), $n, $values) }
     };
 }
 
 macro_rules! with_two_counts {
     ($function:ident, $component:expr, $references:expr, $n:expr, $values:expr) => {
-        // SAFETY: a component, and lists of the stated length.
+        // SAFETY: the component is valid, and the lists have the stated length.
         unsafe { $function($component, $references.as_ptr(), $n, $values, $n) }
     };
 }
 
-/// The life of a unit, by the functions of one interface.
+/// Calls all functions of one interface, from the creation of a unit to its end.
 macro_rules! life_of_a_unit {
     (
         $unit:expr, $component:expr, $boolean:ty, $call:ident,
@@ -247,7 +247,7 @@ macro_rules! life_of_a_unit {
                 0
             );
             assert_eq!($begin(component), 0);
-            // SAFETY: a component.
+            // SAFETY: the component is valid.
             assert_eq!(unsafe { $end_of_setup(component) }, 0);
         };
         let stepped = |from: usize, to: usize| {
@@ -287,37 +287,37 @@ macro_rules! life_of_a_unit {
         );
         assert_eq!(read(texts[0]), "rpem");
 
-        // Restores a state, into an existing one, and from bytes: with the same digits.
+        // A state is restored, written over an existing state, and restored from bytes, each time with the same digits.
         let [mut state, mut again] = [ptr::null_mut::<State>(); 2];
         for _ in 0..2 {
-            // SAFETY: a component, a place with null or a state.
+            // SAFETY: the component is valid, and the place contains null or a state.
             assert_eq!(unsafe { $get_state(component, &mut state) }, 0);
         }
         stepped(SAMPLES, 2 * SAMPLES);
         let expected = numbers();
         let mut size = 0;
-        // SAFETY: a component, a state, a place on the stack.
+        // SAFETY: the component and the state are valid, and the pointer refers to the stack.
         assert_eq!(unsafe { $size(component, state, &mut size) }, 0);
         let mut bytes = vec![0_u8; size];
-        // SAFETY: a component, a state, and less space than it needs.
+        // SAFETY: the component and the state are valid, and the stated size of the memory is too small.
         assert_eq!(unsafe { $serialise(component, state, bytes.as_mut_ptr(), size - 1) }, 3);
-        // SAFETY: a component, a state, and space for it.
+        // SAFETY: the component and the state are valid, and the memory has room for the state.
         assert_eq!(unsafe { $serialise(component, state, bytes.as_mut_ptr(), size) }, 0);
-        // SAFETY: a component, bytes, a place with null.
+        // SAFETY: the component and the bytes are valid, and the place contains null.
         assert_eq!(unsafe { $deserialise(component, bytes.as_ptr(), size, &mut again) }, 0);
-        // SAFETY: a component, bytes, a place with a state.
+        // SAFETY: the component and the bytes are valid, and the place contains a state.
         assert_eq!(
-            // SAFETY: as above, one byte fewer.
+            // SAFETY: as above, but with one byte fewer.
             unsafe { $deserialise(component, bytes.as_ptr(), size - 1, &mut again) },
             3
         );
         for one in [&mut state, &mut again] {
-            // SAFETY: a component, a state.
+            // SAFETY: the component and the state are valid.
             assert_eq!(unsafe { $set_state(component, *one) }, 0);
             stepped(SAMPLES, 2 * SAMPLES);
             assert_eq!(numbers(), expected);
             for _ in 0..2 {
-                // SAFETY: a component, a place with a state, then with null.
+                // SAFETY: the component is valid, and the place contains a state and then null.
                 assert_eq!(unsafe { $free_state(component, one) }, 0);
                 assert!(one.is_null());
             }
@@ -325,14 +325,14 @@ macro_rules! life_of_a_unit {
         // SAFETY: null is refused.
         assert_eq!(unsafe { $set_state(component, ptr::null_mut()) }, 3);
 
-        // SAFETY: a component.
+        // SAFETY: the component is valid.
         assert_eq!(unsafe { $terminate(component) }, 0);
         assert_eq!($step(component, 1.0), 3);
-        // SAFETY: a component.
+        // SAFETY: the component is valid.
         assert_eq!(unsafe { $reset(component) }, 0);
         set_up();
         for one in [component, ptr::null_mut()] {
-            // SAFETY: made above, freed once; null is allowed.
+            // SAFETY: the handle was created above and is freed once; null is allowed.
             unsafe { $free(one) };
         }
         // SAFETY: null is refused.
@@ -350,8 +350,8 @@ struct Callbacks {
     environment: *mut c_void,
 }
 
-/// Notes what it is reported. Rust has such functions under Miri's compiler alone; elsewhere C has
-/// them.
+/// Stores the reported messages. Rust can define variadic functions only with Miri's compiler; elsewhere they are
+/// defined in C.
 #[cfg(miri)]
 unsafe extern "C" fn logger_2(
     environment: *mut c_void,
@@ -362,7 +362,7 @@ unsafe extern "C" fn logger_2(
     mut rest: ...
 ) {
     assert_eq!((read(name).as_str(), read(format).as_str()), ("one", "%s"));
-    // SAFETY: the format takes one text.
+    // SAFETY: the format consumes one string.
     let text: *const c_char = unsafe { rest.next_arg() };
     note(environment, status, text);
 }
@@ -372,7 +372,7 @@ unsafe extern "C" fn logger_3(environment: *mut c_void, status: c_int, _category
 }
 
 fn note(environment: *mut c_void, status: c_int, text: *const c_char) {
-    // SAFETY: the list of the test, which is read when no call is in progress.
+    // SAFETY: the list belongs to the test, which reads it only when no call is in progress.
     let notes = unsafe { &mut *environment.cast::<Vec<(c_int, String)>>() };
     notes.push((status, read(text)));
 }
@@ -399,30 +399,30 @@ fn a_unit_by_every_function_of_fmi_2() {
     let made = |kind: c_int, token: &str| {
         let token = CString::new(token).unwrap();
         let callbacks = ptr::from_ref(&callbacks).cast();
-        // SAFETY: texts that end with a zero, callbacks that stay valid for the life of the component.
+        // SAFETY: the strings are null-terminated, and the callbacks stay valid for the life of the component.
         unsafe { fmi2Instantiate(c"one".as_ptr(), kind, token.as_ptr(), ptr::null(), callbacks, 0, 0) }
     };
     assert!(made(0, &FmuKind::Tracker.token()).is_null() && made(1, "another").is_null());
     let component = made(1, &FmuKind::Tracker.token());
-    // SAFETY: a component.
+    // SAFETY: the component is valid.
     assert_eq!(unsafe { fmi2SetDebugLogging(component, 1, 0, ptr::null()) }, 0);
     life_of_a_unit!(
         unit(), component, c_int, with_a_count,
         fmi2SetString fmi2GetString fmi2SetReal fmi2GetReal fmi2SetBoolean fmi2GetBoolean fmi2SetInteger fmi2GetInteger,
         |component| {
-            // SAFETY: a component.
+            // SAFETY: the component is valid.
             let done = unsafe { fmi2SetupExperiment(component, 0, 0.0, 0.0, 0, 0.0) };
-            // SAFETY: a component.
+            // SAFETY: the component is valid.
             done + unsafe { fmi2EnterInitializationMode(component) }
         },
         fmi2ExitInitializationMode,
-        // SAFETY: a component.
+        // SAFETY: the component is valid.
         |component, t| unsafe { fmi2DoStep(component, t, 0.01, 1) },
         fmi2Reset, fmi2Terminate, fmi2FreeInstance,
         fmi2GetFMUstate fmi2SetFMUstate fmi2FreeFMUstate fmi2SerializedFMUstateSize fmi2SerializeFMUstate
         fmi2DeSerializeFMUstate
     );
-    // SAFETY: made above, and no call is in progress.
+    // SAFETY: the list was created above, and no call is in progress.
     let told = unsafe { &*environment };
     assert_eq!(told.len() > 5, cfg!(miri));
 }
@@ -434,7 +434,8 @@ fn a_unit_by_every_function_of_fmi_3() {
     let environment: *mut Vec<_> = &mut *notes;
     let made = |token: &str, logger| {
         let token = CString::new(token).unwrap();
-        // SAFETY: texts that end with a zero, a logger whose list stays valid for the life of the component.
+        // SAFETY: the strings are null-terminated, and the list of the logger stays valid for the life of the
+        // component.
         unsafe {
             fmi3InstantiateCoSimulation(
                 c"one".as_ptr(),
@@ -454,12 +455,12 @@ fn a_unit_by_every_function_of_fmi_3() {
     };
     assert!(made("another", Some(logger_3)).is_null() && made("another", None).is_null());
     let component = made(&FmuKind::Tracker.token(), Some(logger_3));
-    // SAFETY: a component.
+    // SAFETY: the component is valid.
     assert_eq!(unsafe { fmi3SetDebugLogging(component, true, 0, ptr::null()) }, 0);
     let step = |component, t: f64| {
         let (mut flags, mut last) = ([true; 3], f64::NAN);
         let [event, terminate, early] = flags.each_mut();
-        // SAFETY: a component, places on the stack.
+        // SAFETY: the component is valid, and the pointers refer to the stack.
         let done = unsafe { fmi3DoStep(component, t, 0.01, true, event, terminate, early, &mut last) };
         assert_eq!((flags, last.is_nan()), ([done != 0; 3], done != 0));
         done
@@ -467,14 +468,14 @@ fn a_unit_by_every_function_of_fmi_3() {
     life_of_a_unit!(
         unit(), component, bool, with_two_counts,
         fmi3SetString fmi3GetString fmi3SetFloat64 fmi3GetFloat64 fmi3SetBoolean fmi3GetBoolean fmi3SetInt32 fmi3GetInt32,
-        // SAFETY: a component.
+        // SAFETY: the component is valid.
         |component| unsafe { fmi3EnterInitializationMode(component, false, 0.0, 0.0, false, 0.0) },
         fmi3ExitInitializationMode,
         step, fmi3Reset, fmi3Terminate, fmi3FreeInstance,
         fmi3GetFMUState fmi3SetFMUState fmi3FreeFMUState fmi3SerializedFMUStateSize fmi3SerializeFMUState
         fmi3DeserializeFMUState
     );
-    // SAFETY: made above, and no call is in progress.
+    // SAFETY: the list was created above, and no call is in progress.
     let told = unsafe { &*environment };
     assert!(told.iter().all(|(status, text)| *status == 3 && !text.is_empty()) && told.len() > 4);
 }

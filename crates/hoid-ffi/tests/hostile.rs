@@ -1,4 +1,4 @@
-//! Any data from a caller give a status: no panic, no invalid value.
+//! Any data from a caller give a status, without a panic or an invalid value.
 #![allow(clippy::unwrap_used)]
 
 use std::{
@@ -9,12 +9,12 @@ use std::{
 use hoid_ffi::*;
 use proptest::prelude::*;
 
-/// A tracker that frees itself.
+/// A tracker that is freed when it is dropped.
 struct Owned(*mut HoidTracker);
 
 impl Drop for Owned {
     fn drop(&mut self) {
-        // SAFETY: made by this library, freed once.
+        // SAFETY: the tracker was created by this library and is freed once.
         unsafe { hoid_tracker_free(self.0) };
     }
 }
@@ -22,7 +22,7 @@ impl Drop for Owned {
 fn made(method: &str, sample_time: f64, options: &str) -> Result<Owned, (HoidStatus, String)> {
     let (method, options) = (CString::new(method).unwrap(), CString::new(options).unwrap());
     let mut tracker = ptr::null_mut();
-    // SAFETY: texts that end with a zero, a place on the stack.
+    // SAFETY: the strings are null-terminated, and the pointer refers to the stack.
     let status = unsafe { hoid_tracker_new(method.as_ptr(), sample_time, options.as_ptr(), &mut tracker) };
     answered(status, tracker)
 }
@@ -32,18 +32,18 @@ fn answered(status: HoidStatus, tracker: *mut HoidTracker) -> Result<Owned, (Hoi
         return Ok(Owned(tracker));
     }
     assert!(tracker.is_null());
-    // SAFETY: a text of this thread.
+    // SAFETY: the text belongs to this thread.
     let text = unsafe { CStr::from_ptr(hoid_last_error()) };
     Err((status, text.to_str().unwrap().to_owned()))
 }
 
 fn saved(tracker: &Owned) -> Vec<u8> {
     let mut length = 0;
-    // SAFETY: only the length is requested.
+    // SAFETY: the tracker is valid, and only the length is requested.
     let status = unsafe { hoid_tracker_save(tracker.0, ptr::null_mut(), 0, &mut length) };
     assert_eq!(status, HOID_OK);
     let mut bytes = vec![0; length];
-    // SAFETY: space for this many.
+    // SAFETY: the tracker is valid, and the memory has room for this number of bytes.
     let status = unsafe { hoid_tracker_save(tracker.0, bytes.as_mut_ptr(), length, &mut length) };
     assert_eq!(status, HOID_OK);
     bytes
@@ -51,7 +51,7 @@ fn saved(tracker: &Owned) -> Vec<u8> {
 
 fn restored(bytes: &[u8]) -> Result<Owned, (HoidStatus, String)> {
     let mut tracker = ptr::null_mut();
-    // SAFETY: a slice, a place on the stack.
+    // SAFETY: the bytes are a slice, and the pointer refers to the stack.
     let status = unsafe { hoid_tracker_restore(bytes.as_ptr(), bytes.len(), &mut tracker) };
     answered(status, tracker)
 }
@@ -64,7 +64,7 @@ const ANY: HoidEstimate = HoidEstimate {
     determined: 0,
 };
 
-/// All results of a tracker, each call with a status that is not an error.
+/// Requests all results of a tracker; no call may return an error.
 fn asked(tracker: &Owned) -> Vec<HoidStatus> {
     let t = tracker.0;
     let mut list = [ANY; 64];
@@ -86,27 +86,27 @@ fn asked(tracker: &Owned) -> Vec<HoidStatus> {
         steps_shortened: 0,
     };
     vec![
-        // SAFETY: a tracker.
+        // SAFETY: the tracker is valid.
         unsafe { hoid_tracker_ready(t) },
-        // SAFETY: a tracker, and space as stated.
+        // SAFETY: the tracker is valid, and the memory has the stated size.
         unsafe { hoid_tracker_operator(t, list, room, &mut count) },
-        // SAFETY: a tracker, and space as stated.
+        // SAFETY: the tracker is valid, and the memory has the stated size.
         unsafe { hoid_tracker_parameters(t, list, room, &mut count) },
-        // SAFETY: a tracker, and space as stated.
+        // SAFETY: the tracker is valid, and the memory has the stated size.
         unsafe { hoid_tracker_open_loop(t, list, room, &mut count) },
-        // SAFETY: a tracker, and space as stated.
+        // SAFETY: the tracker is valid, and the memory has the stated size.
         unsafe { hoid_tracker_response(t, 2.5, list, room, &mut count) },
-        // SAFETY: a tracker, and space as stated.
+        // SAFETY: the tracker is valid, and the memory has the stated size.
         unsafe { hoid_tracker_covariance(t, numbers.as_mut_ptr(), numbers.len(), &mut count) },
-        // SAFETY: a tracker, and a place.
+        // SAFETY: the tracker is valid, and the pointer refers to the stack.
         unsafe { hoid_tracker_change(t, &mut change) },
-        // SAFETY: a tracker, and a place.
+        // SAFETY: the tracker is valid, and the pointer refers to the stack.
         unsafe { hoid_tracker_change_log_odds(t, &mut odds) },
-        // SAFETY: a tracker, and a place.
+        // SAFETY: the tracker is valid, and the pointer refers to the stack.
         unsafe { hoid_tracker_level(t, &mut level) },
-        // SAFETY: a tracker, and a place.
+        // SAFETY: the tracker is valid, and the pointer refers to the stack.
         unsafe { hoid_tracker_counts(t, &mut counts) },
-        // SAFETY: a tracker, and a place.
+        // SAFETY: the tracker is valid, and the pointer refers to the stack.
         unsafe { hoid_tracker_sample_time(t, &mut ts) },
     ]
 }
@@ -118,7 +118,7 @@ fn null_pointers_are_refused_everywhere() {
     // SAFETY: null is allowed.
     let status = unsafe { hoid_tracker_step(ptr::null_mut(), 0.0, 0.0, ptr::null_mut()) };
     assert_eq!(status, HOID_BAD_POINTER);
-    // The default method, or under Miri the one that is created at once.
+    // The default method, or under Miri a method that starts without a warm-up.
     let (method, options) = if cfg!(miri) {
         (c"rpem".as_ptr(), c"{\"nk\": 9}".as_ptr())
     } else {
@@ -157,7 +157,7 @@ fn a_fit_is_what_a_tracker_begins_with() {
     let of = |sample_time: f64, fit: &str| {
         let text = CString::new(fit).unwrap();
         let mut tracker = ptr::null_mut();
-        // SAFETY: a text that ends with a zero, a place on the stack.
+        // SAFETY: the string is null-terminated, and the pointer refers to the stack.
         let status = unsafe { hoid_tracker_from_fit(text.as_ptr(), sample_time, ptr::null(), &mut tracker) };
         answered(status, tracker)
     };
@@ -165,13 +165,13 @@ fn a_fit_is_what_a_tracker_begins_with() {
     let options = format!("{{\"prior\": {fit}}}");
     let same = made("adaptive", 0.01, &options).ok().unwrap();
     for tracker in [&tracker, &same] {
-        // SAFETY: a tracker.
+        // SAFETY: the tracker is valid.
         unsafe { hoid_tracker_step(tracker.0, 0.1, 0.2, ptr::null_mut()) };
     }
     let first = |tracker: &Owned| {
         let mut list = [ANY; 6];
         let mut count = 0;
-        // SAFETY: a tracker, and space as stated.
+        // SAFETY: the tracker is valid, and the memory has the stated size.
         let status = unsafe { hoid_tracker_operator(tracker.0, list.as_mut_ptr(), 6, &mut count) };
         assert_eq!((status, count), (HOID_OK, 6));
         list.map(|e| (e.value.to_bits(), e.standard_error.to_bits()))
@@ -179,9 +179,9 @@ fn a_fit_is_what_a_tracker_begins_with() {
     assert_eq!(first(&tracker), first(&same));
     let value = f64::from_bits(first(&tracker)[0].0);
     assert!((value - 2.0).abs() < 0.2, "the gain of the fit: {value}");
-    // It continues from its bytes, which contain the fit.
+    // The restored tracker continues from its bytes, which contain the fit.
     assert_eq!(first(&restored(&saved(&tracker)).ok().unwrap()), first(&tracker));
-    // The sample time is that of the fit.
+    // The sample time must equal the sample time of the fit.
     let (status, said) = of(0.02, fit).err().unwrap();
     assert_eq!(status, HOID_BAD_OPTION);
     assert!(said.contains("these samples are at"), "{said}");
@@ -251,12 +251,12 @@ proptest! {
         let options = if method == "adaptive" { "" } else {
             r#"{"nk": 9, "nd": 1, "start": "nothing"}"#
         };
-        // Methods that need the fit of a warm-up have one.
+        // Methods that require a start fit have a short warm-up.
         let tracker = made(method, 0.01, options).or_else(|_| made(method, 0.01, r#"{"nk": 9, "nd": 1, "warm_up": 0.2}"#));
         let tracker = tracker.map_err(|(_, said)| TestCaseError::fail(said))?;
         let mut outcome = HoidOutcome { innovation: 0.0, ready: 0, skipped: 0, held: 0, shortened: 0, changed: 0 };
         for (e, u, f_t, moves) in samples {
-            // SAFETY: a tracker, a place on the stack.
+            // SAFETY: the tracker is valid, and the pointer refers to the stack.
             let status = unsafe { hoid_tracker_update(tracker.0, e, u, f_t, moves, &mut outcome) };
             prop_assert_eq!(status, HOID_OK);
         }
@@ -267,7 +267,7 @@ proptest! {
         prop_assert_eq!(saved(&again), saved(&tracker));
     }
 
-    /// Arbitrary options create a tracker or give the reason why not.
+    /// Arbitrary options create a tracker or give a reason for the refusal.
     #[test]
     #[cfg_attr(miri, ignore = "the filters of the method adaptive take minutes there; tests/every_function.rs has few samples")]
     fn any_options_have_an_answer(

@@ -1,8 +1,8 @@
-//! The functions exported by the shared library are those listed in `abi/symbols-N.txt`, N the version of the
+//! The shared library exports exactly the functions listed in `abi/symbols-N.txt`, where N is the version of the
 //! interface.
 //!
-//! A program linked once finds its functions in every later library of the same version: none may be removed. The list
-//! also prevents accidental exports.
+//! A program that was linked once must find its functions in every later library of the same version, so no function
+//! may be removed. The list also prevents accidental exports.
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 

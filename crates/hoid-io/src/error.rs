@@ -1,4 +1,4 @@
-//! All errors of files, described in the terms of the user who has to correct the file.
+//! All errors of files, described for the user who has to correct the file.
 
 use hoid_model::ModelError;
 use thiserror::Error;
@@ -304,7 +304,7 @@ pub enum IoError {
         /// Number of rows examined.
         rows: usize,
     },
-    /// Values missing in many places, as in a topic with another rate.
+    /// Values missing in many places, as in a topic that was logged at another rate.
     #[error(
         "{file}, {place}, column {column}: the value is missing ({found}; {count} of {rows} missing in this column); \
          if the column was logged at its own times, read it with {} (or linear or drop); otherwise bridge missing \
@@ -629,7 +629,7 @@ pub enum IoError {
 
 /// Returns the remedy for a row of another length than the header.
 fn remedy_of_row(found: usize, expected: usize) -> &'static str {
-    // The decimal commas of such a row separate each number into two cells.
+    // In such a row, decimal commas split each number into two cells.
     if expected > 1 && expected.checked_mul(2) == Some(found) {
         "if the numbers have decimal commas, save the table with semicolons or tabs between the columns; otherwise look \
          for a stray separator"

@@ -39,7 +39,7 @@
 //! | `wording` | formatting of numbers and names in messages |
 //! | `error` | [`IoError`] |
 
-// Numbers from a file are checked before they serve as an index, a length or a summand.
+// Numbers from a file are checked before they are used as an index, a length or a summand.
 #![cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 
 mod data_quality;

@@ -109,7 +109,7 @@ pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
 }
 
 /// Returns the column that holds the requested signal under another name: if `e` or `error` is requested, the column of
-/// the error; if `u` or `stick` is requested, that of the control.
+/// the error; if `u` or `stick` is requested, the column of the control.
 fn by_role(asked: &str, names: &[&str]) -> Option<String> {
     let default = match (error_among(&[asked]), control_among(&[asked])) {
         (Some(_), _) => error_among(names),

@@ -1,5 +1,5 @@
-//! Files of named arrays: those of other programs, as written by the `make.py` of their folder in
-//! `fixtures`, and our own.
+//! Files of named arrays: files of other programs, written by the `make.py` of their folder in `fixtures`, and files of
+//! hoid.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
 
@@ -38,7 +38,7 @@ fn u() -> Vec<f64> {
     (0..N).map(|k| (0.3 * k as f64).cos() * 1e-3).collect()
 }
 
-/// The sine functions of two libraries differ in the last bit.
+/// Compares values that may differ in the last bit, because the sine functions of two libraries do.
 fn close(found: &[f64], expected: &[f64]) {
     assert_eq!(found.len(), expected.len());
     assert!(
@@ -148,7 +148,7 @@ fn variables_of_matlab() {
         if name != "mat/h5py_v73.mat" {
             close(channel(&read(&name, "e", "u"), "wide(2,:)"), &times(3.0, &u()));
         }
-        // Elements of structures, by their full path and by its end, with the nearest time.
+        // Elements of structures, selected by their full path and by the end of the path, with the nearest time.
         for run in 1..=3_i32 {
             let factor = f64::from(run);
             for path in ["run", "data.run"] {
@@ -233,7 +233,7 @@ fn objects_of_matlab_come_with_the_line_that_saves_their_numbers() {
         message.contains("timeseries") && message.contains("x.Time"),
         "{message}"
     );
-    // A missing name may be in the object.
+    // The missing name may be inside the object.
     let message = refused("mat/h5py_objects_v73.mat", "e", "u");
     assert!(
         message.contains("runs holds an object of the class timetable"),
@@ -290,7 +290,7 @@ fn element(kind: u32, bytes: &[u8]) -> Vec<u8> {
 
 #[test]
 fn streams_of_the_lab_streaming_layer() {
-    // The error of one stream at the times of the stick of another.
+    // The error of one stream, interpolated to the times of the stick in another stream.
     let found = read("xdf/tracking.xdf", "e", "u");
     let record = &found.record;
     assert!((1.0 / record.sample_time().s() - 25.0).abs() < 0.05);
@@ -300,8 +300,8 @@ fn streams_of_the_lab_streaming_layer() {
         found.notes
     );
     for (k, (e, u)) in record.input().iter().zip(record.output()).enumerate() {
-        // Jitter of 2 ms over 300 samples leaves 0.3 ms, the quantum is 1e-4, and linear
-        // interpolation of the sine at 40 Hz adds 8e-5.
+        // After averaging over 300 samples, jitter of 2 ms leaves an error of 0.3 ms; the quantisation step is 1e-4,
+        // and linear interpolation of the sine at 40 Hz adds 8e-5.
         let t = u.acos();
         let expected = if record.time_s(k) < std::f64::consts::PI {
             1e4 * t.sin()
@@ -358,7 +358,7 @@ fn what_cannot_be_meant_says_so() {
 
 const WRITTEN: [&str; 2] = ["npz", "mat"];
 
-/// Numbers in [-1, 1) from a linear congruence (Knuth's MMIX constants).
+/// Numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX constants).
 struct Draw(u64);
 
 impl Draw {
@@ -427,8 +427,7 @@ fn records_come_back_bit_for_bit() {
     }
 }
 
-/// Files with modified bytes, or truncated: an error that names the file, or values, but never a
-/// panic.
+/// Truncated files and files with modified bytes give values or an error that names the file, but never a panic.
 #[test]
 fn damaged_files_never_panic() {
     let dir = tempfile::tempdir().unwrap();
@@ -465,7 +464,7 @@ fn damaged_files_never_panic() {
             bytes.truncate(draw.below(bytes.len()));
         }
         for _ in 0..=draw.below(4) {
-            // Headers and the end of an archive contain most of the structure.
+            // Most of the structure is in the headers and at the end of an archive.
             let length = bytes.len().max(1);
             let at = match draw.below(3) {
                 0 => draw.below(length),

@@ -4,7 +4,7 @@
 //! A single test, so that the peak memory of the process is that of the readers.
 #![allow(clippy::unwrap_used)]
 
-// The commands use the rest of both modules.
+// Other commands use the rest of both modules.
 #[allow(dead_code)]
 #[path = "common/bombs/mod.rs"]
 mod bombs;

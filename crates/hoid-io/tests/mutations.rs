@@ -11,7 +11,7 @@ use std::fs;
 
 use mutations::{case, originals::originals, readers};
 
-/// A seed other than that of the page.
+/// A seed that differs from the seed of the page.
 const SEED: u64 = 5;
 const CASES: u64 = 2000;
 

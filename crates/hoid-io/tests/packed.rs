@@ -1,4 +1,4 @@
-//! Text packed by gzip, and tables of BIDS with a file of JSON next to them.
+//! Text compressed by gzip, and BIDS tables with a JSON file in the same directory.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
 
@@ -25,7 +25,7 @@ fn packed_tables_and_sidecars() {
         (read.record.input(), read.record.output()),
         (&[1.0, 3.0][..], &[2.0, 4.0][..])
     );
-    // BIDS: rows only, and the file that describes them.
+    // A BIDS table contains only rows; a JSON file describes them.
     let json = r#"{"SamplingFrequency": 50.0, "StartTime": -2.0, "Columns": ["error", "stick"]}"#;
     let options = ReadOptions {
         input: Some("error".parse().unwrap()),
@@ -51,12 +51,12 @@ fn packed_tables_and_sidecars() {
         let record = read_record(&desk.path(name), &filled).unwrap().record;
         assert_eq!(record.input(), [1.0, 3.0, 5.0], "{name}");
         assert_eq!((record.time_s(0), record.sample_time().s()), (-2.0, 0.02));
-        // Without the file next to it, it is a table without a header.
+        // Without the JSON file, the table has no header.
         std::fs::remove_file(desk.path("a_physio.json")).unwrap();
         let message = read_record(&desk.path(name), &options).unwrap_err().to_string();
         assert!(message.contains("the first line holds numbers"), "{message}");
     }
-    // Truncated, and another format inside.
+    // A truncated gzip file, and a gzip file with another format inside.
     let packed = gzip(b"t,e,u\n0,1,2\n0.02,3,4\n");
     std::fs::write(desk.path("cut.csv.gz"), &packed[..packed.len() - 6]).unwrap();
     let message = |name: &str| {
@@ -69,7 +69,8 @@ fn packed_tables_and_sidecars() {
     assert!(message("run.npz.gz").contains("unpack it first"));
 }
 
-/// By the inheritance principle of BIDS a file with fewer entities, also above the recording, describes it.
+/// By the inheritance principle of BIDS, a JSON file with fewer entities describes the recording, even from a parent
+/// directory.
 #[test]
 fn sidecars_of_many_recordings() {
     let desk = Desk::new();
@@ -90,7 +91,7 @@ fn sidecars_of_many_recordings() {
     let read = || read_record(&name, &options);
     let message = read().unwrap_err().to_string();
     assert!(message.contains("the first line holds numbers"), "{message}");
-    // Of another task, of another kind, and damaged.
+    // JSON files of another task and of another kind, and a damaged JSON file.
     std::fs::write(desk.path("task-rest_physio.json"), json(10)).unwrap();
     std::fs::write(desk.path("task-track_stim.json"), json(20)).unwrap();
     std::fs::write(folder.join("sub-01_physio.json"), "{").unwrap();

@@ -1,4 +1,4 @@
-//! Complete files written and read: the data are reproduced, and damage is reported.
+//! Complete files are written and read: the data are reproduced, and damage is reported.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
 
@@ -10,7 +10,8 @@ use common::{Desk, defaults, options};
 use hoid_io::{IoError, ReadOptions, ReadRecord, Repair, read_record, write_record};
 use hoid_model::{Channel, Record, SampleTime};
 
-/// Numbers in [-1, 1) from a linear congruence (Knuth's MMIX constants): the same on every machine.
+/// Numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX constants); they are the same on every
+/// machine.
 struct Draw(u64);
 
 impl Draw {
@@ -156,7 +157,7 @@ fn other_extensions_and_places() {
     ));
 }
 
-/// A text table is known by its content, whatever the program called the file.
+/// A text table is recognised by its contents, regardless of the name of the file.
 #[test]
 fn text_tables_under_other_names() {
     let desk = Desk::new();
@@ -317,7 +318,7 @@ fn expressions_choose_and_combine() {
     assert_eq!(record.output_channel().unit, "mV");
     let names: Vec<&str> = record.channels().map(|c| c.name.as_str()).collect();
     assert_eq!(names, ["r-y", "-stick", "r", "y", "stick"]);
-    // Written and read again, the columns r-y and -stick are found by their names.
+    // After the record has been written and read again, the columns r-y and -stick are found by their names.
     let path = desk.path("again.csv");
     write_record(&path, &record).unwrap();
     let again = read_record(&path, &options("r-y", "-stick"))
@@ -368,7 +369,7 @@ fn decimal_commas_give_the_same_record() {
         assert_eq!(comma.record, point.record);
         assert_eq!(comma.notes, ["the commas in the numbers are taken as decimal commas"]);
     }
-    // Before three digits a comma may separate thousands.
+    // A comma before three digits may separate thousands.
     let message = desk.error("t,e,u\n0,\"1,500\",\"2,000\"\n1,\"1,250\",\"3,000\"\n", &defaults());
     assert!(message.contains("decimal point instead of a comma"), "{message}");
 }
@@ -571,7 +572,7 @@ fn damaged_files_never_panic() {
     assert!(read > 250 && refused > 250, "{read} read, {refused} refused");
 }
 
-/// Recordings of people, which are not part of the project: skipped if they are absent.
+/// Recordings of people are not part of the project; the test is skipped if they are absent.
 #[test]
 fn recordings_of_people_are_read() {
     let Some(dir) = std::env::var_os("HOID_HUMAN_DATA") else {

@@ -1,4 +1,4 @@
-//! Topics logged at instants of their own in one table: `--sparse`.
+//! Topics logged at separate times in one table: `--sparse`.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -15,7 +15,7 @@ fn with(sparse: &[(&str, Sparse)]) -> ReadOptions {
     }
 }
 
-/// 100 Hz; u in every row, e in each third from the second, e = 10 t and u = 1 - t.
+/// A table at 100 Hz with u in every row and e in every third row from the second row on; e = 10 t and u = 1 - t.
 fn thirds(rows: i32) -> String {
     let row = |k: i32| {
         let t = 0.01 * f64::from(k);
@@ -33,7 +33,7 @@ fn thirds(rows: i32) -> String {
 fn values_are_held_between_their_own() {
     let desk = Desk::new();
     let read = desk.read(thirds(30), &with(&[("e", Sparse::Hold)])).unwrap();
-    // From the first value, in row 1, to the last, in row 28.
+    // The record extends from the first value of e, in row 1, to the last one, in row 28.
     assert_eq!((read.record.len(), read.record.time_s(0)), (28, 0.01));
     for (k, e) in read.record.input().iter().enumerate() {
         let own = 1 + 3 * (k / 3);
@@ -56,12 +56,12 @@ fn values_are_held_between_their_own() {
     else {
         panic!("{:?}", read.steps);
     };
-    // Ages of 0, 1 and 2 rows, the last row with one of 0.
+    // The held values have ages of 0, 1 and 2 rows; the age in the last row is 0.
     assert!(
         (longest_s - 0.03).abs() < 1e-12 && (age - 0.01 * 27.0 / 28.0).abs() < 1e-12,
         "{age}"
     );
-    // What is declared is no fault.
+    // A declared sparse column is not reported as a fault.
     assert!(
         read.quality_issues
             .iter()
@@ -89,7 +89,7 @@ fn values_lie_on_lines_or_their_rows_are_dropped() {
         let t = 0.01 + 0.03 * k as f64;
         assert!((e - 10.0 * t).abs() < 1e-12 && (u - (1.0 - t)).abs() < 1e-12, "{k}");
     }
-    // Rows that are left must be even.
+    // The remaining rows must be evenly spaced.
     let uneven = thirds(30).replace("0.1000,1.0,", "0.1000,,");
     let refused = desk.error(&uneven, &with(&[("e", Sparse::Drop)]));
     assert!(refused.contains("--resample"), "{refused}");
@@ -119,7 +119,7 @@ fn a_span_starts_with_what_was_logged_before_it() {
     );
 }
 
-/// Two clocks of their own, 50 and 40 Hz: the grid is that of the faster one, as with `--fill`.
+/// Two separate clocks at 50 and 40 Hz: the grid is that of the faster clock, as with `--fill`.
 #[test]
 fn topics_of_two_clocks_are_resampled_after_the_step() {
     let desk = Desk::new();
@@ -143,7 +143,7 @@ fn topics_of_two_clocks_are_resampled_after_the_step() {
     assert!((read.record.sample_time().s() - 0.02).abs() < 1e-12);
     for k in 0..read.record.len() {
         let t = read.record.time_s(k);
-        // The last of u: held on the grid too, and not on a line to the next.
+        // The last value of u is also held on the grid, and not interpolated to the next value.
         let last = 0.013 + 0.025 * ((t - 0.013 + 1e-9) / 0.025).floor();
         let (e, u) = (read.record.input()[k], read.record.output()[k]);
         assert!(
@@ -176,7 +176,7 @@ fn without_the_option_all_is_as_before_and_the_remedy_is_named() {
         "{:?}",
         read.notes
     );
-    // A dropout is no sparse column.
+    // A column with a dropout is not sparse.
     let dropout = "t,e,u\n".to_owned()
         + &(0..60)
             .map(|k| format!("{k},{},1\n", if k == 9 { String::new() } else { k.to_string() }))
@@ -218,12 +218,12 @@ fn what_cannot_be_done_is_refused() {
             .to_string()
             .contains("hold, linear or drop")
     );
-    // Text and infinite numbers are no missing values.
+    // Text and infinite numbers do not count as missing values.
     for bad in ["lost", "inf"] {
         let spoilt = text.replace("0.1000,1.0,", &format!("0.1000,{bad},"));
         assert!(refused(&spoilt, &[("e", Sparse::Hold)]).contains(bad));
     }
-    // Nothing to do is reported.
+    // A column without missing values is reported.
     let read = desk
         .read(&text, &with(&[("e", Sparse::Hold), ("u", Sparse::Drop)]))
         .unwrap();

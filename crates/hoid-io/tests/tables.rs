@@ -1,4 +1,4 @@
-//! Tables of results written and read, and Parquet files of other programs and damaged ones.
+//! Tables of results are written and read; Parquet files of other programs and damaged files are read.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
 
@@ -66,7 +66,7 @@ fn table(rows: usize) -> OutputTable {
     }
 }
 
-/// Equal to the last bit, except for what NaN holds.
+/// Checks that two tables are bit-identical, except for the payload of NaN.
 fn assert_same(a: &OutputTable, b: &OutputTable) {
     assert_eq!(a.comments, b.comments);
     assert_eq!(a.schema(), b.schema());
@@ -99,7 +99,7 @@ fn tables_come_back_to_the_last_bit() {
         write_table(&path, &single).unwrap();
         assert_same(&read_table(&path).unwrap(), &single);
     }
-    // Without rows CSV has no kinds.
+    // In a CSV file without rows, the kinds of the columns are unknown.
     let path = dir.path().join("none.parquet");
     write_table(&path, &table(0)).unwrap();
     assert_same(&read_table(&path).unwrap(), &table(0));
@@ -210,7 +210,7 @@ fn what_cannot_be_written_says_so() {
             "{differ}"
         );
         assert!(matches!(writer.append(&uneven), Err(IoError::ColumnLength { .. })));
-        // Refused rows leave no trace.
+        // Refused rows have no effect on the file.
         writer.append(&table(2)).unwrap();
         writer.finish().unwrap();
         assert_same(&read_table(&path).unwrap(), &table(2));
@@ -222,7 +222,7 @@ fn what_cannot_be_written_says_so() {
         Err(IoError::Directory { .. })
     ));
     assert!(write_table(&dir.path().join("no/table.parquet"), &table(2)).is_err());
-    // A comment of two lines is two comments in both formats.
+    // A comment of two lines is written as two comments in both formats.
     for extension in ["csv", "parquet"] {
         let path = dir.path().join("lines").with_extension(extension);
         let lines = OutputTable {
@@ -305,7 +305,7 @@ fn files_of_another_program_are_read() {
             let channel = record.channels().find(|c| c.name == number).unwrap();
             let check = |k: usize, value: f64| {
                 let found = channel.values[k];
-                // Sine functions of two libraries; missing values were interpolated.
+                // The sine functions of two libraries differ in the last bit; missing values were interpolated.
                 assert!(
                     (found - value).abs() <= 2e-16 || value.is_nan(),
                     "{name}, {number}, row {k}: {found} {value}"
@@ -475,14 +475,14 @@ fn what_is_no_parquet_says_so() {
         zstd.contains("column t, row group 1 is compressed with Zstandard") && zstd.contains("Snappy"),
         "{zstd}"
     );
-    // Truncated anywhere, it is refused.
+    // A file that is truncated at any position is refused.
     for cut in (0..whole.len()).step_by(97) {
         message(&whole[..cut]);
     }
 }
 
-/// Modified bytes anywhere, especially in footers: a table, a record or an error, without a panic
-/// or excessive memory.
+/// Files with modified bytes, especially in footers, give a table, a record or an error, without a panic or excessive
+/// memory.
 #[test]
 fn damaged_parquet_never_panics() {
     let dir = tempfile::tempdir().unwrap();

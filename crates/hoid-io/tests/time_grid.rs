@@ -1,4 +1,4 @@
-//! The time of a file: its name, its grid, handling of gaps and jitter, and spans.
+//! The time of a file: its name, its grid, the handling of gaps and jitter, and spans.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
 
@@ -26,7 +26,7 @@ fn the_time_may_have_the_name_that_a_recorder_gives_it() {
         std::fs::write(&path, format!("{header}\n{rows}")).unwrap();
         read_record(&path, &ReadOptions::default())
     };
-    // Printed to a microsecond or a millisecond: the grid is found in both cases.
+    // The times are printed to a microsecond or a millisecond; the grid is found in both cases.
     let found = read("Time [ms];e;u", 1000.0).unwrap();
     assert!((found.record.sample_time().s() - 1.0 / 60.0).abs() < 1e-6);
     assert!(
@@ -38,7 +38,7 @@ fn the_time_may_have_the_name_that_a_recorder_gives_it() {
         found.notes
     );
     assert!((read("time;e;u", 1.0).unwrap().record.time_s(39) - 0.65).abs() < 1e-3);
-    // Two times: the choice is ambiguous.
+    // With two time columns the choice is ambiguous.
     let path = directory.path().join("two.csv");
     std::fs::write(&path, "time,time_ms,e,u\n0,0,1,2\n0.01,10,1,2\n").unwrap();
     let message = read_record(&path, &ReadOptions::default()).unwrap_err().to_string();
@@ -230,7 +230,7 @@ fn fill_bridges_and_says_so() {
     );
 }
 
-/// An outer join of two topics: each row lacks one of the two, and neither the first nor the last row has both.
+/// An outer join of two topics: each row has a value of only one topic, including the first and the last row.
 #[test]
 fn two_topics_in_one_table_are_read_where_both_have_values() {
     let desk = Desk::new();
@@ -239,7 +239,7 @@ fn two_topics_in_one_table_are_read_where_both_have_values() {
         resample: true,
     };
     let ask = |repair| ReadOptions { repair, ..defaults() };
-    // On a common clock, e in every second row.
+    // Both topics have a common clock, and e is in every second row.
     let mut text = String::from("t,e,u\n");
     for k in 0..=21 {
         let t = 0.01 * f64::from(k);
@@ -265,7 +265,8 @@ fn two_topics_in_one_table_are_read_where_both_have_values() {
              holds the last value"
         ]
     );
-    // On separate clocks, 50 and 40 Hz, without a common time stamp: the grid is that of the faster one.
+    // The topics have separate clocks at 50 and 40 Hz without a common time stamp; the grid is that of the faster
+    // clock.
     let mut rows: Vec<(f64, bool)> = (0..50).map(|k| (0.02 * f64::from(k), true)).collect();
     rows.extend((0..40).map(|k| (0.013 + 0.025 * f64::from(k), false)));
     rows.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -286,7 +287,7 @@ fn two_topics_in_one_table_are_read_where_both_have_values() {
             (read.record.input()[k] - 10.0 * t).abs() < 1e-12 && (read.record.output()[k] - (1.0 - t)).abs() < 1e-12
         );
     }
-    // No overlap at all: the error reports it.
+    // The topics do not overlap at all, which the error reports.
     assert!(
         desk.error("t,e,u\n0,1,\n1,2,\n2,,1\n3,,2\n", &ask(FILL))
             .contains("of the record are missing")
@@ -301,8 +302,8 @@ fn resample_goes_over_gaps_and_jitter() {
         sampling_hz,
         ..defaults()
     };
-    // e = 10 t and u = 1 - t on an uneven t with two missing samples: straight lines are reproduced
-    // up to rounding.
+    // With e = 10 t and u = 1 - t on an uneven t with two missing samples, the straight lines are reproduced up to
+    // rounding.
     let times = [0.0, 0.101, 0.199, 0.3, 0.6, 0.7, 0.803, 0.9, 1.0];
     let mut text = String::from("t,e,u\n");
     times
@@ -334,7 +335,7 @@ fn resample_goes_over_gaps_and_jitter() {
     assert!((coarse.record.input()[1] - 2.5).abs() < 1e-14);
     let slow = desk.read(&text, &ask(RESAMPLE, Some(2.0))).unwrap();
     assert!(slow.notes[0].contains("no low-pass filter"), "{:?}", slow.notes);
-    // An even record is unchanged, and one with a jump in time is not a record.
+    // A file with evenly spaced times is unchanged; a file with a jump in time is refused.
     let even = "t,e,u\n0.0,1,2\n0.1,2,3\n0.2,4,5\n";
     assert_eq!(
         desk.read(even, &ask(RESAMPLE, None)).unwrap(),
@@ -346,7 +347,7 @@ fn resample_goes_over_gaps_and_jitter() {
     assert!(back.contains("expected increasing time"), "{back}");
 }
 
-/// The time is a signal too: it has a sample in each row, and is on the grid.
+/// If the time is also a signal, it has a value in each row and is resampled to the grid.
 #[test]
 fn the_time_is_resampled_as_a_signal() {
     let options = ReadOptions {
@@ -392,7 +393,7 @@ fn what_lies_outside_the_span_is_not_looked_at() {
         (vec![1.0, 2.0, 3.0], &[1.0, 2.0, 3.0][..])
     );
     assert!(desk.error(text, &span(Some(3.0), None)).contains("column e"));
-    // 0.3 falls on the sample that floating point puts at 0.30000000000000004.
+    // The bound 0.3 coincides with the sample at 0.30000000000000004.
     let sums = "t,e,u\n0.1,1,2\n0.2,2,2\n0.30000000000000004,3,2\n0.4,4,2\n";
     assert_eq!(desk.read(sums, &span(None, Some(0.3))).unwrap().record.len(), 2);
     assert_eq!(desk.read(sums, &span(Some(0.3), None)).unwrap().record.len(), 2);
@@ -410,7 +411,7 @@ fn what_lies_outside_the_span_is_not_looked_at() {
     }
 }
 
-/// Serial days are known by their size and their steps; the same numbers with longer steps are seconds.
+/// Serial days are recognised by their size and their steps; the same numbers with longer steps are seconds.
 #[test]
 fn serial_days_and_seconds() {
     let in_days = |header: &str, step_s: f64, decimals: usize| {
@@ -430,11 +431,11 @@ fn serial_days_and_seconds() {
         (seconds.record.time_s(0), seconds.record.sample_time().s()),
         (45_321.5, 0.02)
     );
-    // A column of another name is no time.
+    // A column with another name is not a time.
     assert!(record_with("level", |k| format!("{:.10}", 45_321.5 + 1e-6 * k as f64), None).is_err());
 }
 
-/// The unit below the header counts also where the name shows only that it is a time.
+/// The unit below the header also applies if the name denotes a time without a unit.
 #[test]
 fn units_of_the_time_below_the_header() {
     let desk = Desk::new();

@@ -57,7 +57,7 @@ fn trials_and_tables_without_topics_are_not_joined() {
     };
     let message = desk.error(format!("t,e,u\n{}{}", trial(0), trial(7)), &defaults());
     assert!(message.contains("2 trials by t"), "{message}");
-    // One topic only, or no value at all.
+    // A table with only one topic, or without any value.
     for text in ["t,e,u\n0,1,\n1,2,\n0,1,\n1,2,\n", "t,e,u\n1,,\n0,,\n"] {
         let message = desk.error(text, &defaults());
         assert!(!message.contains("joined"), "{message}");

@@ -1,4 +1,4 @@
-//! Trials in one file are separate records, however they are separated.
+//! Trials in one file become separate records, regardless of how they are marked.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
 
@@ -78,7 +78,7 @@ fn a_time_that_starts_again_or_a_column_divides_the_rows() {
             read[0].notes
         );
     }
-    // One of them, and a missing one.
+    // A single trial is requested, and then a trial that does not exist.
     assert_eq!(first_and_len(&trials(&counted, Some("trial=2")).unwrap()), [(10.0, 12)]);
     let message = |choice| trials(&counted, Some(choice)).unwrap_err().to_string();
     assert!(message("trial=4").contains("there is no trial trial=4; it has 1, 2, 3"));

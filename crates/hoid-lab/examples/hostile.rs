@@ -1,8 +1,7 @@
-//! A million modified messages to the lab, files of sessions, settings, results and numbers of saved trackers: no panic,
-//! caught or not.
-//! The numbers of `research/notes/mutations.md`.
+//! A million modified messages to the lab, session files, settings, results and saved trackers: none causes a panic,
+//! caught or not. The results are the numbers of `research/notes/mutations.md`.
 //!
-//! `cargo xtask slow hostile [CASES] [FIRST] [SEED]`; built with overflow checks on, as the tests are.
+//! `cargo xtask slow hostile [CASES] [FIRST] [SEED]`; it is built with overflow checks, as the tests are.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[allow(dead_code)]

@@ -1,11 +1,12 @@
-//! `cargo xtask slow lab [RUNS] [SEEDS]`: compares the plant of the page with Rust over 10 000
-//! runs, and identifies simulated operators who track through the page's engine in injected time.
+//! `cargo xtask slow lab [RUNS] [SEEDS]`: compares the plant of the page with Rust over 10 000 runs, and identifies
+//! simulated operators that track with the page's engine in injected time.
 //!
-//! Three operators: those of C1 and C2, and a gain with a lag with 4/s, each with a first-order remnant whose variance
-//! is a tenth of that of u. The operator sees e at each tick; the record has every tenth tick, and estimators assume a
-//! hold: their delay is half a sample shorter. Reported: bias of each parameter in percent with its standard error, and
-//! the coverage of the 95 % intervals; also the number of runs in which the live estimate determines a lag of unknown
-//! form, and its error.
+//! There are three operators: the operators of C1 and C2, and a gain with a lag for the element 4/s. Each has a
+//! first-order remnant whose variance is a tenth of the variance of u. The operator receives e at each tick, whereas
+//! the record contains every tenth tick and estimators assume a hold; the estimated delay is therefore half a sample
+//! shorter. The program reports the bias of each parameter in percent with its standard error, the coverage of the 95 %
+//! intervals, the number of runs in which the live estimate determines a lag without knowing the form, and the error of
+//! this lag.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../tests/common/page.rs"]
@@ -28,7 +29,7 @@ use hoid_model::{
 use hoid_sim::RunSeed;
 use serde_json::{Value, json};
 
-/// Wide enough that no operator reaches an end.
+/// Range wide enough that no operator reaches its ends.
 const MAP: InputMap = InputMap {
     centre: 0.0,
     span: 1000.0,
@@ -65,8 +66,8 @@ fn people() -> Vec<Person> {
             name: "4/s, lag",
             form: Form::Lag,
             neuromuscular: false,
-            // K = .4 and T_I = 1 s: crossover 1.1 rad/s, margin 32 deg. At this bandwidth the neuromuscular system is
-            // not observable, and so there is none.
+            // With K = .4 and T_I = 1 s, the crossover is 1.1 rad/s and the margin 32 deg. At this bandwidth a
+            // neuromuscular system could not be identified, so the operator has none.
             coordinates: vec![0.4, 1.0, 0.18],
             element: "4/s".to_owned(),
         },
@@ -90,7 +91,7 @@ fn variance(values: &[f64]) -> f64 {
     values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64
 }
 
-/// u and e at each tick, with a remnant of the given standard deviation.
+/// Returns the task with u and e at each tick, for a remnant of the given standard deviation.
 fn tracked(engine: &mut page::Engine, person: &Person, seed: u64, remnant: f64) -> (Task, Vec<f64>, Vec<f64>) {
     let condition = Condition {
         controlled_element: person.element.clone(),
@@ -122,7 +123,7 @@ fn tracked(engine: &mut page::Engine, person: &Person, seed: u64, remnant: f64) 
             n
         })
         .collect();
-    // An event takes effect at the next tick: one tick of the delay.
+    // An event takes effect at the next tick, which is one tick of the delay.
     let delay = (operator.tau_e_s() / TICK_S).round() as usize - 1;
     let answer = engine.ask(
         &json!({"phases": task.phases, "ticks": task.ticks, "map": MAP, "target": bytes(&task.target),

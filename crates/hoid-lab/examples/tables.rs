@@ -1,4 +1,4 @@
-//! `cargo xtask lab-page`: an experiment as the tables of its runs, in JSON, for a page without a server. Usage:
+//! `cargo xtask lab-page`: writes an experiment as the tables of its runs, in JSON, for a page without a server. Usage:
 //! `tables [lab.toml]`.
 //!
 //! Runs are in the order of the first person. Tables are little-endian doubles in base 64.

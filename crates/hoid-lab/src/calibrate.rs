@@ -4,7 +4,7 @@
 //! pointer events as output. Its gain, neuromuscular system and delay tau are known. The delay identified by
 //! `hoid identify` minus tau is the latency of page, frames and events, which is part of every delay identified on this
 //! computer. The latency does not include the screen (from the frame buffer to the light) or the device (from the hand
-//! to the event): these can be measured only with a sensor.
+//! to the event), which can be measured only with a sensor.
 
 use std::path::Path;
 
@@ -32,7 +32,7 @@ const DELAY: usize = 150;
 /// Standard deviation of the remnant, and time constant of its filter in s.
 const REMNANT: f64 = 0.05;
 const REMNANT_S: f64 = 0.1;
-/// Prior spread of the neuromuscular parameters, which are known up to the effect of the hold.
+/// Prior spread of the neuromuscular parameters, which are known except for the effect of the hold.
 const KNOWN: f64 = 0.01;
 
 /// Result of a calibration, stored in `calibration.toml` of the experiment.

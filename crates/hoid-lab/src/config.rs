@@ -36,7 +36,7 @@ pub struct Config {
     pub consent: String,
     /// The order of the conditions.
     pub order: Order,
-    /// When the live estimate is shown to the person; the experimenter's window always shows it.
+    /// Time at which the live estimate is shown to the person; the experimenter's window always shows it.
     pub live: LiveFor,
     /// Recursive method of the live estimate, as in `hoid track --method`.
     pub method: String,
@@ -57,7 +57,7 @@ pub enum Order {
     Given,
 }
 
-/// When the live estimate is shown to the person.
+/// Time at which the live estimate is shown to the person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LiveFor {
@@ -149,14 +149,14 @@ pub struct Condition {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Signal {
-    /// Period in s, of which all sines are harmonics.
+    /// Period in s; all sines are harmonics of this period.
     pub period_s: f64,
     /// Largest multiple of the base frequency.
     pub largest: u32,
     /// Root mean square of the signal.
     pub rms: f64,
     /// Choice of the prime multiples that the signal contains. If the display shows the target, target and disturbance
-    /// need lines of their own: `even` for one of them and `odd` for the other.
+    /// need different lines: `even` for one of them and `odd` for the other.
     #[serde(skip_serializing_if = "is_all")]
     pub interleaved: Interleaved,
 }
@@ -179,7 +179,8 @@ impl Default for Signal {
 }
 
 impl Default for Condition {
-    /// Returns a condition with compensatory tracking and rate control (4/s), 80 s long after a run-in of 10 s.
+    /// Returns a condition with compensatory tracking and rate control (4/s), with a measurement of 80 s after a run-in
+    /// of 10 s.
     fn default() -> Self {
         Self {
             name: "rate".to_owned(),

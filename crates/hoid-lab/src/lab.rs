@@ -90,7 +90,7 @@ struct Current {
     /// A run that was sent to the page but not started.
     ready: Option<Ready>,
     run: Option<Running>,
-    /// Number of the last run that ended; its page may not know this yet and still send batches.
+    /// Number of the last run that ended; its page may still send batches.
     last_ended_run: Option<usize>,
     reporting: bool,
     pages: Pages,

@@ -6,10 +6,9 @@
 //! data determine it ([`hoid_analysis::identify`]). If the selected form has no lag, or if the interval of T_I includes
 //! a pure integration, T_I is not determined and no value is reported.
 //!
-//! For an operator without a lag a form with a lag is sometimes selected, with a short lag combined with a longer lead:
-//! in 13 of 60 runs of C1 and 2 of 20 runs of C2 (30 and 80 s long), with T_I up to 6.3 standard errors from zero. A
-//! true lag of 1 s is at least 25 standard errors from zero. A lag is therefore reported only if it exceeds ten
-//! standard errors.
+//! For an operator without a lag, a form with a short lag and a longer lead is sometimes selected: in 13 of 60 runs of
+//! C1 and 2 of 20 runs of C2 (30 and 80 s long), with T_I up to 6.3 standard errors from zero. A true lag of 1 s is at
+//! least 25 standard errors from zero. A lag is therefore reported only if it exceeds ten standard errors.
 
 use std::{
     sync::mpsc::{Receiver, Sender, channel},
@@ -168,7 +167,7 @@ mod tests {
         seed.white_noise(samples)
     }
 
-    /// e and u of a gain of .4 with a lag and 4/s, with a first-order remnant.
+    /// Returns e and u of a gain of .4 with a lag, with the element 4/s and a first-order remnant.
     fn with_lag(seconds: f64, seed: u64) -> Vec<Sample> {
         let n = (seconds / TS.s()) as usize;
         let operator = FamilyOperator::new(Form::Lag, false, &[0.4 / LAG_S, 1.0 / LAG_S, 0.18]).unwrap();
@@ -213,7 +212,7 @@ mod tests {
 
     #[test]
     fn who_has_no_lag_is_given_none() {
-        // Without the limit of `MIN_SIGNIFICANCE` a lag is reported for the last three.
+        // Without the limit of `MIN_SIGNIFICANCE`, a lag would be reported for the last three.
         for (seed, n) in [(1, 3000), (21, 3000), (31, 3000), (2, 8000)] {
             assert_eq!(
                 Lag::of(record(&samples_of_c1(seed)[..n])),
@@ -234,7 +233,7 @@ mod tests {
         rest.iter().for_each(|sample| fits.take(*sample));
         assert_eq!(fits.lag(), Lag::Waiting);
         assert!(fits.busy);
-        // The fit in progress now belongs to a previous operator.
+        // The fit in progress now refers to the operator before the change.
         fits.changed(50.0);
         assert_eq!((fits.e.len(), fits.from_s), (1000, 50.0));
         let answer = fits.found.recv().unwrap();

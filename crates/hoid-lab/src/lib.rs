@@ -2,7 +2,7 @@
 //!
 //! The page simulates the controlled element in steps of 1 ms from tables computed by this crate. It logs every input
 //! event, tick and frame, and sends them in batches. This crate appends the batches to the folder of the session,
-//! passes them to the tracker, and after the run recomputes every tick to the last bit.
+//! passes them to the tracker, and after the run recomputes every tick bit for bit.
 //!
 //! | module | contents |
 //! |---|---|
@@ -21,7 +21,7 @@
 //! | `experiment`, `export`, `replay`, `reports` | files outside the sessions; archives; replay of runs; result pages |
 //! | [`calibrate`] | the delay that page, frames and events add to the loop |
 
-// Numbers from a page or a file are checked before they serve as an index, a length or a summand.
+// Numbers from a page or a file are checked before they are used as an index, a length or a summand.
 #![cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 
 pub mod calibrate;

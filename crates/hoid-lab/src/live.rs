@@ -278,7 +278,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::config::Condition;
 
-    /// e and u of the operator of C1, for a seed.
+    /// Returns e and u of the operator of C1 for a seed.
     pub(crate) fn samples_of_c1(seed: u64) -> Vec<Sample> {
         let simulator = Simulator::new(&Scenario::condition(Reference::C1)).unwrap();
         let seed = RunSeed {
@@ -308,7 +308,7 @@ pub(crate) mod tests {
             last = run.take(five);
         }
         assert!((last.t - 81.92).abs() < 1e-6, "{}", last.t);
-        // The margins of C1 by its formulas: the loop of s1.
+        // The margins of C1 are computed from the formulas of the loop of s1.
         let scenario = Scenario::condition(Reference::C1);
         let open = scenario.initial.operator.transfer_function().unwrap();
         let open = open.series(&scenario.initial.controlled_element.transfer_function().unwrap());
@@ -327,12 +327,12 @@ pub(crate) mod tests {
 
     #[test]
     fn margins_are_those_of_the_formula() {
-        // Y = 1 exactly, P = 3 e^{-0.2 s}/s: omega_c = 3, phi_m = 90 - 0.6 rad; a variance of ln|Y|
-        // moves omega_c by 3 and phi_m by slope -0.2.
+        // With Y = 1 and P = 3 e^{-0.2 s}/s, omega_c = 3 and phi_m = 90 deg - 0.6 rad. A change of ln|Y| changes
+        // omega_c with the factor 3, and phi_m with the slope -0.2.
         let element: ContinuousTransferFunction = "3/s".parse().unwrap();
         let y = |omega: f64| {
             let (sin, cos) = (-0.2 * omega).sin_cos();
-            // Covariance along Y (gain) only: 0.01^2.
+            // The covariance is 0.01^2 along Y, which is an error of the gain only.
             let v = 1e-4;
             Some(Response {
                 value: [cos, sin],

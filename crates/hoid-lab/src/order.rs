@@ -2,8 +2,8 @@
 //!
 //! In the balanced Latin squares of E. J. Williams (*Australian Journal of Scientific Research* A 2 (1949) 149-168),
 //! row r for n conditions is `r, r+1, r-1, r+2, r-2, ...` modulo n: each condition occurs once in each position and
-//! follows each other condition equally often. For an odd n a second square is required, in which each row of the first
-//! is reversed; there are then 2n rows.
+//! follows every other condition equally often. For an odd n a second square is required, which consists of the
+//! reversed rows of the first; there are then 2n rows.
 
 use serde::{Deserialize, Serialize};
 
@@ -41,7 +41,7 @@ pub fn latin_row(n: usize, row: usize) -> Vec<usize> {
     order
 }
 
-/// Returns all runs of a session, one condition after the other, each with its training runs first.
+/// Returns all runs of a session, one condition after the other; in each condition the training runs are first.
 pub fn plan(config: &Config, row: usize) -> Vec<Planned> {
     let n = config.condition.len();
     let order = match config.order {

@@ -1,5 +1,5 @@
 //! The controlled element over one tick, and the conversion of device positions to u. The page executes the same
-//! arithmetic operations in the same order (`page/src/plant.ts`), so that both give identical bits.
+//! arithmetic operations in the same order (`page/src/plant.ts`), so both give identical bits.
 //!
 //! At tick k, with the held input u from the device, disturbance d and target f,
 //!
@@ -128,7 +128,7 @@ mod tests {
         for _ in 0..1000 {
             plant.step(&mut x, 2.0);
         }
-        // 1000 sums of 2e-3, each rounded.
+        // The state is the sum of 1000 terms of 2e-3, with a rounding error in each addition.
         assert!((plant.output(&x, 2.0) - 9.0).abs() < 1e-11);
     }
 

@@ -1,6 +1,6 @@
 //! Conversion of a run to a record that all commands of hoid can read. It contains every tenth tick: e and u at that
-//! time, and the target, disturbance, output and displayed e. A target that the display showed has a role for the
-//! person. t = 0 is the start of the measurement.
+//! time, and the target, disturbance, output and displayed e. A target that was displayed has a role for the person.
+//! t = 0 is the start of the measurement.
 
 use hoid_model::{Channel, Record, SampleTime};
 

@@ -1,6 +1,6 @@
 //! Pages about a session, created by running the program `hoid`: the results of `identify`, `track` and `describe` for
 //! each run, and the results of `group` for all people so far. The program runs in a separate process on one core, so
-//! that it can neither abort nor delay an experiment.
+//! it can neither abort nor delay an experiment.
 
 use std::{
     path::{Path, PathBuf},

@@ -221,9 +221,9 @@ mod tests {
 
     #[test]
     fn the_simulator_of_hoid_finds_the_same_loop() {
-        // The simulator of C4 at 100 Hz, with u held over ten ticks each, agrees with the task at 1
-        // kHz: both holds are exact, and the element changes in the same blocks except for the
-        // middle of the block that the task uses.
+        // The simulator of C4 at 100 Hz, with u held over ten ticks, agrees with the task at 1 kHz: both holds are
+        // exact, and the element changes in the same blocks. The only difference is that the task evaluates the element
+        // at the middle of each block.
         use hoid_model::scenario::{Condition as Reference, Scenario};
         use hoid_sim::Simulator;
         let own = Condition {
@@ -236,7 +236,7 @@ mod tests {
         let signals = simulator
             .signals(&RunSeed::default().white_noise(simulator.samples()))
             .unwrap();
-        // Without the fade, which the simulator does not have.
+        // Only ticks after the fade-in are compared, because the simulator has no fade-in.
         let faded = (FADE_S / TICK_S) as usize;
         let forcing = hoid_model::forcing::ForcingFunction::reference();
         let whole = forcing.samples(-10.0, SampleTime::new(TICK_S).unwrap(), faded);
@@ -265,7 +265,7 @@ mod tests {
             phase.plant.b[0] * phase.plant.c[0] / TICK_S
         };
         assert!((gain(0) - 4.0).abs() < 1e-6 && (gain(task.ticks - 1) - 8.0).abs() < 1e-6);
-        // The middle of the change is within a block of it: the slope there is 4 * 2/4 per second.
+        // The gain at the middle of the change is correct to within one block; its slope there is 4 * 2/4 per second.
         assert!((gain(15_000) - 6.0).abs() < 0.02);
         assert!(task.phases.windows(2).all(|pair| pair[0].from < pair[1].from));
         assert_eq!(Task::new(&condition("4/s"), 0, 1).unwrap().phases.len(), 1);
@@ -279,7 +279,7 @@ mod tests {
         assert_ne!(a, b);
         assert_eq!(a[0], 0.0);
         let rms = |x: &[f64]| (x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64).sqrt();
-        // One whole period.
+        // The sum is over one whole period.
         assert!((rms(&a[5_000..25_000]) - 1.5).abs() < 1e-3);
     }
 

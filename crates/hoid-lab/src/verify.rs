@@ -11,13 +11,13 @@
 //! | `lab-input` | u at a tick does not match the input events |
 //! | `lab-tick` | e at a tick differs in at least one bit from the e computed with the controlled element |
 //! | `lab-event` | an event took effect before its time stamp, too late, or out of sequence |
-//! | `lab-frame` | a frame was late, did not show the tick that was due, or showed another e than that of its tick |
+//! | `lab-frame` | a frame was late, did not show the tick that was due, or showed an e that differs from the e of its tick |
 //! | `lab-changed` | a file was changed after the end of the run |
 //!
 //! u and e are compared bit by bit, except for the sign of zero, which is not preserved in text. e is recomputed from
-//! the logged u, so that a wrong event can be distinguished from a wrong tick. The tables used are those sent to the
-//! page; they are compared, up to rounding, with tables recomputed from the seed (sines may differ between computers in
-//! the last bit).
+//! the logged u, so a wrong event can be distinguished from a wrong tick. The tables used are those sent to the page;
+//! they are compared, up to rounding, with tables recomputed from the seed (sines may differ between computers in the
+//! last bit).
 
 use hoid_model::{Finding, Verdict, VerdictLevel};
 use hoid_numerics::statistics::upper_median;
@@ -219,7 +219,7 @@ fn errors_of(task: &Task, logged: &Logged) -> Option<Finding> {
 /// Returns the first index at which two signals differ in a bit, and the number of differences; `None` if they are
 /// equal.
 fn differing(made: &[f64], logged: &[f64]) -> Option<(usize, usize)> {
-    // Adding zero turns minus zero into zero.
+    // Adding zero converts minus zero to zero.
     let differ = |(a, b): (&f64, &f64)| (a + 0.0).to_bits() != (b + 0.0).to_bits();
     let places: Vec<usize> = (logged.iter().enumerate())
         .filter(|(k, logged)| made.get(*k).is_none_or(|made| differ((made, logged))))

@@ -105,7 +105,7 @@ pub struct State {
     pub name: String,
     /// Consent text that the person must confirm.
     pub consent: String,
-    /// When the live estimate is shown to the person.
+    /// Time at which the live estimate is shown to the person.
     pub live: LiveFor,
     /// True if a simulated operator replaces the person.
     pub calibrate: bool,
@@ -115,13 +115,13 @@ pub struct State {
     pub open: Vec<String>,
     /// Runs that have ended.
     pub done: Vec<Done>,
-    /// Names of the conditions of all planned runs; `next` is the index of the next one.
+    /// Names of the conditions of all planned runs; `next` is the index of the next run.
     pub planned: Vec<String>,
     /// Index of the next run in `planned`.
     pub next: Option<usize>,
     /// The condition of the next run.
     pub condition: Option<Condition>,
-    /// Whether the next run is a training run.
+    /// True if the next run is a training run.
     pub training: bool,
     /// Number of the run in progress, if there is one.
     pub running: Option<usize>,

@@ -1,4 +1,4 @@
-//! The experiment that `hoid design --out` writes is one of the laboratory.
+//! The lab accepts the experiment that `hoid design --out` writes.
 #![allow(clippy::unwrap_used)]
 
 use std::fs;

@@ -1,7 +1,7 @@
-//! Disks of 64 kB to 4 MB that fill at any instant of a session: data reported as logged are there, verified runs
-//! remain verified, and the session opens.
+//! Disks of 64 kB to 4 MB that become full at any time during a session: data reported as logged are present, verified
+//! runs remain verified, and the session opens.
 //!
-//! A disk is a `tmpfs` of that size, which Linux lets an administrator mount; elsewhere the test reports that it is
+//! A disk is a `tmpfs` of that size, which an administrator can mount on Linux; elsewhere the test reports that it is
 //! skipped.
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used)]
@@ -92,7 +92,7 @@ struct LoggedBefore {
     verified: Vec<Stem>,
 }
 
-/// A session whose disk is full from batch `full` until batch `until`.
+/// Runs a session whose disk is full from batch `full` until batch `until`.
 fn session(out: &Path, full: usize, until: usize, told: &mut LoggedBefore) -> Option<Session> {
     let ballast = out.join("ballast");
     let mut session = Session::begin(out, &config(), "P01", false).ok()?;
@@ -194,7 +194,7 @@ fn a_disk_that_fills_loses_nothing_that_was_told() {
                 broken += 1;
             }
         }
-        // The session continues.
+        // The session can be continued.
         assert!(again.new_number().is_ok());
         again.save().unwrap();
     }
@@ -204,8 +204,8 @@ fn a_disk_that_fills_loses_nothing_that_was_told() {
     );
 }
 
-/// The disk fills while a person tracks: the page is notified at once, the run does not count, and the session
-/// continues.
+/// If the disk becomes full while a person tracks, the page is notified at once, the run does not count, and the
+/// session continues.
 #[test]
 fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     let at = tempfile::tempdir().unwrap();
@@ -225,7 +225,7 @@ fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     // Messages of the page in the meantime are ignored, and the pages see that no run is in progress.
     person.track(1, 3000..3100).unwrap();
     assert_eq!(person.state()["running"], Value::Null);
-    // No run starts while it is full.
+    // No run starts while the disk is full.
     let said = person.next(2).unwrap_err();
     assert!(said.contains("No space left") && said.contains("free space"), "{said}");
     fs::remove_file(&ballast).unwrap();

@@ -1,4 +1,4 @@
-//! A sample of the cases of `cargo xtask slow hostile`: none panics.
+//! A sample of the cases of `cargo xtask slow hostile`, none of which may panic.
 #![allow(clippy::unwrap_used)]
 
 #[allow(dead_code)]
@@ -21,7 +21,7 @@ use person::Person;
 use serde_json::json;
 
 const CASES: u64 = 1500;
-/// Cases that once failed: a preview of eleven days, more samples held back than are in the ring.
+/// Cases that failed in the past: a preview of eleven days, and more samples held back than the ring buffer contains.
 const FOUND: [u64; 2] = [6025, 66_758];
 
 #[test]
@@ -31,7 +31,7 @@ fn what_nobody_says_or_saved_ends_nothing() {
     FOUND.into_iter().for_each(|number| hostile.case(2026, number));
 }
 
-/// A page asks for a run, continues with a session whose plan is shorter, and starts the run there.
+/// A page requests a run, continues with a session whose plan is shorter, and tries to start the run there.
 #[test]
 fn a_run_of_one_session_does_not_start_in_another() {
     let dir = tempfile::tempdir().unwrap();
@@ -56,6 +56,6 @@ fn a_run_of_one_session_does_not_start_in_another() {
         .unwrap();
     let said = person.say(person::begin(2)).unwrap_err();
     assert!(said.contains("run 2 was not requested"), "{said}");
-    // The run of that session starts.
+    // The next run of that session can start.
     person.next(1).unwrap();
 }

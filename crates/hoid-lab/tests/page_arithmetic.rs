@@ -1,5 +1,5 @@
-//! The page computes the same as Rust, to the last bit. Without node the test reports that it is
-//! skipped; `cargo xtask slow lab` does ten thousand runs.
+//! The page and Rust give bit-identical results. Without Node.js the test reports that it is skipped;
+//! `cargo xtask slow lab` compares ten thousand runs.
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
 #[path = "common/page.rs"]

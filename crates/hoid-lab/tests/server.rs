@@ -64,7 +64,7 @@ impl At {
     fn raw(&self, request: &[u8]) -> String {
         let mut stream = TcpStream::connect(&self.host).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
-        // The server may refuse before all is written.
+        // The server may refuse the request before it has been written completely.
         let _ = stream.write_all(request);
         let mut reply = Vec::new();
         let _ = stream.read_to_end(&mut reply);
@@ -150,7 +150,7 @@ impl Page {
         self.0.send(Message::text(message.to_string())).unwrap();
     }
 
-    /// The next message of this type; others are skipped.
+    /// Returns the next message of this type; other messages are skipped.
     fn hear(&mut self, kind: &str) -> Value {
         loop {
             if let Message::Text(text) = self.0.read().unwrap() {
@@ -192,7 +192,7 @@ impl Page {
     }
 }
 
-/// Ticks of a person who does nothing: e is the target.
+/// Returns a batch of ticks of a person who does not move the device, so e equals the target.
 fn batch(number: u64, first: usize, target: &[f64]) -> Value {
     let e: Vec<f64> = target[first..first + 50].to_vec();
     let frame = json!([first as f64 + 0.5, first as f64 + 0.5, first, e[0]]);
@@ -251,7 +251,7 @@ fn a_window_that_is_closed_breaks_its_run_off() {
             .unwrap()
             .contains("another window")
     );
-    // When the first one is closed, the session continues in the second.
+    // When the first window is closed, the session continues in the second.
     drop(person);
     second.hear("yours");
     loop {
@@ -323,8 +323,8 @@ fn one_experiment_has_one_server() {
     assert!(second.is_err_and(|error| error.to_string().contains("another process is using")));
 }
 
-/// Connections that the server has not accepted yet wait for it. The system drops what its queue does not hold, and the
-/// client asks again after a second.
+/// Connections that the server has not accepted yet are queued. The system drops connections if its queue is full, and
+/// the client retries after a second.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_burst_of_connections_is_kept_until_it_is_accepted() {
@@ -344,7 +344,7 @@ fn a_burst_of_connections_is_kept_until_it_is_accepted() {
     assert_eq!(waiting.len(), BURST);
 }
 
-/// Connections that send a byte at intervals, as many as the system allows: they are closed for the page.
+/// As many connections as the system allows, each of which sends one byte at intervals, are closed to admit the page.
 #[test]
 fn slow_strangers_do_not_shut_the_page_out() {
     let dir = tempfile::tempdir().unwrap();
@@ -368,9 +368,9 @@ fn slow_strangers_do_not_shut_the_page_out() {
     assert_eq!(status(&reply), "200");
 }
 
-/// A thousand connections of strangers, each of which reconnects as soon as it is closed: silence, half a head, heads
-/// without the token or without an end, sockets, arbitrary bytes. The page is answered each time, and the longest time
-/// is printed (within a second where the machine is not busy with something else).
+/// A thousand connections of strangers, each of which reconnects as soon as it is closed, send nothing, half a head,
+/// heads without the token or without an end, requests for sockets, or arbitrary bytes. The page receives a reply each
+/// time, and the longest time is printed (less than a second if the machine is otherwise idle).
 #[test]
 fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
     let dir = tempfile::tempdir().unwrap();
@@ -417,7 +417,7 @@ fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
         })
         .collect();
     thread::sleep(Duration::from_millis(300));
-    // The page answers throughout, until strangers were refused and have reconnected.
+    // The page receives replies throughout, until strangers have been refused and have reconnected.
     let start = Instant::now();
     let (mut asked, mut slowest) = (0, Duration::ZERO);
     while asked < 20 || (begun.load(Ordering::Relaxed) <= strangers * each && start.elapsed() < Duration::from_secs(60))
@@ -439,7 +439,7 @@ fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
     assert!(begun > strangers * each, "{begun} strangers");
 }
 
-/// The address for starting a browser is visible in the list of processes: it works once.
+/// The address for starting a browser is visible in the list of processes, so it works only once.
 #[test]
 fn the_address_of_the_browser_leads_to_the_page_once() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! A session without a page: batches as a page sends them, their processing, and the findings after
+//! A session without a page: batches in the form in which a page sends them, their processing, and the findings after
 //! modifications.
 #![allow(clippy::unwrap_used)]
 
@@ -45,7 +45,7 @@ fn begun(session: &Session, number: usize) -> (RunStart, Task) {
     run::begun(session, number, MAP).unwrap()
 }
 
-/// Batches of a run up to a tick: an event every 8 ms, a frame every 16.7 ms.
+/// Returns the batches of a run up to a tick, with an event every 8 ms and a frame every 16.7 ms.
 fn batches(task: &Task, until: usize) -> Vec<Batch> {
     let events: Vec<Event> = (0..until / 8)
         .map(|k| {
@@ -120,7 +120,7 @@ fn a_run_is_verified_and_its_record_is_read_by_hoid() {
     }
 }
 
-/// A display that shows the target gives it a role in the recording.
+/// If the display shows the target, the target has a role in the recording.
 #[test]
 fn a_displayed_target_has_its_role_in_the_recording() {
     for (display, role) in [
@@ -163,7 +163,7 @@ fn corrupt(stem: &Stem, end: &str, line: usize, cell: usize, with: impl Fn(f64) 
     fs::write(&path, lines.join("\n") + "\n").unwrap();
 }
 
-/// Modification of a number.
+/// A modification of a number.
 type Change<'a> = &'a dyn Fn(f64) -> f64;
 
 #[test]
@@ -187,7 +187,7 @@ fn what_is_changed_makes_a_run_unverified_for_its_own_reason() {
         let kinds: Vec<&str> = checked.verdict.findings().iter().map(|finding| finding.kind).collect();
         assert!(kinds.contains(&kind), "{file} {cell}: {kinds:?} lacks {kind}");
         assert!(kinds.contains(&"lab-changed"));
-        // Its own reason, and not that of another file.
+        // The verdict has the reason for this modification, and no other reason.
         let others = ["lab-input", "lab-event", "lab-tick", "lab-ticks", "lab-frame"];
         let own = |other: &&str| *other != kind && kinds.contains(other);
         assert_eq!(others.iter().find(|other| own(other)), None, "{file} {cell}: {kinds:?}");
@@ -221,7 +221,7 @@ fn a_session_goes_on_after_its_server_was_killed() {
     let mut session = Session::begin(dir.path(), &config(), "P01", true).unwrap();
     let (stem, log) = run(&mut session, 1234);
     drop((log, session));
-    // The last line is truncated, as by a kill in the middle of it.
+    // The last line is truncated, as if the process was killed while writing it.
     let path = stem.file("ticks.csv");
     let text = fs::read_to_string(&path).unwrap();
     fs::write(&path, &text[..text.len() - 7]).unwrap();
@@ -235,7 +235,7 @@ fn a_session_goes_on_after_its_server_was_killed() {
         "{}",
         lost.reasons
     );
-    // Both runs are made, with different numbers.
+    // Two runs with different numbers are made.
     for _ in 0..2 {
         let (stem, log) = run(&mut session, usize::MAX);
         drop(log);
@@ -287,8 +287,8 @@ fn people_have_their_rows_and_pseudonyms_are_checked() {
     }
 }
 
-/// Files truncated at any byte, with flipped bits or deleted, as by power cuts and full disks: the session opens, its
-/// damaged runs are unverified, and it can continue.
+/// Files are truncated at any byte, have flipped bits or are deleted, as after power cuts and on full disks: the
+/// session opens, its damaged runs are unverified, and it can continue.
 #[test]
 fn every_session_opens_whatever_was_cut_or_lost() {
     let dir = tempfile::tempdir().unwrap();
@@ -370,7 +370,7 @@ fn numbers_of_files_are_no_places() {
     fs::write(&json, value.to_string()).unwrap();
     let said = check(&stem).unwrap().reasons();
     assert!(said.contains("do not fit each other"), "{said}");
-    // A preview of eleven days: no memory of its length is allocated.
+    // With a preview of eleven days, no memory of this length is allocated.
     let mut value: serde_json::Value = serde_json::from_str(&begun).unwrap();
     value["condition"]["preview_s"] = serde_json::json!(1e6);
     fs::write(&json, value.to_string()).unwrap();
@@ -381,14 +381,14 @@ fn numbers_of_files_are_no_places() {
     let other = facts.replacen("condition = 0", "condition = 9", 1);
     assert_ne!(facts, other);
     fs::write(&toml, &other).unwrap();
-    // As long as the copy contains the plan, the session opens.
+    // The session opens if the copy contains the plan.
     assert_eq!(Session::open(&session.folder).unwrap().facts, session.facts);
     fs::write(session.folder.join("lab.copy.toml"), other).unwrap();
     let said = Session::open(&session.folder).unwrap_err().to_string();
     assert!(said.contains("condition 9 of 1"), "{said}");
 }
 
-/// `--replay` reads and does not write.
+/// `--replay` only reads and does not write.
 #[test]
 fn reading_a_session_changes_no_file() {
     let dir = tempfile::tempdir().unwrap();
@@ -398,7 +398,7 @@ fn reading_a_session_changes_no_file() {
     fs::write(&runs, &cut).unwrap();
     assert_eq!(Session::read(&session.folder).unwrap().done.len(), 1);
     assert_eq!(fs::read_to_string(&runs).unwrap(), cut);
-    // The next line is after the last complete one.
+    // The next line is written after the last complete line.
     let mut session = Session::open(&session.folder).unwrap();
     let (stem, log) = run(&mut session, usize::MAX);
     drop(log);

@@ -1,10 +1,9 @@
 //! Four numbers in one or two registers.
 //!
-//! A sum over a record is a recursion: each term has to wait for the sum of the preceding terms. Four partial sums,
-//! each over every fourth term, are independent of each other. There are four partial sums for all registers, since
-//! their number determines the last digits of the sum. With AVX2 four numbers fill one register; without it they fill
-//! two. Products and sums act on each number separately, without contraction, so all registers give bit-identical
-//! results.
+//! A sum over a record is a recursion: each term must wait for the sum of the preceding terms. Four partial sums, each
+//! over every fourth term, are independent of each other. The number of partial sums is four for all registers, because
+//! it determines the last digits of the sum. With AVX2 four numbers fill one register; without it they fill two.
+//! Products and sums act on each number separately, without contraction, so all registers give bit-identical results.
 
 use std::ops::{Add, Mul, Sub};
 

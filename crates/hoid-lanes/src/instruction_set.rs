@@ -73,8 +73,9 @@ impl<T: LaneTask> NullaryFnOnce for OneLane<T> {
 
 /// Runs a task for a single run, with f64 numbers.
 ///
-/// If this processor has AVX2, the task uses AVX2 instructions. They have three register operands, so an operand need
-/// not be copied before it is overwritten. Products and sums are not contracted, so the results are bit-identical.
+/// If this processor has AVX2, the task uses AVX2 instructions. These instructions have three register operands, so an
+/// operand need not be copied before it is overwritten. Products and sums are not contracted, so the results are
+/// bit-identical.
 pub fn with_one_lane<T: LaneTask>(task: T) -> T::Output {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     if let Some(simd) = pulp::x86::V3::try_new() {

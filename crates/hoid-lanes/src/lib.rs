@@ -1,8 +1,8 @@
 //! Simultaneous runs of a recursion in the lanes of vector registers, bit-identical to each run alone.
 //!
-//! A recursion `y(t) = x(t) - f y(t-1)` has to wait at each sample for its previous result. A single run therefore
-//! leaves most of a processor idle, and no vector instruction can speed it up: sample t + 1 cannot start before sample
-//! t has finished. Several runs can be computed simultaneously, one in each lane of a register:
+//! A recursion `y(t) = x(t) - f y(t-1)` must wait at each sample for its previous result. A single run therefore leaves
+//! most of a processor idle, and no vector instruction can speed it up: sample t + 1 cannot start before sample t has
+//! finished. Several runs can be computed simultaneously, one in each lane of a register:
 //!
 //! `[y_1(t) .. y_L(t)] = [x_1(t) .. x_L(t)] - [f_1 .. f_L] [y_1(t-1) .. y_L(t-1)]`, lane by lane.
 //!

@@ -4,7 +4,7 @@
 
 use hoid_lanes::{FourLaneTask, FourLanes, InstructionSet, LaneTask, Number, with_four_lanes, with_one_lane};
 
-/// A sum, a difference and a product of each four; contraction would change the rounding of the products.
+/// Sums, differences and products of groups of four numbers; contraction would change the rounding of the products.
 struct Horner<'a>(&'a [[f64; 4]]);
 
 impl FourLaneTask for Horner<'_> {
@@ -39,8 +39,8 @@ fn each_number_goes_alone_and_without_contraction() {
     }
 }
 
-/// A recursion of second order with a gain that is divided by its input power: all operations of a number, with
-/// products whose rounding contraction would change. `x` contains a sample of all lanes, then the next.
+/// A second-order recursion whose gain is divided by the input power. It uses all operations of a number, with products
+/// whose rounding would change by contraction. `x` contains one sample of all lanes, followed by the next sample.
 struct Recursion<'a>(&'a [f64]);
 
 impl LaneTask for Recursion<'_> {

@@ -52,8 +52,8 @@ mod tests {
 
     #[test]
     fn single_integrator_below_and_double_above_the_break() {
-        // K_c/omega_b / s far below, K_c / s^2 far above; the other pole changes either by
-        // (1e-4)^2/2.
+        // Asymptotes: K_c/omega_b / s far below omega_b, K_c / s^2 far above. The neglected term changes the magnitude
+        // by (1e-4)^2/2.
         let low = response(90.0, 6.0, 6e-4);
         assert!((low.norm() * 6e-4 - 15.0).abs() < 1e-6);
         assert!((low.arg() + std::f64::consts::FRAC_PI_2).abs() < 2e-4);

@@ -56,7 +56,7 @@ pub fn delayed_operator(parameters: [f64; 5], sample_time: SampleTime) -> Result
 }
 
 /// As [`delayed_operator`], for a given number l of whole samples in the delay. Both ends of the interval
-/// `l Ts <= tau <= (l + 1) Ts` are included, so that the model and its derivatives are smooth functions of tau over the
+/// `l Ts <= tau <= (l + 1) Ts` are included, and the model and its derivatives are smooth functions of tau over the
 /// whole interval.
 ///
 /// # Errors
@@ -216,7 +216,7 @@ mod tests {
         all
     }
 
-    /// Impulse response of the discrete model to a pulse of one sample.
+    /// Response of the discrete model to a pulse of one sample.
     fn response(operator: &DelayedOperator, n: usize) -> Vec<f64> {
         let mut y: Vec<f64> = Vec::with_capacity(n);
         for k in 0..n {
@@ -230,7 +230,7 @@ mod tests {
         y
     }
 
-    /// The same by the matrix exponentials of the states in controllable canonical form.
+    /// The same response, computed by matrix exponentials in controllable canonical form.
     fn by_matrix_exponentials(p: [f64; 5], n: usize) -> Vec<f64> {
         let [k_e, k_e_dot, omega, zeta, tau] = p;
         let w2 = omega * omega;
@@ -265,8 +265,8 @@ mod tests {
             let theirs = by_matrix_exponentials(p, 80);
             let size = theirs.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
             for (k, (a, b)) in ours.iter().zip(&theirs).enumerate() {
-                // The recursion of the difference equation loses digits by 1/|1 + f1 + f2| at most
-                // 2500 here.
+                // The recursion of the difference equation amplifies rounding errors by at most 1/|1 + f1 + f2|,
+                // here 2500.
                 assert!((a - b).abs() < 2e-12 * size, "{p:?} sample {k}: {a} and {b}");
             }
         }
@@ -285,19 +285,20 @@ mod tests {
             let ours = delayed_operator(delayed_parameters(&operator), ts()).unwrap();
             let known = operator.discretise(ts()).unwrap();
             assert_eq!((ours.nk, ours.b[2]), (known.nk, 0.0));
-            // The same formulas, in another order of the products.
+            // The same formulas, but the factors are multiplied in another order.
             assert!((ours.b[0] - known.held.b0).abs() < 1e-16 && (ours.b[1] - known.held.b1).abs() < 1e-16);
             assert_eq!(ours.f, [known.held.f1, known.held.f2]);
             let jacobian = delayed_operator_jacobian(delayed_parameters(&operator), ts()).unwrap();
             let expected = discretisation_jacobian(&operator, ts());
             for (row, known) in [0, 1, 3, 4].into_iter().zip(expected) {
                 for (a, b) in jacobian[row].iter().zip(known) {
-                    // Both cancel in 1 - E C + (s/2) E S, by a factor of 100.
+                    // In both formulas the terms of 1 - E C + (s/2) E S cancel, which loses a factor of 100 in
+                    // precision.
                     assert!((a - b).abs() < 1e-13 * (1.0 + b.abs()), "{row}: {a} and {b}");
                 }
             }
         }
-        // The reference task: nk = 29 at 0.28 s.
+        // In the reference task, a delay of 0.28 s gives nk = 29.
         let s1 = delayed_operator([0.09, 0.036, 11.25, 0.35, 0.28], ts()).unwrap();
         assert_eq!(s1.nk, 29);
         assert!((s1.b[0] - 0.0442765923).abs() < 5e-11 && (s1.b[1] + 0.0431823806).abs() < 5e-11);
@@ -312,8 +313,8 @@ mod tests {
                 [d.b[0], d.b[1], d.b[2], d.f[0], d.f[1]]
             };
             for j in 0..5 {
-                // Inside the sample: the whole ones have derivatives on one side only, tested
-                // alongside.
+                // Only delays within a sample are tested here: at a whole number of samples the derivatives are
+                // one-sided, which the next test checks.
                 if j == 4 && [0.0, 0.28, 0.29].contains(&p[4]) {
                     continue;
                 }
@@ -329,8 +330,8 @@ mod tests {
                 let scale = (0..5).map(|k| exact[k][j].abs()).fold(0.0, f64::max);
                 for i in 0..5 {
                     let difference = (up[i] - down[i]) / (2.0 * h);
-                    // Central differences: truncation h^2 and rounding eps/h against derivatives of
-                    // 1e-3 and more.
+                    // Central differences have a truncation error h^2 and a rounding error eps/h; the derivatives are
+                    // at least 1e-3.
                     assert!(
                         (exact[i][j] - difference).abs() < 1e-7 * scale + 1e-10,
                         "{p:?} row {i} by {}: {} and {difference}",
@@ -349,7 +350,7 @@ mod tests {
         let at = |h: f64| delayed_operator([p[0], p[1], p[2], p[3], p[4] + h], ts()).unwrap().b;
         for i in 0..3 {
             let h = 1e-5;
-            // Second order from one side.
+            // One-sided difference of second order.
             let difference = (-3.0 * at(0.0)[i] + 4.0 * at(h)[i] - at(2.0 * h)[i]) / (2.0 * h);
             assert!((exact[i][4] - difference).abs() < 1e-6 * exact[0][4].abs(), "{i}");
         }
@@ -363,7 +364,7 @@ mod tests {
             assert_eq!([before.nk, there.nk, after.nk], [28, 29, 29]);
             let (a, b, c) = (response(&before, 90), response(&there, 90), response(&after, 90));
             for k in 0..90 {
-                // 1e-9 s times the slope of the response, omega^2 K_e_dot at most.
+                // Bound: 1e-9 s times the slope of the response, which is at most omega^2 K_e_dot.
                 let bound = 2e-9 * omega * omega * 0.036 + 1e-13;
                 assert!(
                     (a[k] - b[k]).abs() < bound && (c[k] - b[k]).abs() < bound,
@@ -384,7 +385,7 @@ mod tests {
         for i in 0..2 {
             assert!((above.b[i] - below.b[i + 1]).abs() < 1e-15);
         }
-        // From below the slope is that of the sample below.
+        // For decreasing tau, the derivatives are those of the model with one whole sample less.
         let at = |h: f64| {
             delayed_operator_within(27, [p[0], p[1], p[2], p[3], p[4] - h], ts())
                 .unwrap()

@@ -179,7 +179,7 @@ pub enum NotConvertible {
         /// Constant coefficient of the continuous denominator.
         a2: f64,
     },
-    /// `b0 + b1 = 0`: the model does not respond to a constant error, so that T_L = K_e_dot / K_e does not exist.
+    /// `b0 + b1 = 0`: the model does not respond to a constant error, so T_L = K_e_dot / K_e does not exist.
     #[error("the gain K_e is zero (b0 + b1 = 0), so the lead time T_L = K_e_dot / K_e does not exist")]
     ZeroGain,
     /// Polynomial orders that differ from those of the operator model.

@@ -21,7 +21,7 @@ pub enum FaultKind {
     Frozen,
     /// A stretch in which all channels, or a single named channel, are at rest.
     Idle,
-    /// A value that left the range of its channel at one end and re-entered at the other.
+    /// A value that left the range of its channel at one end and re-entered it at the other.
     Wrap,
     /// A permanent change of level from one sample to the next.
     Step,
@@ -102,8 +102,8 @@ pub struct Fault {
     /// Size of the fault: deviation of a spike or a step and modulus of a wrap in the unit of the channel, duration of
     /// a frozen or idle stretch in s, factor of a change of scale, or the sample time in s for a wrong unit of time.
     pub size: f64,
-    /// Size of the fault relative to the robust standard deviation that its test statistic has for good data; `None` if
-    /// the kind has no such statistic.
+    /// Size of the fault relative to the robust standard deviation of its test statistic for good data; `None` if the
+    /// kind has no such statistic.
     pub deviations: Option<f64>,
     /// Action taken because of the fault.
     pub action: FaultAction,

@@ -1,13 +1,13 @@
 //! Response of a person to a displayed target: `u = Y e + F f + remnant`.
 //!
-//! F has a form, gains and a delay of its own. The neuromuscular system is that of the response to the error (M. M. van
+//! F has its own form, gains and delay. F shares the neuromuscular system of the response to the error (M. M. van
 //! Paassen and M. Mulder, IFAC Man-Machine Systems, 1998; K. van der El et al., IEEE Trans. Cybernetics 46 (2016)
-//! 1199-1209): if it changes in time, it changes in F too. The gains, times and delay of F may also change, with the
-//! sigmoid of the scenario.
+//! 1199-1209); if this system changes over time, it also changes in F. The gains, times and delay of F may also change,
+//! with the sigmoid of the scenario.
 //!
 //! As text, a response is its form and the gain of this form, followed by other parameters by name:
 //! `derivative:0.15,tau_f=0.1,preview=0.25`. tau_f is the delay relative to the present target; with a preview it may
-//! be negative. `K_d = 0.15 s` before and 0.3 s after the change of the scenario is `derivative:0.15..0.3`.
+//! be negative. `derivative:0.15..0.3` means `K_d = 0.15 s` before and 0.3 s after the change of the scenario.
 
 use crate::{FamilyOperator, Form, ModelError, SampleTime, delayed_operator::whole_samples, schedule::Schedule};
 
@@ -182,8 +182,8 @@ impl Feedforward {
     }
 
     /// Returns the operator at time `t_s`, with its delay as a number of whole samples and a fraction of a sample.
-    /// `neuromuscular` is the neuromuscular system of the person at this time; without it, that of the operator is
-    /// used.
+    /// `neuromuscular` is the neuromuscular system of the person at this time; if it is `None`, the system of the
+    /// stored operator is used.
     ///
     /// # Errors
     /// As [`Feedforward::check`] and [`FamilyOperator::new`].
@@ -219,9 +219,9 @@ impl Feedforward {
     }
 }
 
-/// Returns name, unit and value of the parameters of the response to a further input: those of its form, and the delay
-/// tau_f relative to the present input. The parameters of the neuromuscular system are those of the response to the
-/// error.
+/// Returns name, unit and value of the parameters of the response to a further input: the parameters of its form, and
+/// the delay tau_f relative to the present input. The neuromuscular parameters are omitted, because the response to the
+/// error has the same ones.
 pub fn response_parameters(operator: &FamilyOperator, preview_s: f64) -> Vec<(&'static str, &'static str, f64)> {
     let named = operator.named().into_iter();
     let own = named.filter(|p| !["omega_nm", "zeta_nm"].contains(&p.name));
@@ -254,7 +254,7 @@ pub fn delays(tau_s: [f64; 2], sample_time: SampleTime) -> Result<[(usize, f64);
     Ok(delays)
 }
 
-/// Returns the delay at time `t_s`, between those of [`delays`]; it is rounded to whole samples if the delay changes.
+/// Returns the delay at time `t_s`, between the two values of [`delays`]; a changing delay is rounded to whole samples.
 pub fn delay_at([initial, last]: [(usize, f64); 2], schedule: &Schedule, t_s: f64) -> (usize, f64) {
     if initial == last {
         return initial;

@@ -7,8 +7,8 @@
 //! sinusoid, and there is no leakage.
 //!
 //! [`ForcingFunction::samples`] uses `sin(a + b) = sin a cos b + cos a sin b` with b from a table over one block. This
-//! takes two products per sinusoid and sample instead of a sine; unlike the error of a recurrence, the error does not
-//! grow along the record.
+//! takes two products per sinusoid and sample instead of a sine. Unlike with a recurrence, the error does not grow
+//! along the record.
 
 use std::f64::consts::TAU;
 
@@ -48,8 +48,8 @@ const TABLE_1: [(f64, f64, f64); 10] = [
     (229.0, 0.025, 0.604),
 ];
 
-/// Multiples and phases in rad of the disturbance: one line below each line of the target of Table 1, so that the lines
-/// of both alternate. With these phases, the largest value is 2.0 times the rms.
+/// Multiples and phases in rad of the disturbance: one line below each line of the target of Table 1, so the lines of
+/// target and disturbance alternate. With these phases, the largest value is 2.0 times the rms.
 const DISTURBANCE: [(f64, f64); 10] = [
     (2.0, 0.7),
     (4.0, -0.3),
@@ -63,8 +63,8 @@ const DISTURBANCE: [(f64, f64); 10] = [
     (181.0, 2.0),
 ];
 
-/// Number of samples in one block of the table of angles: near the square root of the record length, for which the
-/// fewest sines are computed in total.
+/// Number of samples in one block of the table of angles. A block length near the square root of the record length
+/// requires the fewest sines.
 const BLOCK: usize = 96;
 
 impl ForcingFunction {
@@ -115,8 +115,8 @@ impl ForcingFunction {
         }
     }
 
-    /// Returns a disturbance for the target of Table 1, with a root mean square in deg: ten lines between those of the
-    /// target, so that the responses to target and error can be separated. Each amplitude is proportional to the
+    /// Returns a disturbance for the target of Table 1, with a root mean square in deg: ten lines between the lines of
+    /// the target, so that the responses to target and error can be separated. Each amplitude is proportional to the
     /// geometric mean of the amplitudes of the neighbouring lines of the target.
     ///
     /// # Errors
@@ -204,7 +204,7 @@ mod tests {
     #[test]
     fn reference_frequencies_and_size() {
         let f = ForcingFunction::reference();
-        // Table 1 prints omega_k to 1e-3, expected-values the rms to 1e-4.
+        // Table 1 prints omega_k to 1e-3; the expected rms is known to 1e-4.
         let printed = [0.230, 0.384, 0.614, 0.997, 1.687, 2.608, 4.065, 6.596, 10.661, 17.564];
         for (s, omega) in f.sinusoids().iter().zip(printed) {
             assert!((s.omega_rad_s - omega).abs() < 5.1e-4);
@@ -243,7 +243,7 @@ mod tests {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let rms = (values.iter().map(|v| v * v).sum::<f64>() / n).sqrt();
-        // Orthogonal over a whole number of periods: only rounding is left.
+        // The sinusoids are orthogonal over a whole number of periods, so only rounding errors remain.
         assert!(mean.abs() < 1e-13);
         assert!((rms - f.rms_deg()).abs() < 1e-13);
         assert!((f.value(0.0) - f.value(REFERENCE_PERIOD_S)).abs() < 1e-12);
@@ -257,7 +257,7 @@ mod tests {
             assert_eq!(samples.len(), n);
             for (k, value) in samples.into_iter().enumerate() {
                 let t = start + k as f64 * 0.01;
-                // Angles up to 1500 rad are rounded to 1e-13; they belong to an amplitude of 0.025
+                // The angle reaches 1500 rad, where it is rounded to 1e-13; the amplitude at this frequency is 0.025
                 // deg.
                 assert!((value - f.value(t)).abs() < 1e-13, "t = {t}");
             }
@@ -273,7 +273,7 @@ mod tests {
         };
         let f = ForcingFunction::new(vec![slow]).unwrap();
         let samples = f.samples(0.0, ts(), 1_000_000);
-        // The angle reaches 5000 rad, rounded to 5e-13.
+        // The angle reaches 5000 rad, where it is rounded to 5e-13.
         let worst = (0..1_000_000).map(|k| (samples[k] - f.value(k as f64 * 0.01)).abs());
         assert!(worst.fold(0.0, f64::max) < 2e-12);
     }

@@ -1,7 +1,7 @@
 //! Units of the gains of an operator.
 //!
-//! A gain is a ratio of the output u to the input e, so that its unit is the ratio of their units. It is reported only
-//! if the units of both channels are declared; for a recording without units, gains are reported without units. An
+//! A gain is a ratio of the output u to the input e, so its unit is the ratio of their units. It is reported only if
+//! the units of both channels are declared; for a recording without units, gains are reported without units. An
 //! operator `K (1 + T_L s) / (1 + T_I s)` has the gain `K` in u/e, the gain of the error rate `K_e_dot = K T_L` in u
 //! s/e, and the ratio `K / T_I` in u/(e s).
 

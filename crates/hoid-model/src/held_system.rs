@@ -9,7 +9,7 @@
 //!
 //! (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 3.2). The exponential and the integral
 //! are blocks of the exponential of `[A B; 0 0] h` (C. F. Van Loan, IEEE Trans. Automatic Control 23 (1978) 395-404).
-//! Internally, time is in samples, so that the entries are of moderate size. Poles may be anywhere: at the origin,
+//! Internally, time is in samples, which keeps the entries at moderate size. Poles may be anywhere: at the origin,
 //! multiple, or in the right half plane.
 
 use nalgebra::{DMatrix, DVector};
@@ -17,7 +17,7 @@ use num_complex::Complex64;
 
 use crate::{ModelError, SampleTime};
 
-/// A rational transfer function after a zero-order hold. Its state is that of `1/den`; the numerator determines the
+/// A rational transfer function after a zero-order hold. It has the state of `1/den`; the numerator determines the
 /// output row C.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldSystem {
@@ -56,7 +56,7 @@ impl HeldSystem {
         }
         let order = den.len() - 1;
         let ts = sample_time.s();
-        // The coefficients are those of ascending powers of s Ts: the state is z^(i) Ts^i / Ts^n.
+        // The coefficients belong to ascending powers of s Ts: the state is z^(i) Ts^i / Ts^n.
         let scaled = |p: &[f64], i: usize| {
             let coefficient = if i < p.len() { p[p.len() - 1 - i] } else { 0.0 };
             coefficient * ts.powi((order - i) as i32)
@@ -183,7 +183,7 @@ mod tests {
 
     #[test]
     fn integrators_sum_what_is_held() {
-        // 1/s: y = sum of v Ts; 1/s^2 with v = 1: t^2/2; both exact for held inputs.
+        // For 1/s, y is the sum of v Ts; for 1/s^2 with v = 1, it is t^2/2. Both are exact for held inputs.
         let one = HeldSystem::new(&[1.0], &[1.0, 0.0], 0.0, ts()).unwrap();
         let two = HeldSystem::new(&[1.0], &[1.0, 0.0, 0.0], 0.0, ts()).unwrap();
         let (first, second) = (run(&one, &[1.0; 200]), run(&two, &[1.0; 200]));
@@ -191,7 +191,7 @@ mod tests {
             let t = k as f64 / 60.0;
             assert!((first[k] - t).abs() < 1e-13 && (second[k] - t * t / 2.0).abs() < 1e-13);
         }
-        // A part of a sample late: as many samples, less that part.
+        // An integrator with a delay of 0.3 samples has integrated 9.7 samples after 10.
         let late = HeldSystem::new(&[1.0], &[1.0, 0.0], 0.3, ts()).unwrap();
         assert!((run(&late, &[1.0; 11])[10] - 9.7 / 60.0).abs() < 1e-14);
     }
@@ -212,7 +212,7 @@ mod tests {
 
     #[test]
     fn operators_of_the_family_have_their_exact_hold() {
-        // Two independent exponentials: nalgebra's by Pade, the family's by its series.
+        // The two matrix exponentials are independent: nalgebra uses a Pade approximation, the family a power series.
         let x = [4.0, 0.6, 0.2, 11.0_f64.ln(), 0.25_f64.ln(), 0.1437];
         let operator = FamilyOperator::new(Form::Lead2Lag, true, &x).unwrap();
         let held = operator.zoh(ts()).unwrap();
@@ -224,7 +224,7 @@ mod tests {
             let f = [&[1.0][..], &held.f].concat();
             let family = polynomial::value(&held.b, backward) / polynomial::value(&f, backward);
             let found = ours.response(omega).unwrap();
-            // Without the whole samples, the first coefficient of B belongs to one sample.
+            // Without the whole samples of the delay, the first coefficient of B has a lag of one sample.
             let error = (found - family * backward).norm() / found.norm();
             assert!(error < 1e-9, "{omega} {error}");
         }

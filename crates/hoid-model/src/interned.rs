@@ -2,7 +2,7 @@
 //!
 //! Kinds of findings and units are literals of the program (`&'static str`). A result written by another version may
 //! contain a name that this program does not have. Such a name is stored once, in a set that only grows. The length and
-//! the number of these names are limited, so that no file can exhaust the memory.
+//! the number of these names are limited, so no file can exhaust the memory.
 
 use std::{
     collections::BTreeSet,

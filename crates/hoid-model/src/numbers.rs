@@ -1,8 +1,8 @@
 //! Numbers with as many digits as their standard error allows.
 //!
-//! A standard error is itself known to a few per cent at best. It is therefore given with two significant digits, and
-//! the value with the same number of decimals (ISO/IEC Guide 98-3, 7.2.6). Numbers without a standard error are given
-//! with five significant digits.
+//! A standard error is itself accurate to a few per cent at best. It is therefore given with two significant digits,
+//! and the value with the same number of decimals (ISO/IEC Guide 98-3, 7.2.6). Numbers without a standard error are
+//! given with five significant digits.
 
 /// Text for a missing number.
 pub const DASH: &str = "\u{2013}";

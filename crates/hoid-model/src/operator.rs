@@ -242,7 +242,7 @@ mod tests {
 
     #[test]
     fn discrete_parameters_of_both_states() {
-        // Independent values: expected-values, deterministic part.
+        // Independent values from the deterministic part of the expected values.
         let expected = [(s1(), 0.0442765923, -0.0431823806), (s2(), 0.1024498216, -0.1015987680)];
         for (operator, b0, b1) in expected {
             let d = operator.discretise(ts()).unwrap();
@@ -258,7 +258,8 @@ mod tests {
     fn parameters_undo_discretise() {
         for operator in others() {
             let back = operator.discretise(ts()).unwrap().parameters().unwrap();
-            // b0 + b1 cancels to about Ts omega_nm^2 Ts: K_e keeps 16 digits less that factor.
+            // b0 and b1 cancel in their sum to a fraction of about (omega_nm Ts)^2, and K_e loses this factor in
+            // precision.
             for (a, b) in [
                 (back.k_e, operator.k_e),
                 (back.t_l_s, operator.t_l_s),
@@ -301,7 +302,7 @@ mod tests {
                 let (up, down) = (at(up), at(down));
                 for i in 0..4 {
                     let difference = (up[i] - down[i]) / (2.0 * h);
-                    // Central differences: truncation h^2 and rounding eps/h, both below 1e-8 of
+                    // Central differences have a truncation error h^2 and a rounding error eps/h, both below 1e-8 of
                     // the column.
                     let scale = (0..4).map(|k| exact[k][j].abs()).fold(0.0, f64::max);
                     assert!(

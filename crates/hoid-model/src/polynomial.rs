@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn multiple_roots_are_found_to_the_accuracy_that_they_allow() {
-        // A root of multiplicity m is known to eps^(1/m) only.
+        // A root of multiplicity m has an accuracy of only eps^(1/m).
         let found = roots(&from_roots(&[c(0.85, 0.0); 4])).unwrap();
         assert!(found.iter().all(|z| (z - 0.85).norm() < 5e-4));
     }

@@ -317,7 +317,7 @@ mod tests {
             vec![-2.1, 1.2, 0.04, -0.03],
         )
         .unwrap();
-        // The predictor of an ARX model is always stable, the model itself need not be.
+        // The predictor of an ARX model is always stable, but the model itself may be unstable.
         assert!(unstable.predictor_is_stable() && !unstable.is_stable());
     }
 }

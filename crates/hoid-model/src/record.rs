@@ -2,7 +2,7 @@
 //!
 //! A [`Record`] contains the input of the person (the tracking error e), the output (the control u) and any other
 //! channel that was measured or simulated at the same samples. A record is checked when it is created: all channels
-//! have the same length and every sample is finite, so that later code need not check again.
+//! have the same length and every sample is finite, so later code need not check again.
 
 use crate::{ModelError, SampleTime};
 
@@ -163,7 +163,7 @@ impl Record {
 
     /// Time of sample `k` in s.
     pub fn time_s(&self, k: usize) -> f64 {
-        // The time is computed from the index and not by summation, so that no rounding error grows along the record.
+        // The time is computed from the index and not by summation, so rounding errors do not grow along the record.
         self.start_s + k as f64 * self.sample_time.s()
     }
 
@@ -238,7 +238,7 @@ impl Record {
     }
 
     /// Returns this record followed by another record, which starts one sample time after the last sample of this
-    /// record, so that the time of the boundary is known.
+    /// record, so the time of the boundary is known.
     ///
     /// Channels that only one of the two records has are omitted; label, names and units are those of the first record.
     ///
@@ -402,7 +402,7 @@ mod tests {
             (Some(&[0.1, 0.2, 0.3][..]), None)
         );
         assert!((joined.time_s(2) - 5.02).abs() < 1e-12);
-        // What was joined is cut apart again.
+        // A span of the joined record gives the first record again.
         assert_eq!(joined.span(5.0, 5.02).unwrap().output(), first.output());
         let slower = Record::new(
             SampleTime::new(0.02).unwrap(),
@@ -435,7 +435,7 @@ mod tests {
         assert_eq!(part.len(), 30);
         assert_eq!(part.input()[0], 20.0);
         assert!(part.time_s(0).abs() < 1e-12);
-        // 0.29 falls on a sample although 0.29 / 0.01 is not a whole number in floating point.
+        // 0.29 s is the time of a sample, although 0.29 / 0.01 is not an integer in floating point.
         assert_eq!(record.span(0.09, 10.0).unwrap().input()[0], 29.0);
         assert!(matches!(record.span(0.5, 0.5), Err(ModelError::EmptySpan { .. })));
         assert!(record.span(9.0, 10.0).is_err());
@@ -466,7 +466,7 @@ mod tests {
         let twice = |values: &mut [f64]| values.iter_mut().for_each(|v| *v *= 2.0);
         let found = whole.clone().map_signals(twice).unwrap();
         assert_eq!((found.input(), found.output()), (&[2.0, 4.0][..], &[6.0, 8.0][..]));
-        // Nothing else is another: its inverse gives the record back.
+        // Everything else is unchanged: the inverse function restores the record.
         let back = found.map_signals(|values| values.iter_mut().for_each(|v| *v /= 2.0));
         assert_eq!(back.unwrap(), whole);
         let mut order = Vec::new();

@@ -327,7 +327,7 @@ mod tests {
 
     #[test]
     fn gains_of_the_response_definition() {
-        // Expected values, remnant gain K_n, first definition: s1 then s2, P_n = .01, .1, .2, .3.
+        // Expected K_n with the first definition of P_n, for s1 and then s2 at P_n = .01, .1, .2, .3.
         let table = [
             [0.02302, 0.07636, 0.11453, 0.14996, 0.04212, 0.13971, 0.20956, 0.27438],
             [0.02977, 0.09875, 0.14812, 0.19394, 0.04975, 0.16500, 0.24751, 0.32406],
@@ -338,7 +338,7 @@ mod tests {
             for (i, expected) in row.into_iter().enumerate() {
                 let level = [0.01, 0.1, 0.2, 0.3][i % 4];
                 let found = gain(level, NoiseDefinition::Response, m, i / 4).unwrap();
-                // Half of the last digit printed.
+                // The tolerance is half a unit of the last printed digit.
                 assert!(
                     (found - expected).abs() <= 5.1e-6,
                     "m {m}, P_n {level}: {found} and {expected}"
@@ -349,7 +349,7 @@ mod tests {
 
     #[test]
     fn gains_of_the_remnant_definition() {
-        // Expected values, second definition at P_n = 0.1, m = 1..4.
+        // Expected K_n with the second definition at P_n = 0.1, m = 1..4.
         let table = [
             [0.08682, 0.12207, 0.14175, 0.15574],
             [0.19926, 0.28993, 0.34465, 0.38536],
@@ -364,8 +364,8 @@ mod tests {
 
     #[test]
     fn integrals_agree_with_scipy() {
-        // scipy.integrate.quad at 1e-13: V_u of s1 and s2 for m = 1, 4, and V_n for m = 4; V_f is
-        // common to all levels.
+        // V_u of s1 and s2 for m = 1 and 4, and V_n for m = 4, by scipy.integrate.quad with a tolerance of 1e-13; V_f
+        // is the same at all levels.
         let expected = [
             (0, 1, 0.10113885417079896_f64, 0.005307028936817029),
             (0, 4, 0.041602794077966486, 0.005307028936817029),
@@ -374,7 +374,7 @@ mod tests {
         ];
         for (s, m, by_noise, forced) in expected {
             let found = gain(0.5, NoiseDefinition::Response, m, s).unwrap();
-            // The integral is good to 1e-10, the gain to half of that.
+            // The integral is accurate to 1e-10, the gain to half of this value.
             assert!((found / (forced / by_noise).sqrt() - 1.0).abs() < 1e-10);
         }
         let own = remnant_integral(4, 6.0 * std::f64::consts::PI) / (6.0 * std::f64::consts::PI);
@@ -399,7 +399,7 @@ mod tests {
                 assert!(gain(largest, NoiseDefinition::Remnant, m, s).is_err());
             }
         }
-        // scipy: V_n/V_u of s1, m = 1.
+        // V_n/V_u of s1 for m = 1, computed with scipy.
         let Err(ModelError::UnreachableNoiseLevel { largest, .. }) = gain(0.9, NoiseDefinition::Remnant, 1, 0) else {
             panic!("a level of 0.9 was reached");
         };
@@ -408,8 +408,7 @@ mod tests {
 
     #[test]
     fn without_feedback_both_definitions_follow_from_variances() {
-        // No controlled element: u = H_HO f_t + n, so that var(u_n) = var(n) and both definitions
-        // are one.
+        // Without a controlled element, u = H_HO f_t + n. Therefore var(u_n) = var(n), and both definitions are equal.
         let [(operator, _), _] = states();
         let none = tf(&[0.0], &[1.0, 1.0]);
         let line = [SpectralLine {
@@ -426,8 +425,8 @@ mod tests {
 
     #[test]
     fn sharp_peaks_are_integrated() {
-        // Just below the gain that makes the loop unstable the integrand has a peak of relative
-        // width 1e-6: V_u is its residue, which grows as the inverse of the distance.
+        // Just below the gain at which the loop becomes unstable, the integrand has a peak of relative width 1e-6. V_u
+        // is dominated by its residue, which is inversely proportional to the distance from this gain.
         let [(operator, element), _] = states();
         let margin = crate::margins::margins(|w| operator.series(&element).response(w), (0.1, 100.0));
         let limit = 10f64.powf(margin.gain_margin_db.unwrap() / 20.0);
@@ -446,7 +445,7 @@ mod tests {
             .unwrap();
             own.powi(-2) * distance
         };
-        // Off the limit by terms of the order of the distance.
+        // The deviation from the limit is of the order of the distance.
         assert!((at(1e-5) / at(1e-6) - 1.0).abs() < 1e-3, "{} {}", at(1e-5), at(1e-6));
     }
 

@@ -4,7 +4,7 @@
 //! with `D = (1 - p q^-1)^m`, `p = e^{-Ts/T_n}`, and `sigma = K_n g(T_n)`; C is the monic spectral factor of the
 //! numerator of the zero-order hold ([`crate::remnant`]). The derivatives follow from `dp/dT_n = p Ts/T_n^2` and from
 //! the derivative `-N_a/N_zeta` of a zero zeta of the numerator N with respect to `a = Ts/T_n`; the derivative of zeta
-//! also gives that of its mirror image `1/conj zeta`.
+//! also gives the derivative of its mirror image `1/conj zeta`.
 
 use crate::{
     ModelError, SampleTime,
@@ -96,8 +96,7 @@ mod tests {
 
     #[test]
     fn spectrum_of_second_order_in_closed_form() {
-        // n_1 = 1 - p - a p and n_2 = p (p - 1 + a) of the hold of 1/(T_n s + 1)^2: sigma^2 C C*
-        // has to be N N*.
+        // The hold of 1/(T_n s + 1)^2 has n_1 = 1 - p - a p and n_2 = p (p - 1 + a), and sigma^2 C C* must equal N N*.
         let a: f64 = 1.0 / 6.0;
         let p = (-a).exp();
         let (n1, n2) = (1.0 - p - a * p, p * (p - 1.0 + a));
@@ -125,8 +124,8 @@ mod tests {
                 for (slope, up, down) in pairs {
                     for ((s, u), d) in slope.iter().zip(up).zip(down) {
                         let difference = (u - d) / (2.0 * h);
-                        // Rounding: coefficients up to 6 with 1e-16 (zeros of m = 4 with 1e-14)
-                        // over h; truncation (h/T_n)^2.
+                        // Coefficients up to 6 have a rounding error of 1e-16 (1e-14 for the zeros of m = 4), which is
+                        // divided by h; the truncation error is (h/T_n)^2.
                         let bound = 2e-8 * difference.abs() + 5e-14 / h;
                         assert!((s - difference).abs() < bound, "m {m} T_n {t_n}: {s} and {difference}");
                     }

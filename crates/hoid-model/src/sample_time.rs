@@ -69,7 +69,7 @@ impl SampleTime {
         ((samples - rounded).abs() <= 1e-6 && (0.0..1e15).contains(&rounded)).then_some(rounded as usize)
     }
 
-    /// True if two sample times are equal up to rounding (1e-6 relative), so that their records can be fitted together.
+    /// True if two sample times are equal up to rounding (1e-6 relative); their records can then be fitted together.
     pub fn matches(self, other: Self) -> bool {
         (self.0 - other.0).abs() <= 1e-6 * self.0
     }

@@ -26,8 +26,8 @@ use crate::{
     schedule::Schedule,
 };
 
-/// Longest run, in samples: 11 days at 100 Hz. Because of this limit, a time with a wrong exponent causes an error
-/// message before memory is exhausted.
+/// Longest run, in samples: 11 days at 100 Hz. With this limit, a time with a wrong exponent causes an error message
+/// instead of exhausting the memory.
 const MOST_SAMPLES: usize = 100_000_000;
 
 /// A state of adaptation: the operator and the controlled element.
@@ -287,7 +287,7 @@ impl Scenario {
         let mut lines = self.forcing.lines();
         let operator = state.operator.transfer_function()?;
         let scaled = |line: &SpectralLine, by: f64| SpectralLine {
-            // A response of zero to the error, for which the ratio is infinite, has no stable loop with a noise level.
+            // The ratio is infinite if the response to the error is zero; such a loop has no noise level.
             amplitude: if by.is_finite() {
                 line.amplitude * by
             } else {
@@ -440,7 +440,7 @@ impl ResolvedScenario {
         self.measurement_samples
     }
 
-    /// True if the response to the target changes in time, in itself or by its neuromuscular system.
+    /// True if the response to the target or its neuromuscular system changes over time.
     pub fn feedforward_changes(&self) -> bool {
         let Scenario { initial, last, .. } = &self.scenario;
         let muscles = |state: &OperatingState| (state.operator.omega_nm_rad_s, state.operator.zeta_nm);
@@ -515,7 +515,7 @@ mod tests {
             (Condition::C5, 0.07, 0.09),
             (Condition::C6, 0.07, 0.09),
         ] {
-            // The slow sigmoid is e^-20 away from its ends.
+            // At both ends of the run, the slow sigmoid deviates by e^-20 from its final values.
             assert!((gain(condition, 0.0) - start).abs() < 1e-9, "{condition}");
             assert!((gain(condition, 81.92) - end).abs() < 1e-9, "{condition}");
             assert_eq!(condition.to_string().parse::<Condition>().unwrap(), condition);
@@ -526,7 +526,7 @@ mod tests {
 
     #[test]
     fn each_state_has_the_gain_of_its_noise_level() {
-        // Expected values: K_n for m = 1, P_n = 0.1 in s1 and s2.
+        // Expected K_n for m = 1 and P_n = 0.1 in s1 and s2.
         let c4 = Scenario::condition(Condition::C4).resolve().unwrap();
         assert!((c4.parameters_at(0.0).k_n - 0.07636).abs() < 5e-6);
         assert!((c4.parameters_at(81.92).k_n - 0.13971).abs() < 5e-6);
@@ -545,7 +545,7 @@ mod tests {
         assert_eq!([0.0, 40.96, 81.92].map(|t| resolved.delay_samples_at(t)), [28, 31, 34]);
         for k in 0..8192 {
             let p = resolved.parameters_at(0.01 * f64::from(k));
-            // The gain is where the delay is, to half a sample of six.
+            // The gain and the delay have completed the same share of their change, to within half a sample of six.
             let share = (p.operator.k_e - 0.09) / (0.07 - 0.09);
             let samples = p.operator.tau_e_s / 0.01;
             assert!((samples - samples.round()).abs() < 1e-9);

@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn steepest_slope_is_a_quarter_of_the_rate() {
         let slope = (SLOW.value(0.0, 1.0, 40.961) - SLOW.value(0.0, 1.0, 40.959)) / 0.002;
-        // The third derivative, G^3/8, leaves 2e-9.
+        // The third derivative, G^3/8, causes a truncation error of 2e-9.
         assert!((slope - 0.125).abs() < 1e-8);
     }
 
@@ -194,7 +194,7 @@ mod tests {
             midpoint_s: 20.0,
             interval_s: 10.0,
         };
-        // Midway between two changes e^-25 of each is left.
+        // Midway between two changes, the deviation due to each of them is e^-25.
         for (t, expected) in [
             (-5.0, 2.0),
             (15.0, 2.0),
@@ -214,7 +214,7 @@ mod tests {
                 (often.value(2.0, 3.0, t) - single.value(2.0, 3.0, t)).abs() < 1e-10,
                 "{t}"
             );
-            // The next is its mirror image.
+            // The next change is the mirror image of this one.
             assert!(
                 (often.value(2.0, 3.0, t + 10.0) + often.value(2.0, 3.0, t) - 5.0).abs() < 1e-10,
                 "{t}"

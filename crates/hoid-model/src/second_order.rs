@@ -283,7 +283,7 @@ mod tests {
         .collect()
     }
 
-    /// The extended-matrix exponential of eq. B.7, forward.
+    /// The zero-order hold by the extended-matrix exponential of eq. B.7.
     fn by_matrix_exponential(c: SecondOrder, ts: f64) -> HeldSecondOrder {
         let m = DMatrix::from_row_slice(3, 3, &[0.0, 1.0, 0.0, -c.a2, -c.a1, 1.0, 0.0, 0.0, 0.0]) * ts;
         let e = m.exp();
@@ -305,8 +305,7 @@ mod tests {
         for case in cases() {
             let exact = case.zoh(ts()).unwrap();
             let matrix = by_matrix_exponential(case, 0.01);
-            // The matrix way loses digits in b1 and f2 by cancellation: 1e-13 of the largest
-            // coefficient.
+            // The matrix exponential loses digits in b1 and f2 by cancellation, up to 1e-13 of the largest coefficient.
             for (name, a, b) in [
                 ("b0", exact.b0, matrix.b0),
                 ("b1", exact.b1, matrix.b1),
@@ -325,9 +324,9 @@ mod tests {
     fn unhold_inverts_hold_for_all_pole_cases() {
         for case in cases() {
             let back = case.zoh(ts()).unwrap().inverse_zoh(ts()).unwrap();
-            // A held system knows its poles to eps/(Ts |p1 - p2|) and, at a double pole, to
-            // sqrt(eps)/Ts; the coefficients a1, a2, which are symmetric, keep more. Fast poles
-            // leave e^{p Ts} small and keep fewer digits.
+            // The poles of a held system are determined to eps/(Ts |p1 - p2|), and double poles to sqrt(eps)/Ts. The
+            // coefficients a1 and a2, which are symmetric in the poles, are more accurate. Fast poles are less
+            // accurate, because e^{p Ts} is small.
             for (name, a, b) in [
                 ("b0", back.b0, case.b0),
                 ("b1", back.b1, case.b1),
@@ -402,7 +401,7 @@ mod tests {
             held(f64::NAN, 0.2).inverse_zoh(ts()),
             Err(NotConvertible::NotFinite { .. })
         ));
-        // A complex pair always converts, also with f1 > 0.
+        // A complex pair can always be converted, even with f1 > 0.
         assert!(held(0.5, 0.9).inverse_zoh(ts()).is_ok());
     }
 

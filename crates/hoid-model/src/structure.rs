@@ -75,7 +75,7 @@ impl Structure {
         self.polynomials().contains('b')
     }
 
-    /// True if the residual is linear in theta, so that least squares gives the fit in one step: FIR, AR, ARX.
+    /// True if the residual is linear in theta (FIR, AR, ARX); least squares then gives the fit in one step.
     pub fn is_linear(self) -> bool {
         matches!(self, Self::Fir | Self::Ar | Self::Arx)
     }
@@ -312,7 +312,7 @@ mod tests {
         assert_eq!(bj.parameters(), 5);
         let arx = Structure::Arx.operator_orders(29);
         assert_eq!(arx.parameter_names(), ["a1", "a2", "b0", "b1"]);
-        // i0 of eq. 5.33, counted from 0.
+        // This is i0 of eq. 5.33, counted from 0.
         assert_eq!(arx.first_regressed_sample(), 30);
     }
 

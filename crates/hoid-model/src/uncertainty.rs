@@ -201,8 +201,8 @@ mod tests {
     use super::*;
     use crate::{Orders, SampleTime, Structure};
 
-    /// Normal deviates by Box and Muller on a linear congruential generator: enough for a check to
-    /// a few per cent.
+    /// Normal deviates by the method of Box and Muller from a linear congruential generator, which suffices for a check
+    /// to a few per cent.
     fn normals(seed: u64) -> impl FnMut() -> f64 {
         let mut state = seed;
         let mut uniform = move || {
@@ -225,13 +225,13 @@ mod tests {
         PolynomialModel::new(Structure::BoxJenkins, orders, SampleTime::new(0.01).unwrap(), theta).unwrap()
     }
 
-    /// State s1 with noise of T_n = 0.06 s.
+    /// Parameters of state s1 with a remnant of T_n = 0.06 s.
     fn truth() -> Vec<f64> {
         vec![0.0442765923, -0.0431823806, -0.8464817249, -1.9121130548, 0.9242709633]
     }
 
-    /// Lower factor (by rows) of a covariance like that of a fit, b0 and b1, f1 and f2 nearly
-    /// opposite, scaled down so that the map is linear over it.
+    /// Lower triangular factor (by rows) of a covariance as in a fit: the errors of b0 and b1, and of f1 and f2, are
+    /// nearly opposite. It is scaled down such that the conversion is linear over its range.
     fn factor() -> Vec<f64> {
         let rows = [
             [2e-3, 0.0, 0.0, 0.0, 0.0],
@@ -290,7 +290,8 @@ mod tests {
         for (i, (sample, estimate)) in samples.iter().zip(ours).enumerate() {
             let mean = sample.iter().sum::<f64>() / runs as f64;
             let spread = (sample.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (runs - 1) as f64).sqrt();
-            // The standard deviation of 4000 draws is known to 1.1 %; four of that.
+            // The standard deviation of 4000 draws has a standard error of 1.1 %; the tolerance is four standard
+            // errors.
             let ratio = spread / estimate.standard_error.unwrap();
             assert!((ratio - 1.0).abs() < 0.045, "parameter {i}: ratio {ratio}");
         }

@@ -224,7 +224,7 @@ mod tests {
         };
         let mut design = request.run().unwrap();
         let figure = design_figure(&design);
-        // A stem for each line, and two bars with caps.
+        // Each line has a stem and two bars with caps.
         assert!(figure.matches("<circle").count() >= 3 * design.lines.len() && !figure.contains("NaN"));
         let runs = runs_figure(&design);
         assert!(runs.contains("tau") && runs.contains("relative error") && !runs.contains("NaN"));

@@ -1,9 +1,9 @@
 //! A result as a table for a paper: estimates with errors and intervals, in LaTeX (`.tex`, booktabs), Markdown (`.md`),
 //! or as data (CSV and other table formats).
 //!
-//! The table is made from the JSON object of the result ([`hoid_analysis::json`]), so that the two agree. In LaTeX and
-//! Markdown a value is rounded to the second significant digit of its error. In data files every number has all digits,
-//! and the error is in the column after the value.
+//! The table is made from the JSON object of the result ([`hoid_analysis::json`]), so both agree. In LaTeX and Markdown
+//! a value is rounded to the second significant digit of its error. In data files every number has all digits, and the
+//! error is in the column after the value.
 
 use std::path::Path;
 

@@ -97,7 +97,7 @@ pub fn comparison(models: &[ModelSection<'_>], qualities: &[Result<GoodnessOfFit
     }
 }
 
-/// The true operator, if all models for which it is known have the same; otherwise `None`.
+/// The true operator, if it is the same for all models for which it is known; otherwise `None`.
 fn common_truth(models: &[ModelSection<'_>]) -> Option<OperatorParameters> {
     let mut known = models.iter().filter_map(|m| m.truth);
     let first = known.next()?;

@@ -1,4 +1,4 @@
-//! The page as a whole, from simulated runs.
+//! The whole page, made from simulated runs.
 #![allow(clippy::unwrap_used)]
 
 use hoid_ident::{
@@ -65,14 +65,14 @@ fn page<'a>(models: Vec<ModelSection<'a>>) -> String {
     report.to_html().unwrap()
 }
 
-/// The text after the first `<h2 id=...>` with this name, up to the next section.
+/// Returns the text after the first `<h2 id=...>` with this name, up to the next section.
 fn section_of<'a>(html: &'a str, name: &str) -> &'a str {
     let start = html.find(&format!("\">{name}</h2>")).unwrap();
     let end = html[start..].find("</section>").unwrap();
     &html[start..start + end]
 }
 
-/// Properties of every page: no external resources, no NaN, unique ids, valid references.
+/// Checks the properties of every page: no external resources, no NaN, unique ids, valid references.
 fn check_page(html: &str) {
     let without_namespace = html.replace("xmlns=\"http://www.w3.org/2000/svg\"", "");
     for outside in ["http", "src=", "<link", "<script", "@import", "url(\"", "//cdn"] {
@@ -108,7 +108,7 @@ fn two_models_with_truth_show_all_that_is_asked_for() {
     }
     let html = page(models);
     check_page(&html);
-    // Two time responses, two tests each, one Bode pair.
+    // There are two time responses, two tests for each record, and one Bode diagram.
     assert_eq!(html.matches("<svg ").count(), 7);
     let reason = arx.operator().unwrap_err().to_string();
     assert!(html.contains(&format!("ARX: not convertible: {reason}")));
@@ -173,7 +173,7 @@ fn text_of_the_user_is_escaped() {
     let html = report.to_html().unwrap();
     check_page(&html);
     assert!(!html.contains("<b>") && !html.contains("<deg>"));
-    // Title twice, setting, note, heading, column, legend, record table and captions.
+    // The name occurs twice in the title, and in the setting, note, heading, column, legend, record table and captions.
     assert!(html.matches("a&lt;script&gt;alert(1)&lt;").count() >= 10);
     assert!(html.contains("$x^2$") && html.contains("u&amp;$v$ (&lt;b&gt;)"));
 }
@@ -189,7 +189,7 @@ fn several_records_are_listed_and_at_most_four_drawn() {
     }
     assert!(html.contains("2 more records are not drawn"));
     assert!(html.contains("all records of a model together"));
-    // Four time responses, two tests, one Bode pair.
+    // There are four time responses, two tests, and one Bode diagram.
     assert_eq!(html.matches("<svg ").count(), 7);
     let together = fit.quality(&records).unwrap().vaf_simulation;
     assert!(html.contains(&format!("<td class=\"n\">{together:.2}</td>")));
@@ -221,8 +221,8 @@ fn a_series_shorter_than_the_lags_has_its_figures() {
     check_page(&html);
     assert!(html.contains(&format!(" of {lags} lags outside")));
 
-    // For a record that the model cannot be compared with the reason is given, for one without a
-    // name its number.
+    // If a record cannot be compared with the model, the page shows the reason; a record without a name is shown by its
+    // number.
     let other = [cut(12), cut(1)];
     let html = page(vec![section("ARX", &fit, &other)]);
     check_page(&html);
@@ -316,7 +316,7 @@ fn figures_are_the_same_twice_and_bounded_for_unstable_models() {
     let stable = figures::time_response("a", &records[0], &validation);
     assert!(stable == figures::time_response("a", &records[0], &validation));
     assert!(stable.contains("u (deg)") && stable.contains("time (s)"));
-    // Peaks are preserved and yet the figure is small: 3 lines of at most 682 points, twice.
+    // Peaks are preserved, but the figure is small: two panels, each with 3 lines of at most 682 points.
     assert!(stable.len() < 90_000, "{}", stable.len());
     for (k, v) in validation.simulated.iter_mut().enumerate() {
         *v = 1.2_f64.powi(k as i32);
@@ -326,7 +326,7 @@ fn figures_are_the_same_twice_and_bounded_for_unstable_models() {
         .split(|c: char| !(c.is_ascii_digit() || c == '.'))
         .filter_map(|n| n.parse::<f64>().ok())
         .fold(0.0, f64::max);
-    // 999999 is a colour.
+    // 999999 occurs as a colour.
     assert!(largest < 1e6 && !unstable.contains("inf"), "{largest}");
 }
 
@@ -347,7 +347,7 @@ fn bode_has_a_band_for_each_model_with_errors_and_the_dashed_truth() {
         sample_time: SampleTime::HUNDREDTH,
     };
     let svg = figures::bode("b", &[model("first", &arx), model("second", &bj)], &[truth]);
-    // Two panels with one band per model.
+    // Each of the two panels has one band per model.
     assert_eq!(svg.matches("fill-opacity=\"0.22\"").count(), 4, "bands");
     assert_eq!(
         svg.matches("stroke-dasharray").count(),
@@ -390,7 +390,7 @@ fn a_describing_function_stands_over_the_models() {
     let h = describe(&records, &excitation, &options).unwrap();
     let points = figures::BodePoints::of_describing_function("describing function", &h);
     let svg = figures::bode_with_points("b", &[model], &[truth], std::slice::from_ref(&points));
-    // Ten lines in two panels, and the legend.
+    // There are ten points in each of two panels, and one in the legend.
     assert_eq!(svg.matches("<circle").count(), 21);
     assert!(svg.contains(">describing function<") && !svg.contains("NaN"));
     let without = figures::bode_with_points("b", &[model], &[truth], &[]);

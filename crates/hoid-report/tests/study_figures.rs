@@ -1,4 +1,4 @@
-//! One figure of each kind for studies, with made-up results of their size. To look at them:
+//! One figure of each kind for studies, with artificial results of realistic size. To view them:
 //! `HOID_FIGURES=folder cargo test -p hoid-report --test study_figures -- --ignored`.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
@@ -15,7 +15,7 @@ use hoid_report::figures::{
 
 const PARAMETERS: [&str; 4] = ["a_1", "a_2", "b_0", "b_1"];
 
-/// Pseudo-random numbers between -1 and 1 (a linear congruence).
+/// Pseudo-random numbers between -1 and 1 from a linear congruential generator.
 struct Noise(u64);
 
 impl Noise {
@@ -28,7 +28,7 @@ impl Noise {
     }
 
     fn bell(&mut self) -> f64 {
-        // The third power of a sum has heavy tails, hence outliers.
+        // The third power of a sum has heavy tails and therefore outliers.
         let sum = self.next() + self.next() + self.next();
         sum + 0.3 * sum.powi(3)
     }
@@ -200,7 +200,7 @@ fn curve(name: &str, kind: LineKind, shade: Shade, points: impl IntoIterator<Ite
     }
 }
 
-/// Obtained against specified noise level.
+/// Curves of the obtained noise level over the specified noise level.
 fn obtained() -> CurveGrid {
     let demanded: Vec<f64> = (0..=30).map(|k| 0.01 * f64::from(k)).collect();
     let panel = |m: usize| {
@@ -479,7 +479,7 @@ fn figures_are_whole_and_the_same_each_time() {
     }
 }
 
-/// 420 units are 85 mm in print, so that 7 pt are 12.2 of them.
+/// In print 420 units are 85 mm, so 7 pt are 12.2 units.
 #[test]
 fn type_is_seven_points_in_print_but_for_subscripts() {
     for (name, svg) in figures() {

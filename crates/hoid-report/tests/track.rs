@@ -1,4 +1,4 @@
-//! The page of recursive estimates, from simulated runs.
+//! The page about recursive estimates, made from simulated runs.
 #![allow(clippy::unwrap_used)]
 
 use hoid_ident::{Estimator, Fit};
@@ -58,7 +58,7 @@ fn report<'a>(record: &'a Record, traces: Vec<TraceSection<'a>>) -> TrackReport<
     }
 }
 
-/// Properties of every page: no external resources, no NaN, unique ids, valid references.
+/// Checks the properties of every page: no external resources, no NaN, unique ids, valid references.
 fn check_page(html: &str) {
     let without_namespace = html.replace("xmlns=\"http://www.w3.org/2000/svg\"", "");
     for outside in ["http", "src=", "<link", "<script", "@import", "url(\"", "//cdn"] {
@@ -91,7 +91,7 @@ fn check_page(html: &str) {
     assert_eq!(ids.len(), count, "two equal ids");
 }
 
-/// A figure of the page by the id of its title.
+/// Returns a figure of the page by the id of its title.
 fn figure<'a>(html: &'a str, id: &str) -> &'a str {
     let at = html.find(&format!("aria-labelledby=\"{id}-title\"")).unwrap();
     let start = html[..at].rfind("<svg ").unwrap();
@@ -114,7 +114,7 @@ fn three_methods_over_each_other_show_all_that_is_asked_for() {
     assert_eq!(html, page.to_html().unwrap());
     assert!(html.len() < 1_200_000, "{}", html.len());
 
-    // Operator, coefficients, innovations, standard errors; shortened steps when there are any.
+    // The figures are operator, coefficients, innovations, standard errors and, if there are any, shortened steps.
     let shortened = traces.iter().any(|t| t.counts().shortened > 0);
     assert_eq!(html.matches("<svg ").count(), 4 + usize::from(shortened));
     assert_eq!(html.contains("No step had to be shortened"), !shortened);
@@ -145,7 +145,7 @@ fn three_methods_over_each_other_show_all_that_is_asked_for() {
     for trace in &traces {
         assert!(html.contains(&format!("<td class=\"n\">{}</td>", trace.counts().samples)));
     }
-    // Relative error, by its definition.
+    // Relative error according to its definition.
     let k_e = record.channel("K_e").unwrap();
     let squares: Vec<f64> = (0..traces[2].len())
         .filter(|row| traces[2].times_s()[*row] >= 10.0)
@@ -159,7 +159,7 @@ fn three_methods_over_each_other_show_all_that_is_asked_for() {
     let row = &errors[errors.find("<sub>e</sub></th>").unwrap()..];
     assert!(row[..row.find("</tr>").unwrap()].ends_with(&format!("<td class=\"n\">{rms:.1}</td>")));
 
-    // A section each, with the start fit and the ends of the batch spans.
+    // Each method has a section with the start fit and the ends of the batch spans.
     for name in ["RLS", "RPEM", "physical"] {
         assert!(html.contains(&format!("\">{name}</h2>")));
     }
@@ -190,7 +190,7 @@ fn a_recording_has_no_truth() {
     assert!(!html.contains("<b>") && !html.contains("<deg>"));
     assert!(!html.contains(">truth<") && !html.contains("Relative error"));
     assert!(!html.contains("Dashed") && !html.contains("dashes") && !html.contains("Coloured dots"));
-    // Only the parameters of the operator are estimated, so that their errors are shown.
+    // Only the parameters of the operator are estimated, so their errors are shown.
     assert!(html.contains("Standard errors of the parameters of the operator"));
 }
 
@@ -249,11 +249,11 @@ fn short_records_and_averages_have_their_page() {
         .to_vec();
     let html = report(&record, vec![late]).to_html().unwrap();
     check_page(&html);
-    // Shorter than 10 s: errors over the whole record.
+    // In a record shorter than 10 s, errors are computed over the whole record.
     assert!(html.contains("with <i>t</i> &ge; 0 s"));
     assert!(html.contains("101 rows, behind by 0.5 s"));
     assert!(html.contains("nothing at the end of [-3, -1] s: the trace starts later"));
-    // One row alone.
+    // A trace with a single row.
     let one = track(&record, &options, 800).unwrap();
     assert_eq!(one.len(), 1);
     check_page(&report(&record, vec![section("one", &one, &[])]).to_html().unwrap());
@@ -287,7 +287,7 @@ fn a_batch_fit_beside_a_delay_that_changed_has_the_delay_of_its_span() {
     let trace = track(&record, &with_delay, 8).unwrap();
     let (_, fit) = batch_fit(&trace, &record, SPANS[1]).unwrap();
     assert!((34..=36).contains(&fit.orders().nk), "{}", fit.orders());
-    // The trace has no row there: that of the start applies.
+    // The trace has no row in this span, so the delay of the start applies.
     assert_eq!(batch_fit(&trace, &record, SPANS[0]).unwrap().1.orders().nk, 29);
 }
 

@@ -1,8 +1,8 @@
 //! The batch fits that the estimators of a cell need; each is computed once for a batch of runs.
 //!
-//! If a recursion starts from the fit of a span and an estimator makes the same fit, they share it. The fits of one
-//! estimator to the single runs of a batch are searched in one call ([`Estimator::fit_each`]). Neither affects the
-//! results.
+//! If a recursion starts from the fit of a span and an estimator makes the same fit, they share this fit. The fits of
+//! one estimator to the single runs of a batch are searched in one call ([`Estimator::fit_each`]). Neither measure
+//! affects the results.
 
 use std::borrow::Cow;
 

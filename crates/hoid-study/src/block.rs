@@ -14,8 +14,8 @@ use crate::{
     prepared::Preparation,
 };
 
-/// Maximum number of samples between two points of a trace at which its errors are evaluated; much shorter than any
-/// memory length.
+/// Maximum number of samples between two points of a trace at which its errors are evaluated; it is much shorter than
+/// any memory length.
 const ERRORS_EVERY: usize = 4;
 
 /// Number of replications whose fits are searched in one batch. A run of 82 s at 100 Hz takes 1 MB.
@@ -111,8 +111,8 @@ struct CellRun<'a> {
 }
 
 impl<'a> CellRun<'a> {
-    /// Applies all estimators to these runs. `should_continue` is called before each estimator, some of which take
-    /// 0.1 s; if it returns false, the result is `None`.
+    /// Applies all estimators to these runs. `should_continue` is called before each estimator, because some take 0.1
+    /// s; if it returns false, the result is `None`.
     fn estimate_all(
         &mut self,
         simulator: &Simulator,

@@ -147,7 +147,7 @@ pub(crate) fn comments(plan: &Plan) -> Vec<String> {
     ]
 }
 
-/// Returns the axes without a dedicated column; each of them gets a column of its own name.
+/// Returns the axes without a dedicated column; each of them gets a column with its name.
 pub(crate) fn extra_axes(plan: &Plan) -> Vec<String> {
     const KNOWN: [&str; 15] = [
         "name",

@@ -4,7 +4,7 @@
 //! - `delta_vaf`, %: `vaf` of this estimator minus `vaf` of another one with the same nk on the same run.
 //! - `response_error`, %: root mean square of `|H - H0| / |H0|` over the lines of the forcing function, where H0 is the
 //!   simulated operator with a hold at the sample time of the simulation. The model need not be converted to operator
-//!   parameters, so that models of any order can be compared.
+//!   parameters, so models of any order can be compared.
 //! - `rms_<p>`, %: root mean square of the relative error of a trace, from 10 s after its start, over the rows that can
 //!   be converted to operator parameters.
 //! - `settle50_<p>`, `settle90_<p>`, s: time from t_M until the trace first covers 50 or 90 % of the step of a
@@ -128,7 +128,7 @@ impl TraceErrors {
 const DECLARATION_TIME_S: f64 = 5.0;
 /// Length of the final part of a trace whose mean error is evaluated, s.
 const END_S: f64 = 10.0;
-/// Half width of a 95 % band, standard errors.
+/// Half width of a 95 % band, in standard errors.
 const BAND: f64 = 1.96;
 
 /// Measures of how a trace responds to a change: its bias, its bands and its declared changes.

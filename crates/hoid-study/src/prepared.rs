@@ -1,4 +1,5 @@
-//! The record as an estimator uses it: a span of it, every n-th sample, with mean or linear trend removed.
+//! The record in the form that an estimator uses: a span of the record, every n-th sample, with mean or linear trend
+//! removed.
 
 use std::borrow::Cow;
 

@@ -33,9 +33,9 @@ pub struct RunOptions {
     pub shard: Option<Shard>,
     /// Number of threads; `None` for one per core.
     pub jobs: Option<usize>,
-    /// Whether a stopped study is continued.
+    /// True if a stopped study is continued.
     pub resume: bool,
-    /// Whether the tables are written as CSV instead of Parquet.
+    /// True if the tables are written as CSV instead of Parquet.
     pub csv: bool,
 }
 

@@ -76,8 +76,8 @@ impl RunRecord {
 
     /// Returns the difference that prevents two parts from being merged into one study; `None` if they match.
     pub fn differs(&self, other: &Self) -> Option<String> {
-        // Settings that a user may have changed come first. Each of them also changes the hash of the plan, but a
-        // different hash is less informative.
+        // Settings that a user may have changed are compared first. Each of them also changes the hash of the plan, but
+        // a different hash is less informative.
         let pairs = [
             ("hoid version", self.hoid.clone(), other.hoid.clone()),
             ("study", self.study.clone(), other.study.clone()),

@@ -150,7 +150,7 @@ mod tests {
         assert!(matches!(on_disk(d, "plan", 0), OnDisk::Damaged(_)));
         fs::write(&path, good).unwrap();
         assert_eq!(on_disk(d, "plan", 0), OnDisk::Whole);
-        // Block 1 replaced by block 0, including its seal.
+        // Block 1 is replaced by block 0, including its seal.
         for (from, to) in [
             (part(d, 0, "fits"), part(d, 1, "fits")),
             (seal_path(d, 0), seal_path(d, 1)),

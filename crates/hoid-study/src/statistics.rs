@@ -164,8 +164,8 @@ mod tests {
 
     #[test]
     fn a_box_by_hand() {
-        // NumPy: quantile([1..9, 100], [.25, .5, .75]) = 3.25, 5.5, 7.75; whiskers within 3.25 -
-        // 6.75 and 7.75 + 6.75.
+        // In NumPy, quantile([1..9, 100], [.25, .5, .75]) = 3.25, 5.5, 7.75; the whiskers are within 3.25 - 6.75 and
+        // 7.75 + 6.75.
         let values = [5.0, 1.0, 9.0, 100.0, 2.0, 8.0, 3.0, 7.0, 4.0, 6.0];
         let s = Statistics::of(&values);
         assert_eq!((s.lower_quartile, s.median, s.upper_quartile), (3.25, 5.5, 7.75));
@@ -189,13 +189,13 @@ mod tests {
         assert_eq!(rate(1, 4), (0.25, (0.1875_f64 / 4.0).sqrt()));
     }
 
-    /// Errors of mean, standard deviation and median over many samples of 100 normal and of 100
-    /// uniform numbers.
+    /// Compares the computed Monte Carlo errors with the spread of mean, standard deviation and median over many
+    /// samples of 100 normal and of 100 uniform numbers.
     #[test]
     fn monte_carlo_errors_are_the_spread_that_they_claim() {
-        // 4000 samples: a standard deviation is known to 1.1 %, the mean of the claimed errors far
-        // better; the order statistics are 6 % below at n = 100 for the median of a uniform (a
-        // small-sample effect of the interpolation).
+        // With 4000 samples, the standard error of a standard deviation is 1.1 %; the mean of the computed errors is
+        // much more accurate. At n = 100, the error of the median of uniform numbers from order statistics is 6 % too
+        // small, a small-sample effect of the interpolation.
         let mut state = 12345u64;
         let mut uniform = || {
             state = state

@@ -1,5 +1,5 @@
-//! Estimators of a study run as by `hoid identify`: the operator of a person, one with changing gains, instrumental
-//! variables, each with its verdict.
+//! Estimators of a study that run as in `hoid identify` and give a verdict: the operator of a person, an operator with
+//! changing gains, and instrumental variables.
 #![allow(clippy::unwrap_used)]
 
 use hoid_analysis::{Identification, Identified, Polynomials, Recordings};
@@ -54,7 +54,7 @@ name = "SRIV"
 method = "sriv"
 "#;
 
-/// A study of a plan in a directory, and its fits.
+/// Runs the study of a plan in a directory; returns the directory and the table of fits.
 fn fits(text: &str) -> (tempfile::TempDir, OutputTable) {
     let directory = tempfile::tempdir().unwrap();
     let plan = Plan::parse(text, "people.toml").unwrap();
@@ -85,7 +85,7 @@ fn rows(table: &OutputTable) -> usize {
     }
 }
 
-/// The row of an estimator on the first replication of a scenario.
+/// Returns the row of an estimator for the first replication of a scenario.
 fn row(table: &OutputTable, scenario: &str, name: &str) -> usize {
     let is = |row: &usize| text(table, "scenario", *row) == scenario && text(table, "name", *row) == name;
     (0..rows(table)).find(is).unwrap()
@@ -131,8 +131,7 @@ fn is_operator(table: &OutputTable, row: usize, found: &Identified) {
     }
 }
 
-/// Each row is the result of the analysis of that run, to the last bit, with the options of the
-/// plan.
+/// Each row is bit-identical to the result of analysing that run with the options of the plan.
 #[test]
 fn a_row_is_the_analysis_of_the_run() {
     let (directory, fits) = fits(PLAN);
@@ -191,13 +190,13 @@ fn a_row_is_the_analysis_of_the_run() {
         let levels = ["trustworthy", "doubtful", "not_determined"].map(|level| one(level, scenario, name));
         assert!((levels.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{name}: {levels:?}");
     }
-    // No operator with changing gains is reported as constant.
+    // No operator with changing gains is identified as a constant operator with a trustworthy verdict.
     assert_eq!(one("trustworthy", "change", "lead"), 0.0);
     assert!(one("bias_t_M", "change", "change").abs() < 2.0);
     assert!(one("bias_K_e2", "change", "change").abs() < 30.0);
 }
 
-/// The lead of a form with a lag is not an estimate of the lead that was simulated.
+/// The lead of a form with a lag is not an estimate of the simulated lead.
 #[test]
 fn a_lead_of_another_form_has_no_bias() {
     let text = PLAN.replace("form = \"lead\"", "form = \"lead-lag\"");

@@ -44,10 +44,10 @@ fn changes_there_and_back_are_found_and_measured() {
         let row = results.one(&Query::of(quantity).name(name)).unwrap();
         row.statistics.mean
     };
-    // Changes at 40.96 and 61.44 s; that at 81.92 s is beyond the last sample.
+    // There are changes at 40.96 and 61.44 s; the change at 81.92 s is after the last sample.
     assert_eq!(mean("found", "multiple-model"), 100.0);
     assert!((0.4..3.0).contains(&mean("lag", "multiple-model")));
-    // 51.2 s after the start fit, minus 5 s for each change.
+    // False alarms can occur in the 51.2 s after the start fit, except for 5 s after each change.
     assert!((mean("hours", "multiple-model") - 41.2 / 3600.0).abs() < 1e-6);
     for p in ["K_e", "T_L", "K_e_dot"] {
         let (all, through) = (
@@ -73,6 +73,6 @@ fn the_comparison_has_nine_methods_in_all_kinds_of_change() {
         .unwrap()
         .plan()
         .unwrap();
-    // Two of the methods again with a tracked delay.
+    // Two of the methods are also applied with a tracked delay.
     assert_eq!((plan.cells.len(), plan.estimators.len()), (133, 11));
 }

@@ -1,4 +1,4 @@
-//! Groups of recorded runs, analysed on simulated persons.
+//! Analysis of groups of recorded runs, tested with simulated persons.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -18,7 +18,7 @@ use hoid_study::{
     group::{ConditionSettings, GroupSummary, Manifest, Pattern, PersonStatus, run_group},
 };
 
-/// Two subjects with different gains, two conditions, two runs each.
+/// Writes recordings of two subjects with different gains, in two conditions with two runs each.
 fn recorded() -> tempfile::TempDir {
     let directory = tempfile::tempdir().unwrap();
     for (subject, gain) in [("A", 1.0), ("B", 1.2)] {
@@ -50,7 +50,7 @@ fn manifest(directory: &Path) -> Manifest {
     assert_eq!((manifest.runs.len(), others.len()), (8, 1));
     manifest.analysis.delay_s = (0.25, 0.32);
     manifest.analysis.form = "lead".to_owned();
-    // The data read are the data written.
+    // The manifest that is read equals the manifest that was written.
     assert_eq!(Manifest::parse(&manifest.text(), "group.toml").unwrap(), manifest);
     manifest
 }
@@ -67,9 +67,9 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
         ..RunOptions::default()
     };
     let outcome = run_group(&manifest, data.path(), &whole, &options(2, false), &|_| (), &|| true).unwrap();
-    // Eight runs, and the fits of both runs of a person in a condition.
+    // There are eight runs, and four joint fits of both runs of a person in a condition.
     assert!(outcome.finished && outcome.estimates == 12);
-    // Three runs at a time on one thread: the same bytes.
+    // The analysis is stopped after every three runs on one thread; the results have the same bytes.
     for _ in 0..5 {
         let left = AtomicU64::new(3);
         let should_continue = || {
@@ -88,7 +88,7 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
     }
     assert!(content(&whole) == content(&pieces));
 
-    // A stopped group, with a damaged table of each kind of block.
+    // A stopped analysis with a damaged table of each kind of block.
     let damaged = out.path().join("damaged");
     let left = AtomicU64::new(6);
     let should_continue = || {
@@ -130,8 +130,8 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
             .contains("of this command, which may be overwritten")
     );
 
-    // Delay and gain of each person: nk = 29, K_e = 0.09 and 0.108 in C1 within four standard
-    // errors of the mean of two runs.
+    // The delay of each person is nk = 29, and the gains in C1 are K_e = 0.09 and 0.108, within four standard errors of
+    // the mean of two runs.
     let delays = read_table(&whole.join("delays.parquet")).unwrap();
     for nk in reals(&delays, "BJ_nk") {
         assert!((nk - 29.0).abs() <= 1.0, "{nk}");
@@ -175,7 +175,7 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
         of("last")
     );
 
-    // The operator of each person: gain and delay within four standard errors; C4 changes.
+    // Gain and delay of the operator of each person are within four standard errors; in C4 the operator changes.
     let summary = GroupSummary::read(&manifest, &whole).unwrap();
     let status: Vec<PersonStatus> = summary.people.iter().map(|p| p.status).collect();
     let (fitted, changes) = (PersonStatus::Fitted, PersonStatus::Changes);
@@ -199,7 +199,7 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
         }
     }
 
-    // Other data under the same manifest are another group.
+    // Other data with the same manifest belong to another group.
     let file = data.path().join("A_C1_1.csv");
     fs::write(&file, fs::read_to_string(&file).unwrap().replacen('1', "2", 1)).unwrap();
     let error = run_group(&manifest, data.path(), &whole, &options(1, true), &|_| (), &|| true).unwrap_err();
@@ -224,7 +224,7 @@ fn a_polynomial_model_that_is_not_asked_for_is_in_no_table() {
     };
     let drawn = estimators("responses.parquet");
     assert!(drawn.iter().any(|name| name == "BJ") && !drawn.iter().any(|name| name == "ARX"));
-    // The recursion has its orders, and starts.
+    // The orders of the recursion are known, so the recursion can start.
     assert!(estimators("estimates.parquet").iter().any(|name| name == "RLS"));
     fs::remove_dir_all(out).unwrap();
 
@@ -304,8 +304,7 @@ fn a_bad_file_is_a_row_and_a_bad_manifest_an_error() {
     );
 }
 
-/// Runs of two persons joined at the seam, and the agreement of the fits with the describing
-/// function.
+/// Runs of two persons are joined, and the fits agree with the describing function.
 #[test]
 fn joined_runs_settle_and_fits_agree_with_the_describing_function() {
     let data = recorded();
@@ -355,7 +354,8 @@ run = "2"
     let out = out.path().join("out");
     run_group(&manifest, data.path(), &out, &RunOptions::default(), &|_| (), &|| true).unwrap();
 
-    // B has 1.2 times the gain of A: 1.58 dB at every frequency, at the seam after 81.92 s.
+    // B has 1.2 times the gain of A: the gain increases by 1.58 dB at every frequency where the files are joined, after
+    // 81.92 s.
     let settling = read_table(&out.join("settling.parquet")).unwrap();
     let row = texts(&settling, "parameter")
         .iter()
@@ -375,15 +375,15 @@ run = "2"
         of("settle90_s")
     );
 
-    // Without a bias to speak of, Box-Jenkins is within two errors of the describing function and
+    // Box-Jenkins has a negligible bias: its distance from the describing function is below two standard errors, and it
     // has the margins of C1.
     let agreement = read_table(&out.join("agreement.parquet")).unwrap();
     let row = texts(&agreement, "estimator").iter().position(|e| e == "BJ").unwrap();
     assert_eq!(texts(&agreement, "agrees")[row], "yes");
     let of = |name: &str| reals(&agreement, name)[row];
     assert!(of("distance_in_errors") < 2.0, "{}", of("distance_in_errors"));
-    // Crossover 1.5635 rad/s and phase margin 76.67 deg (expected-values, Table 2), the latter with
-    // the half sample of the hold.
+    // The crossover is 1.5635 rad/s and the phase margin 76.67 deg (expected values of Table 2); the phase margin
+    // includes the half sample of the hold.
     assert!(
         (of("crossover_rad_s") / 1.5635 - 1.0).abs() < 0.05,
         "{}",
@@ -395,7 +395,7 @@ run = "2"
         of("phase_margin_deg")
     );
 
-    // The change is given by the manifest or by the seam.
+    // The time of the change is given either by the manifest or by the end of the first file, but not by both.
     let both = text.replace(
         "[[runs]]\nfile = \"A_C1_1.csv\"\nsubject",
         "[conditions.\"A then B\"]\nchange_s = 5.0\n\n[[runs]]\nfile = \"A_C1_1.csv\"\nsubject",
@@ -404,15 +404,15 @@ run = "2"
     assert!(refused.contains("where the files are joined"), "{refused}");
 }
 
-/// One more sample of delay in every file is one more sample of nk, by the operator of the person
-/// (C1) and by the joint fits to all runs (C4, for which a change is declared).
+/// One more sample of delay in every file increases nk by one, both with the delay of the person's operator (C1) and
+/// with the joint fits to all runs (C4, for which a change is declared).
 #[test]
 fn the_delay_moves_with_the_output() {
     let data = recorded();
     let late = tempfile::tempdir().unwrap();
     let mut manifest = manifest(data.path());
     manifest.runs.retain(|run| run.subject == "A");
-    // ARX selects longer delays, which must not reach the limit of the range.
+    // ARX selects longer delays, which must stay within the range.
     manifest.analysis.delay_s = (0.27, 0.42);
     manifest.analysis.methods.clear();
     manifest.analysis.each_run = false;
@@ -457,7 +457,7 @@ fn the_delay_moves_with_the_output() {
             assert_eq!(after - before, 1.0, "{before} {after}");
         }
     }
-    // Where the manifest states that u is late, the operator is the same, and the orders are not.
+    // If the manifest states that u is recorded late, the operator is unchanged, but the orders increase.
     let mut told = manifest.clone();
     told.conditions.get_mut("C1").unwrap().offset_samples = 1.0;
     let (late_nk, told_s) = found(&told, late.path(), "told");

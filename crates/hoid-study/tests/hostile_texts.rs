@@ -1,5 +1,5 @@
-//! Modified texts of plans of studies, manifests of groups and scenarios: read, or refused with a
-//! message that names the file, without a panic; accepted data can be read again.
+//! Modified texts of study plans, group manifests and scenarios are read, or refused with a message that names the
+//! file, without a panic. Accepted data can be read again.
 #![allow(clippy::unwrap_used)]
 
 use std::{fs, path::Path};
@@ -90,7 +90,7 @@ const CHARACTERS: [char; 14] = [
     '[', ']', '{', '}', '"', '\'', '=', '.', ',', '#', '\n', '\0', '\u{1b}', '\u{fffd}',
 ];
 
-/// Modification of a text.
+/// A modification of a text.
 #[derive(Debug, Clone)]
 enum Change {
     Value(Index, Index),
@@ -155,7 +155,7 @@ fn changed(text: &str, by: &[Change]) -> String {
     lines.join("\n")
 }
 
-/// A message names its file, is short, and contains no terminal control characters.
+/// Checks that a message names its file, is short, and contains no terminal control characters.
 fn message(said: &str) -> Result<(), TestCaseError> {
     prop_assert!(said.contains("made-up.toml"), "{}", said);
     prop_assert!(said.chars().count() < 4000, "{} characters", said.len());

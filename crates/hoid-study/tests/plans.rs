@@ -1,4 +1,4 @@
-//! Invalid plans fail before anything runs, with file, line and remedy.
+//! Invalid plans are refused before anything runs, with file, line and remedy.
 #![allow(clippy::unwrap_used)]
 
 use hoid_study::{Plan, plan_schema};
@@ -128,7 +128,8 @@ fn bad_plans_name_line_and_remedy() {
     }
 }
 
-/// Options of analyses run as by `hoid identify`: as in the registry, checked before anything runs.
+/// The options of estimators that run as in `hoid identify` are those of the registry, and are checked before anything
+/// runs.
 #[test]
 fn options_of_an_operator_are_checked() {
     let of = |text: &str| {
@@ -233,14 +234,14 @@ fn cells_follow_the_order_of_the_file() {
         .map(|c| c.axes.iter().map(|a| a.value.clone()).collect::<Vec<_>>().join("/"))
         .collect();
     assert_eq!(axes, ["1/0.0", "1/0.2", "2/0.0", "2/0.2"]);
-    // Without remnant all replications are the same.
+    // Without remnant all replications are the same, so only one is run.
     let replications: Vec<u64> = plan.cells.iter().map(|c| c.replications).collect();
     assert_eq!(replications, [1, 10, 1, 10]);
     assert_eq!(plan.estimates(), 2 * 22);
     assert_ne!(plan.hash(), plan.clone().with_replications(11).unwrap().hash());
 }
 
-/// A plan from before the method had its current name is the same plan.
+/// A plan with the earlier name of a method is equivalent to a plan with the current name.
 #[test]
 fn an_earlier_name_of_a_method_is_read() {
     let by = |method: &str| {

@@ -15,7 +15,8 @@ use hoid_study::{
     group::{Manifest, NumberOrText, PeopleExperiment, PreparationSettings, run_group, simulate_people},
 };
 
-/// The runs of a person at a rate, analysed: the manifest, and crossover, margin and delay with their errors.
+/// Analyses the runs of a person at a sampling rate; returns the manifest, and crossover, margin and delay with their
+/// errors.
 fn analysed(directory: &Path, sample_time_s: f64) -> (Manifest, [(f64, f64); 3]) {
     let experiment = PeopleExperiment {
         subjects: 1,
@@ -70,7 +71,7 @@ fn a_group_at_1000_hz_is_that_at_100_hz() {
         );
     }
 
-    // Lines are those of the recordings.
+    // The describing function equals that of the original recordings.
     let whole: Vec<Record> = manifest
         .runs
         .iter()
@@ -90,8 +91,8 @@ fn a_group_at_1000_hz_is_that_at_100_hz() {
     let expected = describe_runs(&whole, &options).unwrap();
     let lines = read_table(&out.join("describing-functions.parquet")).unwrap();
     for (k, (line, phase)) in expected.function.lines.iter().zip(expected.phases_deg()).enumerate() {
-        // The samples that the filter cuts at the ends appear as noise at the lines: a small part of their errors. The
-        // lead of the input by itself would be .26 deg at 1 rad/s.
+        // The effect of the filter at the ends of the record appears as noise at the lines, which is small compared
+        // with their errors. An uncorrected lead of the input would change the phase by .26 deg at 1 rad/s.
         let magnitude = line.magnitude_db();
         for (name, expected, least) in [("magnitude_db", magnitude, 0.02), ("phase_deg", phase, 0.1)] {
             let distance = (reals(&lines, name)[k] - expected.value).abs();
@@ -120,7 +121,7 @@ fn the_rate_of_a_group_as_typed() {
         (of(text("auto"), None), 10),
         (of(text("off"), None), 1),
         (of(number(1.0), None), 1),
-        // What is named is done before.
+        // A given factor or frequency is applied earlier, so nothing remains to be done.
         (of(number(5.0), None), 1),
         (of(None, Some(50.0)), 1),
     ] {

@@ -1,4 +1,4 @@
-//! Simulated sampling defects are detected at their places, and none are reported without defects.
+//! Simulated sampling defects are detected at the correct locations; without defects, none are reported.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
@@ -24,7 +24,7 @@ fn experiment(trouble: &[SamplingDefect]) -> VirtualExperiment {
     }
 }
 
-/// The sampling problems of each run, and the run without defects.
+/// Returns the sampling problems of each run, and the run without defects.
 fn found(trouble: &[SamplingDefect], options: &ReadOptions) -> Vec<(Vec<Found>, Record)> {
     let (clean, troubled) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     simulate_group(&experiment(&[]), clean.path(), &|| ()).unwrap();
@@ -62,7 +62,7 @@ fn only(found: &[Found], kinds: &[QualityIssueKind]) {
 fn jitter_and_clocks_have_the_size_that_was_planted() {
     for (found, _) in found(&[SamplingDefect::Jitter], &resampled()) {
         only(&found, &[QualityIssueKind::Jitter]);
-        // 0.2 of a sample, clamped at 2.25 standard deviations, which leaves 0.194.
+        // Jitter of 0.2 of a sample, which is clamped at 2.25 standard deviations, has an RMS value of 0.194.
         assert!((found[0].size / 0.01 - 0.194).abs() < 0.006, "{}", found[0]);
     }
     for (found, _) in found(&[SamplingDefect::SlowClock], &ReadOptions::default()) {
@@ -79,7 +79,7 @@ fn missing_and_repeated_rows_are_counted_one_by_one() {
     ] {
         for (found, record) in found(&trouble, &resampled()) {
             let gap = found.iter().find(|one| one.kind == QualityIssueKind::Gap).unwrap();
-            // One in two hundred of 8192 rows: 41 with a standard deviation of 6.4.
+            // One in two hundred of 8192 rows is missing: 41 on average, with a standard deviation of 6.4.
             assert!((15..70).contains(&gap.rows) && gap.places.len() <= gap.rows, "{gap}");
             let (first, last) = (record.time_s(0), record.time_s(record.len() - 1));
             for place in &gap.places {
@@ -114,10 +114,10 @@ fn rails_steps_and_stalls_are_found_where_they_are() {
     for (found, record) in found(&[SamplingDefect::Stalled], &ReadOptions::default()) {
         only(&found, &[QualityIssueKind::Stalled]);
         let place = found[0].places[0];
-        // Rows are counted from 1; the first row of a stall still has a value of its own.
+        // Rows are counted from 1; the first row of a stall still has a new value.
         assert_eq!((place.row, place.rows), (record.len() / 3 + 2, 49));
     }
-    // Several at once.
+    // Several defects at the same time.
     let all = [
         SamplingDefect::Saturated,
         SamplingDefect::Quantised,
@@ -149,7 +149,7 @@ fn a_record_is_cut_where_it_is_masked() {
             shortest_s,
         )
     };
-    // Without a mask the gaps are an error as before.
+    // Without a mask, gaps are an error.
     assert!(cut(&[], 2.0).unwrap_err().to_string().contains("missing samples: "));
     let segments = cut(&[QualityIssueKind::Gap, QualityIssueKind::Stalled], 1.0).unwrap();
     assert!(segments.len() > 10);

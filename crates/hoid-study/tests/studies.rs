@@ -1,5 +1,5 @@
-//! Studies as a whole: the same bytes for any division of the work, resumed after any interruption,
-//! refused if parts do not belong together.
+//! Studies as a whole: they give the same bytes for any division of the work, can be resumed after any interruption,
+//! and are refused if parts do not belong together.
 #![allow(clippy::unwrap_used)]
 
 use std::{
@@ -59,7 +59,7 @@ fn quiet(plan: &Plan, directory: &Path, options: RunOptions) -> Result<bool, Stu
     run(plan, directory, &options, &|_| (), &|| true).map(|outcome| outcome.finished)
 }
 
-/// All files of a directory but the manifest, by name.
+/// Returns the contents of all files of a directory except the manifest, by name.
 fn content(directory: &Path) -> BTreeMap<String, Vec<u8>> {
     let files = fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().path());
     files
@@ -88,7 +88,7 @@ fn whole(jobs: usize) -> (tempfile::TempDir, BTreeMap<String, Vec<u8>>) {
     whole_of(&plan(), jobs)
 }
 
-/// The same bytes for any number of threads and shards.
+/// Checks that the bytes are the same for any number of threads and shards.
 fn division_does_not_show(plan: &Plan, threads: &[usize], shards: &[u64]) -> BTreeMap<String, Vec<u8>> {
     let (_one, expected) = whole_of(plan, 1);
     for &jobs in threads {
@@ -172,8 +172,7 @@ fn a_stopped_study_goes_on_and_repeats_nothing() {
     let (mut made, mut sessions) = (0, 0);
     loop {
         sessions += 1;
-        // Three replications at a time, each requested by every estimator: unfinished blocks are
-        // lost.
+        // Each session stops after three replications of all estimators; unfinished blocks are lost.
         let left = AtomicU64::new(3 * plan.estimators.len() as u64);
         let should_continue = || {
             left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1))
@@ -192,7 +191,7 @@ fn a_stopped_study_goes_on_and_repeats_nothing() {
         if outcome.finished {
             break;
         }
-        // A file in progress that a killed program leaves.
+        // A partial file left by a killed program.
         fs::write(directory.path().join("parts/.tmp123"), b"half").unwrap();
         assert!(sessions < 20, "no end");
     }
@@ -243,7 +242,7 @@ fn parts_that_do_not_belong_together_are_refused() {
     assert!(matches!(of(&[]), StudyError::NoStudy { .. }));
     assert!(!at("out").exists(), "nothing is left of what was refused");
 
-    // A directory is not overwritten, nor continued with a different study.
+    // A directory is neither overwritten nor continued with a different study.
     let again = quiet(&plan(), &at("1"), shard(1, 3)).unwrap_err();
     assert!(matches!(again, StudyError::Occupied { .. }));
     let resume = RunOptions {
@@ -288,13 +287,14 @@ fn text<'a>(table: &'a OutputTable, column: &str, row: usize) -> &'a str {
     }
 }
 
-/// A row equals the result of simulating and fitting that run separately, to the last bit.
+/// A row is bit-identical to the result of simulating and fitting that run separately.
 #[test]
 fn a_row_is_the_run_by_itself() {
     let (directory, _) = whole(2);
     let fits = read_table(&directory.path().join("fits.parquet")).unwrap();
     let rows = fits.columns[0].values.len();
-    // 5 replications in two cells by 4 estimators, one in the cell without remnant by 3.
+    // There are 5 replications in two cells with 4 estimators, and one replication in the cell without remnant with 3
+    // estimators.
     assert_eq!(rows, 2 * 5 * 4 + 3);
     let row = (0..rows)
         .find(|r| {
@@ -338,7 +338,7 @@ fn a_row_is_the_run_by_itself() {
 /// A failed estimate is a row with its reason.
 #[test]
 fn failures_are_rows() {
-    // The loop with a gain far beyond the gain margin diverges in every run.
+    // With a gain far above the gain margin, the loop diverges in every run.
     let text_of = PLAN.replace(
         "name = \"silent\"\ncondition = \"C1\"",
         "name = \"silent\"\ncondition = \"C1\"\ninitial.K_c = 90000.0",
@@ -362,7 +362,7 @@ fn failures_are_rows() {
     }
 }
 
-/// A study that was stopped after some of its blocks.
+/// Writes a study that was stopped after some of its blocks.
 fn stopped(directory: &Path) {
     let left = AtomicU64::new(40);
     let should_continue = || {
@@ -397,14 +397,14 @@ fn damaged_blocks_are_computed_again() {
         ..RunOptions::default()
     };
     let damages: [&dyn Fn(&Path); 4] = [
-        // A bit.
+        // A single bit is flipped.
         &|path| {
             let mut bytes = fs::read(path).unwrap();
             let middle = bytes.len() / 2;
             bytes[middle] ^= 4;
             fs::write(path, bytes).unwrap();
         },
-        // Cut short.
+        // The file is truncated.
         &|path| {
             let bytes = fs::read(path).unwrap();
             fs::write(path, &bytes[..bytes.len() / 2]).unwrap();
@@ -426,7 +426,7 @@ fn damaged_blocks_are_computed_again() {
         assert!(outcome.notes[0].contains("was recomputed"), "{:?}", outcome.notes);
         assert!(content(&whole) == content(&again), "{kind}");
     }
-    // Block 1 replaced by block 0, with all that belongs to it.
+    // Block 1 is replaced by block 0, including its seal.
     fs::remove_dir_all(&again).unwrap();
     stopped(&again);
     for path in parts(&again) {

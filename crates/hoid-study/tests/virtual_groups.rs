@@ -1,4 +1,4 @@
-//! Virtual experiments: groups of simulated people, with what is true next to them.
+//! Virtual experiments: groups of simulated people with their true parameters.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -36,8 +36,8 @@ fn a_virtual_experiment_has_its_truth_beside_it() {
     assert!(content(&plain) == content(&again), "the same seed, the same bytes");
     assert_eq!(Manifest::read(&plain.join("group.toml")).unwrap(), manifest);
 
-    // Estimates lie around the truth of each run: all of sixteen within five standard errors, in
-    // mean within 4/sqrt(16).
+    // The estimates agree with the true values of each run: all sixteen errors are within five standard errors, and
+    // their mean is within 4/sqrt(16) standard errors.
     manifest.analysis.methods.clear();
     manifest.analysis.delay_s = (0.2, 0.36);
     manifest.analysis.form = "lead".to_owned();
@@ -69,7 +69,7 @@ fn a_virtual_experiment_has_its_truth_beside_it() {
     assert!(z.iter().all(|z| z.abs() < 5.0), "{z:?}");
     assert!((z.iter().sum::<f64>() / 16.0).abs() < 1.0, "{z:?}");
 
-    // Troubles: an uneven t is refused unchanged and read when it is to be resampled.
+    // With sampling defects, an uneven t is refused, but is read if it is to be resampled.
     let troubled = VirtualExperiment {
         subjects: 1,
         runs: 1,
@@ -110,8 +110,8 @@ fn a_virtual_experiment_has_its_truth_beside_it() {
     }
 }
 
-/// The numbers of the guide: with the delay as a parameter of its own the error bars hold for all
-/// six parameters, ARX takes longer delays than Box-Jenkins.
+/// The numbers of the guide: with the delay as a separate parameter, the error bars are correct for all six parameters;
+/// ARX selects longer delays than Box-Jenkins.
 #[test]
 fn grey_box_error_bars_hold_in_a_virtual_experiment() {
     let experiment = VirtualExperiment {
@@ -161,7 +161,7 @@ fn grey_box_error_bars_hold_in_a_virtual_experiment() {
     }
     assert_eq!(hits.len(), 6);
     for (name, inside) in hits {
-        // 60 sub-batches: one standard error of the rate is 2.8 %.
+        // With 60 sub-batches, the standard error of the rate is 2.8 %.
         assert_eq!(inside.len(), 60, "{name}");
         let rate = inside.iter().filter(|hit| **hit).count() as f64 / 60.0;
         assert!(rate > 0.95 - 3.0 * 0.028, "{name}: {rate}");
@@ -175,15 +175,14 @@ fn grey_box_error_bars_hold_in_a_virtual_experiment() {
             .sum::<f64>()
             / 3.0
     };
-    // C1 has an operator, whose delay both take; in C4 each structure has what fits it best.
+    // In C1 both structures use the delay of the operator; in C4 each structure has the delay that fits it best.
     assert!((mean("BJ_nk", "C1") - 29.0).abs() < 2.0, "{}", mean("BJ_nk", "C1"));
     assert_eq!(mean("ARX_nk", "C1"), mean("BJ_nk", "C1"));
     let (arx, bj) = (mean("ARX_nk", "C4"), mean("BJ_nk", "C4"));
     assert!((bj - 29.0).abs() < 2.0 && arx > bj + 3.0, "ARX {arx}, BJ {bj}");
 }
 
-/// Virtual people: their files are those of recorded experiments, with all that is true next to
-/// them.
+/// The files of virtual people have the format of recorded experiments, together with all true values.
 #[test]
 fn virtual_people_have_their_truth_beside_them() {
     let experiment = PeopleExperiment {
@@ -207,7 +206,7 @@ fn virtual_people_have_their_truth_beside_them() {
     for (row, entry) in manifest.runs.iter().enumerate() {
         assert_eq!(texts(&truth, "condition")[row], entry.condition);
         let margin = reals(&truth, "phase_margin_deg")[row];
-        // The spread between runs leads out of the range of persons by some degrees.
+        // The spread between runs may exceed the range between persons by a few degrees.
         assert!((10.0..75.0).contains(&margin), "{margin}");
         let run = read_table(&plain.join(&entry.file)).unwrap();
         let names: Vec<&str> = run.columns.iter().map(|column| column.name.as_str()).collect();
@@ -217,7 +216,7 @@ fn virtual_people_have_their_truth_beside_them() {
         let offset = reals(&truth, "offset_e")[row];
         assert!((0..2400).all(|k| (e[k] + y[k] - offset).abs() < 1e-9));
     }
-    // For a lead-lag K/T_I is there always, T_I where it is finite.
+    // A lead-lag always has a value of K/T_I, and of T_I if T_I is finite.
     let forms = texts(&truth, "form");
     let ratio = reals(&truth, "K_over_T_I");
     assert!((0..12).all(|row| (forms[row] == "lead") == ratio[row].is_nan()));

@@ -1,5 +1,5 @@
-//! Functions common to methods in physical parameters with the noise model of a batch fit: validation of the options,
-//! and T_L from the gains.
+//! Functions common to methods in physical parameters that use the noise model of a batch fit: validation of the
+//! options, and T_L from the gains.
 
 use hoid_ident::IdentError;
 use hoid_track::{

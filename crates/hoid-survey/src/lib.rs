@@ -1,6 +1,6 @@
-//! Recursive methods from the literature, for comparison with those of hoid.
+//! Recursive methods from the literature, for comparison with the methods of hoid.
 //!
-//! Each method follows the source named in its file and is a [`Method`](hoid_track::Method), as the default method is.
+//! Each method follows the source named in its file and is a [`Method`](hoid_track::Method), like the default method.
 //! All methods share the tracker, the guard, saved states, traces and verdicts of [`hoid_track`]. This crate contains
 //! the list of all methods by name.
 //!
@@ -27,7 +27,7 @@
 //! | `physical` | `physical`: the prediction-error method in the operator's parameters |
 //! | `window` | `window`: a repeated batch fit of the last few seconds |
 //! | `rriv` | `rriv`: recursive refined instrumental variable |
-//! | `multiple_model` | `multiple-model`: a bank of hypotheses about when the person changed; its two-sided estimate |
+//! | `multiple_model` | `multiple-model`: a bank of hypotheses about the time of a change; its two-sided estimate |
 //! | `fused` | `fused`: least squares for B with the poles of the prediction-error method |
 //! | [`kernel`] | the computations of `physical` and `multiple-model` for one sample |
 //! | `joint_filter` | `ekf`, `ukf`: Kalman filters for state and parameters jointly |

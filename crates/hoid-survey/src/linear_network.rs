@@ -9,9 +9,9 @@
 //! `u^(k) = w_0 y_0(k)/s_0 + w_1 y_1(k)/s_1`, `w_i <- w_i + (Ts/T) (y_i/s_i) (u - u^)`,
 //!
 //! and `K_e = w_0/s_0`, `K_e_dot = w_1/s_1`. A signal and its rate are orthogonal over time and the inputs have unit
-//! power, so that each weight forgets with the time constant T. The neuromuscular part, the delay and the initial
-//! weights are taken from the Box-Jenkins fit of the start span; parameters outside the equalization stay constant. The
-//! rule gives no covariance.
+//! power, so each weight forgets with the time constant T. The neuromuscular part, the delay and the initial weights
+//! are taken from the Box-Jenkins fit of the start span; parameters outside the equalization stay constant. The rule
+//! gives no covariance.
 
 use hoid_core::{
     delay::DelayLine,
@@ -259,7 +259,7 @@ mod tests {
 
     #[test]
     fn a_weight_is_learned_with_its_time_constant() {
-        // y_0 = cos, y_1 = sin, both of mean square 1/2: orthogonal. K_e goes from 1 to 2.
+        // y_0 = cos and y_1 = sin have a mean square of 1/2 and are orthogonal. K_e changes from 1 to 2.
         let mut neuron = Neuron {
             gains: [1.0, 0.3],
             squares: [0.5; 2],
@@ -267,18 +267,18 @@ mod tests {
             rate: 0.01 / 4.0,
         };
         for k in 0..400 {
-            // Four periods in the 4 s of one time constant.
+            // There are four periods in the 4 s of one time constant.
             let (y_1, y_0) = (std::f64::consts::TAU * 0.01 * f64::from(k)).sin_cos();
             let error = neuron.error([y_0, y_1], 2.0 * y_0 + 0.3 * y_1);
             neuron.learn([y_0, y_1], error);
         }
         let [k_e, k_e_dot] = neuron.gains;
-        // Averaged over a period the rule is its differential equation, up to (Ts/T).
+        // Averaged over a period, the rule equals its differential equation, except for terms of order Ts/T.
         assert!((2.0 - k_e - (-1.0f64).exp()).abs() < 0.01, "{k_e}");
         assert!((k_e_dot - 0.3).abs() < 0.03, "{k_e_dot}");
     }
 
-    /// The batch twin: y_0 and y_1 weighed by K_e and K_e_dot are the response of the held operator.
+    /// y_0 and y_1 weighted by K_e and K_e_dot give the response of the held operator.
     #[test]
     fn the_inputs_add_up_to_the_held_operator() {
         let operator = OperatorParameters {
@@ -329,7 +329,7 @@ mod tests {
             let trace = track(&simulator.run(seed, false).unwrap(), &options, 100).unwrap();
             mean += trace.operator(64).unwrap().k_e_dot.value / 0.084 / RUNS as f64;
         }
-        // The loop biases a direct fit without a noise model; standard error of the mean 3 %.
+        // The loop biases a direct fit without a noise model; the standard error of the mean is 3 %.
         assert!((mean - 1.0).abs() < 0.25, "{mean}");
     }
 }

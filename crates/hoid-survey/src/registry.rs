@@ -1,4 +1,4 @@
-//! All recursive methods by name: those of [`hoid_track`] and those of this crate. A new method needs an entry in this
+//! All recursive methods by name: the methods of [`hoid_track`] and of this crate. A new method needs an entry in this
 //! list.
 
 use hoid_ident::{IdentError, settings::MethodSpec};

@@ -5,9 +5,9 @@
 //! initial states, bounds and other properties of the estimator, and the covariance of the fit.
 //!
 //! **Wrong minima.** A search from the last theta may stay in a local minimum. The estimator therefore also searches
-//! from its own starts if there is no last theta, if the search from it does not converge, if the loss has risen by a
-//! fraction [`LOSS_RISE`] since the last comparison, and otherwise at every [`COMPARISON_INTERVAL`]-th fit. The lower
-//! of the two minima is used.
+//! from its own starts if there is no last theta, if the search from the last theta does not converge, if the loss has
+//! risen by a fraction [`LOSS_RISE`] since the last comparison, and otherwise at every [`COMPARISON_INTERVAL`]-th fit.
+//! The lower of the two minima is used.
 //!
 //! **Failures.** If a fit fails, for example for a window without excitation, theta and its covariance are unchanged.
 
@@ -288,7 +288,7 @@ impl WindowRecursion {
             }
             Err(failure) => {
                 self.failures += 1;
-                // After a failure the next fit also searches from the own starts of the estimator.
+                // After a failure the next fit also searches from the estimator's own starts.
                 self.since_comparison = COMPARISON_INTERVAL;
                 self.last_failure = Some(failure);
             }

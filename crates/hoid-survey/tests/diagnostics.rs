@@ -1,4 +1,4 @@
-//! Verdict on a trace, and on the estimate of a moment, for methods whose start is a batch fit.
+//! Verdicts on a trace and on the estimate at one time, for methods that start from a batch fit.
 #![allow(clippy::unwrap_used)]
 
 use hoid_model::{
@@ -81,7 +81,7 @@ fn a_delay_that_jumps_is_not_followed_by_a_fixed_one() {
     let told = |record: &Record| kinds(&judged(record, &options)).contains(&"not-followed");
     assert!(told(&late(5000, 20)));
     assert!(!told(&late(5000, 0)));
-    // Shorter than the span that is examined.
+    // The trace is shorter than the examined span.
     assert!(
         judged(&record.span(0.0, 12.0).unwrap(), &options)
             .findings()
@@ -98,7 +98,7 @@ fn the_level_of_a_moment_follows_the_estimate() {
     };
     let record = simulated(Condition::C1);
     let mut tracker = Tracker::new(&options, None, record.sample_time()).unwrap();
-    // From a start from nothing, nothing is known.
+    // With a start that is not a fit, no parameter is determined at first.
     assert_ne!(tracker.level(&tracker.operator()), VerdictLevel::Trustworthy);
     let default = TrackOptions::default_for(physical(), 29);
     let mut known = Tracker::new(&default, Some(&record), record.sample_time()).unwrap();

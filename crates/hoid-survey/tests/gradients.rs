@@ -1,4 +1,4 @@
-//! psi of the recursion in physical parameters compared with finite differences, and its tracked delay.
+//! The gradient psi of the recursion in physical parameters compared with finite differences, and the tracked delay.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../../hoid-core/tests/common/mod.rs"]
@@ -8,7 +8,7 @@ use common::{Noise, bars, box_jenkins, covariance};
 use hoid_core::{adaptation::Forgetting, covariance::Covariance, recursion::Stable, shape::AnyShape};
 use hoid_survey::kernel::physical::{PhysicalModel, PhysicalRpem};
 
-/// A physical model of Box-Jenkins with one noise pole (and a zero), with or without the delay.
+/// A Box-Jenkins model in physical parameters with one noise pole (and a zero), with or without the delay.
 fn physical<const N: usize, const L: usize>(
     nc: usize,
     smallest_nk: Option<usize>,
@@ -77,7 +77,7 @@ fn psi_of_the_physical_recursion_is_its_negative_gradient() {
         [0.09, 0.036, 11.25, 0.35, 0.2, -0.8],
         [1e-6, 1e-6, 1e-4, 1e-5, 1e-6, 1e-6],
     );
-    // A delay inside a sample, where the model is smooth.
+    // A delay within a sample, where the model is smooth.
     check::<6, 16>(
         0,
         Some(2),
@@ -112,7 +112,7 @@ fn a_delay_is_found_from_four_samples_away() {
     let mut slow = 0.0;
     for _ in 0..40_000 {
         slow = 0.97 * slow + 0.3 * noise.next();
-        // The innovation for u = 0 is minus the response of the truth.
+        // For u = 0, the innovation is the negative response of the true operator.
         let response = -truth.step_without_update(slow, 0.0).innovation;
         recursion.step(slow, response + 0.01 * noise.next());
     }

@@ -1,4 +1,4 @@
-//! The guard in front of every method that may have one.
+//! The guard, with every method that may have one.
 #![allow(clippy::unwrap_used)]
 
 use hoid_model::{
@@ -42,7 +42,7 @@ fn a_guard_that_never_acts_changes_no_digit() {
             let without = track(&record, &options(method(), "no"), 16).unwrap();
             assert!(with.is_guarded() && !without.is_guarded());
             assert_eq!(with.faults(), [], "{}", method());
-            // As bits: there is no estimate before the start.
+            // The numbers are compared as bits, because there is no estimate (NaN) before the start.
             let bits = |numbers: &[f64]| numbers.iter().map(|x| x.to_bits()).collect::<Vec<u64>>();
             for row in 0..with.len() {
                 assert_eq!(with.theta(row), without.theta(row), "{}", method());
@@ -65,7 +65,7 @@ fn it_stands_before_methods_of_a_person_by_default() {
     assert!(Method::rpem().with("guard", "perhaps").is_err());
 }
 
-/// A jump that stays: after the wait for it to come back, every number is that without a guard.
+/// A permanent jump: after the time in which the guard waits for a return, all numbers equal those without a guard.
 #[test]
 fn a_jump_that_stays_is_taken_as_if_nothing_had_been() {
     let record = record(5);
@@ -78,7 +78,7 @@ fn a_jump_that_stays_is_taken_as_if_nothing_had_been() {
             let (e, u) = (record.input()[k] + jump, record.output()[k]);
             let found = with.step(e, u);
             let plain = without.step(e, u);
-            // A step of the target: nothing to report.
+            // A step of the target is not reported.
             assert_eq!(with.event(), None);
             if found.held {
                 accepted = k + 1;
@@ -93,7 +93,7 @@ fn a_jump_that_stays_is_taken_as_if_nothing_had_been() {
     }
 }
 
-/// Faulty input: e and u of sample k, wrong from 4000 on.
+/// Faulty input: e and u of sample k, with faults from sample 4000 on.
 fn hostile(record: &Record, k: usize) -> (f64, f64) {
     let (e, u) = (record.input()[k], record.output()[k]);
     match k {
@@ -111,7 +111,7 @@ fn a_restored_guard_goes_on_with_the_same_digits() {
     let record = record(6);
     for method in GUARDED {
         let options = options(method(), "yes");
-        // Within an outlier, a gap, a pause, and the time after it.
+        // Stops are within an outlier, a gap and a pause, and after the pause.
         for stop in [3000, 4102, 4200, 4900, 5300, 5900] {
             let mut first = tracker(&options, &record);
             (0..stop).for_each(|k| {
@@ -123,7 +123,7 @@ fn a_restored_guard_goes_on_with_the_same_digits() {
             assert_eq!(first.is_paused(), second.is_paused());
             for k in stop..6700 {
                 let (e, u) = hostile(&record, k);
-                // NaN is not an innovation, so that outcomes can be compared.
+                // An innovation is never NaN, so outcomes can be compared.
                 let of =
                     |tracker: &mut Tracker| -> (Outcome, Option<GuardEvent>) { (tracker.step(e, u), tracker.event()) };
                 assert_eq!(of(&mut first), of(&mut second), "{} at {k}", method());
@@ -150,7 +150,7 @@ fn what_was_found_and_done_is_told_with_its_place() {
     }
     use {GuardAction as A, GuardKind as K};
     assert_eq!(told[0], (K::Outlier, A::Held, 4000, 1));
-    // Start and end of the gap, of the larger span and of the frozen one.
+    // Start and end of the gap, of the span with wrong scale and of the frozen span.
     let of = |kind: K, action: A| told.iter().find(|t| (t.0, t.1) == (kind, action));
     assert!(of(K::Missing, A::Resumed).is_some(), "{told:?}");
     let level = of(K::Level, A::Restarted).unwrap();
@@ -193,7 +193,7 @@ fn streams_of_nothing_and_of_anything_leave_numbers() {
                 }
                 assert!(tracker.theta().iter().all(|t| t.is_finite()), "{method}");
                 assert!(tracker.innovation_variance().is_finite(), "{method}");
-                // It recovers: the run that follows is tracked.
+                // The tracker recovers: the following run is tracked.
                 let before = tracker.counts();
                 (0..record.len()).for_each(|k| {
                     tracker.step(record.input()[k], record.output()[k]);

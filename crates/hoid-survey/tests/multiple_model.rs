@@ -50,8 +50,8 @@ fn level(deviation: f64) -> InnovationVariance {
     InnovationVariance::new(deviation * deviation, 2000.0, 1.0 - 1.0 / 2000.0)
 }
 
-/// Delayed error and control of an operator whose gains are those of `eta` at each sample, in its output, with AR(1)
-/// noise.
+/// Delayed error and control of an operator with AR(1) noise, whose gains act at the output and are given by `eta` at
+/// each sample.
 fn operator(samples: usize, seed: u64, deviation: f64, eta: impl Fn(usize) -> [f64; 4]) -> Vec<(f64, f64)> {
     with_noise(samples, seed, |_| deviation, eta)
 }
@@ -97,7 +97,7 @@ fn responses_times_gains_are_the_held_operator_and_their_derivatives_are_differe
         (last, largest)
     };
     let (signals, difference) = at(S1);
-    // Rounding of sums of about 25 terms of the size of 0.1.
+    // The tolerance allows for rounding of sums of about 25 terms of size 0.1.
     assert!(difference < 1e-13, "{difference}");
     for (parameter, step) in [(2, 1e-4), (3, 1e-6)] {
         let shifted = |sign: f64| {
@@ -119,7 +119,8 @@ fn responses_times_gains_are_the_held_operator_and_their_derivatives_are_differe
 
 #[test]
 fn a_point_that_moves_takes_the_past_with_it() {
-    // The memory of the filters after a move differs in the second order from that of filters that always were there.
+    // After a move, the states of the filters differ only to second order from those of filters with this linearisation
+    // point from the start.
     let error = |step: f64| {
         let mut noise = Noise(9);
         let (mut moved, mut there) = (
@@ -157,7 +158,7 @@ fn one_hypothesis_with_a_known_neuromuscular_system_is_least_squares() {
     );
     let mut response = Response::new([S1[2], S1[3]], TS);
     let (mut r, mut y) = ([[0.0; 2]; 2], 0.0);
-    // Normal equations of the prior and the whitened data.
+    // These are the normal equations of the prior and the whitened data.
     let mut matrix = [[1.0 / prior[0], 0.0], [0.0, 1.0 / prior[1]]];
     let mut right = [0.05 / prior[0], 0.05 / prior[1]];
     for &(x, u) in &data {
@@ -201,7 +202,7 @@ fn the_neuromuscular_system_is_found_from_a_quarter_away() {
     let covariance = bank.bank().covariance();
     for i in 0..4 {
         let error = bank.bank().mixture().eta[i] - S1[i];
-        // Five standard errors, plus the error of the linearisation at the distant start: a hundredth.
+        // The tolerance is five standard errors plus one hundredth, for the linearisation error at the distant start.
         let allowed = 5.0 * covariance[i][i].sqrt() + 0.01 * S1[i];
         assert!(error.abs() < allowed, "{i}: {error} {allowed}");
     }
@@ -222,7 +223,7 @@ fn a_change_is_declared_once_with_its_time_and_its_gains() {
     assert_eq!(declared.len(), 1, "{declared:?}");
     let (k, change) = declared[0];
     assert!((change_at..change_at + 150).contains(&k), "{k}");
-    // The birth before or after the change.
+    // The change is dated to the birth before or after it.
     let since = k as f64 - change.samples_ago as f64;
     assert!((since - change_at as f64).abs() <= 64.0, "{since}");
     assert!(change.log_odds > 4.0 && change.z[1] > 2.0, "{change:?}");
@@ -236,7 +237,7 @@ fn a_change_is_declared_once_with_its_time_and_its_gains() {
 
 #[test]
 fn a_steady_operator_raises_no_alarm_and_memory_grows() {
-    // Ten minutes.
+    // The run lasts ten minutes.
     let data = operator(60_000, 33, 0.02, |_| S1);
     let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], prior_of());
     for &(x, u) in &data {
@@ -299,7 +300,7 @@ fn silence_constants_saturation_and_overflow_leave_everything_finite() {
             };
             finite(&mut bank, x, u);
         }
-        // The largest numbers that a caller may pass, and then what overflows inside.
+        // The largest numbers that a caller may pass, followed by numbers that cause an internal overflow.
         finite(&mut bank, 1e6, -1e6);
         finite(&mut bank, if round == 2 { 1e308 } else { 0.0 }, 1e308);
         finite(&mut bank, -1e308, -1e308);
@@ -336,7 +337,7 @@ fn t_l_stays_finite_as_k_e_becomes_zero() {
         bank.step(x, u);
         let covariance = bank.bank().covariance();
         let [lead, variance] = bank.bank().lead_time(&covariance);
-        // |E[xy]| <= sqrt(E[x^2] E[y^2]), so that |T| <= sqrt(E[y^2]/E[x^2]).
+        // Because |E[xy]| <= sqrt(E[x^2] E[y^2]), |T| <= sqrt(E[y^2]/E[x^2]).
         let largest = ((0.06_f64.powi(2) + covariance[1][1]) / covariance[0][0]).sqrt();
         assert!(lead.abs() < largest && variance.is_finite(), "{lead} {largest}");
     }
@@ -400,7 +401,7 @@ fn a_neuromuscular_system_that_changes_is_followed_and_named() {
     let (found, covariance) = (bank.bank().mixture().eta, bank.bank().covariance());
     for i in 0..4 {
         let error = found[i] - slower[i];
-        // 3.5 standard errors: four numbers, one seed.
+        // The tolerance is 3.5 standard errors, for four numbers and one seed.
         assert!(
             error.abs() < 3.5 * covariance[i][i].sqrt(),
             "{i}: {error} {}",

@@ -1,5 +1,5 @@
-//! The bank of hypotheses with an unknown delay: one delay compared with a delay line, delays that were wrong or that
-//! change, signals that overflow.
+//! The bank of hypotheses with an unknown delay: one delay compared with a delay line, wrong or changing delays, and
+//! signals that overflow.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../../hoid-core/tests/common/mod.rs"]
@@ -72,8 +72,8 @@ fn operator(samples: usize, seed: u64, delay: impl Fn(usize) -> usize) -> Vec<(f
 
 #[test]
 fn a_delay_that_is_not_questioned_is_a_delay_line() {
-    // omega_nm and zeta_nm are known, so that the linearisation point stays constant: when it moves, signals that are
-    // still in the delay line differ in the second order.
+    // omega_nm and zeta_nm are known, so the linearisation point stays constant. When this point moves, signals that
+    // are still in the delay line differ to second order.
     let prior_of = |delay| ChangePrior {
         neuromuscular_every: 0,
         ..prior_of(delay)
@@ -92,7 +92,7 @@ fn a_delay_that_is_not_questioned_is_a_delay_line() {
     let data = operator(4000, 3, |k| if k < 2000 { 5 } else { 6 });
     for (k, &(x, u)) in data.iter().enumerate() {
         let delayed = k.checked_sub(5).map_or(0.0, |past| data[past].0);
-        // Rounding: the two are compiled separately.
+        // Rounding errors may differ, because the two filters are compiled separately.
         let (a, b) = (one.step(x, u).innovation, other.step(delayed, u).innovation);
         assert!((a - b).abs() < 1e-9, "{k}: {a} {b}");
     }
@@ -114,7 +114,8 @@ fn a_delay_that_changes_is_found_and_named() {
             assert!((total - 1.0).abs() < 1e-12);
             declared.extend(bank.bank().change().map(|c| (k, c)));
         }
-        // Two births of other delays after the change; a second one may identify the changed parameters better.
+        // The change is declared after two births of other delays; a second declaration may identify the changed
+        // parameters better.
         let (k, change) = declared[0];
         assert!((6000..6300).contains(&k), "{seed}: {k} {change:?}");
         let last = declared[declared.len() - 1].1;
@@ -147,7 +148,7 @@ fn a_first_delay_that_was_wrong_is_mended_without_an_alarm() {
 
 #[test]
 fn a_steady_operator_raises_no_alarm() {
-    // Ten minutes.
+    // The run lasts ten minutes.
     let data = operator(60_000, 34, |_| 8);
     let mut bank = bank(8, OPEN);
     for &(x, u) in &data {

@@ -1,4 +1,4 @@
-//! Rests, frozen channels and a constant error, of 10 s to 1000 s: without information no error bar shrinks.
+//! Rests, frozen channels and a constant error, which last 10 s to 1000 s: without information, no error bar decreases.
 #![allow(clippy::unwrap_used)]
 
 use hoid_model::{
@@ -9,7 +9,7 @@ use hoid_sim::{RunSeed, Simulator};
 use hoid_track::{GuardKind, Method, Sample, TrackOptions, Tracker, track};
 
 const DELAY: usize = 29;
-/// Tracking before the rest, s.
+/// Duration of tracking before the rest, s.
 const BEFORE_S: f64 = 41.0;
 
 fn record(condition: Condition) -> Record {
@@ -23,7 +23,7 @@ fn record(condition: Condition) -> Record {
         .unwrap()
 }
 
-/// Duration of the response to a step of e, and the second in which its end is found, s.
+/// Duration of the response to a step of e, including the second in which its end is detected, s.
 const ANSWER_S: f64 = 4.0;
 
 /// Kind of constant signals.
@@ -31,12 +31,12 @@ const ANSWER_S: f64 = 4.0;
 enum Stand {
     /// e and u are zero.
     Rest,
-    /// Both are nearly zero: noise of a sensor.
+    /// e and u are nearly zero, with the noise of a sensor.
     Noise,
     FrozenE,
     FrozenU,
     Frozen,
-    /// e is constant, and u is the response of the person, by their gain.
+    /// e is constant, and u is e multiplied by the gain of the person.
     ConstantE,
 }
 
@@ -71,18 +71,18 @@ fn bars(tracker: &Tracker) -> Vec<(String, f64)> {
 /// Largest age of the numbers that a guard restores, s.
 const KEPT_S: f64 = 10.0;
 
-/// Takes the smaller of each error bar.
+/// Keeps the smaller of both error bars for each parameter.
 fn smallest(of: &mut [(String, f64)], others: Vec<(String, f64)>) {
     for ((_, one), (_, other)) in of.iter_mut().zip(others) {
         *one = one.min(other);
     }
 }
 
-/// Returns a tracker after the constant span, and the error bars before it: for a guard that restores earlier numbers,
-/// the smallest of those that it may have kept.
+/// Returns a tracker after the constant span, and the error bars before this span. A guard may restore earlier numbers,
+/// so these are the smallest error bars that it may have kept.
 fn through(options: &TrackOptions, record: &Record, stand: Stand, length_s: f64) -> (Tracker, Vec<(String, f64)>) {
     let goes_back = match options.method.name() {
-        // It learns from the first sample on, and its error bars vary with time.
+        // This method learns from the first sample on, and its error bars vary with time.
         "adaptive" => true,
         "multiple-model" | "physical" => stand == Stand::FrozenU,
         _ => false,
@@ -106,7 +106,7 @@ fn through(options: &TrackOptions, record: &Record, stand: Stand, length_s: f64)
     let (mut begin, before) = (kept.unwrap_or_else(|| bars(&tracker)), at(first - 1));
     let mut told = Vec::new();
     for k in 0..(length_s / ts) as usize {
-        // After a step of e the response carries information, as long as it moves.
+        // After a step of e, the response contains information as long as it is not constant.
         if stand == Stand::ConstantE && k as f64 * ts <= ANSWER_S {
             begin = bars(&tracker);
         }
@@ -206,7 +206,7 @@ fn a_long_rest_is_as_a_short_one_and_tracking_goes_on_behind_it() {
             "{}",
             options.method.name()
         );
-        // A few seconds of information do not reduce the error bars to a hundredth.
+        // The error bars must not decrease to a hundredth after a few seconds of information.
         for ((name, before), (_, after)) in begin.iter().zip(bars(&tracker)) {
             assert!(
                 after >= 0.05 * before,
@@ -217,7 +217,7 @@ fn a_long_rest_is_as_a_short_one_and_tracking_goes_on_behind_it() {
     }
 }
 
-/// A record with a rest: the trace reports the time without information, and a trace without a rest reports none.
+/// In a record with a rest, the trace reports the time without information; without a rest, it reports none.
 #[test]
 fn the_time_without_excitation_is_a_finding() {
     let whole = record(Condition::C1);

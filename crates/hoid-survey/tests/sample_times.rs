@@ -1,5 +1,5 @@
-//! Trackers at every sample time, from a microsecond to days: each takes its samples, or refuses with the sample time
-//! and the remedy.
+//! Trackers at sample times from a microsecond to days: each either accepts its samples, or is refused with a message
+//! that contains the sample time and the remedy.
 #![allow(clippy::unwrap_used)]
 
 use hoid_ident::{IdentError, NamedOrders, order_selection::Criterion};
@@ -12,7 +12,7 @@ fn sample_times() -> impl Iterator<Item = f64> {
     (-24..=24).map(|quarter| 10_f64.powf(f64::from(quarter) / 4.0))
 }
 
-/// Two sums of sines with a lag, which is sufficient as input.
+/// Returns two sums of sines with a lag between them, which suffice as input.
 fn signals(k: usize) -> (f64, f64) {
     let x = k as f64;
     (
@@ -79,7 +79,7 @@ fn a_start_from_a_span_and_a_plan_say_so_too() {
     }
 }
 
-/// The memory of a tracker would hold billions of samples.
+/// Below a microsecond, the memory of a tracker would contain billions of samples.
 #[test]
 fn every_method_refuses_sample_times_below_a_microsecond() {
     for method in hoid_survey::methods() {

@@ -1,4 +1,4 @@
-//! Trackers as numbers: every method continues with the same digits, and no saved numbers end the process.
+//! Saved trackers: every method continues with bit-identical numbers, and no saved numbers cause a panic.
 #![allow(clippy::unwrap_used)]
 
 use hoid_model::{
@@ -23,7 +23,7 @@ fn record() -> Record {
         .unwrap()
 }
 
-/// Bit for bit the same after a stop in the middle, for every method and rule of forgetting.
+/// After a stop in the middle of a run, every method and rule of forgetting gives bit-identical results.
 #[test]
 fn a_restored_tracker_goes_on_with_the_same_digits() {
     let record = record();
@@ -93,8 +93,8 @@ fn a_restored_tracker_goes_on_with_the_same_digits() {
     }
 }
 
-/// Numbers that were changed and sealed again, which does not happen by accident: the tracker is refused or continues,
-/// and no index, length or bound in them ends the process.
+/// Numbers are changed and given a valid checksum, which does not happen by accident: the tracker is refused or
+/// continues, and no index, length or bound causes a panic.
 #[test]
 fn numbers_that_were_changed_and_sealed_again_end_nothing() {
     let record = record();

@@ -1,4 +1,4 @@
-//! A start whose operator is that of the grey box keeps the noise model that was requested.
+//! A start with the operator of the grey box keeps the requested noise model.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeMap;
@@ -41,8 +41,7 @@ fn a_start_outside_the_bounds_keeps_the_order_of_its_noise_model() {
         .collect();
     assert_eq!(d.len(), 6);
     assert!(d.iter().skip(1).any(|d| d.abs() > 0.02), "{d:?}");
-    // The innovations of its first samples are as white as those of the fit: their variance is
-    // that of the start.
+    // The innovations of the first samples have the variance of the start fit.
     let fit = tracker.start().unwrap();
     assert!(tracker.innovation_variance() <= fit.innovation_variance() * 1.001);
 }

@@ -1,5 +1,5 @@
-//! Restoring trackers and warm-ups from numbers that were changed, cut or never saved: they are refused, without a
-//! panic.
+//! Trackers and warm-ups are not restored from numbers that were changed, truncated or never saved: these are refused
+//! without a panic.
 #![allow(clippy::unwrap_used)]
 
 use std::sync::OnceLock;
@@ -12,7 +12,7 @@ use hoid_sim::{RunSeed, Simulator};
 use hoid_track::{Method, Sample, Stage, TrackOptions, Tracker, WarmUp, opened, sealed};
 use proptest::{collection::vec, prelude::*, sample::Index, test_runner::RngSeed};
 
-/// Options with the numbers of a tracker that has run, method by method; and those of a warm-up.
+/// Options and numbers of a tracker after a run, for each method, and the numbers of a warm-up.
 struct Saved {
     sample_time: SampleTime,
     trackers: Vec<(TrackOptions, Vec<f64>)>,
@@ -72,7 +72,7 @@ fn saved() -> &'static Saved {
     })
 }
 
-/// Modification of the numbers.
+/// A modification of the numbers.
 #[derive(Debug, Clone)]
 enum Tampering {
     Set(Index, f64),
@@ -131,7 +131,7 @@ fn same(a: &[f64], b: &[f64]) -> bool {
             .all(|(a, b)| a.to_bits() == b.to_bits() || both_nan(a, b))
 }
 
-/// Changes each number in turn and seals the numbers again: no index, length or difference of counters ends the process.
+/// Changes each number in turn and writes a valid checksum: no index, length or difference of counters causes a panic.
 #[test]
 fn each_number_may_be_anything() {
     let (saved, record) = (saved(), record());
@@ -177,7 +177,7 @@ proptest! {
         if options != others && numbers.len() != of_others.len() {
             prop_assert!(Tracker::restored(options, saved.sample_time, of_others).is_err());
         }
-        // With the same length they are numbers of that tracker: no panic, whatever they mean.
+        // Numbers of the right length are accepted as numbers of that tracker, and no values cause a panic.
         let orders = options.structure.operator_orders(nk);
         let other = TrackOptions { orders, ..options.clone() };
         let _ = Tracker::restored(&other, saved.sample_time, numbers);

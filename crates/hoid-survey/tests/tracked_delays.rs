@@ -13,7 +13,7 @@ use hoid_track::{Method, StartAt, TrackOptions, track};
 const NK: usize = 29;
 const CHANGE_S: f64 = 40.96;
 
-/// C1 with a delay of .28 s until 40.96 s, and another one from then on.
+/// C1 with a delay of .28 s until 40.96 s, and with another delay from then on.
 fn run(after_s: f64, noise_level: f64) -> Record {
     let mut scenario = Scenario::condition(Condition::C1);
     scenario.last.operator.tau_e_s = after_s;
@@ -54,7 +54,7 @@ fn a_range_of_one_delay_is_the_recursion_with_that_delay() {
     }
     let operator = tracked.operator(tracked.len() - 1).unwrap();
     assert!((operator.tau_e_s.value - 0.28).abs() < 1e-12);
-    // Between two samples it may lie anywhere.
+    // The delay may have any value between two samples.
     assert!((operator.tau_e_s.standard_error.unwrap() - 0.01 / 12f64.sqrt()).abs() < 1e-12);
     assert!(tracked.operator_columns().contains(&"tau_e"));
     assert!(!given.operator_columns().contains(&"tau_e"));
@@ -78,7 +78,7 @@ fn a_delay_that_changes_is_followed_and_one_that_stays_is_kept() {
         let last = trace.len() - 1;
         let k_e = trace.operator(last).unwrap().k_e.value;
         assert!((k_e / 0.09 - 1.0).abs() < 0.35, "{after_s}: K_e {k_e}");
-        // The response is that of the polynomials with the delay of the row.
+        // The response is computed from the polynomials with the delay of the row.
         let truth = record.channel("tau_e").unwrap()[record.len() - 1];
         let other = track(&record, &options(None), 8).unwrap();
         let phase = |of: &hoid_track::Trace| of.response(last, 0).unwrap().phase_deg().value;
@@ -93,7 +93,7 @@ fn a_delay_that_changes_is_followed_and_one_that_stays_is_kept() {
     }
 }
 
-/// `physical` moves B along the input as tau_e grows; its response moves too.
+/// `physical` shifts B along the input as tau_e increases; its response changes accordingly.
 #[test]
 fn the_response_of_physical_has_the_delay_of_its_row() {
     let record = run(0.34, 0.1);
@@ -102,7 +102,7 @@ fn the_response_of_physical_has_the_delay_of_its_row() {
         at_rad_s: vec![2.5],
         ..TrackOptions::default_for(hoid_survey::physical(), NK)
     };
-    // A memory with which the delay can move.
+    // The memory is short enough for the delay to change.
     let options = physical
         .with(&[("track_delay", "0.2..0.4"), ("memory_of", "tau_e=5s")])
         .unwrap();
@@ -112,7 +112,7 @@ fn the_response_of_physical_has_the_delay_of_its_row() {
         trace.operator(last).unwrap().tau_e_s.value,
         trace.response(last, 0).unwrap().phase_deg().value,
     );
-    // The value for the operator of the row, not for the delay of the start fit.
+    // The value belongs to the operator of the row, and not to the delay of the start fit.
     let found = trace.operator(last).unwrap();
     let square = found.omega_nm_rad_s.value.powi(2);
     let lead = (2.5 * found.t_l_s.value).atan();
@@ -122,7 +122,7 @@ fn the_response_of_physical_has_the_delay_of_its_row() {
     assert!((tau - 0.28).abs() > 0.02, "the delay has moved: {tau}");
 }
 
-/// Phase of the true operator of the last sample at 2.5 rad/s, after its hold.
+/// Returns the phase of the true operator of the last sample at 2.5 rad/s, including its hold.
 fn true_phase_deg(record: &Record) -> f64 {
     let of = |name: &str| record.channel(name).unwrap()[record.len() - 1];
     let (omega, square) = (2.5_f64, of("omega_nm").powi(2));

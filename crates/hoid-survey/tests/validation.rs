@@ -1,4 +1,4 @@
-//! The start covariance that a second run chooses, and the share of that run that a trace explains.
+//! The initial covariance determined by a second run, and the share of that run that a trace explains.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -33,7 +33,7 @@ fn options(method: Method) -> TrackOptions {
     }
 }
 
-/// A constant model, compared with the difference equation.
+/// Compares a constant model with the difference equation.
 #[test]
 fn the_vaf_of_a_trace_that_stays_is_that_of_its_model() {
     let (record, other) = (run(0.1, 1), run(0.1, 2));
@@ -60,7 +60,7 @@ fn the_vaf_of_a_trace_that_stays_is_that_of_its_model() {
     }
 }
 
-/// Without remnant the best P explains nearly all of the second run, and a P that is too large or too small does not.
+/// Without remnant the best P explains nearly all of the second run, but a P that is too large or too small does not.
 #[test]
 fn the_best_of_the_grid_is_taken() {
     let (record, other) = (run(0.1, 3), run(0.1, 4));
@@ -70,11 +70,11 @@ fn the_best_of_the_grid_is_taken() {
         assert_eq!(chosen.method.covariance(), Some(choice.covariance));
         let most = choice.candidates.iter().map(|(_, vaf)| *vaf).fold(0.0, f64::max);
         assert_eq!(choice.vaf(), most, "{method}");
-        // Its output is that of the trace.
+        // The output of the model equals that of the trace.
         let trace = track(&record, &chosen, 1).unwrap();
         assert_eq!(trace.vaf_of(&other).unwrap(), (most, choice.span_s));
         assert!(most > 80.0, "{method}: {choice:?}");
-        // Everything but the covariance is as it was.
+        // Everything except the covariance is unchanged.
         let mut without = chosen.clone();
         without.method.set("covariance", "0.1").unwrap();
         let mut given = options(method.clone());
@@ -118,7 +118,7 @@ fn what_cannot_choose_is_refused_with_what_to_do() {
     assert!(says(&other, &gradient).contains("has P"));
     let tracked = options(Method::rpem()).with(&[("track_delay", "0.2..0.4")]).unwrap();
     assert!(says(&other, &tracked).contains("without track_delay"));
-    // Another sample time, too short, the sign of u inverted, zeros only.
+    // Second runs with another sample time, too few samples, the sign of u inverted, or only zeros.
     let (e, u) = (other.input().to_vec(), other.output().to_vec());
     let of = |ts: f64, e: &[f64], u: Vec<f64>| {
         let (e, u) = (Channel::new("e", "", e.to_vec()), Channel::new("u", "", u));
@@ -137,8 +137,8 @@ fn what_cannot_choose_is_refused_with_what_to_do() {
     assert!(says(&alone, &options(Method::rls())).contains("no input"));
 }
 
-/// With a power of zero nothing is changed, to the last bit; with the default one P is reduced and the oscillations of
-/// the estimate for a person who changes are smaller, as the thesis expects.
+/// With a power of zero the results are bit-identical; with the default power P is reduced, and the estimate for a
+/// person who changes oscillates less, as the thesis expects.
 #[test]
 fn the_covariance_shrinks_where_less_is_explained() {
     let (mut default, mut updated, mut differs) = (0.0, 0.0, false);
@@ -182,7 +182,7 @@ fn the_covariance_shrinks_where_less_is_explained() {
     assert!(says(&record, options(hoid_survey::window())).contains("rls or rpem"));
     let tracked = options(Method::rpem()).with(&[("track_delay", "0.2..0.4")]).unwrap();
     assert!(says(&record, tracked).contains("without track_delay"));
-    // A second run without any signal carries no information.
+    // A second run without any signal contains no information.
     let n = record.len();
     let silent = Record::new(
         record.sample_time(),

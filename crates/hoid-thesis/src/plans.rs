@@ -33,7 +33,7 @@ pub const SURVEY: &NamedPlan = &NamedPlan {
     text: include_str!("../plans/survey.toml"),
 };
 
-/// All listed plans: those of the thesis and the built-in ones.
+/// All listed plans: the plans of the thesis and the built-in plans.
 pub fn named_plans() -> impl Iterator<Item = &'static NamedPlan> {
     TEXT_PLANS.iter().chain(PLANS)
 }

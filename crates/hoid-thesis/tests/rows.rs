@@ -1,12 +1,12 @@
-//! Checks the page of the book that lists the rows of the thesis: each listed item is made, each
-//! item made is listed, and the numbers are those of its rows.
+//! Checks the page of the book that lists the rows of the thesis: each listed item is made, each item made is listed,
+//! and the stated totals agree with the rows.
 #![allow(clippy::unwrap_used)]
 
 use std::{collections::BTreeSet, path::Path};
 
 use hoid_thesis::{CLAIMS, reproduction::items};
 
-/// The cells of the rows of the tables under a heading.
+/// Returns the cells of the rows of the tables under a heading.
 fn rows<'a>(page: &'a str, heading: &str) -> Vec<Vec<&'a str>> {
     let section = page.split(&format!("\n## {heading}\n")).nth(1).unwrap();
     let section = section.split("\n## ").next().unwrap();
@@ -16,14 +16,14 @@ fn rows<'a>(page: &'a str, heading: &str) -> Vec<Vec<&'a str>> {
         .collect()
 }
 
-/// Expands `C.1` to `C.16` and the like; any other text unchanged.
+/// Expands ranges such as `C.1` to `C.16`; any other text is returned unchanged.
 fn each(first: &str, last: &str) -> Vec<String> {
     let (letter, from) = first.rsplit_once('.').unwrap_or(("", first));
     let to: u32 = last.rsplit_once('.').map_or(last, |(_, n)| n).parse().unwrap();
     (from.parse().unwrap()..=to).map(|n| format!("{letter}.{n}")).collect()
 }
 
-/// Rows of the text in a cell such as `Figs. 1, 2.1` or `Figs. C.1 to C.16`.
+/// Returns the number of rows of the thesis in a cell such as `Figs. 1, 2.1` or `Figs. C.1 to C.16`.
 fn count(cell: &str) -> usize {
     let (_, numbers) = cell.split_once(' ').unwrap();
     let of = |part: &str| {
@@ -33,7 +33,7 @@ fn count(cell: &str) -> usize {
     numbers.split(", ").map(of).sum()
 }
 
-/// Texts between backticks, with ranges expanded.
+/// Returns the texts between backticks, with ranges expanded.
 fn quoted(cell: &str) -> Vec<String> {
     let parts: Vec<&str> = cell.split('`').collect();
     let mut names = Vec::new();
@@ -74,7 +74,7 @@ fn the_page_of_rows_is_true() {
         } else if made.contains(&name) || plans.contains(name.as_str()) {
             named.insert(name);
         } else {
-            // Options and methods are those of the program.
+            // The listed options and methods exist in the program.
             let options = include_str!("../../../docs/src/reference/command-line.md");
             assert!(name == CLAIMS || options.contains(&name), "{name} is nothing");
         }

@@ -1,6 +1,6 @@
 //! Time of one simulated run and of one batch fit: condition C1, 8192 samples, nk = 29.
 //!
-//! `cargo bench -p hoid`. Machines are shared and noisy: compare ratios within one run only.
+//! `cargo bench -p hoid`. Timings vary with the load of the machine, so compare only ratios within one run.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use criterion::{Criterion, criterion_group, criterion_main};

@@ -1,10 +1,11 @@
-//! Effect of a fault of a recording on a result, and whether the result reports it. The numbers of the page
-//! `research/notes/faults.md`.
+//! Effect of a fault in a recording on a result, and whether the result reports the fault. The program prints the
+//! numbers of the page `research/notes/faults.md`.
 //!
-//! `cargo xtask slow faults [--part N] [--clean N] [--only METHOD] [--rows FILE] [--program FILE] [--seed N]`: all
-//! faults in runs of C1, of C2 and of a virtual person, then clean runs (1000 in all by default, evaluated in batch and
-//! by one tracker each). `--part` takes every N-th case and clean run, `--rows` writes a row of CSV for each result,
-//! `--program` is the program that is judged (by default the one that is built next to this example).
+//! `cargo xtask slow faults [--part N] [--clean N] [--only METHOD] [--rows FILE] [--program FILE] [--seed N]`:
+//! evaluates all faults in runs of C1, of C2 and of a virtual person, and then clean runs (by default 1000 in total,
+//! each evaluated in batch and by one tracker). `--part` uses only every N-th case and clean run, `--rows` writes a CSV
+//! row for each result, and `--program` is the program that is judged (by default the program built in the same folder
+//! as this example).
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 #[allow(dead_code)]
@@ -21,9 +22,9 @@ use fault_corpus::{
 };
 use rayon::prelude::*;
 
-/// The seed of the page; the tests have others.
+/// Seed of the page; the tests have other seeds.
 const SEED: u64 = 2121;
-/// First number of the clean runs, so that none is also the run of a fault.
+/// First number of the clean runs; no case with a fault has such a number.
 const FIRST_CLEAN: u64 = 100_000;
 
 fn main() {
@@ -55,7 +56,7 @@ fn main() {
         .into_par_iter()
         .flat_map_iter(|(case, fault, who)| outcomes(&program, seed, case, fault, who, &ways).unwrap())
         .collect();
-    // Half of them people, a quarter each of C1 and C2.
+    // Half of the clean runs are of people, a quarter of C1 and a quarter of C2.
     let sound: Vec<Outcome> = (0..number)
         .step_by(part)
         .collect::<Vec<_>>()
@@ -63,7 +64,7 @@ fn main() {
         .flat_map_iter(|i| {
             let i = i / part as u64;
             let who = [Who::C1, Who::Person, Who::C2, Who::Person][i as usize % 4];
-            // The number of the case determines the kind of person, in turn.
+            // The kinds of people are used in turn, according to the number of the case.
             let case = FIRST_CLEAN + i / 2;
             let tracker = [Way::MultipleModel, Way::Physical, Way::Rpem, Way::Rls][i as usize / 4 % 4];
             let batch = [Way::GreyBox, Way::BoxJenkins][i as usize / 4 % 2];

@@ -1,7 +1,7 @@
 //! Identifies a person from a file and writes a report:
 //! `cargo run --example identify_file -- run1.csv report`.
 //!
-//! The file has the columns t (s), e and u. Without arguments a simulated run represents it.
+//! The file has the columns t (s), e and u. Without arguments, a simulated run is used instead.
 #![allow(clippy::print_stdout)]
 
 use std::{error::Error, path::PathBuf};
@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let records = [record];
     let person = identify(&records)?;
     println!("{person}\n");
-    // The same with polynomials, and the tests of its residuals.
+    // Fits a polynomial model to the same records and tests its residuals.
     let choice = identify_box_jenkins(&records)?;
     println!("{}\n", choice.fit);
     match choice.fit.operator() {

@@ -1,9 +1,9 @@
-//! Checks the error bars of operators of people. The numbers of `research/notes/people-coverage.md`.
+//! Checks the error bars of operators of people. The program prints the numbers of `research/notes/people-coverage.md`.
 //!
-//! `cargo xtask slow people-coverage [PEOPLE] [FIRST] [--given] [--lines] [--no-lines] [--rows FILE]`:
-//! 2000 people by default, from the first number on. `--given` leaves out the fits that choose the
-//! form, which take some ten times as long, `--lines` and `--no-lines` those without and with the
-//! recorded disturbance; `--rows` writes each quantity of each fit as a row of a CSV file.
+//! `cargo xtask slow people-coverage [PEOPLE] [FIRST] [--given] [--lines] [--no-lines] [--rows FILE]`: evaluates 2000
+//! people by default, from the number FIRST on. `--given` omits the fits that select the form, which take about ten
+//! times as long; `--lines` omits the fits without the recorded disturbance, `--no-lines` the fits with it. `--rows`
+//! writes each quantity of each fit as a row of a CSV file.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 #[path = "../tests/common/people_coverage/mod.rs"]
@@ -158,7 +158,7 @@ fn report(variant: Variant, of: &[&Outcome]) {
     findings(of);
 }
 
-/// Number of occurrences of each finding, doubts and notes alike.
+/// Prints the number of occurrences of each finding, including notes.
 fn findings(of: &[&Outcome]) {
     let made: Vec<&Vec<String>> = of.iter().filter_map(|o| Some(&o.found.as_ref().ok()?.kinds)).collect();
     let kinds: BTreeSet<&String> = made.iter().copied().flatten().collect();
@@ -170,7 +170,7 @@ fn findings(of: &[&Outcome]) {
     }
 }
 
-/// Coverage over all determined quantities, each counted once.
+/// Returns the coverage over all determined quantities, each counted once.
 fn over_all(of: &[&Outcome]) -> Share {
     let each = QUANTITIES
         .iter()
@@ -203,7 +203,7 @@ fn by(what: &str, of: &[&Outcome], values: &[String], key: impl Fn(&Outcome) -> 
     }
 }
 
-/// One row for each quantity of each fit.
+/// Returns one row for each quantity of each fit.
 fn as_rows(all: &[Outcome]) -> String {
     let mut text = "person,plant,kind,rate,runs,spread,lines,given,true_form,form,level,kinds,response_error,inflation,nd,seconds,name,truth,value,se,low,high,prior_share,determined,error\n".to_owned();
     for o in all {

@@ -1,5 +1,6 @@
-//! Samples `e,u` on standard input; after each sample the six parameters of the operator, crossover and phase margin,
-//! each with its standard error, and the time of the sample in ns: a place of `cargo xtask places`.
+//! Reads samples `e,u` from standard input. After each sample it prints the six parameters of the operator, crossover
+//! and phase margin, each with its standard error, and the processing time of the sample in ns. This is one of the
+//! places of `cargo xtask places`.
 #![allow(clippy::print_stdout)]
 
 use std::{
@@ -12,7 +13,7 @@ use hoid::prelude::*;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let sample_time = SampleTime::new(0.01)?;
-    // Started with the default delay, 0.2 s.
+    // The tracker starts with the default delay of 0.2 s.
     let options = TrackOptions {
         controlled_element: Some("90/(s(s+6))".parse()?),
         ..TrackOptions::default_for(Method::adaptive(), 21)

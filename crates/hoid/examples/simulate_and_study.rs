@@ -1,4 +1,4 @@
-//! A small Monte Carlo study: ARX against Box-Jenkins on simulated runs.
+//! A small Monte Carlo study: ARX compared with Box-Jenkins on simulated runs.
 //! `cargo run --example simulate_and_study`.
 #![allow(clippy::print_stdout)]
 

@@ -1,5 +1,4 @@
-//! Tracks a person while they act: one sample in, one estimate out.
-//! `cargo run --example track_live`.
+//! Tracks a person in real time: each sample gives one estimate. `cargo run --example track_live`.
 //!
 //! The samples come from a simulated run whose task changes at 40.96 s. The default tracker has no prior information
 //! about the person and starts with the first sample.

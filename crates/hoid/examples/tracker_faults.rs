@@ -1,9 +1,10 @@
-//! Effects of faults in a stream on the trackers: the numbers of `research/notes/guards-evidence.md`.
+//! Effects of faults in a stream on the trackers. The program prints the numbers of
+//! `research/notes/guards-evidence.md`.
 //!
-//! `cargo xtask slow tracker-faults [SEEDS] [FIRST] [--bare] [METHOD...]`: 4 seeds by default, from
-//! the first on; `--bare` without the guard, for comparison. `--cost` takes the samples of one run
-//! SEEDS times and prints nothing: count its instructions with `valgrind --tool=callgrind` or `perf stat`
-//! for two numbers of times, with and without the guard.
+//! `cargo xtask slow tracker-faults [SEEDS] [FIRST] [--bare] [METHOD...]`: evaluates 4 seeds by default, from FIRST on;
+//! with `--bare` the trackers have no guard, for comparison. `--cost` processes the samples of one run SEEDS times and
+//! prints nothing: count its instructions with `valgrind --tool=callgrind` or `perf stat` for two values of SEEDS, with
+//! and without the guard.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../tests/common/tracker_faults/mod.rs"]
@@ -56,7 +57,8 @@ fn main() {
                 let condition = [Condition::C1, Condition::C4][(seed % 2) as usize];
                 let remnant_order = 1 + (seed / 2 % 3) as usize;
                 let run = Run::new(condition, remnant_order, seed, LENGTH_S);
-                // The default noise model of the method, or that of the remnant.
+                // The order of the noise model is the default of the method, or the order of the remnant if this is
+                // higher.
                 let orders = method.default_orders(29);
                 let nd = if orders.nd > 0 { orders.nd.max(remnant_order) } else { 0 };
                 let options = TrackOptions::new(method.clone(), method.default_structure(), Orders { nd, ..orders });

@@ -196,7 +196,7 @@ fn crates_depend_only_downwards() {
             .unwrap_or_else(|| panic!("{name} needs a line here and in ARCHITECTURE.md"));
         for dependency in package["dependencies"].as_array().unwrap() {
             let to = dependency["name"].as_str().unwrap();
-            // Tests may depend on everything.
+            // Tests may depend on all crates.
             let for_tests = dependency["kind"] == "dev";
             if to.starts_with("hoid") && !for_tests {
                 assert!(may.contains(&to), "{name} must not depend on {to}");

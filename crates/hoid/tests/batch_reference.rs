@@ -107,8 +107,8 @@ fn fit_all(structure: Structure, records: &[Record], condition: Condition) -> Ce
     cell
 }
 
-/// m0, P_n, ARX: a1, b0, omega_nm, zeta (None: not convertible in most runs), Box-Jenkins: bounds
-/// of b0, omega_nm, zeta.
+/// m0, P_n; for ARX a1, b0, and omega_nm and zeta (`None` if most runs cannot be converted); for Box-Jenkins the bounds
+/// of b0, omega_nm and zeta.
 type Row = (usize, f64, (f64, f64, Option<(f64, f64)>), [f64; 3]);
 
 const EXPECTED: [Row; 8] = [
@@ -149,7 +149,7 @@ fn medians_agree_with_the_expected_values() {
         );
         let mut check = |name: &str, values: &[f64], expected: f64, printed: f64| {
             let (found, error) = median(values);
-            // Both medians come from 100 runs, and the expected one is rounded as printed.
+            // Both medians are from 100 runs, and the expected median is rounded as printed.
             let allowed = 4.0 * 2f64.sqrt() * error + printed;
             if (found - expected).abs() > allowed {
                 failures.push(format!(
@@ -224,7 +224,7 @@ fn a_start_from_rest_biases_the_gains_and_estimated_states_do_not() {
         median(&errors(InitialState::Estimate)),
     );
     println!("median error of b0 in %: {zero:.2?} from rest, {estimated:.2?} with estimated states");
-    // The record starts in the middle of the motion. An independent study found -4.5 %.
+    // The record starts while the system is in motion. An independent study found -4.5 %.
     assert!(
         zero.0 < -2.0 && estimated.0.abs() < 3.0 * estimated.1,
         "{zero:?} {estimated:?}"
@@ -290,6 +290,6 @@ fn own_starts_reach_the_minimum_that_the_truth_leads_to() {
         }
     }
     println!("{worse} of {fits} fits from own starts end above the minimum reached from the truth");
-    // At most 0.5 %.
+    // At most 0.5 % of the fits may be worse.
     assert!(worse * 200 <= fits, "{worse} of {fits}");
 }

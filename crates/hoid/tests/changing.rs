@@ -1,4 +1,4 @@
-//! A person who changes: the two-sided estimate compared with the causal one, and with the methods for comparison.
+//! A person who changes: the two-sided estimate compared with the causal estimate and with other methods.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -33,7 +33,8 @@ fn options(method: Method) -> TrackOptions {
     }
 }
 
-/// RMS relative error of K_e, T_L ... after the start fit, and the share of samples within 1.96 standard errors.
+/// Returns the RMS relative errors of K_e, T_L and so on after the start fit, and the share of samples within 1.96
+/// standard errors.
 fn errors(record: &Record, options: &TrackOptions) -> [[f64; 5]; 2] {
     let trace = track(record, options, 8).unwrap();
     let (mut squares, mut covered, mut count) = ([0.0; 5], [0.0; 5], 0.0);
@@ -55,7 +56,7 @@ fn errors(record: &Record, options: &TrackOptions) -> [[f64; 5]; 2] {
     [squares.map(|s: f64| (s / count).sqrt()), covered.map(|c| c / count)]
 }
 
-/// Root of the mean square over the runs.
+/// Returns the root mean square over the runs.
 fn mean(all: &[[[f64; 5]; 2]], what: usize, i: usize) -> f64 {
     let values = all.iter().map(|of| of[what][i]);
     values.sum::<f64>() / all.len() as f64
@@ -78,9 +79,10 @@ fn the_two_sided_estimate_is_closer_and_its_bands_hold() {
         let [before, after] = [&causal, &smooth].map(|all| mean(all, 0, i));
         let covered = mean(&smooth, 1, i);
         println!("{name}: {before:.4} {after:.4}, covered {covered:.3}");
-        // The page has .7 for K_e, T_L and K_e_dot; from twelve runs the ratio is known to a tenth.
+        // The page gives a ratio of .7 for K_e, T_L and K_e_dot; with twelve runs its standard error is a tenth.
         assert!(after < if i < 3 { 0.85 } else { 1.1 } * before, "{name}");
-        // 90 to 99 % is required of many runs; twelve have some three independent errors each.
+        // With many runs, a coverage of 90 to 99 % is required; each of these twelve runs has only about three
+        // independent errors.
         assert!(covered > 0.8, "{name}: {covered}");
     }
 }
@@ -93,7 +95,7 @@ fn the_methods_of_the_literature_follow_a_change() {
             .collect();
         let found: [f64; 5] = std::array::from_fn(|i| mean(&all, 0, i));
         println!("{}: {found:.3?}", method.name());
-        // A constant at the start values has errors of .2, .5 and .4 in the gains.
+        // A constant estimate at the start values would have errors of .2, .5 and .4 in the gains.
         assert!(
             found[0] < 0.2 && found[1] < 0.35 && found[2] < 0.3,
             "{method:?}: {found:?}"

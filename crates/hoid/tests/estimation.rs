@@ -1,5 +1,5 @@
-//! Properties of the estimators that need simulated records: coverage of the error bars, several
-//! records, other orders, and the refused input.
+//! Properties of the estimators that require simulated records: coverage of the error bars, several records, other
+//! orders, and refused input.
 #![allow(clippy::unwrap_used)]
 
 use hoid::{
@@ -68,7 +68,7 @@ fn error_bars_cover_the_truth() {
     }
     let shares: Vec<f64> = inside.iter().map(|c| *c as f64 / n as f64).collect();
     println!("coverage of nominal 95 % intervals: {shares:.3?}");
-    // 300 runs leave a standard error of 1.3 %; four of that.
+    // With 300 runs the standard error is 1.3 %; the tolerance is four standard errors.
     assert!(shares.iter().all(|s| (0.90..=0.999).contains(s)), "{shares:?}");
 }
 
@@ -81,7 +81,7 @@ fn several_records_share_theta_and_sharpen_it() {
     assert_eq!(four.residual_count(), 4 * one.residual_count());
     for ((name, a), (_, b)) in one.parameters().into_iter().zip(four.parameters()) {
         let ratio = a.standard_error.unwrap() / b.standard_error.unwrap();
-        // Four times the data halve the error; the estimates of the error scatter by some per cent.
+        // Four times the data halve the standard error; the estimates of the standard error scatter by a few per cent.
         assert!((1.7..2.3).contains(&ratio), "{name}: {ratio}");
     }
     // The order of the records does not matter, and the same record twice gives the same minimum.
@@ -101,7 +101,7 @@ fn records_of_other_lengths_and_spans_fit_together() {
     assert_eq!(fit.residual_count(), parts.iter().map(|p| p.len() - 31).sum::<usize>());
 }
 
-/// `u = (B/F) q^-2 e + (C/D) eps` in open loop, any orders.
+/// Simulates `u = (B/F) q^-2 e + (C/D) eps` in open loop with any orders.
 fn open_loop(b: &[f64], c: &[f64], d: &[f64], f: &[f64], n: usize) -> Record {
     let noise = |cell| {
         RunSeed {
@@ -175,8 +175,7 @@ fn other_orders_find_the_truth_from_own_starts() {
             let truth: Vec<f64> = [b, c, d, f].concat();
             for ((name, e), truth) in fit.parameters().into_iter().zip(truth) {
                 let distance = (e.value - truth) / e.standard_error.unwrap();
-                // Some 50 numbers are checked: 4.5 standard errors have probability 3e-4 among
-                // them.
+                // About 50 numbers are checked; the probability that any of them exceeds 4.5 standard errors is 3e-4.
                 assert!(distance.abs() < 4.5, "{orders} {initial_state:?} {name}: {distance}");
             }
             assert!(
@@ -212,7 +211,7 @@ fn undetermined_models_are_refused_by_name() {
 #[test]
 fn one_sample_too_few_is_told() {
     let record = runs(Condition::C1, 1).remove(0);
-    // 31 samples before the first residual, 5 parameters and 2 states.
+    // There are 31 samples before the first residual, 5 parameters and 2 states.
     let enough = record.span(0.0, 0.39).unwrap();
     let short = record.span(0.0, 0.38).unwrap();
     assert_eq!((enough.len(), short.len()), (39, 38));
@@ -220,8 +219,7 @@ fn one_sample_too_few_is_told() {
         bj().fit(&[short]),
         Err(IdentError::TooFewSamples { samples: 38, .. })
     ));
-    // One residual more than unknowns: whatever the search finds is a fit or a reasoned refusal,
-    // never a panic.
+    // With one residual more than unknowns, the result is a fit or a refusal with a reason, never a panic.
     match bj().fit(&[enough]) {
         Ok(fit) => assert!(fit.loss().is_finite()),
         Err(error) => assert!(matches!(

@@ -1,4 +1,4 @@
-//! The examples of the facade run, and stay short enough to be read in a minute.
+//! The examples of this crate run, and are short enough to be read in a minute.
 #![allow(clippy::unwrap_used)]
 
 use std::process::Command;

@@ -1,5 +1,5 @@
-//! The grey box on simulated runs: bias, spread against the Cramér-Rao bound, coverage, choice of
-//! m, delays between samples, constraints, several records, and the refused input.
+//! The grey box on simulated runs: bias, spread compared with the Cramér-Rao bound, coverage, choice of m, fractional
+//! delays, constraints, several records, and refused input.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid::{
@@ -37,7 +37,7 @@ fn grey_box(m: usize) -> GreyBox {
     GreyBox::new(m..=m)
 }
 
-/// Estimates with their true values, in the order of [`NAMES`].
+/// Returns the estimates with their true values, in the order of [`NAMES`].
 fn pairs(fit: &GreyBoxFit, record: &Record, condition: Condition) -> [(Estimate, f64); 8] {
     let truth = Scenario::condition(condition).initial.operator;
     let (o, r) = (fit.operator(0).unwrap(), fit.remnant(0).unwrap());
@@ -60,8 +60,8 @@ fn median(values: &[f64]) -> f64 {
     (sorted[(n - 1) / 2] + sorted[n / 2]) / 2.0
 }
 
-/// Fits of known m in both conditions: medians within 5 %, spread as the information shows,
-/// intervals that cover.
+/// Fits with known m in both conditions: the medians are within 5 %, the spread agrees with the information matrix, and
+/// the intervals have the nominal coverage.
 fn unbiased_and_efficient(m0: usize) {
     let n = 100;
     let mut inside = [0; 8];
@@ -76,8 +76,7 @@ fn unbiased_and_efficient(m0: usize) {
                 let se = e.standard_error.unwrap();
                 relative[i].push(e.value / truth - 1.0);
                 variance[i] += (e.value - truth).powi(2) / n as f64;
-                // sigma^2 times the inverse of the information, averaged: the Cramér-Rao bound of
-                // these runs.
+                // The average of sigma^2 times the inverse information matrix is the Cramér-Rao bound of these runs.
                 expected[i] += se * se / n as f64;
                 inside[i] += u64::from((e.value - truth).abs() < 1.96 * se);
             }
@@ -90,13 +89,13 @@ fn unbiased_and_efficient(m0: usize) {
                 100.0 * (relative[i].iter().map(|r| r * r).sum::<f64>() / n as f64).sqrt()
             );
             assert!(bias.abs() < 0.05, "{name}: {bias}");
-            // A variance of 100 runs is known to 14 %; four of that.
+            // A variance from 100 runs has a standard error of 14 %; the tolerance is four standard errors.
             assert!((0.44..1.56).contains(&ratio), "{name}: {ratio}");
         }
     }
     let shares = inside.map(|c| c as f64 / (2 * n) as f64);
     println!("m={m0}: coverage of nominal 95 % intervals {shares:.3?} for {NAMES:?}");
-    // 200 runs leave a standard error of 1.5 %; four of that.
+    // With 200 runs the standard error is 1.5 %; the tolerance is four standard errors.
     assert!(shares.iter().all(|s| (0.89..=1.0).contains(s)), "{shares:?}");
 }
 
@@ -148,9 +147,8 @@ fn white_remnant_is_told_from_a_coloured_one() {
     assert!((fit.innovation_variance().sqrt() / 0.004 - 1.0).abs() < 0.05);
 }
 
-/// The operator with a delay of `tau` in open loop: the held input is integrated exactly over the
-/// parts of each sample before and after it reaches the system, so that nothing of the discrete
-/// model under test is used.
+/// The operator with a delay of `tau` in open loop. The held input is integrated exactly over the parts of each sample
+/// before and after a new value reaches the system, so the simulation does not use the discrete model under test.
 fn delayed(tau: f64, n: usize, noise: f64) -> Record {
     respond([0.09, 0.036, 11.25, 0.35, tau], n, noise, 0)
 }
@@ -213,7 +211,7 @@ fn without_noise_every_delay_comes_back() {
                 (o.zeta_nm, 0.35),
                 (o.tau_e_s, tau),
             ] {
-                // Residuals of 1e-13 of the output.
+                // The residuals are 1e-13 of the output.
                 assert!(
                     (found / truth - 1.0).abs() < 1e-8,
                     "{tau} {initial_state:?}: {found} and {truth}"
@@ -232,7 +230,7 @@ fn every_person_is_found_from_the_own_starts() {
         replication: 0,
     }
     .white_noise(5 * 200);
-    // Approximately uniform in (0, 1).
+    // The result is approximately uniform in (0, 1).
     let share = |z: f64| 1.0 / (1.0 + (-1.7 * z).exp());
     let (mut lost, mut singular) = (Vec::new(), 0);
     for (i, z) in draws.chunks_exact(5).enumerate() {
@@ -259,7 +257,7 @@ fn every_person_is_found_from_the_own_starts() {
             .zip(silent.output())
             .map(|(a, b)| (a - b).powi(2));
         let tail: Vec<f64> = noise.skip(3000 - fit.residual_count()).collect();
-        // The minimum lies below the loss of the truth.
+        // The minimum must be below the loss at the true parameters.
         if fit.loss() > tail.iter().sum::<f64>() / tail.len() as f64 || !fit.termination().converged() {
             lost.push((
                 parameters,
@@ -279,7 +277,7 @@ fn a_delay_between_samples_is_found_under_noise() {
     let tau = fit.operator(0).unwrap().tau_e_s;
     let error = tau.standard_error.unwrap();
     println!("tau_e {:.5} s, standard error {error:.5} s", tau.value);
-    // Less than half a sample, and within 4 standard errors.
+    // The standard error is less than half a sample, and the estimate is within 4 standard errors.
     assert!(error < 0.003 && (tau.value - 0.2837).abs() < 4.0 * error);
 }
 
@@ -311,7 +309,7 @@ fn constraints_hold_and_cost_no_variance() {
     let (a, b) = (same.operator(0).unwrap(), reference);
     for ((name, _, a), (_, _, b)) in a.rows().into_iter().zip(b.rows()) {
         let (sa, sb) = (a.standard_error.unwrap(), b.standard_error.unwrap());
-        // Both searches end 1e-4 standard errors from the minimum or nearer.
+        // Both searches end within 1e-4 standard errors of the minimum.
         assert!(
             (a.value - b.value).abs() < 1e-3 * sb && (sa / sb - 1.0).abs() < 1e-3,
             "{name}: {a:?} {b:?}"
@@ -326,7 +324,8 @@ fn records_share_what_is_common() {
     let one = grey_box(1).fit(&records[..1]).unwrap();
     let two = grey_box(1).fit(&records[..2]).unwrap();
     let gain = |fit: &GreyBoxFit| fit.operator(0).unwrap().omega_nm_rad_s.standard_error.unwrap();
-    // Twice the data; the estimates of the error scatter by some per cent.
+    // Twice the data reduce the standard error by sqrt(2); the estimates of the standard error scatter by a few per
+    // cent.
     assert!((1.2..1.65).contains(&(gain(&one) / gain(&two))));
     // The third record has other gains; the neuromuscular system, the delay and the remnant are the
     // same.
@@ -359,14 +358,14 @@ fn the_polynomials_are_the_same_model() {
     let same = fit.polynomial_fit(0);
     let h = fit.operator_parameters(0).unwrap().transfer_function().unwrap();
     for point in same.frequency_response(&[0.5, 3.0, 10.0]) {
-        // The hold delays by half a sample and rounds the amplitude by (omega Ts)^2/24.
+        // The hold delays by half a sample and reduces the amplitude by (omega Ts)^2/24.
         let half = Complex64::from_polar(1.0, -point.omega_rad_s * 0.005);
         let continuous = h.response(point.omega_rad_s) * half;
         assert!((point.magnitude_db.value - 20.0 * continuous.norm().log10()).abs() < 0.01);
         assert!((point.phase_deg.value - continuous.arg().to_degrees()).abs() < 0.1);
         assert!(point.phase_deg.standard_error.unwrap() > 0.0);
     }
-    // Residuals from the first sample that the delay needs: the loss of the fit skips a few more.
+    // The residuals start at the first sample that the delay allows; the loss of the fit omits a few more samples.
     let residuals = same.residuals(&record).unwrap();
     let last = &residuals.values[residuals.values.len() - fit.residual_count()..];
     let loss = last.iter().map(|e| e * e).sum::<f64>() / last.len() as f64;
@@ -396,12 +395,11 @@ fn what_cannot_be_fitted_is_told() {
         refused(|g| g.individual = vec!["mass".to_owned()], &record),
         IdentError::UnknownParameter { .. }
     ));
-    // 62 samples before the first residual that the longest delay leaves, 6 parameters and 2
-    // states.
+    // With the longest delay there are 62 samples before the first residual; there are 6 parameters and 2 states.
     for samples in [1, 5, 61, 65, 69] {
         let short = [record[0].span(0.0, 0.01 * f64::from(samples)).unwrap()];
         let error = refused(|_| (), &short);
-        // The first samples of the task are zero.
+        // The error may also be missing excitation, because the first samples of the task are zero.
         let expected = matches!(
             error,
             IdentError::TooFewSamples { .. } | IdentError::NoExcitation { .. } | IdentError::DelayTooLong { .. }

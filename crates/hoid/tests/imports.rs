@@ -1,8 +1,8 @@
-//! Checks that there is no circle of imports between the files of a crate.
+//! Checks that the imports between the files of a crate have no cycle.
 //!
-//! An arrow goes from a file to another file of which it names an item, by `use` or by a path. `mod` lines and
-//! re-exports (`pub use`) are interfaces and make no arrow, and tests may use everything. Names are resolved as by the
-//! compiler: through modules, imports and re-exports, to the file that defines the item.
+//! A file has an arrow to every other file of which it names an item, by `use` or by a path. `mod` lines and re-exports
+//! (`pub use`) are interfaces and give no arrow, and tests may use everything. Names are resolved as by the compiler:
+//! through modules, imports and re-exports, to the file that defines the item.
 #![allow(clippy::unwrap_used)]
 
 use std::{
@@ -24,10 +24,10 @@ struct Module {
     parent: Option<usize>,
     children: BTreeMap<String, usize>,
     items: BTreeSet<String>,
-    /// Local name, its path, and whether it is a re-export.
+    /// Local name, its path, and true for a re-export.
     imports: Vec<(String, Vec<String>, bool)>,
     globs: Vec<(Vec<String>, bool)>,
-    /// Paths in the code.
+    /// Paths that occur in the code.
     paths: Vec<Vec<String>>,
 }
 
@@ -126,12 +126,12 @@ impl<'ast> Visit<'ast> for Paths<'_> {
     }
 
     fn visit_item_use(&mut self, item: &'ast syn::ItemUse) {
-        // An import within a function.
+        // An import may be within a function.
         self.0.use_tree(&item.tree, Vec::new(), false);
     }
 }
 
-/// Names of the types that a macro declares, or would declare if it were used.
+/// Returns the names of the types that a macro declares, or would declare if it was used.
 fn declared(stream: TokenStream, found: &mut BTreeSet<String>) {
     let mut declares = false;
     for token in stream {
@@ -147,7 +147,7 @@ fn declared(stream: TokenStream, found: &mut BTreeSet<String>) {
     }
 }
 
-/// Runs of names with `::` between them.
+/// Returns sequences of names that are joined by `::`.
 fn tokens(stream: TokenStream, found: &mut Vec<Vec<String>>) {
     let (mut run, mut colons) = (Vec::new(), 0);
     for token in stream {
@@ -219,11 +219,11 @@ impl Crate {
         at
     }
 
-    /// Returns the module that defines the item at the end of a path; none for paths that leave the crate, or end at a
+    /// Returns the module that defines the item at the end of a path; `None` for paths that leave the crate or end at a
     /// module.
     fn resolve(&self, from: usize, path: &[String], depth: usize) -> Option<usize> {
         let (first, rest) = path.split_first()?;
-        // Circles of re-exports, and names that do not exist.
+        // The path has a cycle of re-exports, or a name that does not exist.
         if depth > 12 {
             return None;
         }
@@ -257,7 +257,7 @@ impl Crate {
         })
     }
 
-    /// Returns the files that each file names.
+    /// Returns the files to which each file has an arrow.
     fn arrows(&self) -> BTreeMap<&Path, BTreeSet<&Path>> {
         let mut arrows: BTreeMap<&Path, BTreeSet<&Path>> = BTreeMap::new();
         for (at, module) in self.modules.iter().enumerate() {
@@ -276,7 +276,7 @@ impl Crate {
     }
 }
 
-/// Returns groups of files each of which reaches all others of its group.
+/// Returns groups of files in which each file reaches all other files of its group.
 fn circles<'p>(arrows: &BTreeMap<&'p Path, BTreeSet<&'p Path>>) -> Vec<Vec<&'p Path>> {
     let reached = |from: &'p Path| {
         let (mut seen, mut open) = (BTreeSet::new(), vec![from]);

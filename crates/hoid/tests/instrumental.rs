@@ -1,5 +1,5 @@
-//! Instrumental variables: open loop compared with the true values and with the prediction error method, the closed
-//! loops of the reference task and a faster one in which the input is strongly correlated with the noise, and the
+//! Instrumental variables: the open loop, compared with the true values and with the prediction error method; the
+//! closed loops of the reference task, and a faster loop in which the input is strongly correlated with the noise; and
 //! refused input.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -57,7 +57,7 @@ impl Sample {
         (squares / (self.values.len() - 1) as f64).sqrt()
     }
 
-    /// Distance of the mean from the truth in standard errors of the mean.
+    /// Returns the distance of the mean from the true value in standard errors of the mean.
     fn bias(&self, truth: f64) -> f64 {
         (self.mean() - truth) / (self.spread() / (self.values.len() as f64).sqrt())
     }
@@ -82,7 +82,7 @@ fn noise(cell: u32, replication: u64, n: usize) -> Vec<f64> {
     .white_noise(n)
 }
 
-/// `u = (B/F) q^-2 e + gain (C/D) eps` with white e and eps, after a run-in.
+/// Simulates `u = (B/F) q^-2 e + gain (C/D) eps` with white e and eps, after a run-in.
 fn open_loop(c: &[f64], gain: f64, n: usize, replication: u64) -> Record {
     let run_in = 200;
     let (e, eps) = (noise(0, replication, n + run_in), noise(1, replication, n + run_in));
@@ -150,14 +150,14 @@ fn open_loop_is_unbiased_and_knows_its_errors() {
                 sample.spread(),
                 sample.spread() / of_methods[0][i].spread()
             );
-            // 16 numbers: the largest of as many normal ones exceeds 3.3 in 1.5 % of all seeds.
+            // The largest of 16 normal numbers exceeds 3.3 for 1.5 % of all seeds.
             assert!(sample.bias(truth[i]).abs() < 3.3, "{method} {}", names[i]);
-            // A spread over 100 runs is good to 7 %; four of that.
+            // A standard deviation from 100 runs has a standard error of 7 %; the tolerance is four standard errors.
             assert!((0.75..1.35).contains(&ratio), "{method} {}: {ratio}", names[i]);
         }
     }
     for i in 0..4 {
-        // Both are efficient here, and from the same runs.
+        // Both methods are efficient here, and their estimates are from the same runs.
         let ratio = of_methods[3][i].spread() / of_methods[0][i].spread();
         assert!((0.95..1.05).contains(&ratio), "{}: {ratio}", names[i]);
     }
@@ -184,14 +184,14 @@ fn refined_method_agrees_with_the_prediction_error_method_for_c_and_d_too() {
     for ((name, a), (_, b)) in riv.parameters().into_iter().zip(pem.parameters()) {
         let (sa, sb) = (a.standard_error.unwrap(), b.standard_error.unwrap());
         println!("{name}: {:.5} +- {sa:.5}, PEM {:.5} +- {sb:.5}", a.value, b.value);
-        // The same information: estimates differ by a small part of their errors, and the errors
+        // Both methods use the same information: the estimates differ by a small part of their standard errors, which
         // agree.
         assert!((a.value - b.value).abs() < 0.3 * sb, "{name}");
         assert!((sa / sb - 1.0).abs() < 0.1, "{name}");
     }
 }
 
-/// Runs of the operator of C1 with this delay, remnant and noise level.
+/// Simulates runs of the operator of C1 with this delay, remnant and noise level.
 fn runs(delay_s: f64, time_constant_s: f64, m0: usize, level: f64, n: u64) -> Vec<Record> {
     let mut scenario = Scenario::condition(Condition::C1);
     scenario.initial.operator.tau_e_s = delay_s;
@@ -224,7 +224,7 @@ fn truth() -> [f64; 6] {
     [held.b0, held.f1, 0.09, 0.4, 11.25, 0.35]
 }
 
-/// Fits all runs, prints bias, spread and median standard error in % of the truth.
+/// Fits all runs, and prints bias, spread and median standard error in % of the true value.
 fn fit_all(label: &str, records: &[Record], fit: impl Fn(&Record) -> Result<Fit, IdentError>) -> Vec<Sample> {
     let mut samples: Vec<Sample> = NAMES.iter().map(|_| Sample::new()).collect();
     let mut left_out = 0;
@@ -267,7 +267,7 @@ fn pem(nk: usize) -> impl Fn(&Record) -> Result<Fit, IdentError> {
     move |record| Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(nk)).fit(one(record))
 }
 
-/// The mean within a given number of its standard errors and a share of the truth.
+/// Checks that the mean is within a given number of its standard errors plus a share of the true value.
 fn assert_unbiased(label: &str, samples: &[Sample], errors: f64, share: f64) {
     for ((sample, truth), name) in samples.iter().zip(truth()).zip(NAMES) {
         let distance = (sample.mean() - truth).abs();
@@ -276,8 +276,8 @@ fn assert_unbiased(label: &str, samples: &[Sample], errors: f64, share: f64) {
     }
 }
 
-/// Delay 0.05 s and a remnant of time constant 0.3 s: the error that the operator responds to still contains the noise
-/// that acts now.
+/// With a delay of 0.05 s and a remnant with a time constant of 0.3 s, the error to which the operator responds is
+/// correlated with the present noise.
 #[test]
 fn fast_loop_biases_simulated_instruments_but_not_external_ones() {
     let nk = 6;
@@ -288,19 +288,20 @@ fn fast_loop_biases_simulated_instruments_but_not_external_ones() {
         let from_e = fit_all(&format!("{method} simulated"), &records, |r| {
             operator_iv(method, Instruments::Simulated, nk).fit(one(r))
         });
-        // b0 falls short by about 30 %, at an error of the mean of 2 %.
+        // b0 is too small by about 30 %, with a standard error of the mean of 2 %.
         assert!(from_e[0].bias(truth()[0]) < -8.0, "{method}");
     }
     for method in IvMethod::ALL {
         let label = format!("{method} from f_t");
         let samples = fit_all(&label, &records, |r| operator_iv(method, external(), nk).fit(one(r)));
-        // The estimate is not linear in the data: a second-order bias of some per cent, where a
-        // spread is 13 %, is not a surprise.
+        // The estimate is not linear in the data, so a second-order bias of a few per cent is expected if the spread is
+        // 13 %.
         assert_unbiased(&label, &samples, 3.5, 0.02);
         for (i, (ours, theirs)) in samples.iter().zip(&by_pem).enumerate() {
             let ratio = (ours.spread() / theirs.spread()).powi(2);
             println!("    {}: variance / PEM {ratio:.2}", NAMES[i]);
-            // PEM also uses what the noise excites. Spreads over 40 runs are good to 11 %.
+            // PEM also uses the excitation by the noise. Standard deviations from 40 runs have a standard error of 11
+            // %.
             assert!((0.6..5.0).contains(&ratio), "{label} {}: {ratio}", NAMES[i]);
             let known = ours.median_error() / ours.spread();
             assert!((0.6..1.5).contains(&known), "{label} {}: {known}", NAMES[i]);
@@ -341,7 +342,7 @@ fn reference_cell(m0: usize, level: f64, n: u64) {
             }
             let kept = samples[0].values.len() as f64;
             assert!(kept >= 0.95 * n as f64, "{label}: {kept}");
-            // Second-order bias: estimates are not linear in the data.
+            // The tolerance includes a second-order bias, because estimates are not linear in the data.
             assert_unbiased(&label, &samples, 4.0, 0.03);
             let ratios: Vec<String> = samples
                 .iter()
@@ -396,7 +397,7 @@ fn a_missing_or_useless_channel_is_told() {
 #[test]
 fn instruments_that_vanish_where_they_count_are_told() {
     let record = open_loop(&[], 1.0, 2000, 0);
-    // Zero except for one sample near the end: no instrument is nonzero in the rows that count.
+    // The channel is zero except for one sample at the end, so the instruments are zero in all rows that are used.
     let mut late = vec![0.0; 2000];
     late[1999] = 1.0;
     let record = record.with_channel(Channel::new("late", "", late)).unwrap();
@@ -438,13 +439,13 @@ fn one_sample_too_few_is_told_and_no_length_panics() {
             for instruments in [Instruments::Simulated, external()] {
                 match operator_iv(method, instruments, 29).fit(&record) {
                     Ok(fit) => {
-                        // 30 samples before the first row, 4 parameters.
+                        // There are 30 samples before the first row, and 4 parameters.
                         assert!(samples > 34);
                         assert!(fit.loss().is_finite() && fit.model().theta().iter().all(|t| t.is_finite()));
                         fitted += 1;
                     }
                     Err(error) => {
-                        // One sample is a constant signal.
+                        // A record of one sample counts as a constant signal.
                         let told = matches!(
                             error,
                             IdentError::TooFewSamples { .. }
@@ -499,7 +500,7 @@ fn several_records_sharpen_the_estimate() {
         let (one, four) = (estimator.fit(&records[..1]).unwrap(), estimator.fit(&records).unwrap());
         for ((name, a), (_, b)) in one.parameters().into_iter().zip(four.parameters()) {
             let ratio = a.standard_error.unwrap() / b.standard_error.unwrap();
-            // Four times the data halve the error; the error itself scatters by ten per cent or so.
+            // Four times the data halve the standard error, which itself scatters by about ten per cent.
             assert!((1.5..2.8).contains(&ratio), "{method} {name}: {ratio}");
         }
     }

@@ -1,7 +1,7 @@
 //! A small sample of the study of the error bars of people: `cargo xtask slow people-coverage`.
 #![allow(clippy::unwrap_used)]
 
-// The study uses the other parts.
+// The study uses the other parts of this module.
 #[allow(dead_code)]
 #[path = "common/people_coverage/mod.rs"]
 mod people_coverage;
@@ -30,7 +30,7 @@ fn sample(people: std::ops::Range<u64>, variant: Variant) -> Vec<Outcome> {
 
 #[test]
 fn intervals_hold_the_truth_of_virtual_people() {
-    // People 0 to 5 have one or two runs: short enough for a test.
+    // People 0 to 5 have one or two runs, which is short enough for a test.
     let all = sample(0..6, given(true));
     let of: Vec<&Outcome> = all.iter().collect();
     let each = QUANTITIES.map(|name| coverage(&of_quantity(&of, name)));
@@ -39,14 +39,15 @@ fn intervals_hold_the_truth_of_virtual_people() {
         all: each.iter().map(|s| s.all).sum(),
     };
     assert!(all.iter().all(|o| o.found.is_ok()));
-    // 95 % of some fifty intervals, the nine of a person far from independent of each other.
+    // The expected share is 95 % of about fifty intervals; the nine intervals of a person are far from independent of
+    // each other.
     assert!(share.all >= 40 && share.percent() >= 80.0, "{}", share.text());
     let off = median(all.iter().map(|o| o.found.as_ref().unwrap().response_error)).unwrap();
     assert!(off < 0.3, "{off}");
 }
 
-/// Without lines and with the form chosen, a wrong form must not count as the only one: the true form has a weight, or
-/// what is determined holds the truth.
+/// If the form is selected without lines, a wrong form must not appear to be the only one: either the true form has a
+/// weight, or the intervals of determined quantities contain the true values.
 #[test]
 fn intervals_hold_the_truth_if_the_form_is_chosen_without_lines() {
     let variant = Variant {
@@ -82,7 +83,7 @@ fn a_sample_is_the_same_on_any_number_of_threads() {
 fn shares_have_errors() {
     let share = Share::over([true, true, true, false]);
     assert_eq!((share.of, share.all, share.percent()), (3, 4, 75.0));
-    // All of them: still an error.
+    // A share of 100 % also has a standard error.
     assert!(Share { of: 100, all: 100 }.error() > 1.0);
     assert_eq!(Share::default().text(), "–");
     assert_eq!(median([3.0, f64::NAN, 1.0, 2.0]), Some(2.0));

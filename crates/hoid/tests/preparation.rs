@@ -17,7 +17,7 @@ fn run(replication: u64) -> Record {
     simulator.run(run_seed, false).unwrap()
 }
 
-/// A record of e and u alone, with the output `late` samples late.
+/// Returns a record of e and u only, with the output `late` samples late.
 fn bare(record: &Record, late: usize) -> Record {
     let n = record.len();
     let channel = |name: &str, values: &[f64]| Channel::new(name, "", values.to_vec());
@@ -58,7 +58,7 @@ fn units_change_the_gains_and_nothing_else() {
     }))
     .operator()
     .unwrap();
-    // The search ends within 1e-12 of the loss, which leaves 1e-6 of a parameter.
+    // The search ends within 1e-12 of the loss, which gives an error of 1e-6 of a parameter.
     for (found, expected) in [
         (volts.k_e.value, 0.25 * plain.k_e.value),
         (volts.t_l_s.value, plain.t_l_s.value),
@@ -73,8 +73,8 @@ fn units_change_the_gains_and_nothing_else() {
 fn a_fit_of_every_fourth_sample_is_the_same_person() {
     const RUNS: u64 = 12;
     const FACTOR: usize = 4;
-    // Gain, lead, frequency and damping of the muscles, and the delay: the longer hold would make it shorter by .015
-    // s, and the input is shifted by as much.
+    // Gain, lead, neuromuscular frequency and damping, and delay. The longer hold would shorten the delay by .015 s,
+    // which the shift of the input compensates.
     let expected = [0.09, 0.4, 11.25, 0.35, 0.28];
     let mut sums = [[0.0; 2]; 5];
     let mut worst = 0.0_f64;

@@ -10,7 +10,7 @@ use hoid::{
     prelude::*,
 };
 
-/// C1 with this level of the remnant.
+/// Simulates C1 with this noise level.
 fn run(hz: f64, noise_level: f64, seed: u64) -> Record {
     let mut scenario = Scenario::condition(Condition::C1);
     scenario.sample_time = SampleTime::new(1.0 / hz).unwrap();
@@ -27,7 +27,8 @@ fn run(hz: f64, noise_level: f64, seed: u64) -> Record {
 
 #[test]
 fn the_delay_is_that_of_the_old_rate() {
-    // With little remnant a millisecond is visible; the longer hold alone would add 2.7 to 4.8 ms.
+    // With a small remnant, a change of the delay of a millisecond is visible; the longer hold alone would change it by
+    // 2.7 to 4.8 ms.
     for (hz, factor) in [(250.0, 3), (1000.0, 10), (2000.0, 20)] {
         let (record, done) = Decimation::Auto.of(run(hz, 0.001, 0)).unwrap();
         let done = done.unwrap();

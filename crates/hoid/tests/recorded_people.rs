@@ -1,8 +1,8 @@
-//! Recorded people in a manual tracking task: the open-loop crossover of the identified model
-//! against the describing function.
+//! Recorded people in a manual tracking task: the open-loop crossover of the identified model is compared with the
+//! describing function.
 //!
-//! The recordings are not part of the project. The directory is that of the environment variable
-//! `HOID_HUMAN_DATA`; without it the test reports it and passes.
+//! The recordings are not part of the project. Their directory is given by the environment variable `HOID_HUMAN_DATA`;
+//! if it is not set, the test reports this and passes.
 #![allow(clippy::unwrap_used)]
 
 use std::{env, path::PathBuf};
@@ -42,7 +42,7 @@ fn trials(directory: &PathBuf, person: &str, plant: &str) -> Vec<Record> {
     files.sort();
     let options = ReadOptions {
         input: Some("r-y".parse().unwrap()),
-        // Two periods of the disturbance after the ramp.
+        // The span contains two periods of the disturbance after the ramp.
         span_s: (Some(5.0), Some(45.0)),
         ..ReadOptions::default()
     };
@@ -64,8 +64,7 @@ fn crossover_agrees_with_the_describing_function() {
         assert_eq!(records.len(), 10, "{person} {plant}");
         assert!(records.iter().all(|r| r.len() == 2400));
         let structure = Structure::BoxJenkins;
-        // A subset of the delays and orders that `hoid identify` would search: people need a rich
-        // noise model.
+        // A subset of the delays and orders that `hoid identify` searches; people require a noise model of high order.
         let mut ranges = OrderRanges::from(structure.operator_orders(1));
         ranges.nk = 9..=21;
         ranges.nd = 7..=8;

@@ -1,8 +1,8 @@
-//! Recorded people in a manual tracking task: describing functions against the table that was
-//! published with the recordings.
+//! Recorded people in a manual tracking task: describing functions are compared with the table published with the
+//! recordings.
 //!
-//! The recordings are not part of the project. The directory is that of the environment variable
-//! `HOID_HUMAN_DATA`; without it the test reports it and passes.
+//! The recordings are not part of the project. Their directory is given by the environment variable `HOID_HUMAN_DATA`;
+//! if it is not set, the test reports this and passes.
 #![allow(clippy::unwrap_used)]
 
 use std::{env, path::Path};
@@ -84,8 +84,8 @@ fn describing_functions_are_those_of_the_table() {
         let first_order = row.plant == "fo";
         let harmonics = if first_order { &PRIMES[..] } else { &PRIMES[..7] };
         let excitation = Excitation::of_harmonics(harmonics, 20.0).unwrap();
-        // Two periods of the disturbance after the ramp; the u of a row was read one row before its
-        // error was shown.
+        // The span contains two periods of the disturbance after the ramp. The u of a row was read one row before the
+        // error of the row was displayed.
         let options = DescribingOptions {
             averaging: Averaging::Reference {
                 channel: "d".to_owned(),
@@ -118,7 +118,7 @@ fn describing_functions_are_those_of_the_table() {
         let (crossover, phase) = (margins.crossover_rad_s.unwrap(), margins.phase_margin_deg.unwrap());
         println!("{} {}", row.person, row.plant);
         let shown = |e: Estimate| format!("{:.4} +- {:.4}", e.value, e.standard_error.unwrap_or(f64::NAN));
-        // Half a unit of the table's last digit is beyond 1 % for small numbers.
+        // For small numbers, half a unit of the last digit of the table exceeds 1 %.
         let mut check = |name: &str, found: Estimate, expected: f64, tolerance: f64| {
             let off = (found.value - expected).abs();
             println!("  {name}: {} (table {expected})", shown(found));
@@ -152,7 +152,7 @@ fn describing_functions_are_those_of_the_table() {
             row.off_line_share,
             0.005 + 1e-9,
         );
-        // With the plant as it responded, after its hold of half a tick.
+        // The plant response is the measured one, which includes its hold of half a tick.
         let (by_ratio, by_phase) = (measured.crossover_rad_s.unwrap(), measured.phase_margin_deg.unwrap());
         println!("  with the plant measured: {}, {}", shown(by_ratio), shown(by_phase));
         println!("  noise ratio {}, misfit {:.3}", shown(h.noise_ratio), fit.misfit);

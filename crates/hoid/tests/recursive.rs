@@ -1,4 +1,4 @@
-//! Recursive identification compared with its batch counterpart, by Monte Carlo, and with faulty samples.
+//! Recursive identification: comparison with the batch methods, Monte Carlo simulation, and faulty samples.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -38,7 +38,7 @@ fn options(method: Method) -> TrackOptions {
     }
 }
 
-/// Results of the runs in their order, on all cores.
+/// Computes the results of the runs on all cores and returns them in order.
 fn on_all_cores<T: Send>(runs: u64, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get() as u64);
     let mut results: Vec<(u64, T)> = std::thread::scope(|scope| {
@@ -55,7 +55,7 @@ fn on_all_cores<T: Send>(runs: u64, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
     results.into_iter().map(|(_, t)| t).collect()
 }
 
-/// Standard deviations of the z-scores of the operator at the end of a run of C1, m = 1, P_n = .1.
+/// Returns the standard deviations of the z-scores of the operator at the end of runs of C1 with m = 1 and P_n = .1.
 fn z_scores(options: &TrackOptions, runs: u64) -> [f64; 5] {
     let simulator = Simulator::new(&scenario(Condition::C1, 1, 0.1)).unwrap();
     let squares = on_all_cores(runs, |r| {
@@ -80,8 +80,8 @@ fn with_memory(method: Method, memory: &str) -> TrackOptions {
 #[test]
 fn error_bars_hold_with_an_infinite_memory() {
     for method in [Method::rpem(), hoid::survey::physical()] {
-        // From half of the record, whose own errors are nearly normal. The standard error of a
-        // standard deviation from 6000 runs is 1/sqrt(12000) = .009.
+        // The start fit uses half of the record, so its errors are nearly normal. The standard error of a standard
+        // deviation from 6000 runs is 1/sqrt(12000) = .009.
         let half = TrackOptions {
             start: StartAt::Span(Some((0.0, 40.96))),
             ..with_memory(method.clone(), "inf")
@@ -110,7 +110,7 @@ fn error_bars_hold_with_a_memory_for_each_parameter() {
     }
 }
 
-/// A long record of C1: many periods of the forcing function.
+/// Returns a long record of C1 with many periods of the forcing function.
 fn long_record() -> Record {
     let mut long = scenario(Condition::C1, 1, 0.1);
     long.measurement_s = 10_000.0;
@@ -131,9 +131,9 @@ fn with_an_infinite_memory_it_comes_to_the_batch_fit_from_several_starts() {
         ..with_memory(Method::rpem(), "inf")
     };
     let span = |to: f64| from(StartAt::Span(Some((0.0, to))), None);
-    // With settled filters. The memory grows at the start, so that the initial steps are forgotten. The covariance is
-    // ten times that of the thesis: with 10 the first steps move the estimate to the border of stability, and two of
-    // these starts still differ by .6 standard errors at the end (the cascade forgot that faster).
+    // The filters have settled. The memory length grows at the start, so the initial steps are forgotten. The
+    // covariance is ten times the value of the thesis. With a covariance of 10 the first steps move the estimate to the
+    // limit of stability, and two of these starts still differ by .6 standard errors at the end.
     let theta = |theta: Vec<f64>| {
         let from = from(StartAt::Theta(theta), Some(4.0));
         from.with(&[("covariance", "1")]).unwrap()
@@ -187,13 +187,14 @@ fn least_squares_with_an_infinite_memory_is_the_batch_fit() {
             (found.value - expected.value).abs() < 1e-8 * expected.value.abs(),
             "{name}"
         );
-        // Variances of the innovation: mean of normalised squares here, sum over N - p there.
+        // The innovation variances differ: the recursion averages normalised squares, whereas the batch fit divides the
+        // sum by N - p.
         let ratio = found.standard_error.unwrap() / expected.standard_error.unwrap();
         assert!((ratio - 1.0).abs() < 1e-3, "{name}: {ratio}");
     }
 }
 
-/// Signals that alternate every few thousand samples: the loop, silence, constants, saturation.
+/// Signals that change every few thousand samples: the loop, zeros, constants, saturation.
 fn alternating(k: usize, record: &Record) -> (f64, f64) {
     let (e, u) = (record.input()[k % record.len()], record.output()[k % record.len()]);
     match (k / 20_000) % 5 {
@@ -240,8 +241,8 @@ fn a_million_samples_in_all_weathers_leave_numbers_and_a_bounded_covariance() {
                 );
                 assert!(tracker.innovation_variance().is_finite(), "{name} at {k}");
                 let covariance = tracker.covariance().unwrap_or_default();
-                // A silent window has no covariance, and one with little excitation a large one.
-                // The others: a thousand times the standard error of the start, in squares.
+                // A window without signals has no covariance, and a window with little excitation has a large one. For
+                // other methods the limit corresponds to a thousand times the standard error of the start.
                 let window = options.method.settings().get("forgetting").as_deref() == Some("window");
                 let bound = if window { f64::MAX } else { 1e12 };
                 assert!(
@@ -281,8 +282,8 @@ fn after_silence_the_estimate_recovers_as_fast_as_at_the_start() {
                 }
             }
         }
-        // RMS over 8192 samples from 10 s on. A start from the batch fit has the smaller
-        // covariance: it is better by up to a half.
+        // The errors are RMS values over 8192 samples from 10 s on. A start from the batch fit has a smaller
+        // covariance, and its errors are smaller by up to a half.
         println!("{method:?} fresh and after silence: {errors:?}");
         if method != Method::rpem() {
             for (fresh, silent) in errors[0].iter().zip(errors[1]) {
@@ -321,7 +322,7 @@ fn hostile_samples_are_skipped_counted_and_forgotten() {
         assert_eq!(tracker.counts().samples, record.len() as u64);
         // Two per cent of the samples are missing: the estimate differs, but is consistent with its error bars.
         for (a, b) in clean.parameters().iter().zip(tracker.parameters()) {
-            // The rule of this method has no covariance.
+            // The learning rule of this method gives no covariance.
             if method.name() == "linear-network" {
                 assert_eq!(a.standard_error, None);
                 continue;

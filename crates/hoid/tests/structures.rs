@@ -14,7 +14,7 @@ fn estimator(structure: Structure) -> Estimator {
     Estimator::new(structure, Truth::of(structure).orders())
 }
 
-/// Distance of each coefficient from the truth in standard errors.
+/// Returns the distance of each coefficient from the true value in standard errors.
 fn distances(fit: &Fit, truth: &[f64]) -> Vec<f64> {
     let parameters = fit.parameters();
     parameters
@@ -36,7 +36,7 @@ fn every_structure_finds_the_truth_under_every_rule_for_its_past() {
             Some(InitialState::Estimate),
             Some(InitialState::Backcast),
         ] {
-            // The rule of zeros is right for a record that starts at rest.
+            // The rule of zero initial states is correct for a record that starts at rest.
             let record = if rule == Some(InitialState::Zero) {
                 &from_rest
             } else {
@@ -53,7 +53,7 @@ fn every_structure_finds_the_truth_under_every_rule_for_its_past() {
             assert_eq!(far.len(), truth.theta().len());
             assert!(far.iter().all(|d| d.abs() < 4.0), "{structure} {rule:?}: {far:.1?}");
             let variance = fit.innovation_variance();
-            // 4000 samples know the variance to 2 %.
+            // With 4000 samples the standard error of the variance is 2 %.
             assert!((variance / 0.25 - 1.0).abs() < 0.09, "{structure} {rule:?}: {variance}");
         }
     }
@@ -74,7 +74,7 @@ fn standard_errors_of_every_structure_cover_the_truth() {
         }
         let shares: Vec<f64> = inside.iter().map(|c| f64::from(*c) / runs as f64).collect();
         println!("{structure}: {shares:.3?}");
-        // 200 runs leave a standard error of 1.5 %; four of that.
+        // With 200 runs the standard error is 1.5 %; the tolerance is four standard errors.
         assert!(shares.iter().all(|s| *s > 0.89), "{structure}: {shares:.3?}");
     }
 }
@@ -122,7 +122,7 @@ fn fixed_and_bounded_coefficients_keep_their_word() {
     for (a, b) in loose.model().theta().iter().zip(free.model().theta()) {
         assert!((a - b).abs() < 1e-6);
     }
-    // Linear structures respect bounds as well.
+    // Linear structures also respect bounds.
     let mut arx = estimator(Structure::Arx);
     arx.constraints.insert("b1".into(), Constraint::Fixed(0.0));
     let fit = arx.fit(&[Truth::of(Structure::Arx).record(500, 0.5, 5)]).unwrap();
@@ -154,10 +154,10 @@ fn a_prior_draws_by_its_weight() {
     assert!((f2(&none) - f2(&plain)).abs() < 1e-9);
     assert!(f2(&none) > f2(&some) && f2(&some) > f2(&strong));
     assert!((f2(&strong) - 0.5).abs() < 1e-3);
-    // The loss is that of the residuals, without the penalty.
+    // The loss is the loss of the residuals, without the penalty.
     assert!(strong.loss() > plain.loss() && strong.loss() < 100.0 * plain.loss());
-    // Three parameters of equal weight at the truth: the posterior mean of a linear problem, by
-    // hand.
+    // Three parameters have a prior of equal weight at the true values; the posterior mean of this linear problem is
+    // computed by hand.
     let record = Truth::of(Structure::Fir).record(300, 0.5, 8);
     let mut fir = estimator(Structure::Fir);
     for name in ["b0", "b1"] {
@@ -214,7 +214,7 @@ fn a_robust_loss_shrugs_at_outliers() {
         let fit = e.fit(std::slice::from_ref(&record)).unwrap();
         assert!(fit.termination().converged(), "{:?}", fit.termination());
         robust_error += error(&fit);
-        // With white noise and no outliers the robust error bars still cover.
+        // With white noise and no outliers, the robust error bars also have the nominal coverage.
         let white = Truth::of(Structure::OutputError).record(600, 0.5, 500 + seed);
         let fit = e.fit(&[white]).unwrap();
         inside += distances(&fit, &Truth::of(Structure::OutputError).theta())
@@ -225,7 +225,7 @@ fn a_robust_loss_shrugs_at_outliers() {
     println!("mean error: squares {plain_error:.4}, Huber {robust_error:.4} (sum over {runs} runs)");
     assert!(robust_error < 0.5 * plain_error);
     let share = inside as f64 / (4 * runs) as f64;
-    // 160 intervals: standard error 1.7 %.
+    // With 160 intervals the standard error is 1.7 %.
     assert!(share > 0.88, "{share}");
     let mut bad = estimator(Structure::Arx);
     bad.loss = Loss::Huber { threshold: 0.0 };
@@ -253,7 +253,7 @@ fn the_focus_on_simulation_minimises_the_simulation_error_and_its_bars_cover() {
     assert!((prediction.model().a()[0] + 1.5).abs() > 0.3);
     assert!((simulation.model().a()[0] + 1.5).abs() < 0.05);
     assert!(vaf(&simulation) > vaf(&prediction));
-    // Coloured noise: coverage of the system's coefficients.
+    // With coloured noise, the coverage of the system's coefficients is tested.
     let truth = Truth::of(Structure::BoxJenkins);
     let runs = 200;
     let mut inside = vec![0; truth.theta().len()];
@@ -312,7 +312,7 @@ fn records_without_input_are_told_from_those_with() {
     assert!(v.cross_correlation.lags.is_empty() && v.quality.vaf_simulation == 0.0);
     assert!(v.quality.vaf_prediction > 50.0);
     assert!(fit.operator().is_err());
-    // A record with an input serves as well; the input is not examined.
+    // A record with an input is also accepted; the input is not examined.
     let with = Truth::of(Structure::Arx).record(200, 1.0, 2);
     assert!(estimator(Structure::Ar).fit(&[with]).is_ok());
 }
@@ -365,6 +365,7 @@ fn roots_of_c_near_the_circle_do_not_stop_the_search() {
             (all_higher, all_stuck) = (all_higher + higher, all_stuck + stuck);
         }
     }
-    // Before the search followed the border, 180 of these 360 fits stopped on it. Some minima are on the border.
+    // A search that does not follow the stability limit stops there in 180 of these 360 fits. Some minima are on the
+    // limit.
     assert!(all_higher <= 12 && all_stuck <= 12, "{all_higher} {all_stuck}");
 }

@@ -1,5 +1,5 @@
-//! Every structure on records of textbook systems, against independent implementations:
-//! fixtures/textbook, made by make.py there, which reports what each library assumes.
+//! Every structure on records of textbook systems, compared with independent implementations. The values are in
+//! fixtures/textbook, made by make.py in the same folder, which states the assumptions of each library.
 #![allow(clippy::unwrap_used)]
 
 use std::{fs, path::PathBuf};
@@ -10,17 +10,17 @@ use hoid::{
 };
 use serde_json::Value;
 
-/// Half a unit in the fifth digit of a number that starts with 9, so tighter than five digits for
-/// all others.
+/// Half a unit in the fifth digit of a number that starts with 9; for all other numbers this is stricter than five
+/// digits.
 const FIVE_DIGITS: f64 = 5e-6;
-/// The reference is exact to rounding; the search of hoid then has to go on to the end,
+/// Tolerance for the reference, which is exact up to rounding; the search of hoid must then have the tolerance
 /// `TO_THE_END`.
 const REFERENCE: f64 = 1e-6;
-/// Tolerance of the search at which `sqrt(tolerance n)` = 2e-7 standard errors are left.
+/// Tolerance of the search with which it ends `sqrt(tolerance n)` = 2e-7 standard errors from the minimum.
 const TO_THE_END: f64 = 1e-16;
 /// Distance from the minimum with the default tolerance, in standard errors: `sqrt(1e-12 n)` = 3e-5 for 1000 samples.
 const BY_DEFAULT: f64 = 1e-4;
-/// The loss differs by the square of that over n.
+/// Relative difference of the loss: the square of this distance divided by n.
 const LOSS: f64 = 1e-10;
 /// Four digits of a standard error.
 const ERRORS: f64 = 5e-5;
@@ -96,7 +96,7 @@ fn estimator(case: &Value, rule: InitialState) -> Estimator {
 }
 
 fn fit(case: &Value, rule: InitialState) -> Fit {
-    // No sample time: 1 s.
+    // The case has no sample time, so 1 s is used.
     estimator(case, rule)
         .fit(&[record(case, SampleTime::new(1.0).unwrap())])
         .unwrap()
@@ -117,7 +117,7 @@ fn largest_difference(found: &[f64], expected: &[f64]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Estimates of a case with their rule, of those that follow one of hoid's.
+/// Returns the estimates of a case that follow one of hoid's rules for the initial states, with this rule.
 fn estimates(case: &Value) -> impl Iterator<Item = (&str, InitialState, &Value)> {
     case["estimates"]
         .as_array()
@@ -126,9 +126,9 @@ fn estimates(case: &Value) -> impl Iterator<Item = (&str, InitialState, &Value)>
         .filter_map(|e| Some((e["by"].as_str()?, rule(e["rule"].as_str()?)?, e)))
 }
 
-/// J of the rule backcast depends on which square root of Sigma^-1 makes the residuals. Another one
-/// turns them, which adds to J'J the contribution of about 1/(1 - r^2) samples, r being the largest
-/// root of the noise model; twice that is allowed.
+/// J of the rule backcast depends on the square root of Sigma^-1 from which the residuals are computed. Another square
+/// root rotates the residuals, which adds the contribution of about 1/(1 - r^2) samples to J'J, where r is the largest
+/// root of the noise model. The tolerance is twice this contribution.
 fn square_root_matters(fit: &Fit) -> f64 {
     let model = fit.model();
     let d = polynomial::product(&monic(model.a()), &monic(model.d()));
@@ -230,8 +230,8 @@ fn standard_errors_agree_with_independent_implementations() {
     }
 }
 
-/// The grid of starts is one of neuromuscular frequencies in rad/s: it must not matter that these
-/// systems have none.
+/// The grid of starts consists of neuromuscular frequencies in rad/s; the results must not depend on it, because these
+/// systems have no neuromuscular part.
 #[test]
 fn the_sample_time_does_not_matter() {
     for case in cases() {
@@ -243,8 +243,8 @@ fn the_sample_time_does_not_matter() {
     }
 }
 
-/// Series E of Box and Jenkins, 100 yearly sunspot numbers: c1 of ARMA(2, 1) under each rule, in
-/// standard errors from exact maximum likelihood (statsmodels), which treats the past as it is.
+/// Series E of Box and Jenkins, 100 yearly sunspot numbers: distance of c1 of ARMA(2, 1) with each rule, in standard
+/// errors, from exact maximum likelihood (statsmodels), which treats the past correctly.
 #[test]
 fn on_a_short_series_the_rule_decides() {
     let cases = cases();
@@ -267,8 +267,8 @@ fn on_a_short_series_the_rule_decides() {
     assert!(away(InitialState::Zero) > 1.0);
 }
 
-/// A search that starts from the truth ends in one minimum; a better one may exist (`general`: A
-/// and D with their roots exchanged).
+/// A search from the true parameters ends in one minimum; a better minimum may exist (for `general` with the roots of A
+/// and D exchanged).
 #[test]
 fn own_starts_end_no_higher_than_the_truth_does() {
     for case in cases() {
@@ -293,13 +293,13 @@ fn own_starts_end_no_higher_than_the_truth_does() {
     }
 }
 
-/// ARARX with strong noise whose pole least squares puts into A: from there the search ends up to
-/// 40 % too high. 40 records of 500 samples; the noise has the power of the response.
+/// ARARX with strong noise, whose pole least squares assigns to A; from such a start, the search ends with a loss that
+/// is up to 40 % too high. There are 40 records of 500 samples, and the noise has the power of the response.
 #[test]
 fn the_pole_of_the_noise_stays_in_d() {
     let mut state = 9_u64;
     let mut draw = move || {
-        // Sum of twelve uniform numbers: mean 0, variance 1.
+        // A sum of twelve uniform numbers with mean 0 and variance 1.
         let uniform = |_| {
             state = state
                 .wrapping_mul(6_364_136_223_846_793_005)

@@ -1,5 +1,5 @@
-//! The fit of an operator that changes once: recovery without noise, bias, spread and coverage over simulated runs,
-//! and the report if nothing changes.
+//! The fit of an operator that changes once: exact results without noise, bias, spread and coverage over simulated
+//! runs, and the report if nothing changes.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::collections::BTreeMap;
@@ -34,7 +34,7 @@ fn without_noise(condition: Condition) -> Record {
         .unwrap()
 }
 
-/// Name and true value of each parameter.
+/// Returns the name and the true value of each parameter.
 fn truth(condition: Condition) -> Vec<(&'static str, f64)> {
     let (s1, s2) = ([0.09, 0.4], [0.07, 1.2]);
     let (first, last) = match condition {
@@ -65,7 +65,7 @@ fn value(fit: &SigmoidFit, name: &str) -> Estimate {
     fit.parameter(name).unwrap().estimate
 }
 
-/// Without the walks along t_M and G.
+/// Returns an estimator without likelihood intervals for t_M and G.
 fn quick() -> SigmoidChange {
     SigmoidChange {
         likelihood_intervals: false,
@@ -94,7 +94,7 @@ fn a_change_without_noise_is_recovered() {
             fit.start()
         );
         assert_eq!(fit.termination().reason, Reason::ExactFit);
-        // Residuals of 1e-15 of the output, information matrix of condition 1e4 at most.
+        // The residuals are 1e-15 of the output, and the condition number of the information matrix is at most 1e4.
         assert!(worst < 1e-10 && fit.change_found());
         // Nothing can be reported about the noise: no standard errors, no intervals.
         assert!(fit.covariance().is_none() && fit.midpoint_interval().is_none());
@@ -105,7 +105,7 @@ fn a_change_without_noise_is_recovered() {
     }
 }
 
-/// Runs of one condition, every parameter printed; the assertions allow for the Monte Carlo error.
+/// Fits runs of one condition and prints every parameter; the assertions allow for the Monte Carlo error.
 fn study(condition: Condition, n: u64) {
     let truth = truth(condition);
     let mut errors = vec![Vec::new(); truth.len()];
@@ -121,7 +121,7 @@ fn study(condition: Condition, n: u64) {
             let parameter = fit.parameter(name).unwrap();
             let error = parameter.estimate.value - true_value;
             errors[i].push(error);
-            // A standard error, or a reason why there is none.
+            // There is a standard error, or a reason why there is none.
             assert!(
                 parameter.estimate.standard_error.is_some() == parameter.remark.is_none(),
                 "{name}"
@@ -163,18 +163,18 @@ fn study(condition: Condition, n: u64) {
         if !["t_M", "G"].contains(name) {
             regular += with;
             covered += inside[i];
-            // d1 is drawn to zero by what the operator's parameters take from the slow noise:
-            // 0.0019, a third of its error.
+            // d1 is biased towards zero by 0.0019, a third of its standard error, because the operator's parameters fit
+            // part of the slow noise.
             let allowed = 4.0 / (n as f64).sqrt() + if *name == "d1" { 0.4 } else { 0.0 };
             assert!(mean.abs() < allowed * spread, "{name}");
         }
     }
     let share = covered as f64 / regular as f64;
     println!("  all but t_M and G: {:.1} % covered", 100.0 * share);
-    // 8 n intervals, of which gains and lead times come in pairs: a standard error of 2.2 % for n =
-    // 25, four of that.
+    // There are 8 n intervals, in which gains and lead times are correlated in pairs; for n = 25 the standard error is
+    // 2.2 %, and the tolerance is four standard errors.
     assert!(share > 0.86);
-    // One of 25 has a standard error of 4.4 %: four of that below 95 %.
+    // A share of 25 intervals has a standard error of 4.4 %; the limit is four standard errors below 95 %.
     assert!(midpoints as f64 > 0.77 * n as f64 && rates as f64 > 0.77 * n as f64);
 }
 
@@ -214,7 +214,7 @@ fn where_nothing_changes_it_is_said() {
                 assert_eq!(parameter.estimate.standard_error, None, "{name}");
             }
             assert!(fit.midpoint_interval().is_none() && fit.rate_interval().is_none());
-            // The gains are those of a stationary fit, with their errors.
+            // The gains and their standard errors equal those of a stationary fit.
             let here = fit.gains_at(20.0);
             let truth = truth(condition);
             for (name, true_value) in [("K_e", truth[0].1), ("T_L", truth[2].1)] {
@@ -227,7 +227,7 @@ fn where_nothing_changes_it_is_said() {
             "{condition}: gains covered {inside} of {}, largest likelihood ratio {largest:.1}",
             2 * n
         );
-        // 20 intervals in pairs: a standard error of 7 %; four of that.
+        // With 20 intervals, correlated in pairs, the standard error is 7 %; the tolerance is four standard errors.
         assert!(inside >= 13);
     }
     let exact = SigmoidChange::default().fit(&[without_noise(Condition::C1)]).unwrap();
@@ -255,8 +255,7 @@ fn a_record_without_a_change_agrees_with_box_jenkins() {
         .unwrap();
     for ((name, _, a), (_, _, b)) in ours.rows().into_iter().zip(theirs.rows()) {
         let Some(s) = b.standard_error else { continue };
-        // Box-Jenkins starts its residuals one sample earlier or later: a 1/8000 of the
-        // information.
+        // The residuals of Box-Jenkins start one sample earlier or later, which is 1/8000 of the information.
         assert!(
             (a.value - b.value).abs() < 0.05 * s,
             "{name}: {} and {}",
@@ -276,7 +275,8 @@ fn several_records_sharpen_the_change() {
     assert_eq!((single.state_count(), all.state_count()), (2, 8));
     for name in ["K_e1", "K_e2", "T_L1", "T_L2", "t_M", "omega_nm", "tau_e"] {
         let ratio = value(&single, name).standard_error.unwrap() / value(&all, name).standard_error.unwrap();
-        // Four times the data halve the error; that of t_M depends on the error signal around the change.
+        // Four times the data halve the standard error; the standard error of t_M depends on the error signal near the
+        // change.
         assert!((1.3..3.2).contains(&ratio), "{name}: {ratio}");
     }
 }
@@ -307,7 +307,7 @@ fn parameters_can_be_held_and_the_time_axis_moved() {
     let moved = record.clone().starting_at(100.0);
     let later = held.fit(one(&moved)).unwrap();
     let shift = value(&later, "t_M").value - value(&fit, "t_M").value;
-    // For a standard error of half a second; the search stops at 1e-4 of it.
+    // The standard error is half a second, and the search stops within 1e-4 of it.
     assert!((shift - 100.0).abs() < 1e-3, "{shift}");
 
     let trace = fit.trace(record);
@@ -333,7 +333,7 @@ fn residuals_and_simulation_of_a_fit() {
     assert_eq!(residuals.values.len(), fit.residual_count());
     let mean = residuals.values.iter().map(|e| e * e).sum::<f64>() / residuals.values.len() as f64;
     assert!((mean / fit.loss() - 1.0).abs() < 1e-9);
-    // The remainder of u is the remnant.
+    // u minus the simulated output is the remnant.
     let simulated = fit.simulate(record).unwrap();
     let (u, n) = (
         &record.output()[simulated.first..],
@@ -346,13 +346,12 @@ fn residuals_and_simulation_of_a_fit() {
         .map(|((u, w), n)| (u - w - n).powi(2))
         .sum();
     let noise: f64 = n.iter().map(|n| n * n).sum();
-    // 9 parameters, several of them of the slow part of the noise, of some hundred independent
-    // values of it.
+    // The 9 parameters fit part of the slow noise, which has some hundred independent values.
     assert!(left < 0.1 * noise, "{left} {noise}");
     let levels = quick().fit(one(record)).unwrap().noise_levels().unwrap();
     let k_n = record.channel("K_n").unwrap();
     let ratio = levels[1] / levels[0] / (k_n[8000] / k_n[0]);
-    // 4000 values on either side give either level to 1.1 %.
+    // With 4000 values on either side, the standard error of each level is 1.1 %.
     assert!((ratio - 1.0).abs() < 0.06, "{ratio}");
 }
 
@@ -402,7 +401,7 @@ fn what_cannot_be_fitted_is_refused() {
     )
     .unwrap();
     assert!(matches!(error(quick(), one(&silent)), IdentError::NoExcitation { .. }));
-    // A few seconds only: the result is reported in any case.
+    // The record has only a few seconds, but there is a result.
     let brief = record.span(39.0, 44.0).unwrap();
     if let Ok(fit) = SigmoidChange::default().fit(one(&brief)) {
         assert!(fit.parameters().iter().all(|p| p.estimate.value.is_finite()));

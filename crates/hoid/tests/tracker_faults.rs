@@ -1,5 +1,5 @@
-//! Faults in streams: a seeded sample of the study `cargo xtask slow tracker-faults`, on other seeds than those with
-//! which the limits of the guard were set.
+//! Faults in streams: a sample of the study `cargo xtask slow tracker-faults`, with seeds other than those with which
+//! the limits of the guard were tuned.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -12,7 +12,7 @@ use hoid::{
 };
 use tracker_faults::{Effect, Fault, Reference, Run, Signal};
 
-/// A run in which the person stays as they are, and the tracker over it.
+/// Returns runs in which the person does not change, and the trackers over these runs.
 fn references(method: &Method, seeds: std::ops::Range<u64>, seconds: f64) -> Vec<(Run, Reference)> {
     seeds
         .map(|seed| {
@@ -32,7 +32,7 @@ fn effects(references: &[(Run, Reference)], fault: &Fault, at_s: f64) -> Vec<Eff
     references.iter().map(of).collect()
 }
 
-/// The specification is half a standard error.
+/// The specified limit is half a standard error.
 #[test]
 fn an_outlier_moves_no_parameter_by_half_a_standard_error_for_a_second() {
     use Signal::{E, U};
@@ -89,7 +89,7 @@ fn after_a_hostile_span_the_estimate_comes_back_by_itself() {
     }
 }
 
-/// One sample in 1e5 at most.
+/// At most one sample in 1e5 is held back.
 #[test]
 fn nothing_is_held_back_where_nothing_is_wrong() {
     let (mut held, mut samples) = (0, 0);

@@ -39,12 +39,12 @@ pub trait BatchEstimator: Sized + 'static {
     /// set and printed.
     fn options_of_analysis() -> Vec<AnalysisOption<Self>>;
 
-    /// True if orders and delay are numbers of samples, so that a high sampling rate is kept.
+    /// True if orders and delay are numbers of samples; a high sampling rate is then kept.
     fn counts_samples(&self) -> bool {
         false
     }
 
-    /// Returns the names of the inputs besides the error.
+    /// Returns the names of the inputs other than the error.
     fn further_inputs(&self) -> Vec<&str> {
         Vec::new()
     }

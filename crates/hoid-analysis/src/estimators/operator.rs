@@ -67,14 +67,14 @@ impl BatchEstimator for FamilyEstimator {
     }
 
     fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<FamilyFit>, AnalysisError> {
-        // At a line of an excitation there is only one ratio of u to e, to which several inputs may contribute.
+        // At a line of the excitation, several inputs contribute to the single ratio of u to e.
         let alone = with.estimator.channels.is_empty();
         let described = match alone {
             true => data.described(&with.excitation, with.period_s, with.faults),
             false => Ok(None),
         };
         let channel = match &described {
-            // Instruments need no lines, so a channel named by the user is used even if it has none.
+            // Instruments do not require lines, so a channel named by the user is used even without lines.
             Ok(Some(found)) => found.channel.clone(),
             _ => with.excitation.named().filter(|_| alone).map(str::to_owned),
         };

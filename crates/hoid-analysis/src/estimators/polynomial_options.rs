@@ -21,7 +21,7 @@ pub struct Polynomials {
     /// Structure, initial states, search, constraints, loss and focus. Its orders and start are replaced by the fields
     /// below.
     pub template: Estimator,
-    /// Orders by name, each a number or a range to search; an order without an entry is that of the operator.
+    /// Orders by name, each a number or a range to search; an order without an entry is the order of the operator.
     pub orders: NamedOrders,
     /// Shortest and longest dead time in s; replaces the order nk.
     pub delay_s: Option<(f64, f64)>,
@@ -29,7 +29,8 @@ pub struct Polynomials {
     pub criterion: Criterion,
     /// Start of the search: values of all coefficients by name.
     pub start: Option<BTreeMap<String, f64>>,
-    /// Instrumental-variable method that replaces the prediction error method; the latter still selects the orders.
+    /// Instrumental-variable method that replaces the prediction error method for the fit; the orders are still
+    /// selected by the prediction error method.
     pub method: Option<IvMethod>,
     /// Components of the instruments; by default the forcing function, if it was recorded.
     pub instruments: Option<Instruments>,

@@ -145,7 +145,7 @@ impl BatchEstimator for Polynomials {
     }
 
     fn structure(&self) -> Setting {
-        // The default estimator is not a polynomial structure, so the user requested this one.
+        // The default estimator is not a polynomial structure, so the user must have requested this structure.
         Setting::new("structure", self.template.structure.name()).given(true)
     }
 
@@ -156,7 +156,7 @@ impl BatchEstimator for Polynomials {
         let sample_time = records[0].sample_time();
         let ranges = how.ranges(sample_time)?;
         let combinations = ranges.combinations()?;
-        // Methods with instrumental variables work without means, and no level is estimated.
+        // Instrumental-variable methods use data without means and estimate no level.
         let mut estimator = Estimator {
             level: !level.is_kept() && how.method.is_none(),
             ..how.estimator(&combinations)?
@@ -197,8 +197,8 @@ impl BatchEstimator for Polynomials {
         let mut verdict = fit.verdict(records, choice.as_ref())?;
         let steps = records.iter().all(steps_from_level_to_level);
         if steps {
-            // Step tests determine only the response after the steps, so a finding on the influence of one stretch does
-            // not apply.
+            // A step test has information only after its steps, so a finding on the influence of one stretch does not
+            // apply.
             let others = verdict.findings().iter().filter(|finding| finding.kind != "stretch");
             verdict = Verdict::of(others.cloned().collect());
         }

@@ -141,7 +141,8 @@ pub fn operator(found: &Result<OperatorEstimate, NotConvertible>) -> Value {
             }
             Value::Object(map)
         }
-        // A model with the orders of no operator is not expected to represent one, so no reason is given.
+        // A model whose orders differ from those of an operator is not expected to represent one, so no reason is
+        // given.
         Err(NotConvertible::OtherOrders { .. } | NotConvertible::PolesInBoth { .. }) => Value::Null,
         Err(reason) => json!({"convertible": false, "reason": reason.to_string()}),
     }

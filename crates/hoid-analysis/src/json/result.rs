@@ -36,7 +36,7 @@ pub trait BatchAnswer: Answers + Serialize + DeserializeOwned {
 
 /// The result of any batch fit.
 #[derive(Debug, Clone)]
-// Variants may differ much in size, since a result is read once and not stored in large numbers.
+// The variants may differ greatly in size, because results are read one by one and not stored in large numbers.
 #[allow(clippy::large_enum_variant)]
 pub enum BatchResult {
     /// Operator of a person in the form that the evidence supports.

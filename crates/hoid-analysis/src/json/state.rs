@@ -3,9 +3,9 @@
 //! The numbers outside the state in the JSON object are meant for people and other programs; a model contains more
 //! (covariances of quantities that are not printed, states, fixed parameters). The complete state is written as TOML,
 //! which can represent infinity and NaN, whereas JSON cannot, and is stored as one text in the JSON object;
-//! floating-point numbers are written with enough digits to restore every bit. The first eight bytes of the SHA-256
-//! hash precede the text: a text that was truncated or edited by hand is refused. The hash protects against damage, not
-//! against deliberate forgery.
+//! floating-point numbers are written with enough digits to restore every bit. The first eight bytes of its SHA-256
+//! hash precede the text, so a text that was truncated or edited by hand is refused. The hash protects against damage,
+//! not against deliberate forgery.
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;

@@ -1,4 +1,4 @@
-//! Advice on how to read a file, and the command to type. Both are shown as text, since nothing is chosen silently.
+//! Advice on how to read a file, and the command to type. Both are shown as text, so that the user makes every choice.
 
 use hoid_ident::frequency::COMMON_EXCITATIONS;
 use hoid_io::{TimeChoice, TrialChoice};

@@ -35,7 +35,7 @@ pub(super) fn of_control(
             .map_or_else(String::new, |finding| finding.message));
     }
     let ts_s = record.sample_time().s();
-    // Adding 0.0 turns -0.0 into 0.0.
+    // Adding 0.0 converts -0.0 to 0.0.
     let samples = (-found.delay_s / ts_s).round() + 0.0;
     let plural = if samples == 1.0 { "" } else { "s" };
     Ok(Lag {
@@ -55,7 +55,7 @@ mod tests {
 
     use super::*;
 
-    /// A loop around `y = (u + d) / s` with noise in u, recorded some samples late.
+    /// A loop around `y = (u + d) / s` with noise in u, which is recorded a number of samples late.
     fn integrated(late: usize) -> Record {
         let (ts, n) = (0.02_f64, 2000_usize);
         let (mut y, mut noise, mut state) = (0.0, 0.0, 7_u64);

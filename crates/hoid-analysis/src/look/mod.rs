@@ -1,7 +1,7 @@
 //! Examination of a file: the meaning of its columns, the excitation of the loop and its span of whole periods, and
 //! the lag of the recorded control.
 //!
-//! The command line, the analysis of groups and Python use this module. Nothing is chosen silently: the findings and
+//! The command line, the analysis of groups and Python use this module. No choice is made silently: the findings and
 //! their evidence are shown as [`Advice`] on how to read the file. Values given by the user are not searched for.
 //!
 //! | file | contents |

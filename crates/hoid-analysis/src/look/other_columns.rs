@@ -1,5 +1,5 @@
 //! Error for a file in which the requested columns are missing but error and control are recognised under other names.
-//! Nothing is chosen silently: the message shows which columns to request.
+//! No column is chosen silently: the message shows which columns to request.
 
 use std::path::Path;
 

@@ -17,7 +17,7 @@ const MOST_CUT_S: f64 = 20.0;
 const MOST_CUT_SHARE: f64 = 0.4;
 /// Minimum number of lines of an excitation, since people can predict a single sine.
 const FEWEST_LINES: usize = 3;
-/// Largest ratio of two leaked fractions of the power that count as equal.
+/// Largest ratio of two leaked fractions of the power that are treated as equal.
 const LEAKS_ALIKE: f64 = 3.0;
 /// Fraction of the power outside the lines that may be due to rounding to about five digits.
 const ROUNDING: f64 = 1e-9;
@@ -191,8 +191,8 @@ mod tests {
         assert_eq!(found.excitation.harmonics(), [1, 3, 7, 12]);
     }
 
-    /// Samples after the last period, as from a recorder that was stopped late: the span to the end of the record
-    /// leaks little, but is not a whole period.
+    /// The record has a few samples after the last period, as if the recorder was stopped late. The span to the end of
+    /// the record leaks little, but does not consist of whole periods.
     #[test]
     fn a_period_is_not_drawn_out_by_samples_at_the_end() {
         let whole = record(&[1.0, 2.0, 3.0]);

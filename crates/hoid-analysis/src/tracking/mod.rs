@@ -6,8 +6,8 @@
 //!
 //! A high sampling rate is reduced. Orders that are not given are searched on the span of the start fit. The recursion
 //! then processes the record; if a second run is given, it determines the covariance of the recursion. The verdict
-//! combines the verdict on the trace and the findings on the recording. The guard handles faults sample by sample, so
-//! that a recording is not repaired beforehand.
+//! combines the verdict on the trace and the findings on the recording. The guard handles faults sample by sample, so a
+//! recording is not repaired beforehand.
 
 mod errors;
 mod inputs;

@@ -151,7 +151,7 @@ fn differences(found: &Comparison, verbose: bool) -> Rows {
         .iter()
         .filter_map(|d| Some(d.effect_size.as_ref()?.name.as_str()))
         .collect();
-    // If all rows have the same kind of effect size, the header contains the name of that kind.
+    // If all rows have the same kind of effect size, the header contains its name.
     let size = sizes.first().filter(|name| sizes.iter().all(|other| other == *name));
     let mut header = vec!["quantity"];
     header.extend(several.then_some("factor"));

@@ -93,7 +93,8 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Converts polynomials whose orders are not those of a gain with a lead to an operator of the family, and prints it.
+/// Converts polynomials with orders other than those of a gain with a lead to an operator of the family, and prints
+/// this operator.
 fn to_family(args: &ConvertArgs, f: &[f64], b: &[f64], sample_time: SampleTime) -> Result<(), CliError> {
     let orders = Orders {
         nb: b.len(),

@@ -47,7 +47,7 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
             k_n: scenario.remnant_gain_for(&state, order, level, definition),
         })
         .collect();
-    // A noise level that cannot be reached is a row of the table; any other error concerns all noise levels.
+    // A noise level that cannot be reached gives a row of the table; any other error concerns all noise levels.
     for g in &gains {
         if let Err(error) = &g.k_n
             && !matches!(error, ModelError::UnreachableNoiseLevel { .. })

@@ -19,7 +19,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         cell: args.cell,
         replication: args.replication,
     };
-    // A value out of range ends with 1, like that of a scenario file; an option that does not apply ends with 2.
+    // A value out of range gives exit code 1, as in a scenario file; an option that does not apply gives exit code 2.
     args.sample_time.map(SampleTime::new).transpose()?;
     let scenario = changes(args)
         .apply(chosen_scenario(&args.base)?)
@@ -81,7 +81,7 @@ fn changes(args: &SimulateArgs) -> ScenarioChanges {
     }
 }
 
-/// Names the option as on the command line.
+/// Converts the error; the message contains the option as typed on the command line.
 fn refused(error: &ScenarioChangeError) -> CliError {
     CliError::Usage(format!("--{} {}", error.option.replace('_', "-"), error.reason))
 }

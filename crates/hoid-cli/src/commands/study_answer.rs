@@ -1,8 +1,8 @@
 //! Summary of a study: relative bias of the operator's parameters, as a table that fits onto one screen.
 //!
-//! Each row is for one estimator in one cell: how many of its estimates could be converted to an operator, and for each
-//! parameter the median of `100 (estimate - true) / true` with its Monte Carlo error. The median is used because single
-//! estimates of a poor model may have arbitrarily large errors.
+//! Each row describes one estimator in one cell: the number of its estimates that could be converted to an operator,
+//! and for each parameter the median of `100 (estimate - true) / true` with its Monte Carlo error. The median is used
+//! because single estimates of a poor model may have arbitrarily large errors.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use hoid::report::numbers;
 
 use crate::{error::CliError, text};
 
-/// Parameters in order of preference; the first ones that the table contains are shown.
+/// Parameters in order of preference; the first of them that the table contains are shown.
 const PARAMETERS: [&str; 10] = [
     "K_e",
     "K_over_T_I",

@@ -1,10 +1,10 @@
 //! Pseudo-random numbers from a seed: SplitMix64 (G. L. Steele, D. Lea, C. H. Flood, *Fast splittable pseudorandom
-//! number generators*, 2014). For tests that run the program and for the studies with it.
+//! number generators*, 2014). They are used by tests and studies that run the program.
 
 pub struct Draw(pub u64);
 
 impl Draw {
-    /// 64 bits.
+    /// Returns 64 bits.
     pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -13,12 +13,12 @@ impl Draw {
         z ^ (z >> 31)
     }
 
-    /// An integer below `n`; 0 if `n` is 0.
+    /// Returns an integer below `n`; 0 if `n` is 0.
     pub fn below(&mut self, n: usize) -> usize {
         (self.bits() % (n.max(1) as u64)) as usize
     }
 
-    /// From [0, 1).
+    /// Returns a number in [0, 1).
     pub fn share(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }

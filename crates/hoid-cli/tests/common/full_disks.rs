@@ -1,7 +1,8 @@
-//! `study`, `group` and `track` on disks that fill before the output is complete: existing files are complete, the
-//! blocks before the fault are kept, and on another disk the command resumes and gives the files of an undisturbed run.
+//! `study`, `group` and `track` on disks that become full before the output is complete: existing files are complete,
+//! earlier blocks are kept, and on another disk the resumed command gives the files of an undisturbed run.
 //!
-//! A disk of random size between a page and the largest size of a whole run fills at a random write.
+//! The size of a disk is random, between a page and the largest size of a whole run, so the disk becomes full at a
+//! random write.
 
 use std::fs;
 
@@ -11,7 +12,7 @@ use crate::{
     interrupted::{Bench, Work, compare, files},
 };
 
-/// A page of a disk, kB.
+/// Size of a page of a disk, kB.
 const PAGE_KB: usize = 4;
 
 /// Result of the rounds.
@@ -19,19 +20,19 @@ const PAGE_KB: usize = 4;
 pub struct Outcome {
     /// Number of rounds whose disk was full.
     pub full: usize,
-    /// Number of complete blocks that existed.
+    /// Number of complete blocks found on the disks.
     pub blocks: usize,
     pub failures: Vec<String>,
 }
 
-/// Runs a number of rounds of a work; none if no separate disk can be mounted.
+/// Runs a number of rounds of a work; `None` if no separate disk can be mounted.
 pub fn rounds(bench: &Bench, work: &Work, count: usize, draw: &mut Draw) -> Option<Outcome> {
     let whole = bench.place(work, "whole");
     fs::create_dir_all(&whole).unwrap();
     bench.whole(work, "whole");
     let expected = files(&whole);
     let bytes = |all: &std::collections::BTreeMap<_, Vec<u8>>| all.values().map(Vec::len).sum::<usize>();
-    // Blocks are next to the tables made from them.
+    // The disk contains the blocks in addition to the tables made from them.
     let largest_kb = PAGE_KB * (expected.len() + 2) + (1 + usize::from(work.has_parts)) * bytes(&expected) / 1024;
     let at = bench.at.join("disk");
     fs::create_dir_all(&at).unwrap();
@@ -61,7 +62,7 @@ pub fn rounds(bench: &Bench, work: &Work, count: usize, draw: &mut Draw) -> Opti
             if name.starts_with('.') {
                 fail(format!("{name} is left"));
             } else if name == "study.json" || name == "group.json" {
-                // Progress.
+                // The file contains the progress, so it may differ, but it must be valid.
                 if serde_json::from_slice::<serde_json::Value>(bytes).is_err() {
                     fail(format!("{name} is not whole"));
                 }

@@ -1,6 +1,6 @@
-//! Commands that are interrupted, and their remaining files: the works, the program in a directory, comparison of the
+//! Interrupted commands and their remaining files: the works, the program in a directory, and the comparison of the
 //! files of two runs.
-// Each study uses a part of this module.
+// Each study uses only part of this module.
 #![allow(dead_code, clippy::unwrap_used)]
 
 use std::{
@@ -27,16 +27,16 @@ structure = "bj"
 orders.nd = [1]
 "#;
 
-/// A work to be interrupted.
+/// A command that is interrupted.
 pub struct Work {
     pub name: &'static str,
     /// Arguments before `--out`.
     pub arguments: &'static [&'static str],
-    /// Arguments that resume it.
+    /// Arguments that resume the command.
     pub resume: &'static [&'static str],
-    /// True if its blocks are in `parts/` of the directory itself.
+    /// True if the blocks are in `parts/` of the directory itself.
     pub has_parts: bool,
-    /// Path given to `--out`, relative to its place.
+    /// Path given to `--out`, relative to the directory of the command.
     pub out: &'static str,
 }
 
@@ -49,7 +49,7 @@ pub const STUDY: Work = Work {
     out: "",
 };
 
-/// A group, likewise.
+/// A group, also with blocks in `parts/`.
 pub const GROUP: Work = Work {
     name: "group",
     arguments: &["group", "people", "--jobs", "1"],
@@ -58,7 +58,7 @@ pub const GROUP: Work = Work {
     out: "",
 };
 
-/// Several studies.
+/// A reproduction, which consists of several studies.
 pub const REPRODUCE: Work = Work {
     name: "reproduce",
     arguments: &[
@@ -75,7 +75,7 @@ pub const REPRODUCE: Work = Work {
     out: "",
 };
 
-/// One file.
+/// A trace, which is a single file.
 pub const TRACK: Work = Work {
     name: "track",
     arguments: &["track", "c1.csv", "--method", "rls", "--nk", "29"],
@@ -91,7 +91,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Creates it with a plan, the recordings of a group and one of C1.
+    /// Creates a plan, the recordings of a group and a recording of C1.
     pub fn new(program: PathBuf, at: &Path) -> Self {
         let bench = Self {
             program,
@@ -112,7 +112,7 @@ impl Bench {
         self.at.join(format!("{}-{name}", work.name))
     }
 
-    /// The command whose results are written to a place.
+    /// Returns the command whose results are written to a place.
     pub fn command(&self, work: &Work, place: &Path) -> Command {
         let mut command = Command::new(&self.program);
         command.args(work.arguments).args(work.resume).arg("--out");
@@ -130,15 +130,15 @@ impl Bench {
         command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
     }
 
-    /// Runs to completion.
+    /// Runs a command to completion.
     pub fn whole(&self, work: &Work, name: &str) {
         let status = self.start(work, name).wait().unwrap();
         assert!(status.success(), "{} {name}: {status}", work.name);
     }
 }
 
-/// All files below a directory, by their paths. The page of a reproduction contains the duration of
-/// its studies, the only difference between runs.
+/// Returns all files below a directory, by their paths. The durations on the page of a reproduction are removed,
+/// because they are the only difference between runs.
 pub fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut open = vec![directory.to_owned()];
@@ -161,7 +161,7 @@ pub fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
-/// The differences between the files below a directory and the expected ones.
+/// Returns the differences between the files below a directory and the expected files.
 pub fn compare(expected: &BTreeMap<PathBuf, Vec<u8>>, directory: &Path, what: &str) -> Vec<String> {
     let found = files(directory);
     let differs = |path: &PathBuf| {
@@ -176,7 +176,7 @@ pub fn compare(expected: &BTreeMap<PathBuf, Vec<u8>>, directory: &Path, what: &s
     all.into_iter().filter_map(differs).collect()
 }
 
-/// The program built with this example.
+/// Returns the path of the program built with this example.
 pub fn beside_this() -> PathBuf {
     let mut path = std::env::current_exe().unwrap();
     path.pop();

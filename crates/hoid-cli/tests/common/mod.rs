@@ -1,5 +1,5 @@
-//! Running the program as a user does.
-// Each test file uses a part of this module.
+//! Runs the program as a user does.
+// Each test file uses only part of this module.
 #![allow(dead_code, clippy::unwrap_used)]
 
 use std::{
@@ -34,8 +34,7 @@ pub fn json(directory: &Path, arguments: &[&str]) -> Value {
     serde_json::from_str(&good(directory, arguments)).unwrap()
 }
 
-/// The result of a fit with any verdict: one that is not determined is printed too, with exit code
-/// 1.
+/// Returns the result of a fit with any verdict; a result that is not determined is also printed, with exit code 1.
 pub fn json_of_any_worth(directory: &Path, arguments: &[&str]) -> Value {
     let output = hoid(directory, arguments);
     let found: Value = serde_json::from_slice(&output.stdout)
@@ -45,8 +44,7 @@ pub fn json_of_any_worth(directory: &Path, arguments: &[&str]) -> Value {
     found
 }
 
-/// Exit code and message of a command that fails, which must print nothing on standard output and
-/// leave no file.
+/// Returns exit code and message of a command that fails; it must print nothing on standard output and leave no file.
 pub fn bad(directory: &Path, arguments: &[&str]) -> (i32, String) {
     let files = |d: &Path| fs::read_dir(d).unwrap().count();
     let before = files(directory);
@@ -62,7 +60,7 @@ pub fn bad(directory: &Path, arguments: &[&str]) -> (i32, String) {
     (output.status.code().unwrap(), message)
 }
 
-/// A folder with a simulated run of C1.
+/// Returns a folder with a simulated run of C1.
 pub fn simulated() -> TempDir {
     let directory = TempDir::new().unwrap();
     good(
@@ -72,13 +70,13 @@ pub fn simulated() -> TempDir {
     directory
 }
 
-/// A file of `rows` samples at 100 Hz, each line made by `row` from its index.
+/// Writes a file of `rows` samples at 100 Hz; `row` makes each line from its index.
 pub fn write(directory: &Path, name: &str, header: &str, rows: usize, row: impl Fn(usize) -> String) {
     let lines: Vec<String> = std::iter::once(header.to_owned()).chain((0..rows).map(row)).collect();
     fs::write(directory.join(name), lines.join("\n") + "\n").unwrap();
 }
 
-/// t, e and u of sample k.
+/// Returns t, e and u of sample k.
 pub fn wave(k: usize) -> (f64, f64, f64) {
     let t = k as f64 / 100.0;
     (
@@ -88,14 +86,14 @@ pub fn wave(k: usize) -> (f64, f64, f64) {
     )
 }
 
-/// Sample k as a line of a file.
+/// Returns sample k as a line of a file.
 pub fn row(k: usize) -> String {
     let (t, e, u) = wave(k);
     format!("{t},{e},{u}")
 }
 
-/// Arguments of `track` or `stream` with the physical method, which starts with a fit, unless a
-/// method is given.
+/// Returns arguments of `track` or `stream`, with the physical method, which starts with a fit, unless a method is
+/// given.
 pub fn physical<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
     let mut all = arguments.to_vec();
     if !all.contains(&"--method") {
@@ -104,7 +102,7 @@ pub fn physical<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
     all
 }
 
-/// The value of a setting in a result.
+/// Returns the value of a setting in a result.
 pub fn setting(found: &Value, name: &str) -> String {
     let all = found["settings"].as_array().unwrap();
     let one = all.iter().find(|one| one["name"] == name).unwrap();

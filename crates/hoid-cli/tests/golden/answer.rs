@@ -28,7 +28,7 @@ pub fn run(at: &Path, command: &str, stdin: Option<&str>) -> Output {
         .unwrap()
 }
 
-/// Exit code, standard output, and rows of the written tables.
+/// Returns exit code, standard output, and rows of the written tables.
 pub fn of(at: &Path, call: &Call) -> Value {
     let out = |text: &str| text.replace("{out}", &call.name);
     let done = run(at, &out(&call.command), call.stdin.as_deref());
@@ -48,7 +48,7 @@ fn lines(text: &[u8]) -> Value {
     json!(text.lines().map(|line| line.trim_end()).collect::<Vec<_>>())
 }
 
-/// One JSON object, one per line, or text.
+/// Returns the output as one JSON object, as one object per line, or as text.
 fn printed(bytes: &[u8]) -> Value {
     if let Ok(one) = serde_json::from_slice(bytes) {
         return one;
@@ -58,7 +58,7 @@ fn printed(bytes: &[u8]) -> Value {
     each.map_or_else(|_| lines(bytes), Value::Array)
 }
 
-/// Header, number of rows, some of them and the last.
+/// Returns the header, the number of rows, and some rows including the last one.
 fn rows(text: &str) -> Value {
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
     let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();

@@ -1,11 +1,11 @@
-//! Comparison of two answers: numbers within a tolerance, all else exactly.
+//! Comparison of two answers: numbers must agree within a tolerance, everything else exactly.
 
 use serde_json::Value;
 
-/// Numbers below this are rounding errors.
+/// Numbers below this value are rounding errors.
 const NOTHING: f64 = 1e-15;
 
-/// The changes, each with the key of the call, the old and the new value.
+/// Returns the changes, each with the key of the call, the old and the new value.
 pub fn changes(key: &str, was: &Value, now: &Value, tolerance: f64) -> Vec<String> {
     match (was, now) {
         (Value::Object(a), Value::Object(b)) => {
@@ -52,7 +52,7 @@ fn moved(key: &str, was: &Value, now: &Value) -> String {
     format!("{key}: was {}, now {}", text(was), text(now))
 }
 
-/// JSON with one line for each key of the answer, so that a change is visible in its line.
+/// Formats JSON with one line for each key of the answer, so that a change affects only its line.
 pub fn line_per_key(value: &Value) -> String {
     let Some(map) = value.as_object() else {
         return format!("{value}\n");

@@ -1,4 +1,5 @@
-//! Input files of the calls. A modification of a table is a word with its numbers; `test_golden.py` has the same ones.
+//! Input files of the calls. A modification of a table is a word followed by numbers; `test_golden.py` has the same
+//! modifications.
 
 use std::{fs, path::Path};
 
@@ -32,7 +33,7 @@ fn good(at: &Path, command: &str) -> Vec<u8> {
     done.stdout
 }
 
-/// Columns and rows of a table, with the modifications applied in order.
+/// Applies the modifications to the columns and rows of a table, in order.
 fn changed(text: &str, input: &Input) -> String {
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();

@@ -15,14 +15,14 @@ pub struct Manifest {
     pub calls: Vec<Call>,
 }
 
-/// An input file of calls: made by the program, derived from another one, or written unchanged.
+/// An input file of calls: made by the program, derived from another file, or written unchanged.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Input {
     pub file: String,
     /// Options of `hoid simulate`.
     pub simulate: Option<String>,
-    /// A call whose standard output is the file, or which writes it.
+    /// A call whose standard output is the file, or which writes the file.
     pub command: Option<String>,
     /// Columns of another file, with modifications.
     pub of: Option<String>,
@@ -46,6 +46,6 @@ pub struct Call {
     /// Reason for a larger tolerance.
     #[allow(dead_code)]
     pub reason: Option<String>,
-    /// The call in Python: function, records and keywords.
+    /// The corresponding call in Python: function, records and keywords.
     pub python: Option<BTreeMap<String, toml::Value>>,
 }

@@ -45,7 +45,7 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
     };
     // SAFETY: the strings are supplied by the importer.
     let (name, token, resources) = unsafe { three(name, token, resources) };
-    // FMI 3.0 passes the resources as a path, not as a URI, which FMI 2.0 passes.
+    // FMI 3.0 passes the resources as a path, whereas FMI 2.0 passes a URI.
     let folder = Some(PathBuf::from(resources)).filter(|path| !path.as_os_str().is_empty());
     // SAFETY: the logger is supplied by the importer.
     unsafe { create(name, logger, || Instance::new(token, folder.as_deref())) }

@@ -245,7 +245,7 @@ mod tests {
         instance.set(reference, value).unwrap();
     }
 
-    /// Every output has its value, in the order and of the type of the description.
+    /// Every output has a value, in the order and with the type of the description.
     #[test]
     #[cfg_attr(miri, ignore = "safe code, and a simulated run takes minutes there")]
     fn outputs_are_those_of_the_description() {
@@ -270,7 +270,7 @@ mod tests {
         }
     }
 
-    /// A step of a tenth of the sample time gives the estimate of steps of the sample time.
+    /// Steps of a tenth of the sample time give the same estimate as steps of the sample time.
     #[test]
     #[cfg_attr(miri, ignore = "safe code, and a simulated run takes minutes there")]
     fn shorter_steps_take_the_same_samples() {
@@ -282,7 +282,7 @@ mod tests {
             instance.start().unwrap();
             for k in 0..1000 {
                 for part in 0..parts {
-                    // Within a sample the inputs move on.
+                    // The inputs change within a sample.
                     let moved = f64::from(part);
                     set(&mut instance, "e", FmuStart::Real(record.input()[k] + moved));
                     set(&mut instance, "u", FmuStart::Real(record.output()[k] + moved));
@@ -298,7 +298,7 @@ mod tests {
         assert!(f64::from_bits(expected[0]).is_finite());
     }
 
-    /// A fit lies in the unit; what it is of shows before the data do.
+    /// The unit contains a fit, whose values are reported before the data determine them.
     #[test]
     #[cfg_attr(
         miri,
@@ -362,7 +362,7 @@ mod tests {
         set(&mut instance, "method", FmuStart::Text("kalman".to_owned()));
         assert!(why(instance.start()).contains("adaptive"));
         instance.reset();
-        // The cheapest there is: its method does not matter.
+        // The method does not matter here, so the fastest method is used.
         set(&mut instance, "method", FmuStart::Text("rpem".to_owned()));
         set(&mut instance, "options", FmuStart::Text("{\"nk\": 9}".to_owned()));
         instance.start().unwrap();

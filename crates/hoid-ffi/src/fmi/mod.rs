@@ -10,7 +10,7 @@
 //! | `model` | model that receives the samples: tracker or operator |
 //! | `operator` | operator of a scenario, either of the thesis or of the family |
 //! | `component` | handles, status codes and messages of both FMI versions |
-//! | `state` | saved state of an instance, with which the instance can return to it or another can continue |
+//! | `state` | saved state of an instance, from which this or another instance can continue |
 //! | `fmi2`, `fmi3` | functions of FMI 2.0 and 3.0 |
 
 mod component;

@@ -1,8 +1,8 @@
-//! Saved state of an instance, with which the instance can return to an earlier time or another instance can continue
-//! with bit-identical results (FMI 2.0.4, section 2.1.8; FMI 3.0.1, section 2.2.10).
+//! Saved state of an instance. The instance can return to an earlier time, or another instance can continue, with
+//! bit-identical results (FMI 2.0.4, section 2.1.8; FMI 3.0.1, section 2.2.10).
 //!
-//! A state is held by the importer in its serialised form (`packed`). The description contains the token of the unit,
-//! the phase and times of the experiment, and the values of all variables. The data are those of the tracker, or the
+//! The importer holds a state in its serialised form (`packed`). The description contains the token of the unit, the
+//! phase and times of the experiment, and the values of all variables. The data are the bytes of the tracker, or the
 //! numbers of the operator. 64-bit floating-point numbers are stored in the description as their bit patterns, since
 //! JSON has no NaN.
 

@@ -1,4 +1,4 @@
-//! C compilers, the built library, a recorded run.
+//! C compilers, the built library and a simulated run.
 #![allow(dead_code, clippy::unwrap_used, clippy::print_stderr)]
 
 use std::{
@@ -14,7 +14,7 @@ use hoid_model::{
 };
 use hoid_sim::{RunSeed, Simulator};
 
-/// Data of the tests: 82 s of C4, in which the person changes.
+/// Returns the data of the tests: 82 s of C4, in which the person changes.
 pub fn record() -> Record {
     let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
     let seed = RunSeed {
@@ -24,13 +24,13 @@ pub fn record() -> Record {
     simulator.run(seed, false).unwrap()
 }
 
-/// e and u as lines with all digits.
+/// Returns e and u as lines with all digits.
 pub fn lines(record: &Record) -> String {
     let pairs = record.input().iter().zip(record.output());
     pairs.map(|(e, u)| format!("{e:?},{u:?}\n")).collect()
 }
 
-/// The folder of the library that these tests were built with, and the newest of this name in it.
+/// Returns the newest library with this name in the folder in which these tests were built.
 pub fn library(name: &str) -> PathBuf {
     let tests = env::current_exe().unwrap();
     let deps = tests.parent().unwrap();
@@ -48,7 +48,7 @@ pub fn shared_library() -> PathBuf {
     ))
 }
 
-/// A compiler that is here; its absence is reported.
+/// Returns a compiler if it is installed; otherwise reports that it is missing.
 pub fn compiler(name: &str) -> Option<String> {
     let there = Command::new(name).arg("--version").stdout(Stdio::null()).status();
     if there.is_ok_and(|status| status.success()) {

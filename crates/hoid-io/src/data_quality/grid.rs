@@ -2,12 +2,12 @@
 //!
 //! Row i is at `t_i = t_0 + k_i Ts + jitter` with integers k_i, which increase by one from row to row, and by more
 //! where rows are missing. The increments are `k_i - k_{i-1} = round((t_i - g) / Ts)`, where g is a phase that is
-//! corrected at each row by a small fraction of its deviation from the time: jitter of nearly half a sample is then not
-//! mistaken for a gap. If a row then appears not to advance, the excess increment of a nearby row is undone. Ts is the
-//! least-squares slope, computed twice.
+//! corrected at each row by a small fraction of its deviation from the time. Jitter of nearly half a sample is
+//! therefore not mistaken for a gap. If a row then appears not to advance, the excess increment of a nearby row is
+//! undone. Ts is the least-squares slope, computed twice.
 //!
-//! Jitter is the deviation of the times from straight lines fitted to parts of up to 256 rows without a gap, so that
-//! slow drift does not count as jitter.
+//! Jitter is the deviation of the times from straight lines fitted to parts of up to 256 rows without a gap, so slow
+//! drift does not count as jitter.
 
 use std::borrow::Cow;
 
@@ -206,7 +206,7 @@ pub(super) fn slope(times: &[f64], steps: &[f64]) -> f64 {
         })
     };
     let n = times.len() as f64;
-    // Each index is divided by n before summation, so that the sum does not overflow.
+    // Each index is divided by n before summation to avoid overflow.
     let x = indexed().map(|(index, _)| index / n).sum::<f64>();
     let y = times.iter().map(|t| t / n).sum::<f64>();
     let covariance: f64 = indexed().map(|(index, time)| (index - x) * (time - y)).sum();

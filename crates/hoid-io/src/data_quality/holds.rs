@@ -1,11 +1,12 @@
 //! Duplicated rows, and stalls: all channels hold their values while the time advances.
 //!
-//! A single channel may hold because the hand rests, and two coarsely quantised channels may do so together. The
-//! channel whose natural holds are shortest therefore decides: in a stall all channels hold for longer than
+//! A single channel may hold its value because the hand rests, and two coarsely quantised channels may hold at the same
+//! time. The channel whose natural holds are shortest therefore decides: in a stall all channels hold for longer than
 //! `min_c L_c`. For a quantised channel L is ten times the 90th percentile of the lengths of its holds. For a channel
 //! in full precision L is twice its longest hold while another channel moves; this is 0 unless the channel is printed
-//! with few decimals. If the minimum is 0, each hold of all channels is reported, but if one of them is quantised, not
-//! a hold of a single row. If only one channel moves, stalls are searched only if it is in full precision.
+//! with few decimals. If the minimum is 0, every hold of all channels is reported; if one of the channels is quantised,
+//! holds of a single row are not reported. If only one channel moves, it is searched for stalls only if it is in full
+//! precision.
 
 use std::ops::Range;
 
@@ -107,8 +108,8 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
                     .map_or(0, |longest| longest.saturating_mul(2))
             }
         };
-        // A channel printed with few digits holds at a peak, and may by chance do so together with a quantised channel,
-        // which holds often.
+        // A channel printed with few digits holds its value at a peak. A quantised channel, which holds often, may by
+        // chance hold in the same row.
         let by_chance = usize::from(moving.iter().any(|(_, levels)| levels.is_quantised()));
         moving.iter().zip(&holds).map(natural).min().unwrap_or(0).max(by_chance)
     };

@@ -24,7 +24,7 @@ pub enum QualityIssueKind {
     Gap,
     /// Times that deviate from an evenly spaced grid.
     Jitter,
-    /// A clock whose rate differs from that of another clock, from the given rate or from a common rate.
+    /// A clock whose rate differs from the rate of another clock, from the given rate or from a common rate.
     Clock,
     /// A clock whose rate changes.
     Drift,
@@ -39,8 +39,8 @@ pub enum QualityIssueKind {
 }
 
 impl QualityIssueKind {
-    /// Kinds of problems that are located in part of a record, so that the part can be excluded; a clock error or a
-    /// constant channel affects the whole record.
+    /// Kinds of problems that are located in part of a record, which can be excluded; a clock error or a constant
+    /// channel affects the whole record.
     pub const MASKABLE: [Self; 4] = [Self::Missing, Self::Gap, Self::Stalled, Self::Saturated];
 
     /// Returns the remedy for the problem.

@@ -12,8 +12,8 @@
 //! | `search` | search for all these problems in columns that share a time and in the channels of a record |
 //! | `in_table` | search in the table columns from which a record is made |
 //!
-//! Signals of an operator may legitimately be smooth, quiet or constant: the rules are designed so that no problem is
-//! found in simulated operators without faults (tested). A problem is described without interpretation.
+//! Signals of an operator may legitimately be smooth, quiet or constant. The rules find no problem in simulated
+//! operators without faults, which is tested. A problem is described without interpretation.
 
 mod grid;
 mod holds;

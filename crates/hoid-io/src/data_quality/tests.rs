@@ -48,7 +48,7 @@ fn kinds(found: &[QualityIssue]) -> Vec<QualityIssueKind> {
 fn smooth_and_quiet_channels_have_no_faults() {
     let [e, u] = smooth();
     assert_eq!(look(&even(), &e, &u), []);
-    // Printed with few decimals, slow, and far from zero.
+    // Slow values far from zero, printed with few decimals.
     let printed = |values: &[f64]| {
         values
             .iter()
@@ -61,7 +61,7 @@ fn smooth_and_quiet_channels_have_no_faults() {
     let at = resting[1000];
     resting[1000..2300].fill(at);
     assert_eq!(look(&even(), &e, &resting), []);
-    // Times that are printed rounded, or in single precision.
+    // Times that are rounded when printed, or in single precision.
     let rounded: Vec<f64> = (0..N).map(|k| (k as f64 / 60.0 * 1e4).round() / 1e4).collect();
     let mut precision = Precision::default();
     precision.add("0.0167");
@@ -83,7 +83,7 @@ fn gaps_are_found_under_jitter_of_nearly_half_a_sample() {
     let mut any = Arbitrary(3);
     let mut t: Vec<f64> = even().iter().map(|t| t + 0.45 * TS * any.next()).collect();
     let [mut e, mut u] = smooth();
-    // In the order of the remaining rows.
+    // The rows are removed from the end, so that the remaining row numbers stay valid.
     for (row, missing) in [(3000, 1), (2000, 7), (1000, 1), (500, 150)] {
         for column in [&mut t, &mut e, &mut u] {
             column.drain(row..row + missing);
@@ -94,7 +94,7 @@ fn gaps_are_found_under_jitter_of_nearly_half_a_sample() {
     let places: Vec<(usize, usize)> = found[0].places.iter().map(|place| (place.row, place.rows)).collect();
     assert_eq!(places, [(500, 150), (850, 1), (1849, 7), (2842, 1)]);
     assert_eq!(found[0].rows, 159);
-    // Uniform within 0.45 of a sample: an RMS of 0.45 / sqrt 3 samples.
+    // The jitter is uniform within 0.45 of a sample, so its RMS value is 0.45 / sqrt 3 samples.
     assert!(
         (found[1].size / (0.45 * TS / 3_f64.sqrt()) - 1.0).abs() < 0.05,
         "{}",
@@ -113,7 +113,7 @@ fn stalls_and_rows_there_twice() {
     let place = found[0].places[0];
     assert_eq!((found[0].places.len(), place.row, place.rows), (1, 702, 91));
     assert!((found[0].size - 0.91).abs() < 1e-9);
-    // Quantised channels hold too; a stall is a longer hold.
+    // Quantised channels also hold their values, but a stall lasts longer.
     let steps = |values: &[f64]| values.iter().map(|v| (v * 20.0).round() / 20.0).collect::<Vec<_>>();
     let coarse = look(&even(), &steps(&e), &steps(&u));
     let stalls: Vec<&QualityIssue> = coarse
@@ -195,7 +195,8 @@ fn clocks() {
     );
     let drifting: Vec<f64> = even().iter().map(|t| t + 5e-5 * t * t).collect();
     let found = look(&drifting, &e, &u);
-    // From 1e-4 * 2 / 3 of the time to the same share of its last third: 40 s * 2 / 3 * 1e-4.
+    // The rate changes by 1e-4 per second over 40 s; the centres of the first and the last third are 2/3 of this time
+    // apart.
     let drift = found.iter().find(|one| one.kind == QualityIssueKind::Drift).unwrap();
     assert!((drift.size - 40.0 * 2.0 / 3.0 * 1e-4).abs() < 2e-4, "{}", drift.size);
     let t = even();
@@ -261,8 +262,8 @@ fn nothing_panics() {
     assert_eq!(look(&[0.0], &[1.0], &[1.0]), []);
 }
 
-/// In a recording of hours, all values are sorted only if the first rows repeat theirs. A later value of another order
-/// of magnitude may leave fewer than eight levels.
+/// In a recording of hours, all values are sorted only if values are repeated in the first rows. A later value of
+/// another order of magnitude may leave fewer than eight levels.
 #[test]
 fn an_outlier_after_a_million_rows() {
     let mut u: Vec<f64> = (0..(1 << 20) + 1000).map(|k| (0.37 * f64::from(k)).sin()).collect();

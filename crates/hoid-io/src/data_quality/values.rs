@@ -2,13 +2,14 @@
 //!
 //! A channel is quantised if at most half of its finite values are distinct (of a long channel, see [`EXAMINED`]) and
 //! the distinct values lie on a grid within `1e-3 q`, where q is the smallest step between two of them. The smallest
-//! and the largest value may lie off the grid, like the end stops of a stick.
+//! and the largest value need not be on the grid: they may be the end stops of a stick.
 //!
-//! A channel is saturated at a limit if it stays there longer than a peak can. In full precision no two consecutive
-//! values are equal by chance: three successive rows at the extreme value are saturation. In a quantised channel a peak
-//! stays longest at its top: a parabola with its top at the far edge of the last step stays 3 times as long there as on
-//! average at the next three steps. Saturation of a quantised channel is reported if the rows at the extreme are at
-//! least 6 times as many as that average, with one stay of at least 5 rows and at least two stays of 3 or more rows.
+//! A channel is saturated at a limit if it stays there longer than is possible at a peak. In full precision no two
+//! consecutive values are equal by chance, so three successive rows at the extreme value count as saturation. In a
+//! quantised channel a peak stays longest at its top level: a parabola whose top is at the far edge of the last step
+//! stays there 3 times as long as, on average, at each of the next three levels. Saturation of a quantised channel is
+//! reported if the number of rows at the extreme is at least 6 times this average, with one stay of at least 5 rows and
+//! at least two stays of 3 or more rows.
 
 use std::ops::Range;
 
@@ -17,8 +18,8 @@ use super::signals::{Signal, Signals, runs};
 use crate::time::sampling::steps;
 use crate::wording::{counted, short};
 
-/// Smallest reported quantisation step, relative to the standard deviation: the quantisation noise has 1e-5 of the
-/// power.
+/// Smallest reported quantisation step, relative to the standard deviation; its quantisation noise has 1e-5 of the
+/// power of the signal.
 const COARSE: f64 = 1e-2;
 /// Number of consecutive rows at the extreme that count as saturation, for channels in full precision and for quantised
 /// channels.
@@ -145,7 +146,7 @@ fn ends(values: &[f64], first: &[f64]) -> Vec<f64> {
     let (lower, upper) = (first.get(Levels::END - 1), first.iter().nth_back(Levels::END - 1));
     let is_outer = |v: &f64| lower.is_some_and(|lower| v <= lower) || upper.is_some_and(|upper| v >= upper);
     let outer: Vec<f64> = values.iter().copied().filter(is_outer).collect();
-    // Compared with a later value of another order of magnitude, the end levels of `first` may be a single level.
+    // Relative to a later value of another order of magnitude, the end levels of `first` may count as a single level.
     let mut levels = distinct(&outer);
     keep_ends(&mut levels);
     levels
@@ -282,8 +283,8 @@ fn missing(
 mod tests {
     use super::*;
 
-    /// An outlier of another order of magnitude after the first rows, compared with which the lowest levels are a single
-    /// level.
+    /// An outlier of another order of magnitude after the first rows: relative to it, the lowest levels count as a
+    /// single level.
     #[test]
     fn an_outlier_in_a_long_channel() {
         for outlier in [1e30, -1e30, 1e308] {
@@ -308,7 +309,7 @@ mod tests {
             assert_eq!((found.len(), found[0].value, found[0].stays.len()), (1, 2.0, 1));
             assert_eq!(found[0].stays[0], 3000..3005);
         }
-        // In the quantised channel all rows are examined: its largest level occurs in one of the last rows.
+        // All rows of the quantised channel are examined, because its largest level occurs in one of the last rows.
         let mut coarse: Vec<f64> = values.iter().map(|v| (10.0 * v).round() / 10.0).collect();
         coarse[3990] = 7.0;
         let found = Levels::examined(&coarse, 64);

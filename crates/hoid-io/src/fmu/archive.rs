@@ -116,7 +116,7 @@ impl Library {
     ///
     /// # Errors
     /// [`IoError::Unreadable`] if the file cannot be read; [`IoError::NoLibrary`] if it is not a shared library for a
-    /// known platform; [`IoError::OtherLibrary`] if the library is not that of hoid.
+    /// known platform; [`IoError::OtherLibrary`] if it is not the library of hoid.
     pub fn read(path: &Path) -> Result<Self, IoError> {
         let bytes = read_bytes(path)?;
         let platform = Platform::of(&bytes).ok_or_else(|| IoError::NoLibrary {

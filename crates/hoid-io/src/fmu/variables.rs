@@ -43,7 +43,7 @@ pub enum FmuStart {
     Real(f64),
     /// An integer or a choice.
     Integer(i32),
-    /// A truth value.
+    /// A Boolean value.
     Boolean(bool),
     /// A text.
     Text(String),

@@ -1,9 +1,10 @@
 //! Recordings of the Brain Imaging Data Structure: a table without a header, whose column names and sampling rate are in
 //! a JSON file (BIDS specification, *Physiological recordings* and *Motion*).
 //!
-//! By the inheritance principle of the specification the JSON file of `sub-01_task-track_run-2_physio.tsv` is also one
-//! with fewer entities, such as `task-track_physio.json`, in the same directory or in one above it. Motion recordings
-//! have their column names in a table `..._channels.tsv` next to them.
+//! By the inheritance principle of the specification, a JSON file with fewer entities, such as
+//! `task-track_physio.json`, in the same directory or in a parent directory, also describes
+//! `sub-01_task-track_run-2_physio.tsv`. Motion recordings have their column names in a table `..._channels.tsv` next
+//! to them.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -14,7 +15,8 @@ use serde::Deserialize;
 
 use crate::table::Cell;
 
-/// Number of directories searched: those of session, person and data set lie above that of the recording.
+/// Number of directories searched: the directory of the recording and, above it, the directories of session, person and
+/// data set.
 const DIRECTORIES: usize = 4;
 
 /// Content of the JSON file of a recording.

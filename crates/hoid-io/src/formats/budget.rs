@@ -1,14 +1,15 @@
-//! Memory limit of a file of any format, since a few bytes can be crafted to decompress to any length.
+//! Memory limit of a file of any format, because a crafted file of a few bytes can decompress to any length.
 //!
 //! A file of n bytes may decompress to `48 MB + 64 n`, at most 16 GB. The environment variable [`UNPACKED`], in
-//! megabytes, replaces this limit if it is larger. Parsing settings takes many times the length of their text (TOML up
-//! to a hundred times, JSON less): their text may have at most 2 MB (TOML) or 10 MB (JSON), or a fraction of the limit
-//! in the environment variable if that is longer.
+//! megabytes, replaces this limit if it is larger. Parsing a settings file takes many times the memory of its text
+//! (TOML up to a hundred times, JSON less). The text may therefore have at most 2 MB (TOML) or 10 MB (JSON), or a
+//! fraction of the limit in the environment variable if that is larger.
 
 use crate::IoError;
 
-/// Number of bytes to which a file of any size may decompress. Readers hold values up to four times during conversion
-/// (as stored, as numbers, as columns, in a survey): reading a file of a few bytes takes less than 300 MB.
+/// Number of bytes to which a file of any size may decompress. Readers hold up to four copies of the values during
+/// conversion (as stored, as numbers, as columns, in a survey), so reading a file of a few bytes takes less than 300
+/// MB.
 const AT_LEAST: u64 = 48 << 20;
 /// Additional decompressed bytes allowed per byte of the file.
 const FACTOR: u64 = 64;

@@ -118,8 +118,9 @@ fn not_readable(path: &Path) -> IoError {
     unknown(path, readable_endings(), elsewhere.map(|(_, remedy)| *remedy))
 }
 
-/// Returns the format of a file that will be read: that of its extension, or text if the extension belongs to no format
-/// and the file starts with a table, as many programs name their text `.dat`, `.log` or without an extension.
+/// Returns the format of a file that will be read: the format of its extension, or text if the extension belongs to no
+/// format and the file starts with a table. Many programs write text files with the extension `.dat` or `.log`, or
+/// without an extension.
 fn format_to_read(path: &Path) -> Result<&'static Format, IoError> {
     let inner = packed::inner(path);
     match format_of(inner.as_deref().unwrap_or(path)) {
@@ -133,7 +134,8 @@ fn format_to_read(path: &Path) -> Result<&'static Format, IoError> {
 /// Number of bytes at the start of a file from which a table is recognised.
 const START: u64 = 64 << 10;
 
-/// True if a file, which may be packed, starts with a table of text. Pipes are not read, since what is read is lost.
+/// True if a file, which may be packed, starts with a table of text. Pipes are not read, because the bytes read would
+/// be lost.
 fn starts_with_table(path: &Path, is_packed: bool) -> bool {
     let read = || -> io::Result<Vec<u8>> {
         let mut start = Vec::new();

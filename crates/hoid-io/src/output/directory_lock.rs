@@ -1,8 +1,8 @@
 //! Exclusive use of a directory of results by one process.
 //!
-//! The lock is an operating-system lock on the directory itself (on a file `.hoid-lock` in the directory where
-//! directories cannot be opened), so that a killed process leaves no lock. On a file system that does not support locks
-//! nothing is locked.
+//! The lock is an operating-system lock on the directory itself (or, on systems where directories cannot be opened, on
+//! a file `.hoid-lock` in the directory), so a killed process leaves no lock. On a file system that does not support
+//! locks nothing is locked.
 
 use std::fs::{File, TryLockError};
 use std::path::Path;

@@ -122,7 +122,7 @@ fn sweep_once(directory: &Path) {
     }
 }
 
-/// Removes the temporary files of processes that have ended. A file that cannot be opened is left.
+/// Removes the temporary files of processes that have ended. A file that cannot be opened is left in place.
 fn sweep(directory: &Path) {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     for entry in entries {

@@ -1,13 +1,13 @@
 //! Change of the sampling rate, with the same anti-aliasing filter for all channels.
 //!
 //! **Every M-th sample** is the decimation of [`hoid_model::resampling`]: nothing is cut at the ends, and the input is
-//! taken in the middle of its longer hold, so that the delay of a model is unchanged.
+//! taken from the middle of its longer hold, so the delay of a model is unchanged.
 //!
 //! **A new sampling frequency** is obtained by interpolating the record with the windowed sinc of [`Kernel`]. Its pass
 //! band ends at 0.8 of the lower of the old and the new Nyquist frequencies; the ripple in the pass band is below 1e-4
 //! (0.001 dB). If the frequency decreases, the stop band starts at the new Nyquist frequency, and aliases are
 //! attenuated by 80 dB. The filter has linear phase, its delay is compensated, and it is the same for all channels, so
-//! that the relation between e and u is preserved. The new samples lie on a grid that starts at the first sample of the
+//! the relation between e and u is preserved. The new samples lie on a grid that starts at the first sample of the
 //! record; samples whose filter would reach beyond the record are cut.
 //!
 //! In a model with a hold (all models of hoid) the input is held over the new sample time T, whereas the input of the
@@ -99,8 +99,8 @@ impl RecordParts {
             Kernel::interpolating()
         };
         let half = kernel.half() as f64;
-        // The new grid starts at the first sample of the record; of its samples, those whose filter lies within the
-        // record, up to rounding, are used.
+        // The new grid starts at the first sample of the record; only samples whose filter lies within the record, up
+        // to rounding, are used.
         let first = ((half - 1e-10) / factor).ceil();
         let end = ((last - half + 1e-10) / factor).floor();
         if first > end {

@@ -63,7 +63,7 @@ pub struct Scaling {
     factor: f64,
     /// Unit that the channel must have if the file gives one.
     from: Option<&'static str>,
-    /// New unit; `None` if it is unknown, since the old one no longer applies.
+    /// New unit; `None` if it is unknown, because the old unit no longer applies.
     to: Option<String>,
 }
 

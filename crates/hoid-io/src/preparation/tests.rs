@@ -7,7 +7,7 @@ use super::*;
 
 const TS: f64 = 0.01;
 
-/// Sine waves below 0.8 of the Nyquist frequency of 50 Hz: Hz, amplitude, phase.
+/// Sinusoids below 0.8 of the Nyquist frequency at 50 Hz: frequency in Hz, amplitude, phase.
 const WAVES: [(f64, f64, f64); 5] = [
     (0.13, 1.0, 0.3),
     (1.7, 0.8, 1.1),
@@ -71,7 +71,7 @@ fn scales_and_units() {
     assert!((found.input()[0] - 180.0).abs() < 1e-12 && found.output()[0] == 25.0);
     assert_eq!((found.output_channel().unit.as_str(), steps.len()), ("deg", 2));
     assert_eq!(steps[1].to_string(), "stick multiplied by 12.5 (now in deg)");
-    // Forwards and backwards, for all pairs.
+    // Each pair is converted forwards and backwards.
     for (from, to) in [("rad", "deg"), ("deg", "mrad"), ("in", "cm"), ("V", "mV"), ("lbf", "N")] {
         let there: Scaling = format!("{from}:{to}").parse().unwrap();
         let back: Scaling = format!("{to}:{from}").parse().unwrap();
@@ -139,7 +139,7 @@ fn whole_offsets_move_rows_and_change_no_number() {
             ..
         }
     ));
-    // In s, and early: the same rows in reverse.
+    // An offset in s, for a channel that was recorded early: the same number of rows is cut at the other end.
     let early = moved("e", Offset::Seconds(-0.02));
     let (found, _) = early.apply(late.clone()).unwrap();
     assert_eq!(found.input(), &late.input()[..98]);
@@ -159,7 +159,7 @@ fn parts_of_a_sample_are_band_limited_interpolation() {
         let error = largest(found.output(), |k| signal(begin + k as f64 * TS));
         assert!(error < 3e-4, "{offset}: {error:e}");
         assert!(largest(found.input(), |k| signal(begin + k as f64 * TS)) < 1e-12);
-        // Edges are cut, not invented.
+        // The ends are cut, and no values are extrapolated.
         let Step::Offset {
             cut_samples: (start, end),
             ..
@@ -204,11 +204,11 @@ fn a_new_rate_down_and_up() {
         assert!((ts * hz - 1.0).abs() < 1e-12);
         let error = largest(found.input(), |k| low(begin + k as f64 * ts));
         assert!(error < 2e-4, "{hz}: {error:e}");
-        // On the grid of the first sample.
+        // The new samples are on the grid that starts at the first sample.
         let steps = (found.time_s(0) - 3.0) / ts;
         assert!((steps - steps.round()).abs() < 1e-6, "{steps}");
     }
-    // The rate that the record already has.
+    // The requested rate is the rate of the record.
     assert!(
         with(|p| p.rate = NewRate::Hz(100.0))
             .apply(record(3, signal, signal))
@@ -272,7 +272,7 @@ fn what_cannot_be_done_is_said() {
         assert!(bad.parse::<Offset>().is_err(), "{bad}");
     }
     assert_eq!(" 0.02s".parse::<Offset>().unwrap(), Offset::Seconds(0.02));
-    // A factor that leads out of floating point is an error of the record.
+    // A factor that makes values overflow is reported as an error of the record.
     let large = scaled("u", Scaling::by(1e300, None).unwrap());
     assert!(
         large

@@ -1,10 +1,9 @@
 //! Alignment of channels that were recorded late, without losing samples at the ends of the span.
 //!
-//! If a channel is shifted by d samples, d rows are missing at one end of the data. A span of whole periods would then
-//! lose its last period. If the file extends beyond the span, additional rows are therefore read, the channels are
-//! shifted, and the span is cut out afterwards, so that it keeps its length. If the file does not extend far enough, or
-//! if the rate changes (the filters of the rate change cut more samples than the offsets), the rows without a sample
-//! are cut.
+//! If a channel is shifted by d samples, d rows are missing at one end of the data, and a span of whole periods would
+//! lose its last period. If the file extends beyond the span, additional rows are therefore read, and the span is cut
+//! out after the channels have been shifted, so it keeps its length. If the file does not extend far enough, or if the
+//! rate changes (the filters of the rate change cut more samples than the offsets), the rows without a sample are cut.
 
 use std::collections::BTreeMap;
 use std::path::Path;

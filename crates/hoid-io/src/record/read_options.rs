@@ -47,8 +47,8 @@ pub struct ReadOptions {
     /// Trials to read; by default trials are recognised by a t that restarts. A record holds one trial;
     /// [`read_segments`](crate::read_segments) returns all trials.
     pub trial: Option<TrialChoice>,
-    /// Sampling frequency in Hz. It takes precedence over the column t, from which only the time of the first sample is
-    /// then taken (0 if there is no t); with [`Repair::resample`] it is the frequency of the new grid. By default the
+    /// Sampling frequency in Hz. It takes precedence over the column t, which then gives only the time of the first
+    /// sample (0 if there is no t); with [`Repair::resample`] it is the frequency of the new grid. By default the
     /// column t determines the sampling.
     pub sampling_hz: Option<f64>,
     /// Selects the samples with `from <= t < to`, s. By default all samples.

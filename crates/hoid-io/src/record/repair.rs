@@ -2,7 +2,7 @@
 //! linearly, and samples with an unevenly spaced t are interpolated onto an evenly spaced grid.
 //!
 //! Interpolated data are not measured. Over a gap of one or two samples this does little harm, but every estimator
-//! takes a long straight line for behaviour of the operator.
+//! attributes a long straight line to the operator.
 
 use std::ops::Range;
 
@@ -10,11 +10,11 @@ use crate::preparation::Step;
 use crate::table::{Table, kept};
 use crate::time::sampling::pairs;
 
-/// Fraction of a step by which rounding may shift a time: a held signal takes the value of a row already this close
-/// before the row.
+/// Fraction of a step by which rounding may shift a time: a held signal changes to the value of a row this fraction of
+/// a step before the row.
 const ROUNDING: f64 = 1e-6;
 
-/// End of the column that the missing values reach, so that they cannot be interpolated.
+/// End of the column at which values are missing, where they cannot be interpolated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum OpenEnd {
     Start,

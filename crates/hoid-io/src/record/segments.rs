@@ -2,9 +2,9 @@
 //! segment becomes a record.
 //!
 //! No data are invented, and each segment has its own initial states in a fit. However, the choice of the excluded
-//! samples depends on the recorded data: without the samples at saturation the largest responses are missing, which
-//! biases the estimate from the rest (the lead of C1, clipped at 1.5 standard deviations, by 9 %; if the clipped
-//! samples are included, the gain is 12 % too small).
+//! samples depends on the recorded data. Without the saturated samples, the largest responses are missing, which biases
+//! the estimate from the remaining samples: the lead of C1, clipped at 1.5 standard deviations, by 9 %. If the clipped
+//! samples are included, the gain is 12 % too small.
 
 use std::ops::Range;
 use std::path::Path;
@@ -27,7 +27,7 @@ use crate::wording::{decimal, list};
 ///
 /// # Errors
 /// As [`read_prepared`]; [`IoError::Preparation`] for kinds without a location (such as a clock error or a constant
-/// channel), for a run-in, and if no segment is left.
+/// channel), for a run-in, and if no segment remains.
 pub fn read_segments(
     path: &Path,
     options: &ReadOptions,
@@ -118,7 +118,7 @@ fn read_trial(
     let mut segments = Vec::new();
     for segment in between(&quality_issues, mask, rows.clone()) {
         let (from, last) = (at(segment.start), at(segment.end.saturating_sub(1)));
-        // The comparison is false if a time is NaN, so that such a segment is skipped.
+        // The comparison is false if a time is NaN, so such a segment is skipped.
         let is_long = last - from >= shortest_s;
         if !is_long {
             continue;

@@ -6,10 +6,10 @@
 //! |---|---|
 //! | [`Sparse::Hold`] | `x_i`, as for a display or an actuator that is updated at `t_i` |
 //! | [`Sparse::Linear`] | `x_i + (x_{i+1} - x_i) (t - t_i)/(t_{i+1} - t_i)`, for a signal that is smooth between samples |
-//! | [`Sparse::Drop`] | none: the row is left out |
+//! | [`Sparse::Drop`] | none: the row is omitted |
 //!
-//! A held value is late on average by half the time between logged values. Rows before the first logged value and after
-//! the last one are cut. All values are computed before the rows and the span are cut, so that a row at the start of a
+//! On average, a held value is late by half the time between logged values. Rows before the first logged value and
+//! after the last one are cut. All values are computed before the rows and the span are cut, so a row at the start of a
 //! span takes the value logged before the span. Text and infinite numbers do not count as missing values: they remain,
 //! and reading refuses them.
 
@@ -28,7 +28,7 @@ const STEP: &str = "sparse";
 ///
 /// # Errors
 /// [`IoError::Preparation`] if a column does not exist, is the time, is named twice or is completely empty, or if no
-/// row is left; [`IoError::NoSuchColumn`].
+/// row remains; [`IoError::NoSuchColumn`].
 pub(super) fn without_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> Result<(Table<'a>, Vec<Step>), IoError> {
     if options.sparse.is_empty() {
         return Ok((table, Vec::new()));

@@ -29,8 +29,8 @@ impl TableReader<'_> {
         }
     }
 
-    /// Returns the rows to use: if missing values are interpolated, those in which all signals have values on both
-    /// sides, since two topics in one table do not start and end in the same row; otherwise all `rows`.
+    /// Returns the rows to use. If missing values are interpolated, these are the rows in which all signals have values
+    /// on both sides, because two topics in one table do not start and end in the same row; otherwise all `rows`.
     pub(super) fn between_values(&mut self, rows: Range<usize>, time: Option<usize>) -> Range<usize> {
         if !self.options.repair.fill {
             return rows;
@@ -88,8 +88,8 @@ impl TableReader<'_> {
         value.is_finite().then_some(value)
     }
 
-    /// Returns the times at which the signal with the most samples has values; `None` unless these are fewer than the
-    /// rows: if two topics share a table, each has its own clock.
+    /// Returns the times at which the signal with the most samples has values, as two topics that share a table have
+    /// separate clocks; `None` unless there are fewer of these times than rows.
     pub(super) fn own_times(&self, rows: &Range<usize>, time: usize, t: &[f64]) -> Option<Vec<f64>> {
         // If the time itself is a signal, it has a value in each row; its values have already been moved out of the
         // table.

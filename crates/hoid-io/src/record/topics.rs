@@ -2,14 +2,15 @@
 //! export the recordings of ROS.
 //!
 //! The rows of the topics are put in the order of t, and rows of the same t are joined. The result is the table of an
-//! outer join: where the topics share their times all cells are filled; otherwise the cells between are missing.
+//! outer join: where the topics share a time, all cells are filled; in other rows, the cells of the other topics are
+//! missing.
 
 use super::read_options::ReadOptions;
 use crate::table::{Signal, Table, kept};
 use crate::time::sampling::pairs;
 
-/// Returns the table with its topics joined, if t decreases, no row has values of input and output, and each of them has
-/// some; otherwise the table unchanged.
+/// Returns the table with its topics joined if t decreases and no row has values of both input and output, although
+/// each of these has values in other rows; otherwise returns the table unchanged.
 pub(crate) fn joined<'a>(table: Table<'a>, options: &ReadOptions) -> Table<'a> {
     let names = table.names();
     let Some(time) = names.iter().position(|name| *name == "t") else {

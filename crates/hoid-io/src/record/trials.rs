@@ -1,11 +1,11 @@
 //! Trials in one file, distinguished by a column that numbers them, by a time that restarts, or by the elements of an
 //! array of structures.
 //!
-//! Each trial becomes a separate record with its own initial states; in a single record of all trials the output after
-//! each boundary would depend on inputs that never occurred. A trial starts where the value of the given column changes
-//! or where t decreases. Without `--trial`, trials are recognised only where t decreases: each trial must have at least
-//! [`SHORTEST`] rows, and t must decrease by at least half of its range in the trial before, which never occurs in a
-//! clock correction. If a column changes exactly where t decreases, the trials have the names in this column.
+//! Each trial becomes a separate record with its own initial states; in a single record of all trials, the output after
+//! each boundary would depend on inputs that never preceded it. A trial starts where the value of the given column
+//! changes or where t decreases. Without `--trial`, trials are recognised only where t decreases: each trial must have
+//! at least [`SHORTEST`] rows, and t must decrease by at least half of its range in the previous trial, which a clock
+//! correction never does. If a column changes exactly where t decreases, the trials have the names in this column.
 
 use std::ops::Range;
 
@@ -88,7 +88,7 @@ fn cell(table: &Table<'_>, at: usize, row: usize) -> Option<String> {
     is_text.then(|| table.source.cell(row, at))
 }
 
-/// Divides a table into trials by a column and by t, or by t only.
+/// Divides a table into trials by a column and by t, or only by t.
 fn parts_by(table: &Table<'_>, choice: &TrialChoice) -> Result<Parts, IoError> {
     let mut begins = falls(table);
     if choice.column == "t" {
@@ -169,7 +169,7 @@ fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
 }
 
 /// Selects a trial from an array of structures, such as `trial(3).e`; the second value is true if a trial was selected
-/// or the array was requested, so that the rows need not be divided into trials.
+/// or the array was requested; the rows then need not be divided into trials.
 pub(crate) fn of_contents(
     mut contents: Contents,
     choice: Option<&TrialChoice>,

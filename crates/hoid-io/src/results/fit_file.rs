@@ -1,7 +1,7 @@
 //! A fit of an operator as printed by `hoid identify --json`, read as a prior or an initial state.
 //!
-//! The JSON object contains more data than are read here; unknown keys are ignored, so that files from later versions
-//! can be read.
+//! The JSON object contains more data than are read here; unknown keys are ignored, so files from later versions can be
+//! read.
 
 use std::path::Path;
 

@@ -8,7 +8,7 @@ use crate::IoError;
 use crate::formats::{ColumnsWriter, Format, RowWriter, Writing, format_to_write};
 use crate::output::{WholeFile, write_atomically};
 
-/// Number of rows written at a time, so that the contents of the file do not depend on the groups in which rows were
+/// Number of rows written at a time; the contents of the file therefore do not depend on the groups in which rows were
 /// appended.
 const GROUP: usize = 1 << 16;
 

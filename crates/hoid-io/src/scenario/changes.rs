@@ -1,5 +1,4 @@
-//! Changes of a scenario that commands and functions take in addition to it: the options of `hoid simulate` and
-//! `pyhoid.simulate`.
+//! Changes to a scenario that commands and functions accept: the options of `hoid simulate` and `pyhoid.simulate`.
 
 use hoid_model::{
     FamilyScenario, Feedforward, ModelError, SampleTime,
@@ -11,7 +10,7 @@ use thiserror::Error;
 
 use super::reading::AnyScenario;
 
-/// Values that replace those of a scenario; `None` keeps the value of the scenario.
+/// Values that replace the values of a scenario; `None` keeps the value of the scenario.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ScenarioChanges {
     /// Order m of the remnant filter.
@@ -32,7 +31,7 @@ pub struct ScenarioChanges {
     pub disturbance: Option<f64>,
 }
 
-/// A change that a scenario cannot take.
+/// A change that is not possible for a scenario.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error("{option} {reason}")]
 pub struct ScenarioChangeError {
@@ -86,7 +85,8 @@ impl ScenarioChanges {
         Ok(scenario)
     }
 
-    /// Refuses the options of remnant and disturbance, which the file of an operator of the family defines itself.
+    /// Refuses the options of remnant and disturbance, because the scenario file of an operator of the family defines
+    /// both.
     fn of_family(&self, mut scenario: FamilyScenario) -> Result<FamilyScenario, ScenarioChangeError> {
         let remnant = "is for the remnant of the thesis; in a scenario with a form, the tables [[remnant]] specify the \
                        remnant";
@@ -143,8 +143,8 @@ fn feedforward(text: &str, neuromuscular: Option<(f64, f64)>) -> Result<Option<F
     Ok(Some(found))
 }
 
-/// Returns a disturbance with the lines of `known` and another root mean square; with the lines between those of the
-/// target of the thesis if `known` has no lines.
+/// Returns a disturbance with the lines of `known` and another root mean square. If `known` has no lines, the lines are
+/// between the lines of the target of the thesis.
 pub(super) fn disturbance(known: &ForcingFunction, rms_deg: f64) -> Result<ForcingFunction, ModelError> {
     let reference = ForcingFunction::reference_disturbance(rms_deg)?;
     let own = known.rms_deg();

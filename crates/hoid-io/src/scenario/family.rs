@@ -200,8 +200,8 @@ impl Source<'_> {
         })
     }
 
-    /// Returns the person's response to a target, which passes through the neuromuscular system of the operator, omega_nm
-    /// in rad/s and zeta_nm.
+    /// Returns the person's response to a target. The response includes the neuromuscular system of the operator, with
+    /// omega_nm in rad/s and zeta_nm.
     pub(super) fn feedforward(
         &self,
         given: &FeedforwardTable,

@@ -27,7 +27,7 @@ fn a_file_with_every_table_is_read() {
     assert_eq!(initial.operator.form(), Form::LeadLag);
     let expected = [4.0, 0.6, 0.2, 11.0_f64.ln(), 0.25_f64.ln(), 0.1437];
     assert_eq!(initial.operator.coordinates(), expected);
-    // K = 20 of [initial] with the T_I of [last].
+    // K = 20 is taken from [initial], T_I from [last].
     let expected = [20.0 / 4.0, 0.5, 0.25, 11.0_f64.ln(), 0.25_f64.ln(), 0.1437];
     assert_eq!(last.operator.coordinates(), expected);
     assert_eq!(initial.controlled_element.den(), [1.0, 0.0]);
@@ -131,7 +131,7 @@ fn what_does_not_fit_is_refused_with_its_remedy() {
             "{message} lacks {part}"
         );
     }
-    // Studies use the operator of the thesis.
+    // Studies accept only the operator of the thesis.
     let message = parse_scenario(SHORT, "x.toml", "x").unwrap_err().to_string();
     assert!(message.contains("key form"), "{message}");
     assert!(matches!(

@@ -38,7 +38,7 @@ pub(super) struct File {
     pub(super) disturbance_rms_deg: Option<Number>,
 }
 
-/// Keys whose value is a list, so that a list in a plan of a study is one value and not several.
+/// Keys whose value is a list; for these, a list in a study plan is a single value and not several alternatives.
 pub const WHOLE_KEYS: [&str; 2] = ["forcing", "disturbance"];
 
 /// Response to a target or to motion; it includes the neuromuscular system of the operator.

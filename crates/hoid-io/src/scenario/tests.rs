@@ -92,8 +92,8 @@ fn a_file_with_every_key_is_c4() {
         realisation: Realisation::Output,
         ..Scenario::condition(Condition::C4)
     };
-    // The last state takes omega_nm and zeta_nm from the initial one, and gives Table 1 to the last
-    // bit.
+    // The last state takes omega_nm and zeta_nm from the initial state, and the forcing function is bit-identical to
+    // Table 1.
     assert_eq!(read_scenario(&path), Ok(expected));
 }
 
@@ -221,7 +221,7 @@ fn a_condition_with_a_displayed_target_and_a_disturbance() {
     assert_eq!(scenario.feedforward, Some(expected));
     assert_eq!(scenario.disturbance.sinusoids().len(), 10);
     assert!((scenario.disturbance.rms_deg() - 0.1).abs() < 1e-15);
-    // The response after the change, with lines of the disturbance and their rms.
+    // The response to the target after the change, and a disturbance given by its lines and their rms.
     let lines = "[[disturbance]]\namplitude_deg = 1\nphase_rad = 0\ncycles = 4\n\
                  [[disturbance]]\namplitude_deg = 1\nphase_rad = 1\nomega_rad_s = 2\n";
     let changing = parse(&format!(
@@ -238,7 +238,7 @@ fn a_condition_with_a_displayed_target_and_a_disturbance() {
         .map(|s| s.amplitude_deg)
         .collect();
     assert!(amplitudes.iter().all(|a| (a - 0.1).abs() < 1e-15), "{amplitudes:?}");
-    // The response to the target may be all that changes.
+    // The change may be limited to the response to the target.
     let only = "condition = \"C1\"\n[schedule]\nrate_per_s = 1\nmidpoint_s = 40\n[feedforward]\nform = \"gain\"\nK = 0.1\n\
                 [feedforward.last]\nK = 0.2\n";
     assert!(parse(only).unwrap().feedforward.unwrap().last.is_some());

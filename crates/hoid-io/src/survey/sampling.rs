@@ -25,7 +25,7 @@ pub struct SamplingSurvey {
     pub first_gap_s: Option<f64>,
     /// Number of rows in which the time is constant or runs backwards.
     pub not_increasing: usize,
-    /// Number of rows in which each other column, unless it is constant, repeats its value in the row before.
+    /// Number of rows in which all other columns, except constant ones, repeat their values in the row before.
     pub repeated: usize,
 }
 

@@ -41,7 +41,7 @@ pub(super) fn values(all: &[f64]) -> Option<ValueSurvey> {
         return None;
     }
     let n = finite.len() as f64;
-    // The values are divided by their number before summation, so that the sum does not overflow.
+    // The values are divided by their number before summation to avoid overflow.
     let mean = if min == max {
         min
     } else {

@@ -108,7 +108,7 @@ fn without_thousands(cell: &str) -> Option<String> {
     };
     let mark = whole.chars().find(|c| !c.is_ascii_digit())?;
     let decimal_sign = last.and_then(|at| number.get(at..)?.chars().next());
-    // Without decimals, a blank may stand between two numbers.
+    // Without decimals, a blank may separate two numbers.
     let is_mark = match mark {
         '.' | ',' => decimal_sign.is_some_and(|sign| sign != mark),
         ' ' => decimal_sign.is_some(),

@@ -2,7 +2,7 @@
 //!
 //! Laboratories often record the target r and the output y of the controlled element instead of the tracking error
 //! `e = r - y`, or use the opposite sign of the control. A column whose name equals the whole text takes precedence, so
-//! that a name may contain a hyphen.
+//! a name may contain a hyphen.
 
 use std::fmt;
 use std::str::FromStr;

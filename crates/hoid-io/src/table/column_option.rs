@@ -15,7 +15,7 @@ pub enum ColumnOption {
 }
 
 impl ColumnOption {
-    /// Returns how the option selects a column.
+    /// Returns instructions for selecting a column with this option.
     pub(crate) fn remedy(self) -> &'static str {
         match self {
             Self::Signals => "select columns with --input and --output as NAME, -NAME or NAME-NAME",

@@ -1,8 +1,8 @@
 //! Columns of numbers as stored in a file, before selection, checks and repair.
 //!
 //! Each format fills a [`Table`]; all further processing (selection of columns, sampling, repair) is the same for all
-//! formats. A value that is missing or not a number is stored as NaN; the file is read again only if an error message
-//! quotes the cell, so that tables of a million rows are processed quickly.
+//! formats. A value that is missing or not a number is stored as NaN. Tables of a million rows are processed quickly,
+//! because the file is read again only if an error message quotes a cell.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -35,7 +35,7 @@ pub(crate) struct Column {
     /// Rows whose value was not recorded but computed from other values of the column (`--sparse`), in increasing
     /// order.
     pub(crate) filled_rows: Vec<usize>,
-    /// True if the computed values are held, so that the signal is constant from each recorded value to the next.
+    /// True if the computed values are held, which makes the signal constant from each recorded value to the next.
     pub(crate) is_held: bool,
     /// Precision of the printed values; kept only for the time.
     pub(crate) precision: Precision,
@@ -240,8 +240,7 @@ pub(crate) fn read_comments<'a>(comments: impl Iterator<Item = &'a str>, columns
 fn for_each_named(list: &str, columns: &mut [Column], set: impl Fn(&mut Column, String)) {
     // If the list has more entries than there are columns, the remaining entries are ignored.
     for part in list.split(',').take(columns.len()).map(str::trim) {
-        // A name may contain blanks, and so may its words: of the columns with a matching name, the one with the
-        // longest name applies.
+        // Both a name and its words may contain blanks: if several column names match, the longest one applies.
         let words_of = |column: &Column| {
             let words = part.strip_prefix(column.name.as_str())?;
             words.starts_with(char::is_whitespace).then(|| words.trim().to_owned())

@@ -22,9 +22,9 @@ impl Precision {
     }
 
     /// Determines the precision of times stored as binary numbers. If a recorder rounds its times, for example to
-    /// tenths of a ms, all times are multiples of one unit of the last decimal, from which the rounding is recognised.
-    /// A rounded number deviates from such a multiple by less than two units of its last binary digit; for the numbers
-    /// of decimals tried here, numbers that were not rounded do not come so close by chance.
+    /// tenths of a ms, all times are multiples of one unit of the last decimal, which reveals the rounding. A rounded
+    /// number deviates from such a multiple by less than two units of its last binary digit; for the numbers of
+    /// decimals tried here, numbers that were not rounded are not so close to a multiple by chance.
     pub(crate) fn of_times(values: &[f64], single: bool) -> Self {
         if single {
             return Self::single();
@@ -164,7 +164,7 @@ mod tests {
         }
         assert!(precision(&["0.30000000000000004"]).unit(0.3) < 1e-15);
         assert_eq!(Precision::default().unit(3.0), 0.0);
-        // The unit is a number for any content of a file.
+        // The unit is a valid number for any file content.
         assert!(precision(&["1e-99999999999", ".", "-", "e"]).unit(1e300) >= 0.0);
     }
 

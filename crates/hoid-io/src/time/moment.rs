@@ -1,8 +1,8 @@
 //! Dates and clock times in text, such as `2024-03-05T10:11:12.020Z`, `05.03.2024 10:11:12,02` or `10:11:12.5`.
 //!
 //! A clock time is counted in ns from the start of 1970 (from midnight if there is no date) in the proleptic Gregorian
-//! calendar. The year is taken to start on 1 March, so that the leap day is its last day: with `y` and `m` shifted in
-//! this way, the number of days is `365 y + y/4 - y/100 + y/400 + (153 m + 2)/5 + d` (H. Hinnant, *chrono-compatible
+//! calendar. The year is assumed to start on 1 March, which makes the leap day its last day: with `y` and `m` shifted
+//! in this way, the number of days is `365 y + y/4 - y/100 + y/400 + (153 m + 2)/5 + d` (H. Hinnant, *chrono-compatible
 //! low-level date algorithms*).
 
 use super::time_choice::Unit;
@@ -11,7 +11,7 @@ use crate::table::{Column, Precision};
 /// Number of ns in a second.
 const NS_PER_S: i64 = 1_000_000_000;
 
-/// Number of ns after which the hands of a clock without a date, and of one without hours, return.
+/// Period in ns after which a clock without a date, or a clock without hours, returns to zero.
 const DAY: i64 = 86_400 * NS_PER_S;
 const HOUR: i64 = 3600 * NS_PER_S;
 
@@ -86,7 +86,7 @@ fn duration(cell: &str) -> Option<Moment> {
     let ns = (value * unit_s * NS_PER_S as f64).round();
     let mut precision = Precision::default();
     precision.add(number);
-    // Larger numbers of ns are not exact, and beyond those of 64 bits.
+    // Larger numbers of ns are not exact, and may exceed 64 bits.
     (ns.abs() < 9e15).then(|| Moment {
         ns: ns as i64,
         precision: precision.shifted(power),
@@ -105,7 +105,7 @@ pub(crate) enum Moments {
     /// All values so far are missing.
     #[default]
     Unknown,
-    /// Clock times in ns: the first one, from which the others are counted, the last one, and what was added to it
+    /// Clock times in ns: the first one, from which the others are counted, the last one, and the time added to it
     /// because the clock returned to zero.
     From { first: i64, last: i64, added: i64 },
     /// The column contains numbers or other texts.
@@ -128,7 +128,7 @@ impl Moments {
             Self::Unknown | Self::No => (ns, ns, 0),
         };
         let mut now = ns.saturating_add(added);
-        // The clock passed its end shortly before: at midnight, or at the full hour.
+        // The clock has returned to zero since the previous row, at midnight or at the full hour.
         if let Some(cycle) = cycle {
             let step = now.saturating_add(cycle).saturating_sub(last);
             if now < last && (0..cycle / 60).contains(&step) {
@@ -182,8 +182,7 @@ fn days_of(date: &str) -> Option<i64> {
         '.' => (c, b, a),
         _ if a.len() != 4 && month_of(b).is_some() => (c, b, a),
         _ if a.len() == 4 => (a, b, c),
-        // Otherwise the month or the day comes first. It is unknown which of them, but this does not matter within one
-        // day.
+        // Otherwise the month or the day comes first. Which of them is unknown, but has no effect within one day.
         _ => (c, a, b),
     };
     let (year, month, day) = (year.len() == 4).then_some((number(year)?, number(month)?, number(day)?))?;
@@ -372,7 +371,7 @@ mod tests {
             column(&["59:59.5", "00:00.0", "59:59.5", "00:00.0"]),
             [0.0, 0.5, 3600.0, 3600.5]
         );
-        // A time that starts again with each trial, a clock that is set back, and a date.
+        // A time that restarts with each trial, a clock that is set back, and a date.
         assert_eq!(column(&["00:00:30", "00:00:00", "00:00:01"]), [0.0, -30.0, -29.0]);
         assert_eq!(column(&["12:00:00", "11:59:59"]), [0.0, -1.0]);
         assert_eq!(

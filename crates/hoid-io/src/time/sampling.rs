@@ -1,10 +1,10 @@
 //! Sampling determined by a column t, and the check that t is evenly spaced.
 //!
 //! The sample time is `Ts = (t_last - t_first) / (N - 1)`. Each t must lie on the grid `t_first + k Ts` within a
-//! tolerance, which is the larger of `1e-3 Ts` and one unit of the last printed decimal of t: files contain rounded
-//! times (0.0167 at 60 Hz), which still count as evenly spaced. If `1 / Ts` is a whole number of Hz within a relative
-//! deviation of `1e-4`, or within the rounding of t, that number is used, so that all runs of a laboratory have the
-//! same sample time.
+//! tolerance, which is the larger of `1e-3 Ts` and one unit of the last printed decimal of t: rounded times in files
+//! (0.0167 at 60 Hz) still count as evenly spaced. If `1 / Ts` is a whole number of Hz within a relative deviation of
+//! `1e-4`, or within the rounding of t, that number is used, so that all runs of a laboratory have the same sample
+//! time.
 
 use crate::table::Precision;
 
@@ -73,8 +73,8 @@ pub(crate) fn even(t: &[f64], precision: Precision, stated_s: Option<f64>) -> Re
     let mean_s = (last - first) / steps;
     let first_unit = rounding.unit(first);
     let tolerance = |t: f64| (JITTER * mean_s).max(rounding.unit(t).max(first_unit) * (1.0 + 1e-6));
-    // The largest excess of the deviation over the tolerance decides; NaN, which results if times overflow, counts as
-    // an excess.
+    // The largest excess of the deviation over the tolerance is decisive; NaN, which results from an overflow, counts
+    // as an excess.
     let deviation = |k: usize, t: f64| (t - (first + k as f64 * mean_s)).abs();
     let excess = t
         .iter()
@@ -353,7 +353,7 @@ mod tests {
             panic!("not found");
         };
         assert_eq!(row, 321);
-        // A deviation of one sample in 1000 moves neither end of the grid.
+        // One deviating sample of 1000 shifts neither end of the grid.
         assert!((deviation_s - 0.002).abs() < 1e-9 && (tolerance_s - 1e-5).abs() < 1e-9);
         t[321] -= 0.001_995;
         assert!(even(&t, precision, None).is_ok());

@@ -11,11 +11,11 @@
 //!    row and are not row numbers.
 //!
 //! A column selected by `--time COLUMN[:unit]` takes precedence. The unit is taken from the name. Without a unit in the
-//! name, it follows from the size of numbers counted from 1970 (1e11 s would be the year 5138), or else from the steps:
-//! integers at least 5 apart are taken to be in the unit that gives a sampling frequency from 2 to 2000 Hz, and not in
-//! s. Numbers from 20 000 to 80 000 or from 700 000 to 800 000 with steps of 0.5 ms to 10 s in days are the serial days of
-//! spreadsheets (from 1900) or the date numbers of MATLAB (from the year 0): in s, the sampling frequency would be above
-//! 8 kHz. The choice is reported.
+//! name, the unit follows from the size of numbers counted from 1970 (1e11 s would be the year 5138), or else from the
+//! steps: integers with steps of 5 or more are not in s, but in the unit that gives a sampling frequency from 2 to 2000
+//! Hz. Numbers from 20 000 to 80 000 or from 700 000 to 800 000 with steps of 0.5 ms to 10 s in days are the serial
+//! days of spreadsheets (from 1900) or the date numbers of MATLAB (from the year 0): in s, the sampling frequency would
+//! be above 8 kHz. The choice is reported.
 
 use std::ops::Range;
 
@@ -25,7 +25,7 @@ use crate::IoError;
 use crate::table::{Column, ColumnOption, Precision, Table};
 use crate::wording::{did_you_mean, list, named, shown};
 
-/// Size above which the numbers in a time stamp column are taken to be counted from 1970: 1e8 s falls in 1973.
+/// Size above which the numbers in a time stamp column are assumed to be counted from 1970: 1e8 s is in 1973.
 const STAMP: f64 = 1e8;
 /// Median step above which integer times are assumed not to be in s.
 const STEP_OF_NO_SECONDS: f64 = 5.0;
@@ -104,7 +104,7 @@ pub(crate) fn is_time(name: &str) -> bool {
     column_role(name) != ColumnRole::Other
 }
 
-/// True if a column may be the time or a part of it, because of its name, its position or the choice of the user.
+/// True if a column may be the time or a part of the time, because of its name, its position or the choice of the user.
 pub(crate) fn may_be_time(at: usize, name: &str, choice: Option<&TimeChoice>) -> bool {
     let last = name.to_lowercase();
     let last = last.rsplit(['.', '_', '/', ' ']).next().unwrap_or_default();
@@ -319,7 +319,7 @@ fn make_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
     if was_t && unit == Unit::Power(0) {
         return;
     }
-    // Of a column that does not look like a time by its name, the printed digits were not counted.
+    // If the name of the column does not denote a time, its printed digits were not counted.
     if time.precision == Precision::default() && !time.moments {
         time.precision = Precision::of_times(&time.values, false);
     }
@@ -365,7 +365,8 @@ fn make_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
         }
         Unit::Minutes | Unit::Hours | Unit::Days => {
             let (unit_s, power) = unit.seconds().unwrap_or((1.0, 0));
-            // Days are counted from a date long ago; the last binary digit of such a number is an appreciable time.
+            // Serial days are counted from a distant date, so the last binary digit of such a number is an appreciable
+            // time.
             let is_date = unit == Unit::Days && is_serial_days(&time.values);
             scale(time, unit_s, if is_date { first } else { 0.0 }, false);
             time.precision = time.precision.shifted(power);
@@ -458,7 +459,7 @@ mod tests {
         ] {
             assert_eq!(unit(first, step), Unit::Power(power), "{first} {step}");
         }
-        // Serial days at 100 Hz, and seconds of the day.
+        // Serial days at 100 Hz, and seconds since midnight.
         for (first, step, unit_found) in [
             (45_321.5, 0.01 / 86_400.0, Unit::Days),
             (739_000.5, 0.01 / 86_400.0, Unit::Days),

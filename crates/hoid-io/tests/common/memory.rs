@@ -2,7 +2,7 @@
 
 use std::fs;
 
-/// Resets the peak memory before something is measured, on systems that support it.
+/// Resets the peak memory before a measurement, on systems that support this.
 pub fn forget_peak() {
     let _ = fs::write("/proc/self/clear_refs", "5");
 }

@@ -1,5 +1,5 @@
 //! Files that tests write and read.
-// Each test file uses a part of this module.
+// Each test file uses only part of this module.
 #![allow(dead_code, clippy::unwrap_used)]
 
 use std::{fs, path::PathBuf};
@@ -22,14 +22,14 @@ impl Desk {
         self.dir.path().join(name)
     }
 
-    /// The record of a file with this text.
+    /// Returns the record of a file with this text.
     pub fn read(&self, text: impl AsRef<[u8]>, options: &ReadOptions) -> Result<ReadRecord, IoError> {
         let path = self.path("run.csv");
         fs::write(&path, text).unwrap();
         read_record(&path, options)
     }
 
-    /// The error for a file with this text, which must name it.
+    /// Returns the error for a file with this text; the error must name the file.
     pub fn error(&self, text: impl AsRef<[u8]>, options: &ReadOptions) -> String {
         let message = self.read(text, options).unwrap_err().to_string();
         assert!(message.contains("run.csv"), "{message}");

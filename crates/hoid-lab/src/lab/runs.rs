@@ -151,7 +151,7 @@ impl Shared {
             });
         let samples: Samples = samples.collect();
         if let (Some(live), false) = (&run.live, samples.is_empty()) {
-            // If the thread of the estimate has ended, the error is ignored: the missing lines show it.
+            // If the thread of the estimate has ended, the error is ignored; the missing lines indicate it.
             let _ = live.send(samples);
         }
         let refused = match run.log.append(batch) {

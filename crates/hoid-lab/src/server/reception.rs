@@ -3,7 +3,7 @@
 //! While no client is connected, the thread waits for the next connection. Otherwise it accepts connections, examines
 //! each client once (complete head, head too long or too late, connection closed by the client), and pauses for
 //! [`PAUSE`] if nothing has happened. New connections are examined before any connection is closed. The page, whose
-//! head arrives at once, is therefore served regardless of the number of other clients; if there are more than [`MOST`]
+//! head arrives at once, is therefore served regardless of the number of other clients. If there are more than [`MOST`]
 //! incomplete connections, the oldest ones are closed.
 
 use std::{

@@ -1,13 +1,13 @@
 //! Journal of a run in progress: each line is complete or absent.
 //!
 //! A line is complete if it has its line end. If a batch cannot be written completely, the write is undone: the files
-//! are truncated to the last complete batch, and the ticks of a batch count only once all three files contain them. A
+//! are truncated to the last complete batch, and the ticks of a batch count only when all three files contain them. A
 //! temporarily full disk therefore leaves no partial line before later lines; the run is ended and is *unverified*.
 //! After a power failure the files are used only up to the last complete line.
 //!
-//! A batch is passed to the operating system when it arrives, so that nothing is lost if the server is killed. It is
-//! flushed to the disk at least every second, which limits the loss if the computer fails. Numbers are written with
-//! enough digits to reproduce every bit.
+//! A batch is passed to the operating system when it arrives, so nothing is lost if the server is killed. It is flushed
+//! to the disk at least every second, which limits the loss if the computer fails. Numbers are written with enough
+//! digits to reproduce every bit.
 
 use std::{
     fs::{File, OpenOptions},
@@ -226,7 +226,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// The third file is on a full disk: the batch is in none of them, and does not count.
+    /// The third file is on a full disk: none of the files contains the batch, and its ticks do not count.
     #[test]
     fn a_batch_that_a_full_disk_refuses_is_taken_back() {
         let dir = tempfile::tempdir().unwrap();
@@ -248,7 +248,7 @@ mod tests {
         assert!(log.append(&batch(10)).unwrap_err().to_string().contains("frames.csv"));
         assert_eq!(log.ticks(), 10);
         assert_eq!(std::fs::read(stem.file("ticks.csv")).unwrap(), before);
-        // Once there is space it continues at the same position.
+        // Once there is space, the log continues at the same position.
         log.files[2].1 = frames;
         log.append(&batch(10)).unwrap();
         assert_eq!(log.ticks(), 20);

@@ -30,8 +30,8 @@ pub struct RunStart {
     pub utc: String,
     /// Condition of the run.
     pub condition: Condition,
-    /// Index of the condition in the configuration. With the seed of the condition and the replication it determines
-    /// the phases.
+    /// Index of the condition in the configuration. Together with the seed of the condition and the replication, this
+    /// index determines the phases.
     pub cell: u64,
     /// Replication; see `cell`.
     pub replication: u64,
@@ -55,7 +55,7 @@ pub struct RunStart {
     pub phases: Vec<Phase>,
 }
 
-/// Whether a run was completed or interrupted.
+/// End of a run: completed or interrupted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RunEnd {
@@ -69,7 +69,7 @@ pub enum RunEnd {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ended {
-    /// Whether the run was completed or interrupted.
+    /// End of the run: completed or interrupted.
     pub how: RunEnd,
     /// Time of the end in UTC.
     pub utc: String,
@@ -89,7 +89,7 @@ impl RunStart {
     /// # Errors
     /// [`LabError::Io`].
     pub fn write(&self, stem: &Stem, task: &Task) -> Result<(), LabError> {
-        // The disturbance is extended to the length of the target, which exceeds that of the run by the preview.
+        // The disturbance is extended to the length of the target, which exceeds the length of the run by the preview.
         let mut disturbance = task.disturbance.clone();
         disturbance.resize(task.target.len(), 0.0);
         let column = |name: &str, values: Vec<f64>| OutputColumn {

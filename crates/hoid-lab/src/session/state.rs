@@ -96,7 +96,7 @@ pub struct Done {
     pub condition: String,
     /// True for a training run.
     pub training: bool,
-    /// Whether the run was completed or interrupted.
+    /// End of the run: completed or interrupted.
     pub how: RunEnd,
     /// Time of the end of the run in UTC.
     pub utc: String,
@@ -185,7 +185,7 @@ impl Session {
     /// # Errors
     /// [`LabError::Damaged`].
     pub fn read(folder: &Path) -> Result<Self, LabError> {
-        // The copy is used only if the file is unreadable; it lags the file by at most one change.
+        // The copy is used only if the file is unreadable; it may lack the last change.
         let facts = match SessionPlan::read(&folder.join(FACTS)) {
             Ok(facts) => facts,
             Err(damaged) => SessionPlan::read(&folder.join(FACTS_AGAIN)).map_err(|_| damaged)?,
@@ -220,7 +220,7 @@ impl Session {
         (0..self.facts.plan.len()).find(|place| !finished(place))
     }
 
-    /// Returns the number of a new run, one more than that of the last run that was started.
+    /// Returns the number of a new run, which is one more than the number of the last run that was started.
     ///
     /// # Errors
     /// [`LabError::Io`].

@@ -7,11 +7,12 @@ use std::{
     process::{Command, Stdio},
 };
 
-/// A separate disk mounted on a folder while this exists: a `tmpfs`, which Linux lets an administrator mount.
+/// A separate disk that is mounted on a folder while this value exists: a `tmpfs`, which an administrator can mount on
+/// Linux.
 pub struct Disk<'a>(&'a Path);
 
 impl<'a> Disk<'a> {
-    /// None if none can be mounted.
+    /// Mounts a disk; `None` if no disk can be mounted.
     pub fn mount(at: &'a Path, kilobytes: usize) -> Option<Self> {
         let size = format!("size={kilobytes}k");
         let mount = Command::new("mount")

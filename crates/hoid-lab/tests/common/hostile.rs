@@ -1,5 +1,5 @@
 //! Invalid messages to a lab, damaged session files, changed settings and results, and trackers restored from modified
-//! numbers with a valid checksum: each gives an answer, and none panics, not even a caught panic.
+//! numbers with a valid checksum: each gives an answer, and none causes a panic, not even one that is caught.
 //!
 //! Case `k` of a seed is the same on every machine.
 #![allow(clippy::unwrap_used)]
@@ -32,7 +32,7 @@ use crate::{
     texts::{self, Text},
 };
 
-/// Ticks of a run.
+/// Number of ticks of a run.
 const TICKS: usize = 500;
 /// Number of messages to one lab.
 const OF_A_LAB: usize = 200;
@@ -59,7 +59,7 @@ const EXTREMES: [f64; 16] = [
     f64::NEG_INFINITY,
 ];
 
-/// The same, and a value that is not a number, as in JSON.
+/// Returns one of these numbers, or a JSON value that is not a number.
 fn extreme(draw: &mut Draw) -> Value {
     match draw.below(12) {
         0 => Value::Null,
@@ -135,7 +135,8 @@ impl Hostile {
         }
     }
 
-    /// Runs a case: of four one a tracker, one messages, one files of a session, one settings or a result.
+    /// Runs a case. Of four cases, one tests a tracker, one tests messages, one tests session files, and one tests
+    /// settings or a result.
     pub fn case(&mut self, seed: u64, number: u64) {
         let mut draw = Draw(seed ^ number.wrapping_mul(0xd134_2543_de82_ef95));
         match number % 4 {
@@ -149,7 +150,7 @@ impl Hostile {
         }
     }
 
-    /// Some messages to a lab in the state left by earlier ones.
+    /// Sends some messages to a lab in the state left by earlier messages.
     fn messages(&mut self, draw: &mut Draw) {
         if self.said % OF_A_LAB == OF_A_LAB - 1 {
             let out = self.directory.path().join(format!("lab-{}", self.said));
@@ -187,7 +188,7 @@ impl Hostile {
         }
     }
 
-    /// A session with one modified file, opened, evaluated and shown.
+    /// Opens, evaluates and shows a session with one modified file.
     fn damaged(&mut self, draw: &mut Draw) {
         let at = self.directory.path().join("damaged/sub-P01/ses-01");
         let _ = fs::remove_dir_all(&at);
@@ -220,7 +221,7 @@ impl Hostile {
         }
     }
 
-    /// A tracker, or a warm-up, from modified numbers with a valid checksum.
+    /// Restores a tracker or a warm-up from modified numbers with a valid checksum.
     fn restored(&mut self, draw: &mut Draw) {
         let which = draw.below(self.trackers.len() + 1);
         let saved = self.trackers.get(which).map_or(&self.warm_up, |(_, numbers)| numbers);
@@ -268,7 +269,7 @@ impl Hostile {
     }
 }
 
-/// Saved trackers after a run, and a warm-up.
+/// Returns saved trackers after a run, and a warm-up.
 fn saved(record: &Record) -> (Vec<(TrackOptions, Vec<f64>)>, Vec<f64>) {
     let span = record.span(0.0, 20.0).unwrap();
     let bj = Structure::BoxJenkins;

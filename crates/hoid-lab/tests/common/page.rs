@@ -1,4 +1,4 @@
-//! The page's engine under node: the same code as in the browser.
+//! The page's engine in Node.js: the same code as in the browser.
 #![allow(dead_code)]
 
 use std::{
@@ -14,7 +14,7 @@ use hoid_lab::{
 use serde_json::{Value, json};
 use sha2::{Digest as _, Sha256};
 
-/// The engine as a process.
+/// The engine in a separate process.
 pub struct Engine {
     child: Child,
     input: ChildStdin,
@@ -22,7 +22,7 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// Nothing if node is not installed.
+    /// Starts the engine; `None` if Node.js is not installed.
     pub fn start() -> Option<Self> {
         let script = concat!(env!("CARGO_MANIFEST_DIR"), "/page/browser-test/engine.mjs");
         let mut child = Command::new("node")
@@ -94,7 +94,7 @@ pub fn same_bits(engine: &mut Engine, seed: u32) -> bool {
     };
     let condition = match condition.course() {
         Ok(_) => condition,
-        // The replaced element was invalid: without the change then.
+        // The element after the change is invalid, so the condition is used without the change.
         Err(_) => Condition {
             last_element: None,
             ..condition
@@ -117,7 +117,7 @@ pub fn same_bits(engine: &mut Engine, seed: u32) -> bool {
     let signals = task.run(&held_inputs(&events, task.ticks));
     let mut hash = Sha256::new();
     for value in signals.u.iter().chain(&signals.e) {
-        // Minus zero plus zero is zero.
+        // Adding zero converts minus zero to zero.
         hash.update((value + 0.0).to_le_bytes());
     }
     answer["sha256"].as_str() == Some(data_encoding::HEXLOWER.encode(&hash.finalize()).as_str())

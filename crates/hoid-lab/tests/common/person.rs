@@ -1,5 +1,5 @@
-//! A page that follows the protocol, without a server: its person does nothing, so that e is the target.
-// Each test file uses a part of this module.
+//! A page that follows the protocol, without a server. The person does not move the device, so e equals the target.
+// Each test file uses only part of this module.
 #![allow(dead_code, clippy::unwrap_used)]
 
 use std::{
@@ -56,7 +56,7 @@ impl Person {
         self.say(begin(number))
     }
 
-    /// Ticks of a run.
+    /// Sends ticks of a run.
     pub fn track(&self, number: usize, ticks: Range<usize>) -> Result<(), String> {
         ticks
             .step_by(BATCH)
@@ -67,7 +67,7 @@ impl Person {
         self.say(json!({"type": "finish", "number": number}))
     }
 
-    /// State of the session, as last sent to the page.
+    /// Returns the state of the session, as last sent to the page.
     pub fn state(&self) -> Value {
         let states = self.heard.try_iter().filter_map(|outgoing| match outgoing {
             Outgoing::Text(text) => serde_json::from_str::<Value>(&text).ok(),
@@ -82,7 +82,7 @@ pub fn begin(number: usize) -> Value {
         "input": {"centre": 512.0, "span": 300.0, "dead": 0.0, "gain": 1.0}})
 }
 
-/// Ticks of a hand at rest.
+/// Returns a batch of ticks with the hand at rest.
 pub fn batch(number: usize, first: usize, e: &[f64]) -> Value {
     json!({"type": "batch", "number": number,
         "batch": {"first": first, "u": vec![0.0; e.len()], "e": e, "events": [], "frames": []}})

@@ -1,5 +1,5 @@
-//! Settings and results of which values or bytes were changed: scenarios, a plan, a manifest, an experiment, a fit.
-// Each test file uses a part of this module.
+//! Settings and results in which values or bytes are changed: scenarios, a plan, a manifest, an experiment, a fit.
+// Each test file uses only part of this module.
 #![allow(clippy::unwrap_used)]
 
 use std::{fs, path::Path};
@@ -24,17 +24,17 @@ const SCENARIOS: [&str; 3] = [
 
 const MANIFEST: &str = include_str!("../../../../fixtures/group/tracking.toml");
 
-/// Reads a text, which may lie at a path, as far as a command does before it computes; true if it is accepted.
+/// Reads a text, which may be stored at a path, as a command does before it computes; true if the text is accepted.
 type Reader = fn(&str, &Path) -> bool;
 
-/// A good text and its reader.
+/// A valid text and its reader.
 pub struct Text {
     text: String,
     is_json: bool,
     reader: Reader,
 }
 
-/// The good texts, with a fit of this record.
+/// Returns the valid texts, including a fit of this record.
 pub fn all(record: &Record) -> Vec<Text> {
     let toml = |text: &str, reader: Reader| Text {
         text: text.to_owned(),
@@ -93,7 +93,7 @@ impl Text {
         (self.reader)(&text, path);
     }
 
-    /// None where a value cannot be written in this form.
+    /// Replaces some values; `None` if a value cannot be written in this form.
     fn with_other_values(&self, draw: &mut Draw) -> Option<String> {
         let mut value: Value = if self.is_json {
             serde_json::from_str(&self.text).ok()?

@@ -19,16 +19,16 @@
 //! slope of the input, gives `Phi`, `Gamma_1`, `Gamma_2` (Van Loan 1978). These matrices are converted back to
 //! polynomials by the Faddeev-LeVerrier recursion on `Phi - I`, in powers of `delta = z - 1`, and a Taylor shift. In
 //! powers of z, the coefficients of a finely sampled system are small differences between multiples of binomial
-//! coefficients; in powers of delta there is no such cancellation, so that numerators of size `(Ts/T)^n / n!` keep
-//! their digits. Both holds accept any delay: the fraction of a sample shifts the instant at which the output is read
-//! (the modified z-transform, Jury 1964).
+//! coefficients; in powers of delta there is no such cancellation, so numerators of size `(Ts/T)^n / n!` keep their
+//! digits. Both holds accept any delay: the fraction of a sample shifts the instant at which the output is read (the
+//! modified z-transform, Jury 1964).
 //!
 //! **Matched.** Of the r zeros at infinity, r - 1 are mapped to z = -1 and one remains at infinity, which gives a delay
 //! of one sample. This is the modified matched method of Franklin, Powell and Workman (section 6.2) and of MATLAB's
 //! `c2d(..., 'matched')`. The gain makes the continuous and the discrete response equal at s = 0. If there are k poles
-//! (or zeros) at s = 0, `s^k H(s)` and `((z - 1)/Ts)^k H(z)` are equal in the limit of small real s, so that the
-//! velocity or acceleration constant is preserved. With or without roots at s = 0, the gain follows from the products
-//! of `p / (e^{p Ts} - 1)` over the poles and over the zeros; a factor with p = 0 is 1/Ts.
+//! (or zeros) at s = 0, `s^k H(s)` and `((z - 1)/Ts)^k H(z)` are equal in the limit of small real s, which preserves
+//! the velocity or acceleration constant. With or without roots at s = 0, the gain follows from the products of
+//! `p / (e^{p Ts} - 1)` over the poles and over the zeros; a factor with p = 0 is 1/Ts.
 
 mod hold;
 mod matched;

@@ -22,7 +22,7 @@ struct Case {
     scipy_den: Vec<f64>,
 }
 
-/// From fixtures/discretise/make.py: exact values in 60 digits (mpmath), and those of
+/// Values from fixtures/discretise/make.py: exact values with 60 digits (mpmath), and the values of
 /// scipy.signal.cont2discrete.
 fn cases() -> Vec<Case> {
     let numbers = |text: &str| -> Vec<f64> { text.split_whitespace().map(|v| v.parse().unwrap()).collect() };
@@ -73,8 +73,8 @@ fn agrees_with_exact_values() {
     assert!(cases.len() >= 40);
     for case in &cases {
         let d = discretise(&case.h, case.sample_time, case.method).unwrap();
-        // Orders 1 to 6 at Ts = 0.01 s: a few roundings; the numerators of order 6 are of size 1e-8
-        // to 1e-12.
+        // Orders 1 to 6 at Ts = 0.01 s: the tolerance is a few rounding errors, although the numerators of order 6 are
+        // as small as 1e-8 to 1e-12.
         assert_close(&case.name, d.num(), &case.num, 1e-14);
         assert_close(&case.name, d.den(), &case.den, 2e-15);
     }
@@ -84,8 +84,8 @@ fn agrees_with_exact_values() {
 fn agrees_with_scipy() {
     for case in cases() {
         let d = discretise(&case.h, case.sample_time, case.method).unwrap();
-        // ss2tf takes a numerator as the difference of two denominators: absolute errors of 1e-15
-        // times binomials.
+        // ss2tf computes a numerator as the difference of two characteristic polynomials, so its absolute errors are
+        // 1e-15 times binomial coefficients.
         let size = largest(&case.scipy_den) + largest(&case.scipy_num);
         for (ours, theirs) in [(d.num(), &case.scipy_num), (d.den(), &case.scipy_den)] {
             assert_eq!(ours.len(), theirs.len());
@@ -145,8 +145,8 @@ fn response_to(h: &DiscreteTransferFunction, input: impl Fn(usize) -> f64, sampl
 
 #[test]
 fn holds_with_a_fraction_of_a_sample_of_delay() {
-    // 0.7 + 2/(s + 3) with a delay of 2.3 samples, by hand: step and ramp start at t = 0, so that
-    // nothing is approximated.
+    // 0.7 + 2/(s + 3) with a delay of 2.3 samples, computed by hand. Step and ramp start at t = 0, so the holds are
+    // exact.
     let sample_time = ts(0.1);
     let delay = 0.23;
     let h = tf(&[0.7, 4.1], &[1.0, 3.0]).with_delay(delay).unwrap();
@@ -155,7 +155,7 @@ fn holds_with_a_fraction_of_a_sample_of_delay() {
         |_| 1.0,
         30,
     );
-    // The triangle hold joins u(-1) = 0 to u(0) by a line; the ramp has u(0) = 0.
+    // The triangle hold interpolates linearly from u(-1) = 0 to u(0); for the ramp, u(0) = 0.
     let ramp = response_to(
         &discretise(&h, sample_time, Method::FirstOrderHold).unwrap(),
         |k| 0.1 * k as f64,
@@ -169,7 +169,7 @@ fn holds_with_a_fraction_of_a_sample_of_delay() {
             let lag = 1.0 - (-3.0 * t).exp();
             (0.7 + 2.0 / 3.0 * lag, 0.7 * t + 2.0 / 3.0 * (t - lag / 3.0))
         };
-        // Accumulated rounding of 30 recursions.
+        // The tolerance allows for the accumulated rounding of 30 recursion steps.
         assert!((step[k] - s).abs() < 1e-13, "{k}: {} and {s}", step[k]);
         assert!((ramp[k] - r).abs() < 1e-13, "{k}: {} and {r}", ramp[k]);
     }
@@ -186,7 +186,7 @@ fn prewarped_tustin_is_exact_at_its_frequency() {
         for omega in [0.5, 11.25, 150.0] {
             let d = discretise(h, ts(0.01), Method::TustinPrewarped { omega_rad_s: omega }).unwrap();
             let error = (d.response(omega) - h.response(omega)).norm() / h.response(omega).norm();
-            // Rounding of coefficients over (z - 1)^2 at z = e^{0.005j}.
+            // The rounding errors of the coefficients are divided by (z - 1)^2 at z = e^{0.005j}.
             assert!(error < 1e-10, "{h:?} at {omega}: {error:e}");
             let plain = discretise(h, ts(0.01), Method::Tustin).unwrap();
             assert!((plain.response(omega) - h.response(omega)).norm() / h.response(omega).norm() > error);
@@ -200,14 +200,14 @@ fn prewarped_tustin_is_exact_at_its_frequency() {
 #[test]
 fn matched_has_the_images_of_poles_and_zeros() {
     let sample_time = ts(0.1);
-    // 3 (s + 2) / ((s + 1) (s^2 + 2 s + 26)): one finite zero, two at infinity.
+    // 3 (s + 2) / ((s + 1) (s^2 + 2 s + 26)) has one finite zero and two zeros at infinity.
     let h = tf(&[3.0, 6.0], &polynomial::product(&[1.0, 1.0], &[1.0, 2.0, 26.0]));
     let d = discretise(&h, sample_time, Method::Matched).unwrap();
     for s in [Complex64::new(-1.0, 0.0), Complex64::new(-1.0, 5.0)] {
         let backward = (-s * 0.1).exp();
         assert!(polynomial::value(d.den(), backward).norm() < 1e-13);
     }
-    // Zeros at e^{-0.2} and -1, and one sample of delay.
+    // The discrete zeros are at e^{-0.2} and -1, and there is one sample of delay.
     assert_eq!(d.num()[0], 0.0);
     assert!(polynomial::value(d.num(), Complex64::new(0.2f64.exp(), 0.0)).norm() < 1e-15);
     assert!(polynomial::value(d.num(), Complex64::new(-1.0, 0.0)).norm() < 1e-15);

@@ -1,5 +1,5 @@
 //! Tasks of people: any operator of the family in a loop with any proper controlled element, with a remnant of several
-//! parts and a stick that drifts.
+//! parts and a drifting stick.
 //!
 //! `e = f - y`, `u = Y e + F f + M y + n`, `y = P (u + d)`, where f is a target that the person may see (F,
 //! [`Feedforward`]), y a motion that the person may feel (M), and d is a disturbance at the input of the controlled element P. Changes follow the sigmoid of eq. 5, as in
@@ -13,7 +13,7 @@
 //! | `multi_sine` | [`MultiSine`], [`Excitation`]: targets and disturbances as used in experiments with people |
 //! | `remnant` | [`RemnantPart`], [`Stick`]: components of u other than the response to e and f |
 //! | `typical_feedforward` | [`typical_feedforward`](typical_feedforward()): response to a target with the inverse of the machine |
-//! | `scenario` | [`FamilyScenario`] and the quantities derived from it for a simulation |
+//! | `scenario` | [`FamilyScenario`] and the quantities that a simulation derives from it |
 
 mod display;
 mod multi_sine;

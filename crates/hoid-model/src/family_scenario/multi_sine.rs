@@ -1,11 +1,11 @@
 //! Sums of sines at prime multiples of one frequency, as used in experiments with people.
 //!
 //! `d(t) = sum over primes p of A_p sin(2 pi p t/T + phi_p)` with `A_p` proportional to `1/p`. No line is a harmonic of
-//! another, so that a nonlinear response of a person to one line does not fall on another line, and most of the power
-//! is at low frequencies, which people can follow (D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics
-//! 8 (1967) 231-249; M. M. van Paassen and M. Mulder, *Identification of Human Control Behaviour*, 2006; M. Yamagami et
+//! another, so the harmonics of a nonlinear response to one line do not fall on another line. Most of the power is at
+//! low frequencies, which people can follow (D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics 8
+//! (1967) 231-249; M. M. van Paassen and M. Mulder, *Identification of Human Control Behaviour*, 2006; M. Yamagami et
 //! al., IEEE Trans. Cybernetics 53 (2023) 2039-2050 with primes times 0.05 Hz). The phases are random in each run, so
-//! that no one can memorise the signal.
+//! the signal cannot be memorised.
 
 use std::f64::consts::TAU;
 

@@ -8,13 +8,13 @@
 //! where g and h are normal, b = 1 with probability `lambda Ts` and 0 otherwise (Poisson pulses), and s is 1 or 0 (on
 //! or off) for exponentially distributed times with means `T_on` and `T_off`, `D = T_on/(T_on + T_off)`. The factor m
 //! is given by `m^2 = 1 - c + c r^2/E r^2`, where r^2 is the running mean square of u or of its rate and `E r^2` is its
-//! mean over the whole run. The factors of g(k) and h(k) are independent of g(k) and h(k), so that w is white with unit
-//! variance, and the filter alone determines the spectrum and the strength of the remnant.
+//! mean over the whole run. The factors of g(k) and h(k) are independent of g(k) and h(k). Therefore w is white with
+//! unit variance, and the filter alone determines the spectrum and the strength of the remnant.
 //!
 //! | part | source |
 //! |---|---|
 //! | broad band, `1/(T_n s + 1)^m` | eq. 3 of the thesis; W. H. Levison, S. Baron and D. L. Kleinman, IEEE Trans. Man-Machine Systems 10 (1969) 101-108 |
-//! | peak near omega_nm | tremor that the neuromuscular loop passes: R. E. Magdaleno and D. T. McRuer, NASA CR-1757 (1971) |
+//! | peak near omega_nm | tremor in the pass band of the neuromuscular loop: R. E. Magdaleno and D. T. McRuer, NASA CR-1757 (1971) |
 //! | slow drift | `1/(T_n s + 1)` with T_n of many seconds |
 //! | signal-dependent | C. M. Harris and D. M. Wolpert, Nature 394 (1998) 780-784; Levison et al. for the scaling with the signals |
 //! | pulses | L. R. Young and J. L. Meiry, IEEE Trans. Automatic Control 10 (1965) 336-341; R. A. Hess, J. Guidance and Control 2 (1979) 221-227 |

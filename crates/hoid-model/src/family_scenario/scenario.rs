@@ -31,8 +31,8 @@ pub struct FamilyScenario {
     pub target: Excitation,
     /// Response of u to the displayed target; `None` if the display shows only the error.
     pub feedforward: Option<Feedforward>,
-    /// Response of u to the motion of the controlled element, its output y, which the person feels; `None` without
-    /// motion. Its neuromuscular system is that of the response to the error.
+    /// Response of u to the motion y of the controlled element, which the person feels; `None` without motion. It
+    /// shares the neuromuscular system of the response to the error.
     pub motion: Option<FamilyOperator>,
     /// Disturbance d at the input of the controlled element, held over each sample.
     pub disturbance: Excitation,
@@ -198,7 +198,7 @@ impl ResolvedFamilyScenario {
         delay_at(self.delays, &self.scenario.schedule, t_s)
     }
 
-    /// True if the response to the target changes in time, in itself or by its neuromuscular system.
+    /// True if the response to the target or its neuromuscular system changes over time.
     pub fn feedforward_changes(&self) -> bool {
         let FamilyScenario { initial, last, .. } = &self.scenario;
         let changes = self.scenario.schedule.change_s().is_some();
@@ -207,8 +207,8 @@ impl ResolvedFamilyScenario {
         changes && seen.is_some_and(|seen| seen.last.is_some() || muscles)
     }
 
-    /// Returns the response to motion of a person in a state, with the neuromuscular system of the state and its delay as
-    /// a number of whole samples and a fraction of a sample; `None` without motion.
+    /// Returns the response to motion with the neuromuscular system of the given state, and its delay as a number of
+    /// whole samples and a fraction of a sample; `None` without motion.
     ///
     /// # Errors
     /// As [`FamilyOperator::new`].

@@ -45,7 +45,7 @@ impl FamilyState {
         Ok(crossings(|omega| open_loop.response(omega), MANUAL_CONTROL_RANGE_RAD_S))
     }
 
-    /// True if both states have the same form, so that a transition between them exists.
+    /// True if both states have the same form, which is required for a transition between them.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         let (c, d) = (&self.controlled_element, &other.controlled_element);
         self.operator.is_like(&other.operator) && (c.num().len(), c.den().len()) == (d.num().len(), d.den().len())

@@ -1,11 +1,11 @@
 //! The typical response of people to a displayed target, without a fit to their data.
 //!
-//! **Inverse of the machine.** People who see the target move the hand so that the machine follows it: `F P = g` near 3
-//! rad/s, with g somewhat below one (R. J. Wasicko, D. T. McRuer and R. E. Magdaleno, *Human Pilot Dynamic Response in
-//! Single-Loop Systems with Compensatory and Pursuit Displays*, AFFDL-TR-66-137, 1966; M. Mulder et al., *IEEE Trans.
-//! Human-Machine Systems* 48 (2018) 457-469). With `s = d ln|P|/d ln omega` at 3 rad/s ([`slope`]), F must have the slope -s: it is
-//! a gain, the rate (`K_d s`), or the rate with a lead that adds the remaining slope. Typically, g is .7
-//! ([`FOLLOWED_FRACTION`]); virtual people have values of .4 to 1.
+//! **Inverse of the machine.** People who see the target move their hand such that the machine follows it: `F P = g`
+//! near 3 rad/s, with g somewhat below one (R. J. Wasicko, D. T. McRuer and R. E. Magdaleno, *Human Pilot Dynamic
+//! Response in Single-Loop Systems with Compensatory and Pursuit Displays*, AFFDL-TR-66-137, 1966; M. Mulder et al.,
+//! *IEEE Trans. Human-Machine Systems* 48 (2018) 457-469). With `s = d ln|P|/d ln omega` at 3 rad/s ([`slope`]), F must
+//! have the slope -s: it is a gain, the rate (`K_d s`), or the rate with a lead that adds the remaining slope.
+//! Typically, g is .7 ([`FOLLOWED_FRACTION`]); virtual people have values of .4 to 1.
 //!
 //! **Delay.** Without preview, the delay is the same as in the response to the error. With preview, people respond to
 //! the future target, and the delay is `-2 zeta_nm/omega_nm`, which compensates the lag of the neuromuscular system at
@@ -18,7 +18,7 @@ use crate::{ContinuousTransferFunction, FamilyOperator, Feedforward, Form, Model
 pub const NEAR_CROSSOVER_RAD_S: f64 = 3.0;
 /// Shortest time constant of people, s.
 const SHORTEST_S: f64 = 0.1;
-/// Longest lead of people, s.
+/// Longest lead time constant of people, s.
 pub const LONGEST_LEAD_S: f64 = 2.0;
 /// Fraction of the target that the machine follows.
 pub const FOLLOWED_FRACTION: f64 = 0.7;
@@ -43,8 +43,8 @@ pub fn time_constant(slope: f64, longest_s: f64) -> f64 {
 
 /// Returns the typical response to the target for a person with this response to the error. `followed` is the fraction
 /// g of the target that the machine follows. With a display of the future target, the preview is `shown_s`. `None` for
-/// an element that rises with frequency, or falls so steeply that its inverse needs the neuromuscular system that the
-/// person lacks.
+/// an element whose gain rises with frequency, or falls so steeply that its inverse is proper only with a neuromuscular
+/// system, which the person does not have.
 ///
 /// # Errors
 /// As [`FamilyOperator::new`].
@@ -84,7 +84,7 @@ pub fn typical_feedforward(
     let Some(mut coordinates) = coordinates else {
         return Ok(None);
     };
-    // The gain is set for the intended motion of the hand, which excludes the neuromuscular system.
+    // The gain refers to the intended motion of the hand, before the neuromuscular system.
     let omega = NEAR_CROSSOVER_RAD_S;
     let ([a, b, c, _], _) = form.shape(&lead_s.into_iter().collect::<Vec<_>>());
     let shape = (a - c * omega * omega).hypot(b * omega);
@@ -100,7 +100,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// A gain with the neuromuscular system and the delay of people.
+    /// A gain with a typical neuromuscular system and delay.
     fn person(element: &str) -> FamilyState {
         FamilyState {
             operator: FamilyOperator::new(Form::Gain, true, &[1.0, 11.0_f64.ln(), 0.25_f64.ln(), 0.2]).unwrap(),
@@ -123,7 +123,8 @@ mod tests {
                     .unwrap()
                     .unwrap();
                 assert_eq!(seen.operator.form(), form, "{element}");
-                // Below the frequency of the arm the part is g, and for a preview in phase.
+                // Apart from the dynamics of the arm, the machine follows the fraction g of the target; with a preview
+                // it follows in phase.
                 let omega = 3.0_f64;
                 let (nm, zeta) = state.operator.neuromuscular().unwrap();
                 let z = omega / nm;
@@ -147,7 +148,8 @@ mod tests {
     #[test]
     fn elements_without_a_typical_response() {
         let of = |state: &FamilyState| typical_feedforward(state, Display::Pursuit, 0.7, 0.0).unwrap();
-        // An element that rises with frequency, and one whose inverse a person without muscles cannot give.
+        // An element whose gain rises with frequency, and an element whose inverse is improper without a neuromuscular
+        // system.
         let rising = FamilyState {
             controlled_element: "(s+1)/(s+9)".parse().unwrap(),
             ..person("1/s")
@@ -158,7 +160,7 @@ mod tests {
             ..person("3/s^2")
         };
         assert!(of(&bare).is_none());
-        // A preview that is shorter than the lag of the muscles.
+        // A preview that is shorter than the neuromuscular lag.
         let short = typical_feedforward(&person("1/s"), Display::Preview, 0.7, 0.02)
             .unwrap()
             .unwrap();

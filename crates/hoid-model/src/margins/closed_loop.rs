@@ -28,7 +28,7 @@ const LOWEST: f64 = 1e-4;
 /// Deviation of the phase, in rad, from an integer number of half turns above which it is not attributed to rounding.
 const NO_HALF_TURN_RAD: f64 = 0.5;
 
-/// Returns the number of closed-loop poles in the right half plane for a loop with unit negative feedback. The loop
+/// Returns the number of closed-loop poles in the right half plane of a loop with unit negative feedback, which
 /// consists of a stable operator, given by its frequency response, and a controlled element.
 ///
 /// Returns `None` if this number cannot be determined: the response is not finite, `|L|` is not below one at
@@ -184,7 +184,7 @@ impl<'a> Characteristic<'a> {
                 }
             }
         }
-        // From this frequency to infinity the argument approaches that of the limit without another turn.
+        // From this frequency to infinity, the argument approaches its limit without another turn.
         let limit = if tau == 0.0 && self.open_loop.num().len() == self.order + 1 {
             Complex64::new(1.0 + self.open_loop.num()[0], 0.0)
         } else {

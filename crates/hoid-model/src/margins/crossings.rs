@@ -38,8 +38,7 @@ pub struct Crossings {
 }
 
 impl Crossings {
-    /// Returns the phase margin and the gain margin nearest to zero; of margins equally near, the one at the lowest
-    /// frequency.
+    /// Returns the phase margin and the gain margin nearest to zero; of equal margins, the one at the lowest frequency.
     pub fn margins(&self) -> Margins {
         let nearest = |of: &[Crossing]| {
             of.iter().copied().reduce(|held, next| {
@@ -95,8 +94,8 @@ pub fn crossings(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) 
             let omega = bisect(low, high, |w| above(open_loop(w)) == above(l_low));
             found.gain.push(crossing(omega, phase_margin_deg(open_loop(omega))));
         }
-        // The phase change between neighbouring points is small, so that a change of the sign of the imaginary part in
-        // the left half plane is a crossing of the negative real axis.
+        // Because the phase change between neighbouring points is small, a sign change of the imaginary part in the
+        // left half plane is a crossing of the negative real axis.
         let upper = |l: Complex64| l.im >= 0.0;
         if upper(l_low) != upper(l_high) && l_low.re < 0.0 && l_high.re < 0.0 {
             let omega = bisect(low, high, |w| upper(open_loop(w)) == upper(l_low));

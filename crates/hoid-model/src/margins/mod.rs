@@ -11,19 +11,19 @@
 //! each with its frequency. MATLAB's `margin` and python-control's `margin` use the same rule. Margins do not show
 //! whether a loop is stable, and have no meaning for an unstable loop: see [`closed_loop_is_stable`].
 //!
-//! **Scan.** The scan starts from a logarithmic grid. A step of the grid is halved wherever the phase changes by more
-//! than 0.5 rad over it, judged by the phases at its ends and also by the slopes of the phase there (the phases alone
-//! would not show a whole turn within the step). The phase is therefore followed even with a long delay. Each crossing,
-//! found by a change of sign, is refined by bisection to rounding. Two crossings that are closer together than the grid
+//! **Scan.** The scan starts from a logarithmic grid. A step of the grid is halved if the phase changes by more than
+//! 0.5 rad over it, as computed from the phases and from the slopes of the phase at both ends (the phases alone would
+//! not show a whole turn within the step). The phase is therefore followed even with a long delay. Each crossing, found
+//! by a change of sign, is refined by bisection to rounding. Two crossings that are closer together than the grid
 //! (because the curve nearly touches the limit) are not detected.
 //!
 //! **Stability.** With `L = N e^{-s tau} / D`, the closed loop is stable if `F(s) = D + N e^{-s tau}` has no zero in
 //! the closed right half plane. `F/(s + a)^n`, where n is the degree of D, is analytic there and, if L is strictly
-//! proper, tends to 1, so that its argument changes by `-pi Z` along s = j omega from omega = 0 to infinity, where Z is
-//! the number of zeros (Cauchy's argument principle; Mikhailov's form of the Nyquist criterion). F has no poles, so
-//! that open-loop poles at the origin or on the imaginary axis need no detour, and common factors of N and D in the
-//! right half plane are counted correctly. If only the frequency response Y of a stable, sampled operator is known
-//! ([`unstable_poles`]), `F = D + N Y e^{-s tau}` is followed up to a frequency beyond which `|L| < 1`.
+//! proper, tends to 1. Its argument therefore changes by `-pi Z` along s = j omega from omega = 0 to infinity, where Z
+//! is the number of zeros (Cauchy's argument principle; Mikhailov's form of the Nyquist criterion). F has no poles:
+//! open-loop poles at the origin or on the imaginary axis need no indentation of the contour, and common factors of N
+//! and D in the right half plane are counted correctly. If only the frequency response Y of a stable, sampled operator
+//! is known ([`unstable_poles`]), `F = D + N Y e^{-s tau}` is followed up to a frequency beyond which `|L| < 1`.
 
 mod closed_loop;
 mod crossings;

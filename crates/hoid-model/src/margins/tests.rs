@@ -50,8 +50,8 @@ fn assert_margins(found: Margins, expected: [(f64, f64); 4]) {
 
 #[test]
 fn both_states_of_the_reference() {
-    // scipy.optimize.brentq on |L| - 1 and on Im L; expected-values gives the same, shorter (its
-    // 5.52 rad/s is 5.525 cut off).
+    // Computed by scipy.optimize.brentq on |L| - 1 and on Im L. The printed expected values agree, with fewer digits
+    // (their 5.52 rad/s is 5.525, truncated).
     let tolerance = 1e-9;
     let expected = |values: [f64; 4]| values.map(|v| (v, tolerance));
     let first = [
@@ -72,7 +72,7 @@ fn both_states_of_the_reference() {
 
 #[test]
 fn crossover_model_in_closed_form() {
-    // K e^{-s tau}/s: omega_c = K, phase margin 90 deg - K tau, phase crossover pi/(2 tau).
+    // K e^{-s tau}/s has omega_c = K, the phase margin 90 deg - K tau and the phase crossover pi/(2 tau).
     for (k, tau) in [(1.0, 0.3), (3.0, 0.2), (0.05, 12.0), (2.0, 0.785)] {
         let h = delayed(&[k], &[1.0, 0.0], tau);
         let phase_crossover = PI / (2.0 * tau);
@@ -90,10 +90,10 @@ fn crossover_model_in_closed_form() {
 
 #[test]
 fn the_margins_nearest_to_zero_govern() {
-    // e^{-0.1 s}/s with a lightly damped mode at 9 rad/s crosses gain one at 1.013, 8.482 and 9.428
-    // rad/s with phase margins of 83.94, 22.75 and -120.7 deg, and the negative real axis at 8.786
-    // and 47.2 rad/s with -5.392 and 61.95 dB. By numpy on two million frequencies; python-control
-    // 0.10.2 `stability_margins` chooses the same two.
+    // e^{-0.1 s}/s with a lightly damped mode at 9 rad/s crosses gain one at 1.013, 8.482 and 9.428 rad/s with phase
+    // margins of 83.94, 22.75 and -120.7 deg, and the negative real axis at 8.786 and 47.2 rad/s with -5.392 and 61.95
+    // dB. These values were computed with numpy at two million frequencies; `stability_margins` of python-control
+    // 0.10.2 selects the same two margins.
     let h = delayed(&[1.0], &[1.0, 0.0], 0.1).series(&tf(&[81.0], &[1.0, 0.36, 81.0]));
     assert_margins(
         continuous(&h),
@@ -104,9 +104,9 @@ fn the_margins_nearest_to_zero_govern() {
 
 #[test]
 fn fast_turning_phase_is_followed() {
-    // |L| rises towards 0.9, so that the phase crossover next to the end of the range governs. The delay turns four whole
-    // rounds over the last step of the grid, from 977.2 to 1000 rad/s: seen from its ends it does
-    // not turn.
+    // |L| rises towards 0.9, so the phase crossover nearest to the end of the range determines the gain margin. Over
+    // the last step of the grid, from 977.2 to 1000 rad/s, the delay turns the phase by exactly four revolutions, which
+    // the phases at the ends of the step do not show.
     let tau = 4.0 * 2.0 * PI / (1000.0 * -(-0.01 * 10f64.ln()).exp_m1());
     let h = delayed(&[0.9, 0.0], &[1.0, 500.0], tau);
     let found = continuous(&h);
@@ -146,8 +146,8 @@ fn no_range_no_margins() {
         assert_eq!(margins(|w| h.response(w), range), none);
     }
     assert_eq!(margins(|_| Complex64::new(f64::NAN, 0.0), (0.1, 10.0)), none);
-    // A double integrator lies on the negative real axis: it crosses nothing, and its phase margin
-    // is zero.
+    // The response of a double integrator lies on the negative real axis: it has no phase crossover, and its phase
+    // margin is zero.
     let double = continuous(&tf(&[4.0], &[1.0, 0.0, 0.0]));
     assert_eq!(double.phase_crossover_rad_s, None);
     assert!((double.crossover_rad_s.unwrap() - 2.0).abs() < 1e-12 && double.phase_margin_deg.unwrap().abs() < 1e-9);
@@ -182,23 +182,23 @@ fn stability_with_delay_in_closed_form() {
             );
         }
     }
-    // A pair of zeros enters at K tau = pi/2 + 2 pi k; for 5000 each step of the grid hides many
-    // rounds.
+    // A pair of zeros enters the right half plane at each K tau = pi/2 + 2 pi k. For K tau = 5000 the phase makes many
+    // revolutions within each step of the grid.
     for product in [1.5, 1.6, 60.0, 5000.0] {
         let h = delayed(&[product / 0.28], &[1.0, 0.0], 0.28);
         let pairs = ((product - PI / 2.0) / (2.0 * PI)).ceil().max(0.0) as usize;
         let found = Characteristic::new(&h).unwrap().zeros_in_right_half_plane();
         assert_eq!(found, Some(2 * pairs), "{product}");
     }
-    // k e^{-s tau}/(s - 1), tau = 0.5: stable for 1 < k < sqrt(1 + w^2) with atan w = w/2 (w =
+    // The loop with k e^{-s tau}/(s - 1) and tau = 0.5 is stable for 1 < k < sqrt(1 + w^2) with atan w = w/2 (w =
     // 2.331122370414423).
     let limit = (1.0 + 2.331122370414423f64.powi(2)).sqrt();
     for (k, stable) in [(0.9, false), (1.001, true), (limit - 1e-3, true), (limit + 1e-3, false)] {
         assert_eq!(closed_loop_is_stable(&delayed(&[k], &[1.0, -1.0], 0.5)), stable, "{k}");
     }
-    // A delay in the wrong unit ends in time.
+    // With a delay in the wrong unit, the test of stability still terminates.
     assert!(!closed_loop_is_stable(&delayed(&[5.0], &[1.0, 0.0], 1e9)));
-    // At most as much gain at infinite frequency as one, for any delay.
+    // With any delay, the gain at infinite frequency must be less than one.
     assert!(closed_loop_is_stable(&delayed(&[0.5], &[1.0], 1.0)));
     assert!(!closed_loop_is_stable(&delayed(&[1.5], &[1.0], 1.0)));
     assert!(closed_loop_is_stable(&delayed(&[0.6, 0.2], &[1.0, 2.0], 0.7)));
@@ -207,7 +207,7 @@ fn stability_with_delay_in_closed_form() {
 
 #[test]
 fn stability_without_delay_agrees_with_the_roots() {
-    // Pseudo-random loops of order 1 to 5, some biproper, some with poles at the origin.
+    // Pseudo-random loops of order 1 to 5. Some are biproper, some have poles at the origin.
     let mut state = 1u64;
     let mut random = || {
         state = state
@@ -248,22 +248,21 @@ fn marginal_and_hidden_modes_are_not_stable() {
     assert!(!closed_loop_is_stable(&tf(&[0.0], &[1.0, 0.0])));
     assert!(closed_loop_is_stable(&tf(&[0.0], &[1.0, 2.0])));
     assert!(!closed_loop_is_stable(&tf(&[-1.0], &[1.0])));
-    // (s - 1)/((s - 1)(s + 2)): the unstable mode is in the loop though not in its transfer
-    // function.
+    // (s - 1)/((s - 1)(s + 2)): the unstable mode is in the loop, although it cancels in the transfer function.
     assert!(!closed_loop_is_stable(&tf(&[1.0, -1.0], &[1.0, 1.0, -2.0])));
-    // Two modes within one step of the grid, which together turn the phase by whole rounds.
+    // Two modes within one step of the grid, which together turn the phase by whole revolutions.
     for (damping, stable) in [(1e-6, true), (-1e-6, false)] {
         let modes = polynomial::product(&[1.0, damping, 7.3], &[1.0, damping, 7.4]);
         assert_eq!(closed_loop_is_stable(&tf(&[1e-12], &modes)), stable);
     }
-    // Damping of 1e-6 each way, at a frequency that no grid hits.
+    // A damping ratio of 1e-6 and of -1e-6, at a frequency that is not on the grid.
     for (damping, stable) in [(1e-6, true), (-1e-6, false)] {
         assert_eq!(closed_loop_is_stable(&tf(&[1e-12], &[1.0, damping, 7.3])), stable);
     }
 }
 
-/// 2.5/s after an operator with a neuromuscular resonance that lifts |L| above one again: three crossings, and the
-/// margin nearest to zero is not that of the lowest one.
+/// 2.5/s after an operator with a neuromuscular resonance that lifts |L| above one again: there are three crossings,
+/// and the margin nearest to zero is not at the lowest of them.
 #[test]
 fn all_crossings_are_given() {
     let resonance = delayed(&[81.0], &[1.0, 1.0, 81.0], 0.15);
@@ -305,7 +304,8 @@ fn poles_of_a_response_are_those_of_the_transfer_function() {
                 let scaled = scaled(operator, gain);
                 let l = scaled.series(element);
                 let Some(found) = unstable_poles(|w| scaled.response(w), element, 300.0) else {
-                    // Pure gains over a first-order element of high gain are above one there.
+                    // There is no result only if |L| is still above 1 at 300 rad/s, as for a pure gain with a
+                    // first-order element of high gain.
                     assert!(l.response(300.0).norm() > 0.5, "{gain} {operator:?} {element:?}");
                     continue;
                 };

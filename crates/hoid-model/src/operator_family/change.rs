@@ -4,7 +4,7 @@ use super::{form::Coordinate, operator::FamilyOperator};
 use crate::ModelError;
 
 impl FamilyOperator {
-    /// True if both operators have the same form, so that a transition between them exists.
+    /// True if both operators have the same form, which is required for a transition between them.
     pub fn is_like(&self, other: &Self) -> bool {
         self.form() == other.form() && self.has_neuromuscular() == other.has_neuromuscular()
     }
@@ -70,7 +70,8 @@ mod tests {
         let half = a.between(&b, |x, y| 0.5 * (x + y)).unwrap();
         let (omega, zeta) = half.neuromuscular().unwrap();
         assert!((omega - 10.0).abs() < 1e-12 && (zeta - 0.35).abs() < 1e-12);
-        // Equal coordinates and the delay are those of the first operator to the last bit.
+        // Coordinates that are equal in both operators, and the delay, are bit-identical to the values of the first
+        // operator.
         assert_eq!(half.coordinates()[..3], a.coordinates()[..3]);
         assert_eq!(half.tau_e_s(), 0.1);
         assert_eq!(a.with_delay(0.3).unwrap().tau_e_s(), 0.3);

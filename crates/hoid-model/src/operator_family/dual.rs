@@ -76,7 +76,7 @@ impl Sub for Dual {
     }
 }
 
-// The lint reports the sums and products in the rules of differentiation as suspicious arithmetic.
+// The rules of differentiation contain sums and products that the lint reports as suspicious arithmetic.
 #[allow(clippy::suspicious_arithmetic_impl)]
 impl Mul for Dual {
     type Output = Self;

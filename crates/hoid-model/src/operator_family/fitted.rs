@@ -1,4 +1,4 @@
-//! A fitted operator, as the start of another estimate of the same person.
+//! A fitted operator, used as the start of another estimate of the same person.
 
 use super::operator::FamilyOperator;
 use crate::{ModelError, SampleTime};
@@ -55,8 +55,8 @@ impl FittedOperator {
         Ok(self)
     }
 
-    /// Checks that sample time and units of a record are those of the fit; units are compared only if both are
-    /// declared. `units` are the units of e and u in the record.
+    /// Checks that a record has the sample time and the units of the fit; units are compared only if both are declared.
+    /// `units` are the units of e and u in the record.
     ///
     /// # Errors
     /// [`ModelError::Operator`] with the difference and the remedy.

@@ -218,7 +218,7 @@ impl Form {
         matches!(self, Self::Lag | Self::LeadLag | Self::Lead2Lag)
     }
 
-    /// True if the degree of the numerator does not exceed that of the denominator, so that the operator does not
+    /// True if the degree of the numerator does not exceed that of the denominator; the operator then does not
     /// differentiate its input.
     pub fn is_proper(self, neuromuscular: bool) -> bool {
         self.degree() <= usize::from(self.has_pole()) + if neuromuscular { 2 } else { 0 }
@@ -280,7 +280,7 @@ impl Form {
             }
             Self::Derivative => ([0.0, 1.0, 0.0, 0.0], [none; 2]),
             Self::DerivativeLead => ([0.0, 1.0, x[0], 0.0], [[0.0, 0.0, 1.0, 0.0], none]),
-            // The denominator is s + 1/5.9, so that the numerator is divided by 5.9.
+            // The denominator is s + 1/5.9, so the numerator is divided by 5.9.
             Self::Canals => ([0.0, 0.0, 1.0 / lag, lead / lag], [none; 2]),
             Self::CanalsRate => ([0.0, 1.0 / lag, lead / lag, 0.0], [none; 2]),
         }

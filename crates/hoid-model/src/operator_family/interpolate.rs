@@ -3,8 +3,8 @@
 //! With a hold, the operator responds to a staircase. If its step response starts with a slope (relative degree 1), the
 //! model has a kink at every delay of an integer number of samples, and a search over the delay of a recorded person
 //! often ends at such a kink. A person does not see a staircase. Here the error `e(t)` is linear from sample to sample,
-//! and the operator acts on `e(t - tau - Ts/2)`. The half sample is the delay of a hold, so that tau has the same
-//! meaning in both models. At frequency omega the gains of the two models differ by the factor `sin(x)/x`,
+//! and the operator acts on `e(t - tau - Ts/2)`. The additional half sample is the mean delay of a hold; with it, tau
+//! has the same meaning in both models. At frequency omega the gains of the two models differ by the factor `sin(x)/x`,
 //! `x = omega Ts/2` (0.5 % at 20 rad/s and 60 Hz); their phases are equal.
 //!
 //! With `tau + Ts/2 = l Ts + delta`, `0 <= delta < Ts`, and times in samples,
@@ -120,8 +120,8 @@ mod tests {
                     let smooth = Complex64::from_polar((half.sin() / half).powi(2), -half);
                     let expected = operator.response(omega) * smooth;
                     let error = (response(&model, omega, ts) - expected).norm() / expected.norm();
-                    // The aliases of a straight line fall with the square of their frequency; what
-                    // the operator passes on of them is its direct part, next to its response here.
+                    // The aliases of the interpolated error decrease with the square of their frequency. The operator
+                    // passes them with its gain at high frequency, here relative to its gain at omega.
                     let aliases = 0.3 + operator.response(1e7).norm() / expected.norm();
                     assert!(
                         error < aliases * (omega * ts).powi(2) + 1e-9,
@@ -150,7 +150,7 @@ mod tests {
                 let ((up, above), (down, below)) = (at(h), at(-h));
                 let scale = exact.jacobian.iter().map(|row| row[i].abs()).fold(1e-3, f64::max);
                 for ((row, up), down) in exact.jacobian.iter().zip(up).zip(down) {
-                    // One-sided at a delay of zero: truncation h.
+                    // At a delay of zero the difference is one-sided, with a truncation error of order h.
                     let error = (row[i] - (up - down) / (above - below)).abs();
                     assert!(error < 1e-5 * scale + 1e-7, "{operator:?} {i} {error}");
                 }

@@ -418,7 +418,7 @@ mod tests {
         operator(form, true, 0.1837)
     }
 
-    /// A gain moves the real part of `dY/Y`, a delay the imaginary part, and both together neither's other.
+    /// A change of gain affects only the real part of `dY/Y`, a change of delay only the imaginary part.
     #[test]
     fn relative_covariance_of_a_gain_and_a_delay() {
         let operator = FamilyOperator::new(Form::Gain, false, &[2.0, 0.3]).unwrap();
@@ -438,7 +438,7 @@ mod tests {
             for named in typical(form).named() {
                 assert!(PARAMETERS.contains(&(named.name, named.unit)), "{form} {}", named.name);
                 seen.push(named.name);
-                // K with a lag is a product, and individual by its gain.
+                // K of a form with a lag has no coordinate, because it is a quotient of two coordinates.
                 if let Some(coordinate) = named.coordinate {
                     assert_eq!(Coordinate::of_parameter(named.name), Some(coordinate), "{form}");
                 }

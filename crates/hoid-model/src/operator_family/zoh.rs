@@ -135,7 +135,7 @@ impl FamilyOperator {
     /// Returns the dynamics of the poles and the delay over one sample.
     fn held_poles(&self, variables: &[Dual], sample: usize, ts: f64) -> HeldPoles {
         let delay = variables[variables.len() - 1];
-        // Time is in samples, so that the entries of all matrices are of moderate size.
+        // Time is in samples, which keeps the entries of all matrices at moderate size.
         let delta = delay.scaled(1.0 / ts) - Dual::constant(sample as f64);
         let denominator = self.denominator_by_samples(variables, ts);
         let order = self.order();
@@ -306,7 +306,7 @@ mod tests {
                 };
                 let scale = exact.jacobian.iter().map(|row| row[i].abs()).fold(1e-3, f64::max);
                 for ((row, up), down) in exact.jacobian.iter().zip(at(h)).zip(at(-h)) {
-                    // Truncation h^2 and rounding eps/h.
+                    // The error of the difference is the truncation, h^2, and the rounding, eps/h.
                     let error = (row[i] - (up - down) / (2.0 * h)).abs();
                     assert!(error < 1e-8 * scale + 1e-7, "{operator:?} {i} {error}");
                 }
@@ -327,7 +327,8 @@ mod tests {
                     * backward.powi(held.nk as i32);
                 let hold = Complex64::from_polar(1.0, -omega * ts_s / 2.0);
                 let expected = operator.response(omega) * hold;
-                // The hold and the aliases are (omega Ts)^2 at most; a derivative has a response so much smaller.
+                // Hold and aliases contribute at most (omega Ts)^2. The response of a derivative form is small at low
+                // frequencies, where the relative error is larger.
                 let small = if operator.form().is_derivative() {
                     omega.min(1.0)
                 } else {
@@ -356,7 +357,7 @@ mod tests {
                 let size: f64 = powers.iter().zip(shape).map(|(p, m)| (x[0] * m * p.b[k]).abs()).sum();
                 assert!((sum - b).abs() <= 1e-12 * size, "{operator:?} {k}: {sum} {b}");
             }
-            // The numerator is not a part of them.
+            // These models do not depend on the coordinates of the numerator.
             let of_numerator = 1 + operator.form().varying_beside_gain();
             for power in &powers {
                 assert_eq!((power.nk, &power.f), (whole.nk, &whole.f));
@@ -401,7 +402,7 @@ mod tests {
         for (log_omega, log_zeta, rate) in [(5.2, -4.0, 0.0), (5.2, 3.0, 40.0), (-3.0, 0.0, 0.0), (2.0, 0.0, 1e-12)] {
             let held = with(log_omega, log_zeta, rate).zoh(ts()).unwrap();
             let roots = polynomial::roots(&[&[1.0][..], &held.f].concat()).unwrap();
-            // A pure integration lies on the circle, up to the rounding of a root next to two
+            // The pole of a pure integration is on the unit circle, up to the rounding of a root that is close to two
             // others.
             assert!(roots.iter().all(|z| z.norm() < 1.0 + 1e-9), "{roots:?}");
         }

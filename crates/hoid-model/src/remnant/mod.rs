@@ -8,9 +8,9 @@
 //! `n_j = a^m  integral over [j-1, j] of e^{-a t} B_m(t) dt`,
 //!
 //! where B_m is the cardinal B-spline of order m: the numerator samples an exponential spline (Unser and Blu, IEEE
-//! Trans. Signal Processing 53, 2005). All n_j are integrals of positive functions, so that no digits cancel, however
-//! fine the sampling. As a tends to 0, the zeros tend to the Euler-Frobenius zeros (m = 2: -1; m = 3: -3.73, -0.27; m =
-//! 4: -9.90, -1, -0.10).
+//! Trans. Signal Processing 53, 2005). All n_j are integrals of positive functions, so no digits cancel, however fine
+//! the sampling. As a tends to 0, the zeros tend to the Euler-Frobenius zeros (m = 2: -1; m = 3: -3.73, -0.27; m = 4:
+//! -9.90, -1, -0.10).
 //!
 //! **Backward Euler** (B.11): `H(z) = K_n (1 - alpha)^m / (1 - alpha z^-1)^m` with
 //! `alpha = T_n/(T_n + Ts)`.

@@ -44,7 +44,7 @@ fn hold_agrees_with_the_general_discretisation() {
         let general = discretise(&continuous, ts(), Method::ZeroOrderHold).unwrap();
         let largest = h.num().iter().fold(0.0, |m: f64, b| m.max(b.abs()));
         for (a, b) in h.num().iter().zip(general.num()) {
-            // The general way keeps 14 digits of the largest coefficient.
+            // The general discretisation is accurate to 14 digits of the largest coefficient.
             assert!((a - b).abs() < 2e-14 * largest, "{filter:?}: {h:?} and {general:?}");
         }
         for (a, b) in h.den().iter().zip(general.den()) {
@@ -68,14 +68,14 @@ fn backward_euler_agrees_with_the_general_discretisation() {
 
 #[test]
 fn first_order_is_an_autoregression() {
-    // corrections.md: d1 = -0.8465 (exact) and -0.8571 (backward Euler).
+    // Values of corrections.md: d1 = -0.8465 (exact) and -0.8571 (backward Euler).
     let filter = RemnantFilter::new(1.0, 0.06, 1).unwrap();
     let exact = filter.noise_model(ts(), RemnantDiscretisation::default()).unwrap();
     assert_eq!(exact.c, vec![1.0]);
     assert!((exact.d[1] + (-1.0f64 / 6.0).exp()).abs() < 1e-15 && (exact.d[1] + 0.8465).abs() < 5e-5);
     let euler = filter.noise_model(ts(), RemnantDiscretisation::BackwardEuler).unwrap();
     assert!((euler.d[1] + 0.8571).abs() < 5e-5);
-    // A first-order process in closed form: variance (1 - alpha)^2/(1 - alpha^2).
+    // In closed form, a first-order process has the variance (1 - alpha)^2/(1 - alpha^2).
     let alpha: f64 = (-1.0f64 / 6.0).exp();
     let h = filter.discrete(ts(), RemnantDiscretisation::ZeroOrderHold).unwrap();
     assert!((variance(&h, 400) - (1.0 - alpha) / (1.0 + alpha)).abs() < 1e-14);
@@ -95,7 +95,7 @@ fn noise_model_has_the_spectrum_of_the_filter() {
                     h.response(omega).norm(),
                     monic.response(omega).norm() * model.innovation_sd,
                 );
-                // Near pi/Ts the numerator nearly vanishes: relative to its largest values.
+                // Near pi/Ts the numerator nearly vanishes, so the tolerance is also relative to its largest values.
                 assert!(
                     (a - b).abs() < 1e-11 * (a + 1e-6),
                     "{filter:?} {how:?} {omega}: {a} {b}"
@@ -118,7 +118,7 @@ fn zeros_go_to_the_euler_frobenius_zeros() {
     ] {
         let zeros = polynomial::roots(&held_numerator(m, 1e-7)).unwrap();
         for (zero, expected) in zeros.iter().zip(expected) {
-            // The zeros move by about a from their limits.
+            // The distance of the zeros from their limits is about a.
             assert!(
                 (zero - expected).norm() < 1e-6 * expected.abs(),
                 "{m}: {zero} and {expected}"
@@ -144,7 +144,7 @@ fn retrieve_inverts_noise_model() {
         for how in BOTH {
             let model = filter.noise_model(ts(), how).unwrap();
             let found = retrieve(&model.d[1..], model.innovation_sd, ts(), how).unwrap();
-            // T_n of 2000 samples leaves 1 - alpha with 12 digits, and K_n goes with its power m.
+            // With T_n of 2000 samples, 1 - alpha has 12 correct digits, and K_n depends on its power m.
             let tolerance = 1e-14 * filter.time_constant_s.max(0.01) / 0.01 * 20.0;
             assert!(
                 (found.t_n_s / filter.time_constant_s - 1.0).abs() < tolerance,
@@ -160,7 +160,7 @@ fn retrieve_inverts_noise_model() {
 
 #[test]
 fn retrieval_of_perturbed_coefficients_is_the_mean() {
-    // By hand: m = 2, backward Euler, alpha from d1 = -1.7 is 0.85, from d2 = 0.7396 is 0.86.
+    // Computed by hand for m = 2 and backward Euler: d1 = -1.7 gives alpha = 0.85, d2 = 0.7396 gives alpha = 0.86.
     let found = retrieve(&[-1.7, 0.7396], 0.02, ts(), RemnantDiscretisation::BackwardEuler).unwrap();
     let expected = 0.5 * 0.01 * (0.85 / 0.15 + 0.86 / 0.14);
     assert!((found.t_n_s - expected).abs() < 1e-15);
@@ -173,7 +173,7 @@ fn jacobian_agrees_with_finite_differences() {
         for m in 1..=4 {
             for t in [0.004, 0.06, 0.3] {
                 let model = RemnantFilter::new(0.3, t, m).unwrap().noise_model(ts(), how).unwrap();
-                // Away from the exact filter, where the coefficients disagree.
+                // The coefficients are changed so that they imply different time constants.
                 let mut p: Vec<f64> = model.d[1..]
                     .iter()
                     .enumerate()
@@ -192,8 +192,8 @@ fn jacobian_agrees_with_finite_differences() {
                     let (up, down) = (at(1.0), at(-1.0));
                     for i in 0..2 {
                         let difference = (up[i] - down[i]) / (2.0 * h);
-                        // Truncation (h/(1 - alpha))^2 with 1 - alpha of 0.03 or more, and rounding
-                        // eps/h.
+                        // The error of the difference is the truncation (h/(1 - alpha))^2, where 1 - alpha is at least
+                        // 0.03, and the rounding eps/h.
                         assert!(
                             (exact[i][j] - difference).abs() <= 2e-6 * difference.abs(),
                             "{how:?} m {m} T_n {t} row {i} column {j}: {} and {difference}",
@@ -210,7 +210,7 @@ fn jacobian_agrees_with_finite_differences() {
 fn what_is_no_remnant_filter_is_named() {
     let reason = |d: &[f64], sd: f64| {
         let error = retrieve(d, sd, ts(), RemnantDiscretisation::ZeroOrderHold).unwrap_err();
-        // As text: NaN is not equal to itself.
+        // The errors are compared as text, because NaN is not equal to itself.
         let same = retrieval_jacobian(d, sd, ts(), RemnantDiscretisation::ZeroOrderHold).unwrap_err();
         assert_eq!(same.to_string(), error.to_string());
         error
@@ -238,7 +238,7 @@ fn what_is_no_remnant_filter_is_named() {
     ));
     let white = retrieve(&[-1e-320], 1.0, ts(), RemnantDiscretisation::BackwardEuler).unwrap_err();
     assert!(white.to_string().contains("white"), "{white}");
-    // Noise-free: a gain of zero is a number.
+    // A noise-free record gives a gain of zero, which is a valid value.
     let silent = retrieve(&[-0.8], 0.0, ts(), RemnantDiscretisation::ZeroOrderHold).unwrap();
     assert_eq!(silent.k_n, 0.0);
 }

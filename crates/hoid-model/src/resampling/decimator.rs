@@ -6,8 +6,7 @@
 //! decimated record.
 //!
 //! **Values that are not finite** (missing, faulty) are replaced by the last valid value at the input of the filter. A
-//! new sample is NaN if one of the M old samples that it replaces is not finite, so that it is not used for
-//! identification.
+//! new sample is NaN, and is not used for identification, if one of the M old samples that it replaces is not finite.
 
 use std::collections::VecDeque;
 

@@ -11,8 +11,8 @@
 //! around c.
 //!
 //! At integer t this is a linear-phase FIR filter whose delay is compensated; at other t it interpolates, with the same
-//! frequency response. The weights for each t are divided by their sum, so that a constant is unchanged. A is
-//! [`DESIGN_DB`], which exceeds the documented attenuation [`STOP_DB`] by a margin.
+//! frequency response. The weights for each t are divided by their sum, so a constant is unchanged. A is [`DESIGN_DB`],
+//! which exceeds the documented attenuation [`STOP_DB`] by a margin.
 
 use std::f64::consts::PI;
 
@@ -59,7 +59,7 @@ impl Kernel {
 
     /// Returns a kernel with a pass band up to 0.8 `ratio` and a stop band from 1.2 `ratio`, where `ratio` is the new
     /// Nyquist frequency relative to the old one; the attenuation is 6 dB at `ratio`. Aliases fall between 0.8 and 1 of
-    /// the new Nyquist frequency, where they replace the part of the spectrum that the filter has removed, so that the
+    /// the new Nyquist frequency, where they replace the part of the spectrum that the filter has removed, so the
     /// spectrum of noise has no gap. `None` if the filter would be longer than `longest` on each side.
     pub fn folding(ratio: f64, longest: usize) -> Option<Self> {
         let half = half_length(2.0 * (1.0 - PASS) * ratio);
@@ -149,7 +149,7 @@ mod tests {
 
     #[test]
     fn bessel_function_against_the_tables() {
-        // Abramowitz and Stegun, Table 9.8 (there times exp(-x)).
+        // Abramowitz and Stegun, Table 9.8, which contains these values multiplied by exp(-x).
         for (x, expected) in [
             (0.0, 1.0),
             (1.0, 1.266_065_877_752_008_4),
@@ -160,8 +160,8 @@ mod tests {
         }
     }
 
-    /// Amplitude and delay in samples of a wave of a given number of cycles a sample, taken at this
-    /// fraction between two samples.
+    /// Amplitude and delay in samples of an interpolated sinusoid; the frequency is in cycles per sample, and the
+    /// instant is this fraction after a sample.
     fn response((offset, weights): &(isize, Vec<f64>), frequency: f64, fraction: f64) -> (f64, f64) {
         let omega = 2.0 * PI * frequency;
         let (mut re, mut im) = (0.0, 0.0);
@@ -185,7 +185,7 @@ mod tests {
                     let share = f64::from(i) / 400.0;
                     let (gain, delay) = response(&weights, share * PASS * nyquist, fraction);
                     let (leak, _) = response(&weights, nyquist + share * (0.5 - nyquist), fraction);
-                    // The designed 90 dB (3.2e-5) leave room up to the stated 80 dB.
+                    // The filter is designed for 90 dB (3.2e-5), which leaves a margin to the documented 80 dB.
                     assert!((gain - 1.0).abs() < 0.5 * stop, "{factor}, {share}: {gain}");
                     assert!(leak < 0.5 * stop, "{factor}, {share}: {leak:e}");
                     assert!(
@@ -212,7 +212,7 @@ mod tests {
                         (gain - 1.0).abs() < 5e-5 && leak < 5e-5,
                         "{factor}, {share}: {gain}, {leak:e}"
                     );
-                    // Linear phase: symmetric about the requested place.
+                    // The phase is linear, because the weights are symmetric about the requested instant.
                     assert!(delay.abs() < 1e-10, "{delay:e}");
                 }
                 let (gain, _) = response(&weights, nyquist, fraction);

@@ -45,7 +45,7 @@ impl Record {
                 "a longer record, or a smaller factor; use decimate off to keep the rate".to_owned(),
             ));
         };
-        // The duration is preserved to within half a new sample, so that whole periods remain whole.
+        // The duration is preserved to within half a new sample, so whole periods remain whole.
         let new_samples = (n + factor / 2) / factor;
         let (label, start_s) = (self.label().to_owned(), self.time_s(0));
         let (input, output, others) = self.into_channels();

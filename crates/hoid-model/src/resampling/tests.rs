@@ -1,11 +1,11 @@
-//! Decimated records and streams against what they must be.
+//! Decimated records and streams, compared with the expected values.
 
 use std::f64::consts::PI;
 
 use super::*;
 use crate::{Channel, ModelError, Record, SampleTime};
 
-/// Waves below 40 Hz, which 100 Hz pass: Hz, amplitude, phase.
+/// Sinusoids below 40 Hz, in the pass band at 100 Hz: frequency in Hz, amplitude, phase.
 const WAVES: [(f64, f64, f64); 4] = [(0.13, 1.0, 0.3), (1.7, 0.8, 1.1), (6.3, 0.5, -2.0), (31.0, 0.3, 2.0)];
 
 fn waves(t: f64) -> f64 {
@@ -25,7 +25,7 @@ fn record(hz: f64, n: usize, e: impl Fn(f64) -> f64, u: impl Fn(f64) -> f64) -> 
         .starting_at(-2.0)
 }
 
-/// Largest distance from a function of time after the reach of the ends, s.
+/// Largest deviation from a function of time, except near the ends, where the reflection has an effect.
 fn farthest(values: &[f64], ts: f64, lead: f64, f: impl Fn(f64) -> f64) -> f64 {
     let edge = 30;
     (edge..values.len() - edge)
@@ -44,7 +44,8 @@ fn a_sum_of_sines_is_the_same_at_the_new_rate() {
         assert!(lost.abs() <= 0.5 * done.factor as f64, "no sample is lost: {lost}");
         assert!((found.time_s(0) + 2.0).abs() < 1e-12);
         assert!((done.lead_s - 0.5 * (ts - 1.0 / hz)).abs() < 1e-15);
-        // 80 dB of the sum of the amplitudes, 6. At 83 Hz the pass band ends above 31 Hz too.
+        // The tolerance is 80 dB below the sum of the amplitudes, which is 6. At a new rate of 83 Hz, the pass band
+        // still ends above 31 Hz.
         for (values, lead, times) in [
             (found.input(), done.lead_s, 1.0),
             (found.output(), 0.0, 2.0),
@@ -58,12 +59,12 @@ fn a_sum_of_sines_is_the_same_at_the_new_rate() {
 
 #[test]
 fn a_ratio_keeps_its_value_and_its_phase() {
-    // u is e half as large and .1 s late, at each frequency.
+    // At each frequency, u is e with half the amplitude and a delay of .1 s.
     for hz in [1.0, 5.0, 20.0, 39.0] {
         let wave = |t: f64| (2.0 * PI * hz * t).cos();
         let late = |t: f64| 0.5 * wave(t - 0.1);
         let (found, done) = record(1000.0, 8000, wave, late).decimated(10).unwrap();
-        // Fourier sums over 6 s, whole periods, away from the ends.
+        // Fourier sums over 6 s, which is a whole number of periods, away from the ends.
         let sums = |values: &[f64], lead: f64| {
             let angle = |k: usize| 2.0 * PI * hz * (k as f64 * 0.01 + lead);
             let sum = |f: fn(f64) -> f64| (100..700).map(|k| values[k] * f(angle(k))).sum::<f64>();
@@ -105,7 +106,7 @@ fn lines_and_constants_stay_to_the_ends() {
             "{k}"
         );
     }
-    // An odd factor takes a sample itself as the middle.
+    // With an odd factor, the middle coincides with a sample.
     let (found, done) = record(300.0, 900, line, line).decimated(3).unwrap();
     assert!((done.lead_s - 1.0 / 300.0).abs() < 1e-15 && found.len() == 300);
 }
@@ -133,13 +134,13 @@ fn what_cannot_be_decimated_is_said() {
             "{factor}"
         );
     }
-    // Without an input there is nothing to hold.
+    // A record without an input has no held channel.
     let alone = Record::of_output(SampleTime::new(0.001).unwrap(), Channel::new("u", "", vec![1.0; 2000])).unwrap();
     let (found, _) = alone.decimated(10).unwrap();
     assert!(found.input().is_empty() && found.output().iter().all(|u| (u - 1.0).abs() < 1e-12));
 }
 
-/// Output of a stream for these samples.
+/// Returns the output of a stream for these samples.
 fn streamed(hz: f64, factor: usize, samples: impl Iterator<Item = (f64, f64)>) -> Vec<[f64; 2]> {
     let mut decimator = Decimator::new(factor, SampleTime::new(1.0 / hz).unwrap(), [true, false]).unwrap();
     samples.filter_map(|(e, u)| decimator.take([e, u])).collect()
@@ -167,7 +168,7 @@ fn a_stream_has_the_digits_of_the_record() {
 fn missing_values_are_nobodys() {
     let value = |k: usize| waves(k as f64 * 1e-3);
     let samples = |k: usize| match k {
-        // A gap in both, a value of u alone, and a start that does not exist.
+        // A gap in e and u, a single invalid value of u, and missing samples at the start.
         0..7 | 1500..1523 => (f64::NAN, f64::NAN),
         2000 => (value(k), f64::INFINITY),
         _ => (value(k), value(k)),
@@ -176,7 +177,7 @@ fn missing_values_are_nobodys() {
     for (k, [e, u]) in found.iter().enumerate() {
         let gone = k == 0 || (150..153).contains(&k);
         assert_eq!((e.is_nan(), u.is_nan()), (gone, gone || k == 200), "{k}");
-        // What is held within the filter leaves traces next to the gap, no larger than the step at its end.
+        // The held value in the filter causes errors next to the gap, which are not larger than the step at its end.
         assert!(gone || (e - value(10 * k)).abs() < 0.5, "{k}");
     }
     let nothing = streamed(1000.0, 10, (0..1000).map(|_| (f64::NAN, f64::NAN)));

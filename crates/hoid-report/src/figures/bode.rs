@@ -1,8 +1,8 @@
 //! Bode diagrams: magnitude and phase of models with their 95 % bands, and of the true operator if it is known.
 //!
 //! The estimators identify the operator including the zero-order hold of the sampling, `B q^-nk/(A F)`. The true
-//! response is drawn with the same hold, so that the curves coincide if the parameters agree. Before the phase is
-//! unwrapped, the phase of the delay, `nk Ts omega`, is removed because it dominates; it is added back afterwards.
+//! response is drawn with the same hold, so the curves coincide if the parameters agree. Before the phase is unwrapped,
+//! the phase of the delay, `nk Ts omega`, is removed because it dominates; it is added back afterwards.
 
 use std::f64::consts::TAU;
 
@@ -315,7 +315,7 @@ mod tests {
             },
             sample_time: SampleTime::HUNDREDTH,
         };
-        // 0.5 s at 50 rad/s are four turns.
+        // A delay of 0.5 s gives four turns of phase at 50 rad/s.
         let figure = bode("b", &[], &[truth(0.5)]);
         let has = |tick: &str| figure.contains(&format!(">{tick}<"));
         assert!(has("-540") && !has("-720") && !has("-900"), "{figure}");
@@ -329,7 +329,7 @@ mod tests {
             sample_time: SampleTime::HUNDREDTH,
         };
         let curve = Curve::of_truth(&truth, &[0.01, 5.0]);
-        // K_e in dB; at 5 rad/s the hold and its half sample of delay add 1.4 deg.
+        // The magnitude is K_e in dB; at 5 rad/s the half-sample delay of the hold adds 1.4 deg of phase lag.
         assert!((curve.magnitude_db[0].0 - 20.0 * 0.09_f64.log10()).abs() < 1e-3);
         let h = truth.operator.transfer_function().unwrap().response(5.0);
         let half_sample_deg = (5.0_f64 * 0.005).to_degrees();

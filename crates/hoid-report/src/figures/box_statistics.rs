@@ -77,7 +77,8 @@ mod tests {
         let mut values: Vec<f64> = (1..=11).map(f64::from).collect();
         values.extend([100.0, -50.0, f64::NAN]);
         let found = BoxStatistics::of(&values);
-        // 13 values: quartiles at ranks 4, 7, 10 are 3, 6, 9; the reach is 9 to either side.
+        // The quartiles of 13 values, at ranks 4, 7 and 10, are 3, 6 and 9; whiskers extend by at most 9 to either
+        // side.
         assert_eq!(found.marks(), [1.0, 3.0, 6.0, 9.0, 11.0]);
         assert_eq!((found.count, found.outliers), (13, vec![-50.0, 100.0]));
         assert_eq!(BoxStatistics::of(&[2.0]).marks(), [2.0; 5]);

@@ -332,7 +332,7 @@ mod tests {
 
     #[test]
     fn a_box_stands_at_the_place_of_its_numbers() {
-        // Ordinate from 0 to 10 with a margin of 5 %: -0.5 to 10.5 over the height of the axes.
+        // The ordinate from 0 to 10 has a margin of 5 %, so the axes extend from -0.5 to 10.5.
         let one = BoxStatistics {
             count: 5,
             lower_whisker: 0.0,
@@ -360,7 +360,7 @@ mod tests {
         assert!(line((middle, y(8.0)), (middle, y(9.0))), "upper whisker");
         assert!(line((side, y(5.0)), (side + WIDEST, y(5.0))), "median");
         assert!(has(&svg, "circle", &[("cx", middle), ("cy", y(10.0))]), "outlier");
-        // The ordinate of the library agrees: its tick at 2 is level with the lower quartile.
+        // The ordinate of the library agrees: its tick at 2 is at the height of the lower quartile.
         assert!(line((style::LEFT - 5.0, y(2.0)), (style::LEFT, y(2.0))), "tick");
         assert!(svg.contains(">10</text>") && svg.contains(">0</text>"));
     }
@@ -402,8 +402,8 @@ mod tests {
             let (_, rest) = of_box.unwrap().split_once(" height=\"").unwrap();
             rest.split_once('"').unwrap().0.parse().unwrap()
         };
-        // Quartiles at 1.1 and 1.3: a fifth of a decade's height where the ordinate bends at 1, and
-        // nothing on a linear one.
+        // With quartiles at 1.1 and 1.3, the box has a fifth of the height of a decade if the ordinate becomes
+        // logarithmic at 1, and almost no height on a linear ordinate.
         assert!(height_of_first(&of(None)) < 0.01);
         assert!(height_of_first(&of(Some(1.0))) > 1.5);
         assert!(of(Some(1.0)).contains("at most 1.4e5") && of(Some(1.0)).contains(">1000</text>"));

@@ -26,7 +26,7 @@ const TICK_HEIGHT: f64 = 30.0;
 /// Colour map of the cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum MapColours {
-    /// From dark for the smallest value to light for the largest.
+    /// From dark for the smallest value to light for the largest value.
     #[default]
     Sequential,
     /// White at zero; the range extends equally far to both sides of zero.
@@ -97,7 +97,7 @@ impl ColourScale {
                 None,
             ));
         }
-        // The name is vertical, so that a subscript extends further to the right.
+        // The name is vertical, so a subscript extends further to the right.
         let x = scene.width - 9.0;
         scene.add(draw::centred(x, top + 0.5 * height, marked(name), Some(-90.0)));
     }

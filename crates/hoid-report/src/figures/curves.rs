@@ -190,7 +190,7 @@ impl CurveGrid {
                 entries.push(entry);
             }
         }
-        // In the legend, the true value comes last, so that the levels of a method stay in one row.
+        // The true value is the last entry of the legend, so that the levels of a method stay in one row.
         entries.sort_by_key(|entry| entry.sample == Sample::Dashed && entry.colour == BLACK);
         entries
     }
@@ -230,7 +230,7 @@ impl CurvePanel {
         style::padded_range(values)
     }
 
-    /// Bands and lines of the panel; the bands come first, so that the lines are drawn over them.
+    /// Bands and lines of the panel; the bands precede the lines, which are drawn over them.
     fn plots(&self, scale: &Scale) -> Vec<Plot> {
         let mut plots: Vec<Plot> = self.curves.iter().flat_map(|c| c.bands(scale)).collect();
         plots.extend(self.curves.iter().flat_map(|c| c.lines(scale)));
@@ -369,7 +369,7 @@ mod tests {
         let svg = curves("c", "t", &grid(vec![stems], true));
         let left = style::LEFT;
         let width = style::WIDTH - style::LEFT - style::RIGHT;
-        // The abscissa extends 3 % of two decades beyond both ends; the ordinate ranges from 0.5 to 1000.
+        // The abscissa extends by 3 % of two decades beyond both ends; the ordinate ranges from 0.5 to 1000.
         let x = |v: f64| left + width * (v.log10() + 0.06) / 2.12;
         let y = |v: f64| 8.0 + SINGLE_PANEL_HEIGHT * (1000.0 / v).log10() / 2000.0_f64.log10();
         let upright = |at: f64, from: f64, to: f64| {
@@ -394,7 +394,7 @@ mod tests {
         let x: Vec<f64> = (0..8).map(f64::from).collect();
         let svg = curves("c", "t", &grid(vec![curve(LineKind::Line, &x, &y)], false));
         let blue = svg.to_lowercase().matches("stroke=\"#0072b2\"").count();
-        // Two lines and the legend sample.
+        // Two lines and the legend sample have this colour.
         assert_eq!(blue, 3, "{svg}");
         assert_eq!(svg.matches("<circle").count(), 1);
         assert!(!svg.contains("NaN") && !svg.contains("inf"));

@@ -187,7 +187,7 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
         model.curve((kind_of(k), Shade::of_method(k + 1)), part, y)
     };
     let known: Vec<(f64, f64)> = omega.iter().copied().zip(phases.iter().map(|p| p.value)).collect();
-    // The models come first, so that the points are drawn over them.
+    // The models precede the points, which are drawn over them.
     let mut magnitude: Vec<Curve> = models
         .iter()
         .enumerate()
@@ -232,7 +232,7 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
     curves(id, title, &grid)
 }
 
-/// The first model has a solid line, further models have dashed and dotted lines, so that curves that coincide stay
+/// The first model has a solid line; further models have dashed and dotted lines, so that coinciding curves stay
 /// visible.
 fn kind_of(model: usize) -> LineKind {
     match model {
@@ -267,7 +267,7 @@ mod tests {
 
     use super::*;
 
-    /// `u(t) = 2 e(t - 0.3)` at lines of 1 to 23 times TAU/20 rad/s, with a disturbance of each run.
+    /// `u(t) = 2 e(t - 0.3)` at lines from 1 to 23 times TAU/20 rad/s, with a different disturbance in each run.
     fn described(runs: u32) -> Description {
         let ts = SampleTime::new(0.1).unwrap();
         let wave = |t: f64| {
@@ -367,7 +367,7 @@ mod tests {
             assert!(svg.contains(text), "{text}");
         }
         assert_eq!(svg, describing("d", "t", &found, &[model]));
-        // One run has neither errors nor coherence.
+        // A single run has neither errors nor coherence.
         let alone = describing("d", "t", &described(1), &[]);
         assert!(!alone.contains("coherence") && !alone.contains("NaN"));
     }
@@ -392,7 +392,7 @@ mod tests {
         let broken = |models: &[ModelCurve]| describing("d", "t", &found, models).matches("stroke-dasharray").count();
         let (none, one) = (broken(&[]), broken(&[model("a")]));
         let (two, three) = (broken(&[model("a"), model("b")]), broken(&["a", "b", "c"].map(model)));
-        // A line in each of two panels, and the legend sample.
+        // Each model adds a line in two panels, and a legend sample.
         assert_eq!([one - none, two - one, three - two], [0, 3, 3]);
     }
 

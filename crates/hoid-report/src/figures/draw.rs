@@ -140,8 +140,8 @@ pub fn fitted(x: f64, y: f64, content: String, room: f64, rotate: Option<f64>) -
     text(x, y, content, size, TextAnchor::Middle, rotate)
 }
 
-/// Space for a text in the reader's font, which without Helvetica or Arial is often DejaVu Sans and about an eighth
-/// wider.
+/// Space for a text in the reader's font; without Helvetica or Arial this is often DejaVu Sans, which is about an
+/// eighth wider.
 pub fn text_space(text: &str, size: u32) -> f64 {
     1.14 * text_width(text, size)
 }
@@ -163,8 +163,7 @@ pub fn text_width(text: &str, size: u32) -> f64 {
 pub mod tests {
     use super::*;
 
-    /// True if the figure has an element with these numbers, to the hundredth with which they are
-    /// written.
+    /// True if the figure has an element with these numbers, to the written precision of a hundredth.
     pub fn has(svg: &str, element: &str, numbers: &[(&str, f64)]) -> bool {
         let number = |tag: &str, name: &str| -> Option<f64> {
             let (_, rest) = tag.split_once(&format!(" {name}=\""))?;
@@ -181,7 +180,7 @@ pub mod tests {
 
     #[test]
     fn widths_of_text() {
-        // Helvetica: digits are 0.556, the point 0.278 of the font size.
+        // In Helvetica, the width of a digit is 0.556 of the font size, and the width of a point 0.278.
         assert!((text_width("-0.55", 10) - 22.9).abs() < 0.5);
         assert_eq!(text_width("", 13), 0.0);
     }

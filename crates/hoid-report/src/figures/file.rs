@@ -122,7 +122,7 @@ mod converted {
         Tree::from_str(svg, &options).map_err(|e| failed(&e))
     }
 
-    /// A font family of the system: the first of [`SANS_SERIF`] that exists, otherwise any.
+    /// A font family of the system: the first family of [`SANS_SERIF`] that exists, otherwise any family.
     fn sans_serif(fonts: &Database) -> Option<String> {
         let has = |name: &&str| {
             fonts
@@ -184,12 +184,12 @@ mod tests {
         let svg = with_width_mm(SVG, 85.0);
         let pdf = FigureFormat::Pdf.bytes(&svg).unwrap();
         assert!(pdf.starts_with(b"%PDF-"));
-        // 85 mm are 240.9 pt.
+        // A width of 85 mm is 240.9 pt.
         let text = String::from_utf8_lossy(&pdf);
         assert!(text.contains("/MediaBox [0 0 240.9"), "{text}");
         assert!(text.contains("/Font"), "letters are letters");
         let png = FigureFormat::Png.bytes(&svg).unwrap();
-        // Width and height are in the first chunk: 85 mm at 300 dots an inch.
+        // The first chunk contains width and height: 85 mm at 300 dots per inch.
         let dots = |at: usize| u32::from_be_bytes(png[at..at + 4].try_into().unwrap());
         assert!(
             dots(16).abs_diff(1004) <= 4 && dots(20).abs_diff(502) <= 4,

@@ -23,7 +23,7 @@ use super::{
 const SPACE: f64 = 8.0;
 /// Space to the left of a panel that shares the ordinate of its neighbour.
 const GAP: f64 = 16.0;
-/// Space to the left of a panel that has ticks of its own but no label.
+/// Space to the left of a panel that has its own ticks but no label.
 const TICKS: f64 = 50.0;
 /// Space to the right of a panel whose neighbour has ticks but no label. This space is less than half of a tick label,
 /// which therefore extends into the space of the neighbour.
@@ -34,7 +34,7 @@ const LABEL_AT: f64 = 13.0;
 /// Distance of the name of the abscissa below the axis, with room for two rows of category names.
 const NAME_BELOW: f64 = 44.0;
 
-/// Which panels of a row have ticks and the label of the ordinate.
+/// Selection of the panels of a row that have ticks and the label of the ordinate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ordinates {
     /// Each panel has ticks and a label.

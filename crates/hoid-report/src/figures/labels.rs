@@ -2,7 +2,7 @@
 //!
 //! The drawing library has no subscripts. Subscripts and superscripts are marked by characters of the private use area
 //! of Unicode, which become tags in the finished SVG ([`tagged`]). SVG readers differ: some add the shifts of nested
-//! tags, others replace them; some drop tags without text, trim spaces at the edges of a tag, or position each tag of a
+//! tags, others replace them. Some drop tags without text, trim spaces at the edges of a tag, or position each tag of a
 //! centred text separately. The tags are therefore not nested; each contains text and the full shift from the previous
 //! tag, and leading spaces are non-breaking. `svg` sets the start position of a text with tags.
 

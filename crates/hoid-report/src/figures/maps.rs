@@ -307,7 +307,7 @@ mod tests {
             let of_colour = svg.replace(&format!("\" fill=\"{colour}\""), "\" wanted=\"1\"");
             has(&of_colour, "rect", &[&place[..], &[("wanted", 1.0)]].concat())
         };
-        // The ends of viridis: the lowest value below at the left, the highest above it.
+        // The ends of viridis: the lowest value is at the lower left, the highest value above it.
         assert!(cell(0.0, 1.0, "#440154"), "{svg}");
         assert!(cell(0.0, 0.0, "#fde725"));
         assert!(cell(1.0, 0.0, "#f2f2f2"));

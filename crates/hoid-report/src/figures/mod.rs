@@ -5,7 +5,7 @@
 //! | [`bode`] | frequency response of fitted models with 95 % bands |
 //! | [`autocorrelation`], [`cross_correlation`] | tests of the residuals |
 //! | [`time_response`] | measured, predicted and simulated output |
-//! | [`trace_panels`] | estimates over time, by method and level: recursive estimates, batch fits, truth |
+//! | [`trace_panels`] | estimates over time, by method and level: recursive estimates, batch fits, true values |
 //! | [`box_plots`] | scatter of the results of many runs, in groups and series |
 //! | [`maps`] | a quantity as a function of two variables, as coloured cells |
 //! | [`bode_grid`] | several Bode diagrams next to each other, each with several responses |
@@ -18,7 +18,7 @@
 //! Figures are 420 units wide, or 840 with several columns of panels. The text is 13 units high, which is 7.5 pt in a
 //! column of 85 mm and on a page of 170 mm; subscripts have 7.0 pt. Dashed black lines are true values; dotted lines
 //! are batch fits. The colours are those of Okabe and Ito (*Color Universal Design*, 2008) on white: the hue represents
-//! the method, the shade the level, and black the truth; see [`Shade`]. In names and titles, `_` and `^` before a
+//! the method, the shade the level, and black the true values; see [`Shade`]. In names and titles, `_` and `^` before a
 //! character or braces mark subscripts and superscripts. Non-finite values leave gaps. Equal data give identical bytes.
 //! Figures on the same page must have different values of `id`, which is the prefix of all ids inside the SVG.
 

@@ -1,8 +1,8 @@
 //! The colours of all figures: the hue represents the method, the shade its level (noise, sample time, memory length),
-//! and black the truth.
+//! and black the true values.
 //!
 //! The hues are those of Okabe and Ito (*Color Universal Design*, 2008). The shades of one hue are evenly spaced in
-//! lightness `L*` (CIE 1976), light for the lowest level and dark for the highest, so that their order is preserved in
+//! lightness `L*` (CIE 1976), light for the lowest level and dark for the highest, so their order is preserved in
 //! greyscale. Where points have markers, each level has its own marker.
 
 use super::style::MODEL_COLOURS;
@@ -124,7 +124,7 @@ mod tests {
                 let of = |level| lightness(channels(&shade(method, level, levels)));
                 let step = (DARKEST - LIGHTEST) / (levels - 1) as f64;
                 for level in 1..levels {
-                    // Rounding to whole channels moves L* by up to 0.4.
+                    // Rounding of the channels to integers changes L* by up to 0.4.
                     assert!(
                         (of(level) - of(level - 1) - step).abs() < 0.8,
                         "{method} {level} {levels}"

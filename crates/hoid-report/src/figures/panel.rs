@@ -1,13 +1,13 @@
 //! One quantity over time, and the range of its ordinate.
 //!
-//! An estimate that leaves its normal range for a moment (such as T_L where K_e nearly vanishes) must not compress the
-//! scale for all other values. The ordinate therefore covers the truth, the batch fits and the estimates between their
+//! An estimate that briefly leaves its normal range (such as T_L where K_e nearly vanishes) must not compress the scale
+//! for all other values. The ordinate therefore covers the true values, the batch fits and the estimates between their
 //! 10 and 90 % quantiles. The ordinate extends beyond this range, by at most one and a half times the range on either
 //! side, to include the 1 and 99 % quantiles and the middle part of the bands. If a true value is known and at least
-//! one method is near it, methods that are far off do not determine the scale either: the ordinate ends at most two
-//! spans from the truth, where a span is the range of the truth or a quarter of its magnitude, and methods and batch
-//! fits beyond are ignored. Values outside the ordinate are cut off at the axes, and [`TracePanel::beyond`] counts
-//! them.
+//! one method is near it, methods far from it do not determine the scale either: the ordinate ends at most two spans
+//! from the true values, where a span is the range of the true values or a quarter of their magnitude, and methods and
+//! batch fits beyond are ignored. Values outside the ordinate are cut off at the axes, and [`TracePanel::beyond`]
+//! counts them.
 
 use hoid_numerics::statistics::{finite_sorted, quantile, quantile_of};
 
@@ -130,8 +130,8 @@ impl TracePanel {
         style::padded_range([low, high])
     }
 
-    /// Limits of the ordinate, two spans to either side of the truth; `None` if the median of no estimate lies between
-    /// them.
+    /// Limits of the ordinate, two spans to either side of the true values; `None` if the median of no estimate lies
+    /// between them.
     fn limit(&self) -> Option<(f64, f64)> {
         let of = |kind| self.curves.iter().filter(move |c| c.kind == kind);
         let truth = finite_sorted(of(CurveKind::Truth).flat_map(|c| c.values.iter().copied()));
@@ -192,7 +192,7 @@ pub(super) mod tests {
         }
         let with = panel(vec![curve(CurveKind::Estimate, values.clone())]);
         let (low, high) = with.range();
-        // At most one and a half ranges of the middle part below it, and a margin of 5 %.
+        // The ordinate extends below the middle part by at most one and a half times its range, plus a margin of 5 %.
         assert!(low > 0.3 && high < quiet.1 + 0.1, "{low} {high}");
         let expected = Beyond {
             method: 0,
@@ -200,7 +200,7 @@ pub(super) mod tests {
             rows: 1000,
         };
         assert_eq!(with.beyond(), [expected]);
-        // The range always includes the whole truth.
+        // The range always includes all true values.
         let truth = vec![1.0, 1.0, -0.5, 1.0];
         let (low, _) = panel(vec![curve(CurveKind::Estimate, values), curve(CurveKind::Truth, truth)]).range();
         assert!(low < -0.5);

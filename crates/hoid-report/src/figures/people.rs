@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn marks_stand_at_the_places_of_their_numbers() {
         let svg = people_by_condition("p", "t", &grid());
-        // Ordinate from 0 to 11 with a margin of 5 %.
+        // The ordinate from 0 to 11 has a margin of 5 %.
         let y = |v: f64| 8.0 + HEIGHT * (11.55 - v) / 12.1;
         let width = style::WIDTH - style::LEFT - style::RIGHT;
         let x = |place: f64, part: f64| style::LEFT + 0.5 * width * (place + part);

@@ -10,7 +10,7 @@ use super::{
 /// for screen readers.
 pub fn responses(id: &str, title: &str, inputs: &[ModelCurve]) -> String {
     let curve = |(k, input): (usize, &ModelCurve), part: usize, y: Vec<f64>| Curve {
-        // The column has its name as a title.
+        // The name is the title of the column, so the curve has no name.
         name: String::new(),
         ..input.curve((LineKind::Line, Shade::of_method(k + 1)), part, y)
     };
@@ -58,7 +58,7 @@ mod tests {
         };
         let svg = responses("two", "both", &[input("to e", Some(0.5)), input("to r", None)]);
         assert!(svg.contains("to e") && svg.contains("to r"), "{svg}");
-        // The phase is continuous: -90 - 60 * 8 deg at the end.
+        // The phase is continuous and ends at -90 - 60 * 8 deg.
         assert!(svg.contains("\u{2212}360") || svg.contains("-360"), "{svg}");
         let empty = responses("none", "none", &[]);
         assert!(empty.contains("<svg"));

@@ -67,7 +67,7 @@ fn columns(n: usize, run: &Range<usize>, parts: usize) -> impl Iterator<Item = R
         .filter(|c| !c.is_empty())
 }
 
-/// Returns both ends and the indices whose value differs from that of a neighbour, since a constant level needs no
+/// Returns both ends and the indices whose value differs from the value of a neighbour, since a constant level needs no
 /// other points.
 pub fn without_level<T: PartialEq>(kept: &[usize], value: impl Fn(usize) -> T) -> Vec<usize> {
     let level = |i: usize| {
@@ -145,7 +145,7 @@ mod tests {
         assert_eq!(runs(10, |k| k != 3 && k != 7), [0..3, 4..7, 8..10]);
         assert_eq!(runs(0, |_| true), []);
         assert_eq!(runs(5, |_| false), []);
-        // Every second one: gaps far narrower than a column.
+        // Every second value is known, so the gaps are much narrower than a column.
         assert_eq!(runs(100_000, |k| k % 2 == 0), vec![0..99_999]);
         // The wide gap of the same series is preserved.
         assert_eq!(

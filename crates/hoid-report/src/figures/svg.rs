@@ -10,8 +10,8 @@ use super::{
     labels::{has_tags, plain, tagged},
 };
 
-/// Returns the SVG text with a view box, so that it scales with the page, a title for screen readers, and the id of the
-/// figure as the prefix of all other ids.
+/// Returns the SVG text with a view box, with which it scales with the page, a title for screen readers, and the id of
+/// the figure as the prefix of all other ids.
 pub fn finish(id: &str, title: &str, scene: Scene) -> String {
     let scene = anchored(scene);
     let raw = SvgBackend::new().render_scene(&scene);
@@ -34,7 +34,7 @@ pub fn finish(id: &str, title: &str, scene: Scene) -> String {
 }
 
 /// Replaces the ids `from` + number by `to` + number, counted from 1 in the order of occurrence. The library counts ids
-/// over the lifetime of the process, so that two drawings of the same figure would differ.
+/// over the lifetime of the process, so two drawings of the same figure would differ.
 fn renumbered(text: &str, from: &str, to: &str) -> String {
     let mut known: Vec<&str> = Vec::new();
     let mut parts = text.split(from);

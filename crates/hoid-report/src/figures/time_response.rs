@@ -24,7 +24,7 @@ const LOWER: f64 = 190.0;
 ///
 /// The ordinate covers all outputs, but extends beyond the measured output by at most half its range on either side;
 /// values beyond (from an unstable model) are cut off. Long records are drawn with the smallest and the largest sample
-/// in each column, so that peaks are preserved.
+/// in each column, which preserves peaks.
 pub fn time_response(id: &str, record: &Record, validation: &Validation) -> String {
     let measured = record.output();
     let (low, high) = style::padded_range(measured.iter().copied());

@@ -169,7 +169,7 @@ impl TraceGrid {
 }
 
 impl TracePanel {
-    /// Bands and lines of the panel within a range; the bands come first, so that the lines are drawn over them.
+    /// Bands and lines of the panel within a range; the bands precede the lines, which are drawn over them.
     fn plots(&self, (low, high): (f64, f64), levels: usize, parts: usize) -> Vec<Plot> {
         let logarithmic = self.ordinate == Ordinate::Logarithmic;
         let half = 0.5 * (high - low);
@@ -211,8 +211,8 @@ impl TraceCurve {
         shade(self.method, self.level, levels)
     }
 
-    /// Returns the points to draw for a run of rows; rows whose value equals that of both neighbours are omitted. A
-    /// single row is drawn as a line over one sample time.
+    /// Returns the points to draw for a run of rows; rows with the same value as both neighbours are omitted. A single
+    /// row is drawn as a line over one sample time.
     fn points(&self, run: Range<usize>, parts: usize, bounded: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
         let at = |k: usize| (self.times_s[k], bounded(self.values[k]));
         if run.len() == 1 {
@@ -284,12 +284,12 @@ mod tests {
         let whole = trace_panels("a", "t", &grid(values.clone()));
         values[100] = f64::NAN;
         values[200] = f64::INFINITY;
-        // A row between two gaps is drawn as well.
+        // A row between two gaps is also drawn.
         values[202] = f64::NAN;
         let broken = trace_panels("a", "t", &grid(values));
         assert_eq!((paths(&whole), paths(&broken)), (1, 4));
         assert!(!broken.contains("NaN") && !broken.contains("inf"));
-        // Without data there are still axes.
+        // Axes are drawn even without data.
         let nothing = trace_panels("a", "t", &grid(vec![f64::NAN; 50]));
         assert!(nothing.contains("time (s)") && !nothing.contains("NaN"));
     }
@@ -374,7 +374,7 @@ mod tests {
             ..TraceGrid::default()
         };
         let svg = trace_panels("g", "t", &grid).to_uppercase();
-        // In each panel and in the legend, which shows the batch fit in grey.
+        // The level appears in each panel and in the legend, which shows the batch fit in grey.
         let lines = |level| svg.matches(&format!("STROKE=\"{}\"", shade(0, level, 2))).count();
         assert_eq!((lines(0), lines(1)), (3, 5));
         assert!(svg.contains("RLS, LOW") && svg.contains("RLS, HIGH") && !svg.contains("NONE, LOW"));

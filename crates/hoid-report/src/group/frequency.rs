@@ -150,7 +150,7 @@ impl GroupReport<'_> {
         let (estimators, omega) = (texts(table, "estimator"), reals(table, "omega_rad_s"));
         let rows = rows_of(table, subject, condition);
         let curve = |(estimator, method): (&str, usize)| {
-            // The frequency range is 10 % wider on both sides, so that the curves cover the lines.
+            // The frequency range is 10 % wider on both sides, so the curves cover the lines.
             let inside = |i: &&usize| estimators[**i] == estimator && (0.9 * low..=1.1 * high).contains(&omega[**i]);
             let at: Vec<usize> = rows.iter().filter(inside).copied().collect();
             let pick = |name: &str| at.iter().map(|i| reals(table, name)[*i]).collect::<Vec<f64>>();

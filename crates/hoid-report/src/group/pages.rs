@@ -76,7 +76,7 @@ const PAGE_MM: f64 = 137.0;
 
 /// Draws the describing functions of a finished group with the fitted operators, one figure for each condition, and
 /// returns pairs of name and SVG text; empty if no condition has a periodic excitation. If `width_mm` is too narrow for
-/// several columns, there is a figure for each subject, so that the text stays legible.
+/// several columns, each subject has a separate figure, so that the text stays legible.
 ///
 /// # Errors
 /// The errors of [`write_group_pages`].

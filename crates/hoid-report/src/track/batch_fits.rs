@@ -55,8 +55,8 @@ pub fn default_batch_fits(trace: &Trace, record: &Record) -> (Vec<BatchFit>, Opt
         all.push(((span.time_s(0), span.time_s(span.len())), start.clone()));
     }
     if trace.options().method.starts_itself() {
-        // The orders of a method without a start fit do not suit a batch fit, because its noise model is long and the
-        // method tracks its own delay.
+        // The orders of a method without a start fit are unsuitable for a batch fit, because the noise model is long
+        // and the method tracks its own delay.
         return (all, None);
     }
     let last_third = (

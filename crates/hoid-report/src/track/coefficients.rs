@@ -1,4 +1,4 @@
-//! Coefficients by name, for all model structures: the poles of the operator are in A of an ARX model and in F of a
+//! Coefficients by name, for all model structures. The poles of the operator are in A of an ARX model and in F of a
 //! Box-Jenkins model.
 
 use hoid_ident::Fit;
@@ -60,7 +60,7 @@ pub fn of_fit(fit: &Fit) -> Vec<Coefficient> {
         .collect()
 }
 
-/// True if some traces have their poles in A and others in F, so that a1 and f1 are the same quantity.
+/// True if some traces have their poles in A and others in F; a1 and f1 are then the same quantity.
 pub fn joined(traces: &[&Trace]) -> bool {
     let orders = |t: &&&Trace| t.options().orders;
     traces.iter().any(|t| orders(&t).na > 0 && orders(&t).nf == 0)

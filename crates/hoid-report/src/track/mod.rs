@@ -1,5 +1,5 @@
 //! One self-contained HTML page about recursive estimates over a record: parameters over time with 95 % bands, batch
-//! fits and, if the record contains them, the true values; also innovations, standard errors and shortened steps.
+//! fits and, if the record contains them, the true values, as well as innovations, standard errors and shortened steps.
 
 mod batch_fits;
 mod coefficients;

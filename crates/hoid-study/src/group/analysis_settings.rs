@@ -108,8 +108,8 @@ impl AnalysisSettings {
         Ok(POLYNOMIALS.into_iter().filter(asked).collect())
     }
 
-    /// Returns the structures whose orders are needed: those of the polynomial models to fit, and those of recursions
-    /// that start from a fit.
+    /// Returns the structures whose orders are needed: the structures of the polynomial models to fit, and of
+    /// recursions that start from a fit.
     ///
     /// # Errors
     /// As [`Self::polynomials`] and [`Self::recursions`].

@@ -5,8 +5,7 @@ use super::manifest::{Manifest, RunEntry};
 /// All runs of a person in a condition.
 pub(super) struct Cell<'a> {
     pub runs: Vec<&'a RunEntry>,
-    /// Description of the change if the task changes within the runs, so that the cell has no operator; otherwise
-    /// `None`.
+    /// Description of the change if the task changes within the runs; the cell then has no operator. Otherwise `None`.
     pub changes: Option<String>,
 }
 

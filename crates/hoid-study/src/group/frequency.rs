@@ -13,10 +13,10 @@
 //! `r_j^2 <- (nu r_j^2 + 4 r~^2)/(nu + 4)` with `r = s/|H|` and `nu = 2 (runs - 1)` (moderated variances, Smyth 2004);
 //! otherwise an error that is small by chance would dominate. Fit and describing function come from the same runs, so
 //! an unbiased fit is closer than one standard error. If the controlled element is known, a fit agrees if its crossover
-//! is within 10 % and its phase margin within 5 deg of those of the describing function, which is about the difference
-//! between two experiments with the same person. Otherwise a fit agrees if its distance is below 10 %. If the task
-//! changes within the run, the fit and the describing function average over the change differently, and no agreement is
-//! reported.
+//! is within 10 % and its phase margin within 5 deg of the values of the describing function, which is about the
+//! difference between two experiments with the same person. If it is not known, a fit agrees if its distance is below
+//! 10 %. If the task changes within the run, the fit and the describing function average over the change differently,
+//! and no agreement is reported.
 
 use std::path::Path;
 

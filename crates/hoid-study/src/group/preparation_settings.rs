@@ -137,7 +137,7 @@ fn decimation(typed: Option<&NumberOrText>) -> Result<Decimation, String> {
         .map_err(|_| format!("decimate is {text}, expected \"auto\", \"off\", or an integer factor of 1 or more"))
 }
 
-/// Parses the settings by channel; those of the condition override those of the group.
+/// Parses the settings by channel; settings of the condition override settings of the group.
 fn parsed<T>(
     group: &BTreeMap<String, NumberOrText>,
     condition: &BTreeMap<String, NumberOrText>,

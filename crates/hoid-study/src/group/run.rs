@@ -70,8 +70,8 @@ pub fn run_group(
             true
         }
     });
-    // The joint analysis of all runs of a person in a condition comes first, since the analysis of each run uses its
-    // results.
+    // The joint analysis of all runs of a person in a condition is made first, because the analysis of each run uses
+    // its results.
     let is_cell = |i: &usize| matches!(blocks[*i], Block::Cell(_));
     let (cells, runs): (Vec<usize>, Vec<usize>) = open.partition(is_cell);
     let notes: Vec<String> = found.note_on_seals().into_iter().chain(notes_on(&damaged)).collect();

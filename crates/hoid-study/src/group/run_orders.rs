@@ -1,7 +1,7 @@
 //! Orders and delay of the ARX and Box-Jenkins models, chosen before the runs are fitted.
 //!
 //! A single run determines the delay of a person poorly: the loss of a second-order model is flat over nk, often
-//! decreases towards the end of the range, and has several minima, and a single sample can change which of them is
+//! decreases towards the end of the range, and has several minima; a single sample can change which minimum is
 //! selected. The delay is therefore common to all runs of a person in a condition. It is the delay of their operator in
 //! the family: `nk = round(tau_e/Ts) + 1`, plus the number of samples by which u is recorded late. If there is no such
 //! operator, every nk in the range is fitted jointly to all runs on each of two sub-batches, and nk is the rounded mean
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn a_sample_more_of_delay_is_a_sample_more_of_nk() {
-        // nk = 1 is a delay of zero.
+        // nk = 1 corresponds to a delay of zero.
         assert_eq!(nk_of(0.0, 0.01, 0.0), 1);
         assert_eq!(nk_of(0.28, 0.01, 0.0), 29);
         assert_eq!(nk_of(0.28, 0.01, 1.0), 30);

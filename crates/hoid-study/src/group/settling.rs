@@ -6,7 +6,7 @@
 //! median over the runs first covers 50 and 90 % of the step, as in the studies. The noise of a run is its deviation
 //! around its own level after the change, `1.4826` times the median absolute deviation; the table gives the median over
 //! the runs. There is no settling time if the step is smaller than the noise, or if the estimate had already covered
-//! the share when the task changed, since it then changed for another reason.
+//! this share of the step when the task changed, since it then changed for another reason.
 
 use std::collections::BTreeMap;
 
@@ -163,7 +163,7 @@ mod tests {
         for k in 0..400 {
             let t = 0.1 * f64::from(k);
             let covered = if t > 10.0 { 1.0 - (-(t - 10.0) / 2.0).exp() } else { 0.0 };
-            // Absolute deviations 0, 0.1, 0.1, 0.2 in turn: their median is 0.1.
+            // The absolute deviations 0, 0.1, 0.1 and 0.2 occur in turn; their median is 0.1.
             let ripple = [0.0, 0.1, -0.1, 0.2][(k as usize + run) % 4];
             rows.begin();
             for (name, value) in [("subject", "A"), ("condition", "C"), ("estimator", "RLS")] {
@@ -181,7 +181,7 @@ mod tests {
     fn a_first_order_step_settles_when_it_must() {
         let names = ["K_e".to_owned(), "flat".to_owned()];
         let (mut settling, mut averages) = (Settling::default(), TraceAverages::new(names.to_vec()));
-        // All phases of the ripple: the median over the runs is smooth.
+        // The runs cover all phases of the ripple, so the median over the runs is smooth.
         for run in 0..4 {
             averages.add(&traces(run));
             settling.add(&traces(run), &names, 10.0);
@@ -190,7 +190,7 @@ mod tests {
         let of = |name: &str| numbers(&table, name);
         assert_eq!(texts(&table, "parameter"), ["K_e", "flat"]);
         assert!((of("before")[0] - 1.05).abs() < 1e-9 && (of("after")[0] - 3.05).abs() < 1e-3);
-        // 2 s ln 2 and 2 s ln 10, and up to one row later.
+        // The settling times are 2 s ln 2 and 2 s ln 10, or up to one row later.
         for (name, exact) in [("settle50_s", 2.0 * 2f64.ln()), ("settle90_s", 2.0 * 10f64.ln())] {
             let found = of(name)[0];
             assert!(

@@ -1,11 +1,11 @@
 //! A virtual experiment: simulated subjects, conditions and runs, with the true parameters.
 //!
-//! The gain K_e, the lead T_L, omega_nm, zeta_nm and the noise level of a subject are those of the condition times
-//! `exp(a z)`, where z is a normal deviate of the subject and a is the spread between subjects (0.15 is 15 %). In each
-//! run each parameter is multiplied by a further factor `exp(b z)`, where b is the spread between runs. The delay
-//! varies between subjects with half their spread, rounded to whole samples, and not between runs. If the loop is
-//! unstable, new deviates are drawn. Deviates come from the random stream (seed, subject, run), remnants from the
-//! streams that `hoid simulate` uses.
+//! The gain K_e, the lead T_L, omega_nm, zeta_nm and the noise level of a subject are the values of the condition
+//! multiplied by `exp(a z)`, where z is a normal deviate of the subject and a is the spread between subjects (0.15 is
+//! 15 %). In each run each parameter is multiplied by a further factor `exp(b z)`, where b is the spread between runs.
+//! The delay varies between subjects with half their spread, rounded to whole samples, and not between runs. If the
+//! loop is unstable, new deviates are drawn. Deviates come from the random stream (seed, subject, run), remnants from
+//! the streams that `hoid simulate` uses.
 
 use std::path::Path;
 
@@ -174,7 +174,7 @@ impl VirtualExperiment {
         let of_run = deviates(1 + cell * 1_000_000 + run);
         let mut reason = String::new();
         for draw in 0..MOST_DRAWS {
-            // The deviates of the run are replaced in each draw, those of the subject in every tenth draw.
+            // The deviates of the run are replaced in each draw, the deviates of the subject in every tenth draw.
             let (s, r) = (&of_subject[6 * (draw / 10)..], &of_run[6 * draw..]);
             let factor = |i: usize| (self.between_subjects * s[i] + self.between_runs * r[i]).exp();
             let mut scenario = Scenario::condition(condition);

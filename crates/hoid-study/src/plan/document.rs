@@ -30,7 +30,7 @@ pub struct Plan {
     pub name: String,
     /// Description in one line.
     pub title: String,
-    /// Content of the study, or notes on it.
+    /// Description of the study, or notes on it.
     pub description: String,
     /// Seed of the random streams.
     pub seed: u64,
@@ -40,11 +40,11 @@ pub struct Plan {
     pub block: u64,
     /// Number of samples from one stored point of a trace to the next; `None` if traces are not stored.
     pub trace_every: Option<usize>,
-    /// Whether the points of traces are stored, not only their summary.
+    /// True if the points of traces are stored, and not only their summary.
     pub trace_points: bool,
-    /// Whether standard errors are stored.
+    /// True if standard errors are stored.
     pub standard_errors: bool,
-    /// Whether bias, bands and declared changes of recursions are measured.
+    /// True if bias, bands and declared changes of recursions are evaluated.
     pub changes: bool,
     /// The scenarios of the grid.
     pub cells: Vec<Cell>,
@@ -66,7 +66,7 @@ pub struct Cell {
     pub axes: Vec<Axis>,
     /// The scenario, ready to be simulated.
     pub resolved: ResolvedScenario,
-    /// Number of replications: that of the plan, or one if there is no remnant.
+    /// Number of replications: the number in the plan, or one if there is no remnant.
     pub replications: u64,
 }
 
@@ -83,7 +83,7 @@ const MOST_REPLICATIONS: u64 = 100_000_000;
 /// Largest number of estimates of a study.
 const MOST_ESTIMATES: u128 = 10_000_000_000;
 
-/// Largest number of blocks of a study; each block is a few files.
+/// Largest number of blocks of a study; each block is stored as a few files.
 const MOST_BLOCKS: u128 = 1_000_000;
 
 impl Plan {

@@ -14,7 +14,7 @@ use serde::{Deserialize, Deserializer, de::Error as _};
 
 use super::{analysis, problem::PlanProblem};
 
-/// Returns the keys whose value is itself a list or a table, so that a list is not an axis.
+/// Returns the keys whose value is itself a list or a table, for which a list is not an axis.
 pub fn whole_keys() -> Vec<String> {
     let fixed = ["scenarios", "span_s", "start_span_s", "delay_s", "delay_range_s"].map(str::to_owned);
     let settings = methods().into_iter().flat_map(|spec| spec.settings);

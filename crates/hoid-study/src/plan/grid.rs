@@ -1,9 +1,9 @@
 //! Grids in TOML: where a list replaces a single value, each of its entries is used in turn.
 //!
 //! A table of a plan is split into its leaves, such as `remnant.order = [1, 2]`. A leaf with a list is an axis, unless
-//! the value of the key is itself a list. All combinations are formed; the first axis in the file varies slowest. Each
+//! the key requires a list as its value. All combinations are formed; the first axis in the file varies slowest. Each
 //! combination is written as a table without lists, one key per line. For each of these lines, the corresponding line
-//! of the plan is stored, so that messages can refer to the line that the user wrote.
+//! of the plan is stored, so messages can refer to the line that the user wrote.
 
 use toml::{
     Spanned,

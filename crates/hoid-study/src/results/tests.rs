@@ -83,7 +83,7 @@ fn rows_are_found_by_what_describes_them() {
     assert_eq!((record.nk, record.name.as_str()), (None, "record"));
     let cells = results.cells(&Query::default().name("ARX").noise_level(0.1));
     assert_eq!(cells.iter().map(|cell| cell.index).collect::<Vec<_>>(), [1, 3]);
-    // All quantities, in the order of the table.
+    // The query selects all quantities, in the order of the table.
     let all = results.find(&Query::default().cell(4).axis("memory", "1s"));
     assert!(all.len() > 20 && all.iter().any(|row| row.quantity == "diverged"));
     assert_eq!(all[0].quantity, "innovation_variance");
@@ -98,7 +98,7 @@ fn values_say_what_the_summary_says() {
         let statistics = Statistics::of(&values);
         let row = results.one(&query).unwrap();
         assert_eq!(values.len(), 6);
-        // The same numbers, except for the order of additions.
+        // The numbers are the same, except for the order of additions.
         assert!(
             (statistics.median - row.statistics.median).abs() <= 1e-12 * row.statistics.median.abs(),
             "{quantity}"
@@ -108,7 +108,7 @@ fn values_say_what_the_summary_says() {
             (row.statistics.count, row.statistics.missing)
         );
     }
-    // One replication without remnant, which OLS returns exactly.
+    // There is one replication without remnant, whose coefficients OLS determines exactly.
     let silent = results.values(&Query::of("bias_b0").name("ARX").noise_level(0.0).nk(29));
     assert!(
         silent.len() == 2 && silent.iter().all(|bias| bias.abs() < 1e-6),

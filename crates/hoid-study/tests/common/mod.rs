@@ -1,12 +1,12 @@
 //! Helpers of the group tests: files and columns of tables.
-// Each test file uses a part of this module.
+// Each test file uses only part of this module.
 #![allow(dead_code, clippy::unwrap_used)]
 
 use std::{collections::BTreeMap, fs, path::Path};
 
 use hoid_io::{ColumnValues, OutputTable};
 
-/// All files of a directory, by name.
+/// Returns the contents of all files of a directory, by name.
 pub fn content(directory: &Path) -> BTreeMap<String, Vec<u8>> {
     let files = fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().path());
     files
@@ -20,7 +20,7 @@ pub fn content(directory: &Path) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
-/// A column of texts.
+/// Returns a column of texts.
 pub fn texts<'a>(table: &'a OutputTable, name: &str) -> &'a [String] {
     match table.column(name) {
         Some(ColumnValues::Text(values)) => values,
@@ -28,7 +28,7 @@ pub fn texts<'a>(table: &'a OutputTable, name: &str) -> &'a [String] {
     }
 }
 
-/// A column of numbers.
+/// Returns a column of numbers.
 pub fn reals<'a>(table: &'a OutputTable, name: &str) -> &'a [f64] {
     match table.column(name) {
         Some(ColumnValues::Real(values)) => values,

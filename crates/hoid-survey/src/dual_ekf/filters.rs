@@ -174,8 +174,8 @@ mod tests {
             innovation_variance: 1e-4,
             input_noise_variance: 0.0,
             x: DVector::zeros(n),
-            // The state is exactly known and has no noise: the gain of y_0 and y_1 is zero, that of n does not depend
-            // on w.
+            // The state is known exactly and has no noise: the gains of y_0 and y_1 are zero, and the gain of n does
+            // not depend on w.
             p: DMatrix::zeros(n, n),
             w: DVector::from_row_slice(w),
             p_w: DMatrix::identity(p, p),
@@ -184,7 +184,7 @@ mod tests {
         }
     }
 
-    /// h is the derivative of the prediction for constant parameters, with and without a Padé approximation of the
+    /// h equals the derivative of the prediction for constant parameters, with and without a Padé approximation of the
     /// delay.
     #[test]
     fn the_whole_derivative_is_that_of_finite_differences() {

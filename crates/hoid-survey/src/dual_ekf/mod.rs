@@ -19,9 +19,9 @@
 //!
 //! A joint filter ([`crate::joint_filter`]) also estimates the covariance between state and parameters, which two
 //! alternating filters neglect. By default the delay is a whole number of samples, as in all other methods. If `pade`
-//! is 1 to 3, the delay is a further parameter, represented by the Padé approximation of that order ([`super::pade`]),
-//! as in the source and in the discussion of the thesis, for a delay that changes or is not a multiple of the sample
-//! time. The states of the approximation lie between y_1 and n.
+//! is 1 to 3, the delay is a further parameter and may change or differ from a multiple of the sample time. It is
+//! represented by the Padé approximation of this order ([`super::pade`]), as in the source and in the discussion of the
+//! thesis. The states of the approximation lie between y_1 and n.
 
 mod filters;
 mod pade;
@@ -291,7 +291,7 @@ impl State for DualEkf {
             &mut self.restarts,
         ];
         visit_all(parts, each);
-        // Numbers that were restored or changed by the caller must also lie within the bounds.
+        // Numbers that the caller restored or changed must also lie within the bounds.
         self.filters.bound(&self.bounds);
     }
 }
@@ -381,11 +381,11 @@ mod tests {
             mean[0] += operator.k_e_dot.value / 0.084 / RUNS as f64;
             mean[1] += operator.omega_nm_rad_s.value / 11.25 / RUNS as f64;
         }
-        // Standard errors of the means 3 % and 1 %.
+        // The standard errors of the means are 3 % and 1 %.
         assert!((mean[0] - 1.0).abs() < 0.12 && (mean[1] - 1.0).abs() < 0.1, "{mean:?}");
     }
 
-    /// A delay that is wrong by two samples is found by the filter that has it as a parameter.
+    /// A filter with the delay as a parameter corrects a delay that is wrong by two samples.
     #[test]
     fn a_delay_behind_pade_is_followed() {
         let record = run(Condition::C1, 0.01, 0).span(0.0, 30.72).unwrap();
@@ -396,7 +396,7 @@ mod tests {
         let trace = track(&record, &options(own.clone(), (0.0, 10.24), 27), 100).unwrap();
         let delay = |row: usize| trace.operator(row).unwrap().tau_e_s.value;
         assert!((delay(4) - 0.26).abs() < 1e-9, "it stays until the start span ends");
-        // The filter leaves it within a sample of the truth.
+        // The estimated delay is within one sample of the true value.
         assert!((delay(29) - 0.28).abs() < 0.01, "{}", delay(29));
         let many = DualEkfOptions { pade: 4, ..own };
         let refused = track(&record, &options(many, (0.0, 10.24), 27), 100).unwrap_err();

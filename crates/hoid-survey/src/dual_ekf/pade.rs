@@ -1,8 +1,8 @@
 //! Padé approximation of a delay by a rational function (H. Padé 1892; K. Ogata, *Modern Control Engineering*).
 //!
 //! `e^(-tau s) ≈ Q(-tau s)/Q(tau s)`, `Q(x) = sum_k c_k x^k`, `c_k = (2n - k)! n!/((2n)! k! (n - k)!)`, for order n.
-//! The approximation is all-pass, and its phase is close to that of the delay up to about `omega tau = n`. Each order
-//! adds a state and a pole. tau appears in the coefficients, so that it can be estimated and can change.
+//! The approximation is all-pass, and its phase is close to the phase of the delay up to about `omega tau = n`. Each
+//! order adds a state and a pole. tau appears in the coefficients, so it can be estimated and can change.
 
 use hoid_model::SampleTime;
 use nalgebra::{DMatrix, DVector};
@@ -36,7 +36,7 @@ pub(super) fn delayed_second_order(
 ) -> (DMatrix<f64>, DVector<f64>) {
     let c = coefficients(order);
     let direct = if order.is_multiple_of(2) { 1.0 } else { -1.0 };
-    // All coefficients are divided by c_n tau^n, so that the leading coefficient of the denominator is 1.
+    // All coefficients are divided by c_n tau^n, which makes the leading coefficient of the denominator 1.
     let leading = c[order] * tau_s.powi(order as i32);
     let denominator = |k: usize| c[k] * tau_s.powi(k as i32) / leading;
     let numerator = |k: usize| {
@@ -89,12 +89,12 @@ mod tests {
         }
     }
 
-    /// The held system compared with the frequency response of the delay and the second-order system.
+    /// Compares the held system with the frequency response of the delay and the second-order system.
     #[test]
     fn the_phase_is_that_of_the_delay() {
         let ts = SampleTime::new(0.01).unwrap();
         let (omega, zeta, tau) = (11.25, 0.35, 0.28);
-        // Frequency and largest error for each order: the phase of Padé's remainder.
+        // Frequency and largest error for each order; the error is the phase error of the Padé approximation.
         for (order, at, most) in [(1, 1.0, 3e-3), (2, 3.0, 2e-3), (3, 6.0, 2e-3)] {
             let (a, b) = delayed_second_order(omega, zeta, tau, order, ts);
             let n = 2 + order;
@@ -108,7 +108,7 @@ mod tests {
             let hold = Complex64::from_polar(half.sin() / half, -half);
             let expected =
                 hold * Complex64::from_polar(1.0, -at * tau) * square / (s * s + 2.0 * zeta * omega * s + square);
-            // Images of the spectrum above half the sample rate: 1e-4.
+            // The images of the spectrum above half the sampling rate contribute 1e-4.
             let off = (state[0] / expected - 1.0).norm();
             assert!(off < most, "{order}: {off}");
         }

@@ -11,15 +11,15 @@
 //! `p <- e - (1 - A) m + (R/omega^2) v`, `v <- R m + (1 - A - 2 zeta R/omega) v`;
 //!
 //! The parameters are modelled as a random walk, and the remnant as white noise in u and in the input of v. Neither
-//! assumption about the remnant holds for a coloured remnant in a closed loop; the published estimators make both
-//! assumptions. [`ekf`] linearises the model (A. Popovici, P. M. T. Zaal, D. M. Pool, *Dual extended Kalman filter for
-//! the identification of time-varying human manual control behavior*, AIAA 2017-3666, with two alternating filters);
-//! [`ukf`] uses sigma points (J. Rojer, D. M. Pool, M. M. van Paassen, M. Mulder, *UKF-based identification of
-//! time-varying manual control behaviour*, IFAC-PapersOnLine 52-19 (2019)).
+//! assumption holds for a coloured remnant in a closed loop, but the published estimators make both. [`ekf`] linearises
+//! the model (A. Popovici, P. M. T. Zaal, D. M. Pool, *Dual extended Kalman filter for the identification of
+//! time-varying human manual control behavior*, AIAA 2017-3666, with two alternating filters); [`ukf`] uses sigma
+//! points (J. Rojer, D. M. Pool, M. M. van Paassen, M. Mulder, *UKF-based identification of time-varying manual control
+//! behaviour*, IFAC-PapersOnLine 52-19 (2019)).
 //!
 //! The variances of both noises are proportional to the variance of the remnant in the start fit, `sigma^2` times the
 //! sum of squares of the impulse response of 1/D. The drift of each parameter is proportional to its initial value. The
-//! factors were set on conditions C3 and C5 with remnants of order 2 and 3, as for the method multiple-model.
+//! factors were tuned on conditions C3 and C5 with remnants of order 2 and 3, as for the method multiple-model.
 
 mod belief;
 mod ekf;

@@ -22,7 +22,7 @@ fn the_transition_is_the_exact_hold() {
         let e = (0.13 * f64::from(t)).sin() + 0.3 * (0.7 * f64::from(t)).cos();
         let [x1, x2, ..] = response.step(e);
         x = MODEL.transition(&x, e);
-        // Rounding errors of 300 samples.
+        // The tolerance allows for the rounding errors of 300 samples.
         assert!((x[0] - x1).abs() < 1e-11 && (x[1] - x2).abs() < 1e-10, "{t}");
         assert!((Model::output(&x) - X[2] * x1 - X[3] * x2).abs() < 1e-11);
     }
@@ -43,14 +43,14 @@ fn jacobian_and_gradient_are_differences() {
         let ((above, y_above), (below, y_below)) = (at(1.0), at(-1.0));
         for i in 0..N {
             let difference = (above[i] - below[i]) / (2.0 * step);
-            // Central differences: rounding of 1e-16 over 1e-6 and more.
+            // Central differences have a rounding error of 1e-16, divided by a step of at least 1e-6.
             assert!((difference - by[i][j]).abs() < 1e-8 * (1.0 + by[i][j].abs()), "{i} {j}");
         }
         assert!(((y_above - y_below) / (2.0 * step) - gradient[j]).abs() < 1e-8);
     }
 }
 
-/// With all parameters known the model is linear, and both filters are the Kalman filter.
+/// If all parameters are known, the model is linear, and both filters are equal to the Kalman filter.
 #[test]
 fn both_filters_agree_on_a_linear_model() {
     let linear = Model {
@@ -66,7 +66,7 @@ fn both_filters_agree_on_a_linear_model() {
         let u = 0.1 * (0.05 * f64::from(t)).cos();
         let [a, s] = ekf::step(&linear, &mut extended, e, u);
         let [b, r] = ukf::step(&linear, &mut unscented, e, u);
-        // Rounding errors.
+        // The tolerance allows for rounding errors.
         assert!((a - b).abs() < 1e-11 && (s - r).abs() < 1e-12, "{t}");
     }
     for i in 0..2 {
@@ -76,7 +76,7 @@ fn both_filters_agree_on_a_linear_model() {
     }
 }
 
-/// Near the truth, with small variances, the points stay where the model is nearly linear.
+/// Near the true values, with small variances, the sigma points stay in the range in which the model is nearly linear.
 #[test]
 fn with_little_doubt_both_filters_nearly_agree() {
     let mut p = [[0.0; N]; N];
@@ -98,7 +98,7 @@ fn with_little_doubt_both_filters_nearly_agree() {
     }
     for i in ETA..N {
         let apart = (extended.x[i] - unscented.x[i]).abs();
-        // Second-order terms of standard errors of about a thousandth.
+        // The difference is due to second-order terms, for standard errors of about a thousandth.
         assert!(
             apart < 0.05 * extended.p[i][i].sqrt() && apart < 1e-4 * X[i],
             "{i}: {apart}"

@@ -1,8 +1,8 @@
 //! The unscented Kalman filter: 2 N points `X ± sqrt(N) L_i` of equal weight, where `L L' = P`, are propagated through
-//! the transition and the output, and give the means and covariances (S. J. Julier and J. K. Uhlmann, *Proceedings of
-//! the IEEE* 92 (2004) 401-422, with kappa = 0). The points are drawn again after the noise of the transition has been
-//! added. The update is `X <- X + c/s eps`, `P <- P - c c'/s`, where c is the covariance of X with the output and s the
-//! variance of the output.
+//! the transition and the output; the propagated points give the means and covariances (S. J. Julier and J. K. Uhlmann,
+//! *Proceedings of the IEEE* 92 (2004) 401-422, with kappa = 0). The points are drawn again after the noise of the
+//! transition has been added. The update is `X <- X + c/s eps`, `P <- P - c c'/s`, where c is the covariance of X with
+//! the output and s the variance of the output.
 
 use super::belief::{AugmentedState, Matrix, Model, N};
 

@@ -1,10 +1,10 @@
-//! The computations for one sample, with fixed capacity, that only the methods of this crate use; their form is the
-//! same as in [`hoid_core`].
+//! Computations for one sample with fixed capacity, in the same form as in [`hoid_core`]; only the methods of this
+//! crate use them.
 //!
 //! | module | contents |
 //! |---|---|
 //! | [`physical`] | the prediction-error method in physical parameters |
-//! | [`multiple_model`] | a bank of hypotheses about when the operator changed |
+//! | [`multiple_model`] | a bank of hypotheses about the time of a change of the operator |
 
 pub mod multiple_model;
 pub mod physical;

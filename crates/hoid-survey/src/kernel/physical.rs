@@ -4,7 +4,7 @@
 //! `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, c.., d..]`. The predictor is the Box-Jenkins predictor with the
 //! polynomials `theta(eta)` of the exact zero-order hold ([`hoid_core::held_operator`]); its gradient is
 //! `psi_eta = (d theta/d eta)' psi_theta`. The step is computed as in [`hoid_core::rpem`], but each forgetting factor
-//! now belongs to a quantity whose rate of change the user knows: operators adapt their gains, and hardly their
+//! now belongs to a quantity whose rate of change the user knows: operators adapt their gains, but hardly their
 //! neuromuscular system.
 //!
 //! Each parameter stays within its bounds: a step is cut off at the bound. C (and D, with

@@ -3,8 +3,8 @@
 //!
 //! If the delay is tracked, other delays are proposed every 1.28 s.
 //!
-//! The constants were set on conditions C3 and C5 with remnants of order 2 and 3; the errors change by a tenth or less
-//! when any constant is halved or doubled.
+//! The constants were tuned on conditions C3 and C5 with remnants of order 2 and 3; the errors change by a tenth or
+//! less if any constant is halved or doubled.
 
 mod prior;
 mod smoother;

@@ -25,14 +25,15 @@ const DRIFT: f64 = 0.005;
 const TRANSIENT_DRIFT: [f64; OPERATOR] = [0.05, 0.25, 0.2, 0.2];
 const TRANSIENT_TIME_CONSTANT_S: f64 = 3.0;
 /// Prior standard deviations of a relative change of omega_nm and of zeta_nm. A hypothesis that omega_nm and zeta_nm
-/// changed too is created every `NEUROMUSCULAR_EVERY` births; `NEUROMUSCULAR_ODDS` are the odds of this change against
+/// also changed is created every `NEUROMUSCULAR_EVERY` births; `NEUROMUSCULAR_ODDS` are the odds of this change against
 /// a change of the gains alone.
 const NEUROMUSCULAR: [f64; 2] = [0.25, 0.4];
 const NEUROMUSCULAR_EVERY: u32 = 4;
 const NEUROMUSCULAR_ODDS: f64 = 0.3;
 /// Crossover frequency, which scales K_e_dot relative to K_e, rad/s.
 const CROSSOVER_RAD_S: f64 = 2.0;
-/// Memory length of the innovation variance, s; `RETAINED_MEMORY_S` is the part of it that remains after a change.
+/// Memory length of the innovation variance, s; `RETAINED_MEMORY_S` is the part of this length that remains after a
+/// change.
 const LEVEL_MEMORY_S: f64 = 20.0;
 const RETAINED_MEMORY_S: f64 = 1.0;
 /// Number of birth intervals for which a hypothesis is kept regardless of its predictions.
@@ -44,7 +45,7 @@ const RECENT_S: f64 = 4.0;
 
 /// Interval between proposals of other delays, in births. The following constants are the number of delays proposed,
 /// the odds of a change of the delay against a change of the gains alone, the standard deviation of that change in s,
-/// and the probability of a delay next to the likeliest.
+/// and the probability of a delay next to the likeliest delay.
 const DELAYS_EVERY: u32 = 4;
 const DELAYS_PROPOSED: usize = 8;
 const DELAY_ODDS: f64 = 1.0;

@@ -16,11 +16,10 @@
 //! is 2/n. The mean and the covariance of the mixture of pairs are reported.
 //!
 //! The backward run starts from the estimate at the end of the forward run, with [`START_COVARIANCE_FACTOR`] times the
-//! covariance of the start fit. The forward run starts with the same covariance, so that the start fit counts twice
-//! only with this small weight. The filters are linearised about omega_nm and zeta_nm at the end of the causal
-//! estimate.
+//! covariance of the start fit. The forward run starts with the same covariance, so the start fit is counted twice only
+//! with this small weight. The filters are linearised about omega_nm and zeta_nm at the end of the causal estimate.
 //!
-//! Offline, more hypotheses are affordable: a hypothesis is born every 0.08 s, and there is capacity for 64.
+//! Offline, more hypotheses can be computed: a hypothesis is born every 0.08 s, and the capacity is 64.
 
 use crate::kernel::multiple_model::{
     bank::Bank,
@@ -42,7 +41,8 @@ const HYPOTHESES: usize = 64;
 const SPACING_S: f64 = 0.08;
 /// Factor by which the covariance of the start fit is multiplied at the start of both runs.
 const START_COVARIANCE_FACTOR: f64 = 100.0;
-/// Time after which it no longer matters that the filters start at rest, in time constants of the neuromuscular system.
+/// Time after which the effect of starting the filters at rest is negligible, in time constants of the neuromuscular
+/// system.
 const SETTLED: f64 = 6.0;
 /// Smallest probability of a hypothesis that is combined with others, and smallest weight of a pair relative to the
 /// largest weight.
@@ -220,7 +220,7 @@ fn join(before: &[Side], after: &[Side]) -> Joined {
     let (mut most, least) = (f64::NEG_INFINITY, LEAST.ln());
     for f in before {
         for b in after {
-            // The comparison is such that a pair is not skipped if this bound is NaN.
+            // The comparison is written so that a pair is not skipped if this bound is NaN.
             let highest = f.log_weight + b.log_weight - f.size.max(b.size);
             if highest < most + least || highest - ForwardBackward::half_square(f, b) < most + least {
                 continue;

@@ -47,7 +47,7 @@ impl RecursiveMethod for PhysicalOptions {
         }
     }
 
-    /// Parameters other than the gains hardly change within a run, so that their memory is infinite.
+    /// Parameters other than the gains hardly change within a run, so their memory is infinite.
     fn default_memory(&self, parameter: &str) -> Memory {
         match parameter {
             "K_e" => Memory::Seconds(5.0),

@@ -1,5 +1,5 @@
 //! The recursion in physical parameters with the interface of all recursions: capacity for the parameters, the delay
-//! line, and conversion of the covariance to that of the coefficients.
+//! line, and conversion of the covariance to the covariance of the coefficients.
 
 use hoid_core::{
     adaptation::Adaptation,

@@ -16,7 +16,7 @@ const FILTERS: usize = 16;
 const TIME_CONSTANT: f64 = 16.0;
 /// Memory length of the weights in samples.
 const MEMORY: f64 = 4096.0;
-/// Initial variance of the weights for signals of unit power: the prior at zero has the weight of a hundredth of a
+/// Initial variance of the weights for signals of unit power; the prior at zero has the weight of a hundredth of a
 /// sample.
 const START: f64 = 100.0;
 
@@ -54,7 +54,7 @@ impl LaguerreRegression {
         let following = bounded(weighted(&self.weights, &self.filters));
         self.samples += 1.0;
         self.power += (external * external - self.power) / self.samples.min(MEMORY);
-        // The signals are scaled to unit power of the external signal, so that P does not depend on its scale.
+        // The external signal is scaled to unit power, so P does not depend on its scale.
         let scale = self.power.sqrt().recip();
         if scale.is_finite() {
             let z = self.filters.map(|v| bounded(scale * v));
@@ -102,7 +102,7 @@ mod tests {
         }
         for i in 0..FILTERS {
             for j in 0..FILTERS {
-                // The impulse responses have decayed to rounding errors.
+                // The impulse responses have decayed to the level of rounding errors.
                 assert!((gram[i][j] - f64::from(u8::from(i == j))).abs() < 1e-12, "{i} {j}");
             }
         }

@@ -11,9 +11,9 @@
 //! are a posteriori: each filter processes a sample again with the updated auxiliary model.
 //!
 //! **Auxiliary model.** The auxiliary model is the estimate, low-pass filtered with the shortest memory length of B and
-//! F. With the unfiltered estimate the instruments would depend on the errors of the estimate, and with short memory
-//! lengths some runs would diverge. The reported innovation and innovation variance are those of the auxiliary model,
-//! whose filters run in any case.
+//! F. If the estimate was not filtered, the instruments would depend on its errors, and with short memory lengths some
+//! runs would diverge. The reported innovation and innovation variance are computed with the auxiliary model, whose
+//! filters run in any case.
 //!
 //! **Instruments.** The signal e' is e itself, or the part of e that follows an external signal ([`super::laguerre`]).
 //! With e itself, the method needs the correct noise model in a closed loop: z then contains past noise, which is
@@ -22,7 +22,7 @@
 //! **Covariance.** To first order the errors follow `t <- (I - A) t - g eps`, where A has the rows `g_i phi'` for B and
 //! F and `g_i psi'` for D; psi is the gradient for all parameters, because D inherits the errors of B and F. The
 //! covariance of theta is therefore `sigma^2 C` with `C <- (I - A) C (I - A)' + g g'` for any gain. For lambda = 1 it
-//! is the covariance of the batch method; with forgetting, C is about `P/(1 + lambda)`.
+//! equals the covariance of the batch method; with forgetting, C is about `P/(1 + lambda)`.
 //!
 //! **Stability.** A step of B and F is halved until the roots of F lie within a circle of radius [`RADIUS`].
 
@@ -346,12 +346,12 @@ impl RefinedRecursion {
             }
         }
         if (0..p).any(|i| self.spread[i * (p + 1)] < 0.0) {
-            // Rounding errors can make C invalid, as they can make P invalid; C is then reset.
+            // Rounding errors can make C invalid, like P; C is then reset.
             self.spread.copy_from_slice(&self.first_spread);
         }
         for i in 0..p {
-            // The first-order recursion of C can be unstable although that of theta is stable. Each variance is
-            // therefore limited to [`LARGEST_GROWTH`] times its initial value.
+            // The first-order recursion of C can be unstable although the recursion of theta is stable. Each variance
+            // is therefore limited to [`LARGEST_GROWTH`] times its initial value.
             let limit = LARGEST_GROWTH * self.first_spread[i * (p + 1)];
             let found = self.spread[i * (p + 1)];
             if limit > 0.0 && found > limit {

@@ -22,8 +22,8 @@ fn textbook() -> Orders {
     }
 }
 
-/// `u = (B/F) q^-2 e + (1/D) eps` with white e and eps of unit variance; B is `gain` times the default one from the
-/// middle on.
+/// `u = (B/F) q^-2 e + (1/D) eps` with white e and eps of unit variance; from the middle of the record on, B is
+/// multiplied by `gain`.
 fn open_loop(n: usize, replication: u64, d: &[f64], gain: f64) -> (Vec<f64>, Vec<f64>) {
     let white = |cell| {
         RunSeed {
@@ -106,13 +106,13 @@ fn without_forgetting_it_comes_to_the_batch_estimate() {
             for (i, found) in errors(&recursion).into_iter().enumerate() {
                 let error = batch.parameters()[i].1.standard_error.unwrap();
                 worst = worst.max((recursion.theta()[i] - batch.model().theta()[i]).abs() / error);
-                // The start has the weight of 5 % of the samples.
+                // The start has a weight of 5 % of the samples.
                 assert!((found / error - 1.0).abs() < 0.02, "{orders}, {i}: {}", found / error);
             }
             assert!((recursion.innovation_variance() / batch.innovation_variance() - 1.0).abs() < 2e-3);
         }
         println!("{orders}: farthest {worst:.3} standard errors");
-        // A second-order effect: past filters and instruments were those of past estimates.
+        // The difference is a second-order effect: past samples were filtered with past estimates.
         assert!(worst < 0.15, "{orders}: {worst}");
     }
 }
@@ -141,7 +141,7 @@ fn errors_are_known_whatever_is_forgotten() {
             squares.map(f64::sqrt)
         );
         for (mean, square) in sums.into_iter().zip(squares) {
-            // Over 200 runs: 0.07 for the mean, 5 % for the deviation.
+            // Over 200 runs, the standard error of the mean is 0.07 and that of the standard deviation 5 %.
             assert!(mean.abs() < 0.2, "{lambda:?}: {mean}");
             assert!((0.85..1.15).contains(&square.sqrt()), "{lambda:?}: {}", square.sqrt());
         }
@@ -157,7 +157,7 @@ fn it_follows_a_jump_of_the_gain() {
         let mut recursion = from_fit(&riv(&warm, textbook()), &warm, &lambda, false);
         for (t, s) in samples(&record(&e, &u)).enumerate().skip(1000) {
             recursion.step(s);
-            // Before the jump, and six memories after it.
+            // The samples are before the jump and six memory lengths after it.
             if t == 2999 || t == 4500 {
                 let gain = if t < 3000 { 1.0 } else { 2.0 };
                 for (i, error) in errors(&recursion).into_iter().enumerate() {
@@ -173,7 +173,7 @@ fn it_follows_a_jump_of_the_gain() {
     }
 }
 
-/// e and u of sample t, from white noise.
+/// Function that returns e and u of sample t, computed from white noise.
 type Shape = fn(usize, f64) -> (f64, f64);
 
 #[test]
@@ -247,7 +247,7 @@ fn silence_is_forgotten_quickly() {
                 recursion.theta()[i],
                 default.theta()[i]
             );
-            // 4000 samples, 16 memories.
+            // 4000 samples are 16 memory lengths.
             assert!((recursion.theta()[i] - default.theta()[i]).abs() < b, "{still:?} {i}");
             assert!((a / b - 1.0).abs() < 0.3, "{still:?} {i}: {a} {b}");
         }

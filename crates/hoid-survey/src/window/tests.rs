@@ -142,7 +142,7 @@ fn without_excitation_the_last_theta_stays() {
         recursion.step(still);
     });
     assert_eq!(recursion.theta(), theta);
-    // It then moves again.
+    // The estimate is then updated again.
     samples(&record).skip(2000).take(1000).for_each(|s| {
         recursion.step(s);
     });
@@ -186,7 +186,7 @@ fn a_window_follows_samples_without_fitting() {
         recursion.step(s);
     });
     assert_eq!(recursion.fits(), 1);
-    // The innovations of the samples to come have the variance of the fit.
+    // The innovations of the following samples have the variance of the fit.
     let squares: f64 = samples(&record)
         .skip(1501)
         .take(90)
@@ -197,7 +197,7 @@ fn a_window_follows_samples_without_fitting() {
     assert!((0.5..1.6).contains(&ratio), "{ratio}");
 }
 
-/// e and u of sample t, from white noise.
+/// Function that returns e and u of sample t, computed from white noise.
 type Shape = fn(usize, f64) -> (f64, f64);
 
 #[test]

@@ -1,4 +1,4 @@
-//! An operator in state s1 of the thesis, and a prior of their changes.
+//! An operator in state s1 of the thesis, and a prior of changes of the operator.
 
 use hoid_survey::kernel::multiple_model::prior::{ChangePrior, DelayPrior};
 
@@ -7,7 +7,7 @@ pub const TS: f64 = 0.01;
 /// K_e, K_e_dot, omega_nm and zeta_nm of s1.
 pub const S1: [f64; 4] = [0.09, 0.036, 11.25, 0.35];
 
-/// The prior at 100 Hz.
+/// Returns the prior at 100 Hz.
 pub fn prior_of(delay: DelayPrior) -> ChangePrior {
     ChangePrior {
         sample_time: TS,
@@ -37,7 +37,7 @@ pub fn prior_of(delay: DelayPrior) -> ChangePrior {
     }
 }
 
-/// A diagonal covariance.
+/// Returns a diagonal covariance.
 pub fn diagonal(d: [f64; 4]) -> [[f64; 4]; 4] {
     std::array::from_fn(|i| std::array::from_fn(|j| if i == j { d[i] } else { 0.0 }))
 }

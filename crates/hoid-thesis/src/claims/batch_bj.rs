@@ -217,8 +217,8 @@ fn second_order_worst(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![part])
 }
 
-/// Tests the bias of a remnant parameter retrieved as in the text (backward Euler), and shows it with the bias of the
-/// exact retrieval.
+/// Tests the bias of a remnant parameter retrieved as in the text (backward Euler), and shows it next to the bias of
+/// the exact retrieval.
 fn remnant(
     evidence: &Evidence<'_>,
     name: &str,

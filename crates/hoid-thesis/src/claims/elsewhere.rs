@@ -1,4 +1,4 @@
-//! Claims that cannot be tested here, because there are no data for them.
+//! Claims that cannot be tested, because there are no data for them.
 
 use super::claim::{Claim, Source, Theme};
 

@@ -4,11 +4,11 @@
 //!   all times of a run were fully correlated, the error of the bias would be the mean over the span of the error of a
 //!   median, 0.93 IQR / sqrt(M) (for a normal sample 1.253 s / sqrt(M) with IQR = 1.349 s). For the span of 30.72 s a
 //!   bootstrap over runs gave 0.3 to 0.57 of the fully correlated error if all parameters forget within 2.56 s (RLS and
-//!   RPEM). If only b forgets so fast (RLS), the bootstrap gave 0.33 to 0.45 for K_e, T_L and K_e_dot, and 0.46 to 1.5
-//!   for the other parameters. Half of the fully correlated error is therefore used if all parameters forget so fast,
-//!   and for K_e, T_L and K_e_dot if only b does; all of this error is used otherwise.
+//!   RPEM). If only b forgets this fast (RLS), the bootstrap gave 0.33 to 0.45 for K_e, T_L and K_e_dot, and 0.46 to
+//!   1.5 for the other parameters. Therefore half of the fully correlated error is used if all parameters forget this
+//!   fast, and for K_e, T_L and K_e_dot if only b does; otherwise the full error is used.
 //! - *Settling of a median trace*: time after t_M at which the trace has covered 90 % of its own step, from its mean
-//!   over the 10.24 s before t_M to its mean over the last 15.36 s: a biased estimate settles at its own value. The
+//!   over the 10.24 s before t_M to its mean over the last 15.36 s: a biased estimate settles at a biased value. The
 //!   error is half the difference between the settling times of the median plus and minus its error, and at least half
 //!   the interval between stored times.
 
@@ -118,7 +118,7 @@ impl<'a> Study<'a> {
     }
 
     /// Share of ones in a quantity that is 0 or 1, over all replications of all rows that a query selects. The error is
-    /// at least 1.5 / n, because for none or all of n the 95 % limit is 3 / n.
+    /// at least 1.5 / n, because the 95 % limit for none or all of n values is 3 / n.
     pub fn share(&self, query: &Query) -> Result<Value, String> {
         if self.results.count(query) == 0 || !self.results.has_quantity(query) {
             return Err(format!(

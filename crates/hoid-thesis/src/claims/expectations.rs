@@ -15,7 +15,7 @@ const PLACE: &str = "6.2.2";
 const GAINS: [&str; 3] = ["K_e", "T_L", "K_e_dot"];
 /// Time span of the transition after the change at 40.96 s, s.
 const TRANSITION_S: (f64, f64) = (40.96, 51.2);
-/// Starts in the plan, with poles, gains or both close to the true values (Table 6.1).
+/// Starts in the plan, whose poles or gains are close to the true values (Table 6.1).
 const STARTS: [&str; 9] = ["base", "IC1", "IC2", "IC3", "IC4", "IC5", "IC6", "IC7", "IC8"];
 
 pub(super) const CLAIMS: &[Claim] = &[

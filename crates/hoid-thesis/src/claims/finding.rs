@@ -1,4 +1,4 @@
-//! What the data show about a claim.
+//! Evidence from the data about a claim, and the resulting verdict.
 
 use hoid_study::Statistics;
 

@@ -6,9 +6,9 @@
 //!      more than the margin, fails if it is on the other side by more than the margin, and is undecided otherwise.
 //!    - *Number* (around 50 %, 10 times): the cell passes if x lies within the range that the wording allows, widened
 //!      by the margin, and fails otherwise. A cell that would pass is undecided if the margin exceeds half the range,
-//!      because such an x carries no information about the number. If the number is the size of an effect (so many
-//!      times slower, so much less error), an x beyond the range on the side of the larger effect *exceeds* the claim:
-//!      the statement is true, and the effect is larger.
+//!      because such an x carries no information about the number. If the number is the size of an effect (slower by a
+//!      factor, less error by a percentage), an x beyond the range on the side of the larger effect *exceeds* the
+//!      claim: the statement is true, and the effect is larger.
 //!    - If less than half of the replications give a value (because models cannot be converted), the cell is undecided.
 //! 2. **A part** of a claim (same figure of merit, same test) *holds* if 90 % of its decided cells pass. A part *holds
 //!    and more so* if fewer cells pass, but 90 % pass or exceed the claim. A part *holds in part* if 50 % of its
@@ -315,7 +315,7 @@ mod tests {
             assert_eq!(cell(value, 1.0, Bound::Above(10.0)), outcome);
             assert_eq!(cell(-value, 1.0, Bound::Below(-10.0)), outcome);
         }
-        // Without Monte Carlo error no cell is undecided: a value that is not larger fails.
+        // Without a Monte Carlo error no cell is undecided, and a value that is not larger fails.
         assert_eq!(cell(10.0, 0.0, Bound::Above(10.0)), Fails);
         assert_eq!(cell(10.0 + 1e-9, 0.0, Bound::Above(10.0)), Passes);
         let around = Bound::Between(25.0, 75.0);
@@ -328,7 +328,7 @@ mod tests {
         ] {
             assert_eq!(cell(value, 1.0, around), outcome);
         }
-        // 2 s = 26 is more than half of 75 - 25.
+        // The margin 2 s = 26 is more than half the range, 75 - 25.
         for (value, outcome) in [(50.0, Undecided), (100.9, Undecided), (101.1, Fails)] {
             assert_eq!(cell(value, 13.0, around), outcome);
         }

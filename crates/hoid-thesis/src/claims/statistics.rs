@@ -158,9 +158,9 @@ mod tests {
 
     #[test]
     fn the_jackknife_of_a_mean_is_its_error() {
-        // The expectation of s^2 is exact for a mean; with 9 degrees of freedom s has a spread of
-        // 24 %, which 400 samples reduce to 1.2 %; the root of a chi-square of 9 degrees is 2.7 %
-        // below.
+        // For a mean, the expectation of s^2 is exact. With 9 degrees of freedom s has a spread of 24 %, which
+        // averaging over 400 samples reduces to 1.2 %, and its mean is 2.7 % too small (square root of a chi-square
+        // variable).
         let errors: f64 = (0..400)
             .map(|seed| jackknife(&[normals(100, seed)], &|s| s[0].iter().sum::<f64>() / s[0].len() as f64).error)
             .sum();
@@ -203,7 +203,7 @@ mod tests {
     fn linearity_of_a_line_and_of_a_parabola() {
         assert!((linearity(&[1.0, 3.0, 5.0, 7.0]) - 1.0).abs() < 1e-12);
         assert!(linearity(&[1.0, 0.0, 0.0, 1.0]) < 1e-12);
-        // NumPy: corrcoef([0, 1, 2, 3], [0, 1, 4, 9])^2 = 0.9184
+        // In NumPy, corrcoef([0, 1, 2, 3], [0, 1, 4, 9])^2 = 0.9184.
         assert!((linearity(&[0.0, 1.0, 4.0, 9.0]) - 0.918_4).abs() < 1e-4);
     }
 }

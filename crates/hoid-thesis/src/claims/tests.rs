@@ -61,7 +61,7 @@ fn claims_are_told_apart_and_short() {
     }
 }
 
-/// A query that selects nothing, or several estimators, would give a reason without parts.
+/// A query that selects nothing, or several estimators, would give a reason but no parts.
 #[test]
 fn each_claim_finds_all_its_cells_in_its_own_plans() {
     let data: &Data = &|_, _, column, replication| 0.01 + scatter(column, replication);
@@ -146,7 +146,7 @@ fn a_verdict_flips_with_the_data() {
 
 #[test]
 fn traces_give_bias_and_settling() {
-    // RPEM is 3 % off, RLS 40 %.
+    // RPEM has an error of 3 %, RLS of 40 %.
     let results = synthetic("recursive", &|cell, estimator, column, replication| {
         let off = match (estimator.name.as_str(), cell.resolved.scenario().remnant.order) {
             ("RLS", 1) => 0.4,

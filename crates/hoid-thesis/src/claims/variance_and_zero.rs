@@ -2,9 +2,9 @@
 //! remnant and in C2, b at a wrong delay, and the zero in C2.
 //!
 //! The *modified remnant noise variance* of the text is the variance of the innovation that drives 1/D. The reference
-//! value of this variance is that of the backward Euler form (eq. B.12), `sigma'^2 = (K_n (Ts/(Tn + Ts))^m)^2`. In the
-//! simulations, both those of the text and those here, the remnant is held exactly over a sample. The innovations of an
-//! exact model therefore have a different variance, which is shown as well.
+//! value is the variance of the backward Euler form (eq. B.12), `sigma'^2 = (K_n (Ts/(Tn + Ts))^m)^2`. In the
+//! simulations of the text and in those of hoid, the remnant is held exactly over a sample. The innovations of an exact
+//! model therefore have a different variance, which is also shown.
 
 use super::{
     claim::{Claim, Source, Theme},
@@ -164,7 +164,7 @@ fn of_zero(t_l_percent: &[f64]) -> Vec<f64> {
 }
 
 /// Median magnitude of the relative error of the zero in C2 minus the same median in C1. If `of` gives two queries, the
-/// median for the second is first subtracted from that for the first.
+/// median for the second query is first subtracted from the median for the first.
 fn zero_change(study: Study<'_>, of: &dyn Fn(Setting) -> Vec<hoid_study::Query>, at: Setting) -> Result<Value, String> {
     let error = |condition| {
         study.of(&of(Setting { condition, ..at }), &|s| {

@@ -45,7 +45,7 @@ pub struct Task<'a> {
 pub struct TrackingResult {
     /// Response at each requested frequency.
     pub response: Vec<Vec<Complex64>>,
-    /// Operator; `None` if the method does not give a valid one.
+    /// Operator; `None` if the method does not give a valid operator.
     pub operator: Vec<Option<OperatorParameters>>,
 }
 

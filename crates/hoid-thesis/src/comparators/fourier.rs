@@ -8,9 +8,9 @@
 //! `x(k) = sum_i (a_i cos omega_i t_k + b_i sin omega_i t_k) + r(k)`
 //!
 //! is fitted to x = e and x = u by least squares for all lines at once. Over a whole period of the forcing function the
-//! estimates are its Fourier coefficients; over less than a period the lines are separated as far as their distances
-//! allow. The response is `H(j omega_i) = U(j omega_i)/E(j omega_i)` with `X = a_i - j b_i`. The window extends T/2 to
-//! either side of t; near the ends of the record it is the first or the last interval of length T.
+//! estimates are the Fourier coefficients of x; over less than a period the lines are separated as far as their
+//! distances allow. The response is `H(j omega_i) = U(j omega_i)/E(j omega_i)` with `X = a_i - j b_i`. The window
+//! extends T/2 to either side of t; near the ends of the record it is the first or the last interval of length T.
 
 use hoid_ident::{settings, settings::Bounds};
 use num_complex::Complex64;
@@ -22,7 +22,7 @@ use super::{
 use crate::ThesisError;
 
 const NAME: &str = "fourier";
-/// Ridge, as a fraction of the power of a line, that regularises lines which a short window cannot separate.
+/// Ridge, as a fraction of the power of a line; it regularises lines that a short window cannot separate.
 const RIDGE: f64 = 1e-4;
 
 settings! {
@@ -92,7 +92,8 @@ mod tests {
 
     #[test]
     fn a_whole_period_gives_the_coefficients_of_the_fourier_transform() {
-        // Lines 3 and 8 of a period of 512 samples; u has twice the first, and the second delayed.
+        // Lines 3 and 8 of a period of 512 samples; in u the first line has twice the amplitude, and the second line is
+        // delayed.
         let omega = [3.0, 8.0].map(|n| n * std::f64::consts::TAU / 5.12);
         let at = |n: usize, k: f64| (omega[n] * 0.01 * k).sin();
         let e: Vec<f64> = (0..512).map(|k| at(0, f64::from(k)) + at(1, f64::from(k))).collect();
@@ -105,12 +106,12 @@ mod tests {
             ..task_of(&record, &[255], &omega)
         };
         let found = FourierCoefficients { window: 5.12 }.follow(&task).unwrap();
-        // The ridge takes the same share of e and u.
+        // The ridge reduces e and u by the same fraction.
         let expected = [Complex64::new(2.0, 0.0), Complex64::from_polar(1.0, -omega[1] * 0.2)];
         for (found, expected) in found.response[0].iter().zip(expected) {
             assert!((found - expected).norm() < 1e-9, "{found} {expected}");
         }
-        // What is not a line has no coefficient.
+        // A frequency that is not a line has no coefficient.
         let other = Task {
             omega_rad_s: &[1.0],
             ..task
@@ -127,7 +128,7 @@ mod tests {
         let run = Run::of(hoid_model::scenario::Condition::C1, 1, 0.0);
         let whole = FourierCoefficients { window: 1e4 }.follow(&run.task()).unwrap();
         let truth = run.responses();
-        // 81.92 s are a period: without remnant each line is exact except for the ridge.
+        // 81.92 s is a whole period, so without remnant each line is exact except for the ridge.
         for (found, expected) in whole.response[0].iter().zip(&truth[0]) {
             assert!((found / expected - 1.0).norm() < 1e-3, "{found} {expected}");
         }

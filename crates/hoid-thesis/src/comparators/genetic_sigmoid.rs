@@ -3,7 +3,7 @@
 //! using genetic maximum likelihood estimation*, J. Guidance, Control, and Dynamics 32 (2009) 1089-1099; with a
 //! sigmoid: P. M. T. Zaal and B. T. Sweet, AIAA 2011-6474).
 //!
-//! The likelihood has many maxima over t_M, G and the delay. The genetic search needs no start. The first population
+//! The likelihood has many maxima over t_M, G and the delay. The genetic search needs no start: the first population
 //! consists of parameter vectors drawn from wide ranges. Each generation keeps the best members and replaces the others
 //! by children of two parents, each of which is the best of three randomly drawn members (a *tournament*). Every gene
 //! of a child is drawn from a range that extends half of the parents' distance beyond both parents (*blend crossover*,
@@ -108,7 +108,7 @@ impl GeneticSigmoid {
             let size = 0.3 * (1.0 - generation as f64 / (self.generations + 1) as f64);
             let mut children = all[..ELITE.min(all.len())].to_vec();
             while children.len() < all.len() {
-                // The members are sorted, so that the smallest index is the best member.
+                // The members are sorted, so the smallest index denotes the best member.
                 let mut parent = || {
                     let places = (0..DRAWN).map(|_| (next() * all.len() as f64) as usize);
                     all[places.min().unwrap_or(0).min(all.len() - 1)]
@@ -236,8 +236,8 @@ mod tests {
 
     #[test]
     fn the_search_finds_the_lowest_of_many_minima() {
-        // Rastrigin's function in three genes, the others free: minima a tenth apart, the lowest at
-        // 0.3, 0.5, 0.7.
+        // Rastrigin's function of three genes, independent of the other genes: its minima are a tenth apart, and the
+        // lowest minimum is at 0.3, 0.5, 0.7.
         let cost = |genes: &[f64; N]| {
             let along = |x: f64| 100.0 * x * x + 0.3 * (1.0 - (TAU * 10.0 * x).cos());
             along(genes[0] - 0.3) + along(genes[1] - 0.5) + along(genes[2] - 0.7)
@@ -251,20 +251,20 @@ mod tests {
             let off = [0.3, 0.5, 0.7].iter().zip(best.genes).map(|(x, y)| (x - y).abs());
             assert!(off.fold(0.0, f64::max) < 0.05, "{seed}: {best:?}");
         }
-        // A cost that is not a number is never the best.
+        // A member whose cost is NaN is never the best.
         let best = GeneticSigmoid::default().search(&|genes| if genes[0] < 0.9 { f64::NAN } else { 1.0 });
         assert!(best.genes[0] >= 0.9);
     }
 
-    /// The criterion at the truth is the variance of the innovations: AR(1) with d1 = -e^(-Ts/Tn).
+    /// At the true parameters, the criterion is the innovation variance of an AR(1) process with d1 = -e^(-Ts/Tn).
     #[test]
     fn the_criterion_at_the_truth_is_the_remnant() {
         let run = Run::of(Condition::C4, 1, 0.1);
         let task = run.task();
         let truth = [0.09, 0.07, 0.4, 1.2, 40.96, 100.0, 11.25, 0.35, 0.28];
         let (loss, d1) = GeneticSigmoid::criterion(&task, run.record.input(), run.record.output(), &truth);
-        // Standard error of d1 0.006; of a mean of squares 1.6 %, around the 1.37e-4 and 4.6e-4 of
-        // the two states; the transient at the start is the run's own.
+        // The standard error of d1 is 0.006. The standard error of the mean square is 1.6 %; its values in the two
+        // states are 1.37e-4 and 4.6e-4. The transient at the start is additional.
         assert!((d1 + 0.8465).abs() < 0.03, "{d1}");
         assert!((1.3e-4..4.6e-4).contains(&loss), "{loss}");
         let mut other = truth;
@@ -272,7 +272,7 @@ mod tests {
         assert!(GeneticSigmoid::criterion(&task, run.record.input(), run.record.output(), &other).0 > loss);
     }
 
-    /// From the genetic start the search ends where it ends from the own starts of the estimator.
+    /// From the genetic start, the search ends in the same minimum as from the estimator's own starts.
     #[test]
     fn it_ends_in_the_minimum_that_other_starts_find() {
         let run = Run::of(Condition::C4, 1, 0.1);

@@ -87,7 +87,7 @@ mod tests {
             (theta[0] - 2.0).abs() < 1e-12 && (theta[1] + 1.0).abs() < 1e-12,
             "{theta}"
         );
-        // By hand: one regressor, weights .5 and 1, y = 1 and 3: (.5 1 + 3)/(1.5).
+        // Computed by hand: one regressor with the weights .5 and 1 and y = 1 and 3 gives (.5 1 + 3)/(1.5).
         let mut one = NormalEquations::new(1, 1);
         one.add(0.5, &[1.0], &[1.0]);
         one.add(0.5, &[1.0], &[3.0]);

@@ -8,11 +8,11 @@
 //! At 100 Hz consecutive states differ by a few hundredths, too little to determine B. Therefore only every d-th sample
 //! of u is used, and v(k) is the mean of the d values of e that act until the next sample used, delayed by nk - 1
 //! samples. The scheduling signal mu is the sigmoid of the controlled element, which the experimenter knows (the
-//! analytical scheduling of the source). Only the gains of an operator change, so that A, C and K do not depend on mu,
-//! and the number of coefficients is proportional to the window p instead of 2^p. The steps are:
+//! analytical scheduling of the source). Only the gains of an operator change, so A, C and K do not depend on mu, and
+//! the number of coefficients is proportional to the window p instead of 2^p. The steps are:
 //!
 //! 1. Estimate by least squares the predictor `u(k) = sum_{i=1..p} C Ã^(i-1) [B_0, B_1, K] z(k-i) + eps`, with
-//!    `z = [v, mu v, u]` and `Ã = A - K C`; p is so large that Ã^p is negligible.
+//!    `z = [v, mu v, u]` and `Ã = A - K C`; p must be large enough that Ã^p is negligible.
 //! 2. The same coefficients, shifted and multiplied by z, give `Gamma x(k)`, the prediction of the next f outputs from
 //!    the past. The n principal directions of this prediction over the record form a state.
 //! 3. With the state of step 2, estimate C by least squares; the residuals are eps. Then estimate A, B_0, B_1 and K by
@@ -213,8 +213,8 @@ mod tests {
 
     use super::{super::tests::*, *};
 
-    /// A system of its own kind, of order 2, white input, innovations of a tenth of the output: the
-    /// response before and after the change.
+    /// A second-order system of the assumed structure, with white input and innovations of a tenth of the output: the
+    /// response is correct before and after the change.
     #[test]
     fn a_system_of_its_kind_is_found() {
         let white = |cell| {
@@ -252,7 +252,7 @@ mod tests {
             let [b_1, b_2] = gains(mu);
             let expected = (b_1 / at + b_2 / (at * at)) / (1.0 + f1 / at + f2 / (at * at));
             let found = model.response(mu, at);
-            // Standard error of a response from 12 000 samples about 1 %.
+            // The standard error of a response from 12 000 samples is about 1 %.
             assert!(
                 (found / expected - 1.0).norm() < 0.04,
                 "{mu} {angle}: {found} {expected}"

@@ -1,5 +1,5 @@
 //! The other methods of the survey as comparators: methods described in Part II of the thesis (section 2.4) that need
-//! more than the samples so far, such as the lines, later samples or a second run. The recursive methods are in
+//! more than the past samples, such as the lines, later samples or a second run. The recursive methods are in
 //! `hoid_survey`.
 //!
 //! A comparator processes a record and returns the operator's response at some frequencies at requested times, and the

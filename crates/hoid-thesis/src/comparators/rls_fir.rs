@@ -7,11 +7,10 @@
 //! `sum_k lambda^(t-k) (u(k) - g' phi(k))^2 + p var(u) g' K^-1 g`.
 //!
 //! The forcing function has ten lines, which excite only twenty of the nb directions. Without the second term of the
-//! criterion, the other directions would be determined by noise and rounding errors, and along them the covariance of
-//! the standard recursion would grow as lambda^-t until it were no longer positive definite. K is the
-//! *tuned-correlated* kernel `K_ij = decay^max(i, j)` (T. Chen, H. Ohlsson and L. Ljung, *Automatica* 48 (2012)
-//! 1525-1535), the covariance of a smooth, decaying response. The inverse of K corresponds to independent increments of
-//! g:
+//! criterion, noise and rounding errors would determine the other directions, along which the covariance of the
+//! standard recursion would grow as lambda^-t until it was no longer positive definite. K is the *tuned-correlated*
+//! kernel `K_ij = decay^max(i, j)` (T. Chen, H. Ohlsson and L. Ljung, *Automatica* 48 (2012) 1525-1535), the covariance
+//! of a smooth, decaying response. The inverse of K corresponds to independent increments of g:
 //!
 //! `g' K^-1 g = sum_i (g_i - g_{i+1})^2/(decay^i - decay^(i+1)) + g_{nb-1}^2/decay^(nb-1)`.
 //!
@@ -82,7 +81,7 @@ impl RlsFir {
         for k in 0..e.len() {
             regressors.rotate_right(1);
             regressors[0] = e[k];
-            // The signals before the record are unknown, so that the regressors are complete only from this sample on.
+            // The signals before the record are unknown, so the regressors are complete only from this sample on.
             if k + 1 >= self.nb {
                 equations.add(lambda, &regressors, &[u[k]]);
             }
@@ -128,8 +127,8 @@ mod tests {
 
     use super::{super::tests::*, *};
 
-    /// Another way to the same minimum: the regularised sum of squares as a tall least-squares
-    /// problem, rows of the prior next to those of the data, by Householder reflections.
+    /// The same minimum is computed in another way: the regularised sum of squares is a tall least-squares problem,
+    /// with rows for the prior in addition to those for the data, which is solved by Householder reflections.
     #[test]
     fn the_recursion_gives_the_minimum_of_its_criterion() {
         let method = RlsFir {
@@ -182,7 +181,7 @@ mod tests {
 
     #[test]
     fn two_hundred_and_fifty_six_coefficients_follow_a_change_of_the_gain() {
-        // u = g(t) e(t - 20), white e; the gain doubles in the middle.
+        // u = g(t) e(t - 20) with white e; the gain doubles in the middle.
         let e = RunSeed::default().white_noise(8000);
         let gain = |k: usize| if k < 4000 { 0.5 } else { 1.0 };
         let u: Vec<f64> = (0..8000)
@@ -199,14 +198,14 @@ mod tests {
         let found = method.follow(&task).unwrap();
         for (row, gain) in found.response.iter().zip([0.5, 1.0]) {
             let expected = Complex64::from_polar(gain, -3.0 * 0.01 * 20.0);
-            // exp(-4000/600) of the old gain is left.
+            // A fraction exp(-4000/600) of the old gain remains.
             assert!((row[0] - expected).norm() < 3e-3, "{row:?} {expected}");
         }
     }
 
     #[test]
     fn lines_alone_leave_it_finite_and_silence_is_refused() {
-        // Two lines excite four of 256 directions.
+        // Two lines excite only four of 256 directions.
         let e: Vec<f64> = (0..3000)
             .map(|k| (0.02 * k as f64).sin() + (0.005 * k as f64).cos())
             .collect();
@@ -216,7 +215,7 @@ mod tests {
             ..RlsFir::default()
         };
         let found = method.follow(&task_of(&record, &[2999], &[2.0])).unwrap();
-        // u = e: the response at the line is near 1, however unsure the others are.
+        // With u = e, the response at the line is near 1, however uncertain the response at other frequencies is.
         assert!((found.response[0][0] - 1.0).norm() < 0.05, "{:?}", found.response);
         let silent = record_of(&[0.0; 500], &[1.0; 500]);
         let refused = method

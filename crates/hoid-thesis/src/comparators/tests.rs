@@ -1,4 +1,4 @@
-//! Common helpers of the tests of comparators, and tests of all of them.
+//! Common helpers for the tests of comparators, and tests of all comparators.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeSet;
@@ -15,13 +15,13 @@ use super::{
     comparators, names, not_tracked,
 };
 
-/// A record at 100 Hz.
+/// Returns a record at 100 Hz.
 pub(super) fn record_of(e: &[f64], u: &[f64]) -> Record {
     let channel = |name: &str, values: &[f64]| Channel::new(name, "deg", values.to_vec());
     Record::new(SampleTime::new(0.01).unwrap(), channel("e", e), channel("u", u)).unwrap()
 }
 
-/// A task without lines.
+/// Returns a task without lines.
 pub(super) fn task_of<'a>(record: &'a Record, at: &'a [usize], omega_rad_s: &'a [f64]) -> Task<'a> {
     Task {
         record,
@@ -35,7 +35,7 @@ pub(super) fn task_of<'a>(record: &'a Record, at: &'a [usize], omega_rad_s: &'a 
     }
 }
 
-/// A run of a condition of the text, and its true values.
+/// A run in a condition of the text, and its true values.
 pub(super) struct Run {
     pub record: Record,
     validation: Record,
@@ -45,7 +45,7 @@ pub(super) struct Run {
 }
 
 impl Run {
-    /// One replication with the given P_n and m0.
+    /// Simulates one replication with the given P_n and m0.
     pub fn of(condition: Condition, order: usize, level: f64) -> Self {
         Self::replication(condition, order, level, 0)
     }
@@ -68,7 +68,7 @@ impl Run {
         Self {
             record: run(0),
             validation: run(1),
-            // Before the change and 24 s after it.
+            // One sample is before the change and one 24 s after it.
             at: vec![2999, 6499],
             lines_rad_s: scenario.forcing.sinusoids().iter().map(|s| s.omega_rad_s).collect(),
             change: scenario.schedule.change_s().zip(scenario.schedule.rate_per_s()),
@@ -108,7 +108,7 @@ impl Run {
     }
 }
 
-/// Relative error over the frequencies, root mean square.
+/// Returns the root mean square of the relative error over the frequencies.
 pub(super) fn error(found: &[Complex64], expected: &[Complex64]) -> f64 {
     let squares: f64 = found
         .iter()
@@ -134,8 +134,8 @@ fn names_lead_to_comparators_and_all_say_where_they_are_from() {
     }
 }
 
-/// All of them on one run with a small remnant: before the change and long after it the error of
-/// the response is below one half, and a value that is not a number is reported as missing.
+/// All comparators are applied to a run with a small remnant: before the change and long after it, the error of the
+/// response is below one half. NaN is reported as a missing value.
 #[test]
 fn all_follow_a_run_of_the_text() {
     let run = Run::of(Condition::C4, 1, 0.01);

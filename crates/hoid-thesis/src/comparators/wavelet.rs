@@ -7,9 +7,9 @@
 //! `X(omega, t) = sum_k x(k) exp(-(t_k - t)^2/(2 s^2)) e^(-j omega t_k)`,
 //!
 //! and `H(j omega, t) = U/E`. The transform shows how much of each frequency a signal contains near time t. The width
-//! of the envelope decreases with frequency, so that a slow line is averaged over tens of seconds and a fast one over
-//! seconds. In frequency the envelope has the width omega/c, and lines that are closer than about this width disturb
-//! each other. The response at t uses as much data after t as before it.
+//! of the envelope decreases with frequency: a slow line is averaged over tens of seconds, a fast line over seconds. In
+//! the frequency domain the envelope has the width omega/c, and lines that are closer than about this width interfere
+//! with each other. The response at t uses as much data after t as before it.
 
 use hoid_ident::{settings, settings::Bounds};
 use num_complex::Complex64;
@@ -93,13 +93,13 @@ mod tests {
             .unwrap();
         for (row, gain) in found.response.iter().zip([1.0, 3.0]) {
             let expected = Complex64::from_polar(gain, -omega * 0.1);
-            // The mirror line at -omega is 12 widths away, the ends of the record 4.
+            // The mirror line at -omega is 12 widths away, and the ends of the record are 4 widths away.
             assert!((row[0] - expected).norm() < 1e-3, "{row:?} {expected}");
         }
     }
 
-    /// The transform against the continuous one of a wave, whose value is known:
-    /// `sqrt(2 pi) s e^(j phase)/2` in samples.
+    /// The transform of a sinusoid is compared with the known continuous transform, `sqrt(2 pi) s e^(j phase)/2` in
+    /// samples.
     #[test]
     fn the_transform_of_a_wave_is_half_its_envelope() {
         let omega = 5.0;
@@ -110,7 +110,7 @@ mod tests {
         let [found, _] = method.transforms([&cosine, &cosine], omega, 2000, 0.01);
         let width = 8.0 / (omega * 0.01);
         let expected = Complex64::from_polar(0.5 * (std::f64::consts::TAU).sqrt() * width, 0.7);
-        // The envelope is cut at 4 widths: 6e-5 of it is left out.
+        // Truncation of the envelope at 4 widths omits 6e-5 of its area.
         assert!((found / expected - 1.0).norm() < 2e-4, "{found} {expected}");
     }
 

@@ -5,14 +5,13 @@
 //! which the last five are evaluated), and to the user's own recordings. For each run ([`procedure`]):
 //!
 //! 1. Batch fits to the first and the last three eighths of the run, [0, 30.72] and [51.20, 81.92] s in the text: ARX
-//!    by OLS and BJ(m* = 1) by PEM, with every delay of a range. In each span the delay with the highest VAF is the
-//!    best. The n_k* of the run and structure is the mean of the two best delays, rounded; T_n* is the mean of the
-//!    remnant time constants of the two fits (the text: *the average between the best two sub-batch-fitting estimations
-//!    made*).
+//!    by OLS and BJ(m* = 1) by PEM, with every delay of a range. In each span, the delay with the highest VAF is
+//!    selected. The n_k* of the run and structure is the rounded mean of the two selected delays; T_n* is the mean of
+//!    the remnant time constants of the two fits (the text: *the average between the best two sub-batch-fitting
+//!    estimations made*).
 //! 2. With this n_k*, OLS and PEM fits to both spans are repeated.
 //! 3. RLS and RPEM with lambda = 1 - 1/256 and P0 = 0.1 I track the run, starting from the fit of the first span. T_n*
-//!    is reported in Table 3 and not used further: d1 is a parameter of RPEM and starts from the value in its fit, as
-//!    in section V.B.
+//!    is only reported in Table 3: d1 is a parameter of RPEM and starts from the value in its fit, as in section V.B.
 //!
 //! Figures show the average over the five runs, as in the text, and also the median.
 //!
@@ -160,7 +159,7 @@ mod tests {
                 .iter()
                 .all(|run| (run.key.subject.as_str(), run.key.run.as_str()) == ("1", "2"))
         );
-        // The true values of a run are those of its person: the same in both spans of C1.
+        // The true values of a run are the parameters of its person, which are the same in both spans of C1.
         let truth = |run: &EvaluatedRun| run.outcome.truth.unwrap().states.map(|state| state.discrete);
         let [first, last] = truth(&found[0]);
         assert_eq!(first, last);

@@ -9,8 +9,8 @@ use hoid_track::{Method, StartAt, TrackOptions, track_from};
 
 use crate::ThesisError;
 
-/// Length of the first and of the last span of a run, to which the batch fits apply, as a fraction of the run: 30.72 of
-/// 81.92 s.
+/// Length of the first and the last span of a run, which are used for the batch fits, as a fraction of the run: 30.72
+/// of 81.92 s.
 const SHARE: f64 = 0.375;
 /// Number of samples between stored estimates.
 const EVERY: usize = 32;
@@ -40,7 +40,7 @@ pub struct RecursiveTrace {
 /// The simulated operator of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {
-    /// Delay including that of the hold, samples.
+    /// Delay including the delay of the hold, samples.
     pub nk: usize,
     /// Operator at the start and at the end of the run.
     pub states: [State; 2],
@@ -53,7 +53,7 @@ pub struct RunOutcome {
     pub spans_s: [(f64, f64); 2],
     /// Delay n_k* by structure, samples.
     pub nk: [usize; 2],
-    /// Best delay by structure and span, samples.
+    /// Selected delay by structure and span, samples.
     pub nk_of_span: [[usize; 2]; 2],
     /// Time constant T_n* of the Box-Jenkins model, s; NaN if neither span gives one.
     pub t_n_s: f64,
@@ -306,7 +306,7 @@ mod tests {
     fn a_small_remnant_leaves_delay_and_time_constant() {
         let found = evaluate(&run(0.05), (26, 32)).unwrap();
         assert!((28..=30).contains(&found.nk[1]), "{:?}", found.nk);
-        // d1 is that of the remnant held exactly: T_n* by backward Euler .055; its error .006.
+        // The remnant is held exactly, so d1 gives T_n* = .055 by backward Euler; the standard error is .006.
         assert!((found.t_n_s - 0.055).abs() < 0.02, "{}", found.t_n_s);
         let [rls, rpem] = &found.courses;
         assert_eq!((rls.times_s.len(), rpem.times_s.len()), (256, 256));

@@ -3,12 +3,12 @@
 //! For each person and condition the last five runs that count are evaluated, as in the text. Times are measured from
 //! the start of the evaluated span, `from_s` in the manifest; the text omits a run-in of 8.08 s.
 //!
-//! A condition is shown in place of the condition of the text in which the controlled element changes in the same way.
-//! How the element changes is determined from `controlled_element`, `changes_to`, `change_s` and `change_per_s` of the
-//! manifest. An element counts as s1 or s2 of the text according to the slope of its logarithmic gain
-//! `d ln|H| / d ln w` at 2 rad/s, near the crossover frequency of people; the slope is -1.1 for s1 and -2.0 for s2. A
-//! change is sudden if its middle 80 %, which takes `2 ln 9 / G`, takes less than a second. If no element is given, the
-//! name of the condition (C1 to C6) decides.
+//! A condition replaces the condition of the text in which the controlled element changes in the same way. The change
+//! is determined from `controlled_element`, `changes_to`, `change_s` and `change_per_s` of the manifest. An element
+//! counts as s1 or s2 of the text according to the slope of its logarithmic gain `d ln|H| / d ln w` at 2 rad/s, near
+//! the crossover frequency of people; the slope is -1.1 for s1 and -2.0 for s2. A change is sudden if the duration of
+//! its middle 80 %, `2 ln 9 / G`, is less than a second. If no element is given, the name of the condition (C1 to C6)
+//! is used.
 
 use std::path::{Path, PathBuf};
 
@@ -250,7 +250,7 @@ mod tests {
             (facts(s2, Some(s1), Some(0.5)), Condition::C5),
             (facts("-5/s^2", Some("4/s"), None), Condition::C6),
         ] {
-            // What is known of the element wins over the name.
+            // A known element takes precedence over the name.
             assert_eq!(of_text("C1", &found), Ok(expected), "{found:?}");
         }
         assert_eq!(of_text("C5", &ConditionSettings::default()), Ok(Condition::C5));

@@ -119,7 +119,7 @@ method = "rpem"
         assert_eq!(all.len(), 12);
         let made = make(&all[7], &results, "C4", &OPERATOR);
         assert!(made.svg.unwrap().contains("average"));
-        // Two estimators, five parameters, four orders.
+        // There are two estimators, five parameters and four orders.
         let rows = made.data.columns[0].values.len();
         assert_eq!(rows % 40, 0);
         assert!(rows > 0);

@@ -102,7 +102,7 @@ impl Parameters {
 const LINEAR_WITHIN: f64 = 10.0;
 
 /// True if biases may reach thousands of times the true value: the remnant parameters of a first-order noise model
-/// differ from those of a higher-order remnant.
+/// differ from the parameters of a higher-order remnant.
 fn has_large_biases(model: Model, remnant_order: usize, letters: &str) -> bool {
     model == Model::First && remnant_order > 1 && matches!(letters, "innovation variance" | "T_n" | "K_n")
 }

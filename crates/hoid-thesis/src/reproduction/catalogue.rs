@@ -28,7 +28,7 @@ fn in_order(mut all: Vec<Item>) -> Vec<Item> {
     all
 }
 
-/// Sort key: tables first, then the figures of the article, then those of the appendices by number, then all others.
+/// Sort key: tables, then the figures of the article, then the figures of the appendices by number, then all others.
 fn place(name: &str) -> (u8, String, u32, String) {
     let number = |text: &str| text.parse::<f64>().map_or(0, |n| (10.0 * n) as u32);
     let parts = |text: &str| {

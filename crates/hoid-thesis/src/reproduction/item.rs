@@ -18,7 +18,7 @@ pub type Studies = BTreeMap<String, Results>;
 type Maker = Box<dyn Fn(&Item, Option<&Results>) -> ItemOutput + Send + Sync>;
 
 /// Runs that several items share and that belong to no plan. Shared runs are made before any item is drawn. Otherwise a
-/// thread that makes the runs for one item could, while it waits for a part of them, start on another item that waits
+/// thread that makes the runs for one item could, while waiting for some of these runs, start another item that waits
 /// for all of them.
 #[derive(Clone)]
 pub(super) struct SharedRuns {
@@ -27,7 +27,7 @@ pub(super) struct SharedRuns {
     pub title: &'static str,
     /// Number of estimates in all runs.
     pub estimates: u64,
-    /// Makes the runs and returns notes about failed runs; an error if all runs fail.
+    /// Makes the runs and returns notes about failed runs, or an error if all runs fail.
     pub make: MakeRuns,
 }
 

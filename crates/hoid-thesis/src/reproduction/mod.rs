@@ -6,7 +6,7 @@
 //! | `bias` | Figs. 5, 6, 9, C.1 to C.16: box plots of relative biases | `bias` |
 //! | `orders` | Figs. 7, 8, E.1 to E.16: maps against n_k* and m* | `bias` |
 //! | `responses` | Figs. 10, D.1 to D.18: Bode plots of averaged models | `bias` |
-//! | `starts` | Figs. F.1 to F.8: fits from other starts compared with those from the base start | `initial-conditions` |
+//! | `starts` | Figs. F.1 to F.8: fits from other starts compared with fits from the base start | `initial-conditions` |
 //! | `traces` | Figs. 11, 12, G.1 to G.8, H.1 to H.12: recursive estimates | `recursive`, `recursive-arx` |
 //! | `averages` | Figs. H.1 to H.12 as in the text: averages, with the medians | `recursive` |
 //! | `experiment` | Table 3, Figs. 13, 14, I.1 to I.18 with virtual or recorded people | its own |
@@ -16,9 +16,9 @@
 //! | `index` | the page with all tables, figures and claims | all |
 //! | `run` | the whole reproduction in a directory | |
 //!
-//! Axes, cells and grouping are those of the captions. The hue represents the method (ARX blue, Box-Jenkins vermillion)
-//! and the shade the noise level or the delay; dashed black lines are the truth. The data of each figure are available
-//! as a table.
+//! Axes, cells and grouping follow the captions. The hue represents the method (ARX blue, Box-Jenkins vermillion) and
+//! the shade the noise level or the delay; dashed black lines are the true values. The data of each figure are
+//! available as a table.
 
 mod averages;
 mod axes;

@@ -1,5 +1,5 @@
-//! Maps of quantities against the delay n_k* and the order m* of the noise model: VAF, its difference from that of ARX,
-//! absolute biases. Figs. 7, 8, E.1 to E.16.
+//! Maps of quantities against the delay n_k* and the order m* of the noise model: VAF, its difference from the VAF of
+//! ARX, and absolute biases. Figs. 7, 8, E.1 to E.16.
 
 use hoid_study::{Query, Results};
 
@@ -134,7 +134,7 @@ fn make(item: &Item, results: &Results, condition: &str, m0: usize, shown: Shown
     }
     let grid = |panels: Vec<MapPanel>, titles: Vec<String>| MapGrid {
         // With two columns the cells have space for their numbers. The biases of b, a and the noise model differ by
-        // orders of magnitude, so that each pair has its own colour bar.
+        // orders of magnitude, so each pair has its own colour bar.
         columns: 2,
         panels,
         titles,

@@ -2,7 +2,7 @@
 //! writes the index page.
 //!
 //! Studies are stored in `studies/NAME`, figures and tables in `figures` and `tables`. An existing study is used
-//! unchanged, so that an interrupted reproduction can be continued.
+//! unchanged, so an interrupted reproduction can be continued.
 
 use std::{
     collections::BTreeSet,
@@ -164,7 +164,7 @@ pub fn reproduce(
     for name in ["figures", "tables"] {
         make_directory(&directory.join(name))?;
     }
-    // The items are collected by position, so that the page does not depend on the order in which they are drawn.
+    // The items are collected by position, so the page does not depend on the order in which they are drawn.
     let made: Vec<_> = chosen
         .par_iter()
         .map(|item| write(item, &studies, directory))
@@ -212,7 +212,7 @@ fn on_threads<R: Send>(jobs: Option<usize>, work: impl FnOnce() -> R + Send) -> 
     Ok(pool.install(work))
 }
 
-/// Returns the selected items and whether the claims are selected. An item is selected by its name, its plan, the runs
+/// Returns the selected items, and true if the claims are selected. An item is selected by its name, its plan, the runs
 /// it shares, or the letter of an appendix. With recorded people no claims are selected.
 fn chosen(all: Vec<Item>, wanted: &Reproduction) -> Result<(Vec<Item>, bool), ThesisError> {
     let only = &wanted.only;

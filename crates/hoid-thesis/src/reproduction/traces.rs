@@ -221,8 +221,8 @@ fn make(
 /// moving away from their initial values.
 const SETTLED_S: f64 = 15.0;
 
-/// Range of the ordinate: all values of the truth and the batch fits, and the estimates from [`SETTLED_S`] on without
-/// the highest and lowest three per cent. Every estimator contributes, even if another is better.
+/// Range of the ordinate: all true values and batch fits, and the estimates from [`SETTLED_S`] on without the highest
+/// and lowest three per cent. Every estimator contributes, even if another is better.
 fn ordinate(curves: &[TraceCurve]) -> Ordinate {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for curve in curves {

@@ -1,9 +1,9 @@
 //! Errors of a method in one run.
 //!
-//! At each stored time `E(t) = sqrt(mean_i |H(j omega_i, t)/H_0(j omega_i, t) - 1|^2)` is computed over the lines of
-//! the forcing function from 0.6 to 11 rad/s, the third to the ninth: the first two have only a few periods in the
-//! whole run, and the last has hardly any power. H_0 is the response of the operator at that time, including the hold.
-//! The reported value is the root mean square of E over a span, in %:
+//! At each stored time `E(t) = sqrt(mean_i |H(j omega_i, t)/H_0(j omega_i, t) - 1|^2)` is computed over the third to
+//! the ninth line of the forcing function, from 0.6 to 11 rad/s: the first two lines have only a few periods in the
+//! whole run, and the last line has hardly any power. H_0 is the response of the operator at that time, including the
+//! hold. The reported value is the root mean square of E over a span, in %:
 //!
 //! | span | interval |
 //! |---|---|
@@ -109,7 +109,7 @@ mod tests {
             .unwrap();
         let at: Vec<usize> = (31..8192).step_by(32).collect();
         let omega = [1.0, 5.0];
-        // 10 % too much gain after the change, exact before.
+        // The gain is exact before the change and 10 % too large after it.
         let operator = |k: usize| {
             let truth = truth(&record, k);
             let factor = if record.time_s(k) < 40.96 { 1.0 } else { 1.1 };
@@ -137,7 +137,7 @@ mod tests {
         let share = (81.92 - 40.96) / (81.92 - 10.0);
         assert!((errors.operator[0] - 10.0 * f64::sqrt(share)).abs() < 0.1, "{errors:?}");
         assert!(errors.operator[1] < 1e-10);
-        // A missing estimate is not a number.
+        // A missing estimate gives NaN.
         let none = TrackingResult {
             response: vec![vec![Complex64::new(f64::NAN, 0.0); 2]; at.len()],
             operator: vec![None; at.len()],

@@ -1,6 +1,6 @@
 //! All methods of the survey, applied to the same runs.
 //!
-//! Part II of the thesis describes methods with which others have identified time-varying operators (section 2.4). A
+//! Part II of the thesis describes published methods for the identification of time-varying operators (section 2.4). A
 //! survey applies all of these methods to the same simulated runs. The recursive methods are estimators of a study; the
 //! [`comparators`](crate::comparators) are tables in a separate file:
 //!

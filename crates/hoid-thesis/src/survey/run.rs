@@ -214,13 +214,13 @@ method = "fourier"
             own.runs[run].clone().unwrap()
         };
         for run in 0..2 {
-            // The batch fit of the end is correct there and wrong before the change.
+            // The batch fit to the end of the run is correct there, but wrong before the change.
             let [before, _, after] = of("BJ", run).response;
             assert!(after < 10.0 && before > 30.0, "{before} {after}");
             // Fourier coefficients give no parameters.
             assert!(of("lines", run).operator[0].is_nan() && of("lines", run).response[0] < 60.0);
         }
-        // Runs differ, and the same plan gives the same numbers.
+        // The runs differ from each other, but the same plan gives the same numbers.
         assert_ne!(of("network", 0), of("network", 1));
         let again = survey(&plan, &|_| ()).unwrap();
         assert_eq!(again[2].runs, found[2].runs);

@@ -1,4 +1,4 @@
-//! The data that hoid and the peers share, written as plain numbers.
+//! The data that hoid and the peer programs share, written as plain numbers.
 //!
 //! | file | holds |
 //! |---|---|
@@ -6,13 +6,13 @@
 //! | `loop.csv` | forcing function and white noise of the whole run, with its run-in |
 //! | `truth.json` | the parameters of the loop |
 //!
-//! Numbers are written so that they read back to the last bit.
+//! Numbers are written with enough digits to reproduce every bit.
 
 use std::{fmt::Write, path::Path};
 
 use hoid::{model::Channel, prelude::*, sim::Signals};
 
-/// Delay of the operator of C1 plus its hold, samples.
+/// Delay of the operator of C1 including its hold, samples.
 pub const NK: usize = 29;
 
 /// One run of C1 and the settings of its simulation.

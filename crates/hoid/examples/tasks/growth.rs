@@ -1,14 +1,13 @@
-//! One point of the growth of the cost, in a separate process, so that its peak memory is its own.
+//! Cost of one task at one problem size, in a separate process, so that its peak memory is measured separately.
 //!
 //! | name | N is |
 //! |---|---|
-//! | `arx`, `bj`, `rls`, `rpem` | samples of the record; the recursions through `track`, one row a sample |
-//! | `arx parameters`, `rls parameters` | parameters, half of them of A, 8192 samples |
-//! | `bj parameters` | parameters, all but four of them of D, 8192 samples |
+//! | `arx`, `bj`, `rls`, `rpem` | samples of the record; the recursions use `track` with one row per sample |
+//! | `arx parameters`, `rls parameters` | parameters, half of them in A, with 8192 samples |
+//! | `bj parameters` | parameters, all except four of them in D, with 8192 samples |
 //!
-//! Prints `{"seconds", "data_bytes", "before_bytes", "peak_bytes"}`: the time of one run after one
-//! to warm up (where that is short), e and u, and the largest resident memory before and after
-//! (Linux).
+//! Prints `{"seconds", "data_bytes", "before_bytes", "peak_bytes"}`: the time of one run (after a warm-up run, if runs
+//! are short), the size of e and u, and the largest resident memory before and after the run (Linux).
 
 use std::{hint::black_box, time::Instant};
 
@@ -21,7 +20,7 @@ use super::{data::NK, traced};
 
 /// Number of samples in the tables over parameters.
 const SAMPLES: usize = 8192;
-/// A run below this time is repeated, s.
+/// A run shorter than this time is repeated, s.
 const SHORT_S: f64 = 0.3;
 
 pub fn measure(name: &str, n: usize, further: &[String]) {
@@ -100,8 +99,8 @@ fn work(name: &str, parameters: Option<usize>) -> Box<dyn Fn(&Record)> {
     }
 }
 
-/// A record of the operator in an open loop: slow noise through the held operator, and autoregressive noise on the
-/// output. Made without further memory, since the memory of the estimators is measured.
+/// Returns a record of the operator in an open loop: slow noise passed through the held operator, with autoregressive
+/// noise added to the output. It is made without additional memory, because the memory of the estimators is measured.
 fn record(samples: usize) -> Record {
     let mut state = 1_u64;
     let mut uniform = move || {
@@ -126,7 +125,7 @@ fn record(samples: usize) -> Record {
     Record::new(SampleTime::HUNDREDTH, e, u).unwrap()
 }
 
-/// Writes the record for the command line instead.
+/// Writes the record for the command-line program instead.
 fn write(record: &Record, file: &str) {
     hoid::io::write_record(std::path::Path::new(file), record).unwrap();
 }

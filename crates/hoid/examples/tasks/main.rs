@@ -1,25 +1,25 @@
-//! The tasks for the comparison of hoid with alternative programs: the part of hoid. `cargo xtask bench` runs it
-//! together with the peers in `crates/hoid/benches/peers` and makes the table of the book.
+//! The tasks for the comparison of hoid with other programs, as performed by hoid. `cargo xtask bench` runs this
+//! example together with the peer programs in `crates/hoid/benches/peers` and makes the table of the book.
 //!
 //! `cargo run --release -p hoid --example tasks -- DIRECTORY [--task NAME,...] [--seconds S | --times K] [--reproduce M]`
 //!
-//! DIRECTORY receives the data that all share ([`data`]). One line of JSON a task:
-//! `{"task", "peer", "seconds", "answer"}`, the median of as many runs as S seconds hold (at least
-//! five), or of K runs. All but `reproduce` run on one thread (`RAYON_NUM_THREADS=1`).
+//! The data that all programs share ([`data`]) are written to DIRECTORY. Each task prints one line of JSON,
+//! `{"task", "peer", "seconds", "answer"}`, with the median time of as many runs as fit into S seconds (at least five),
+//! or of K runs. All tasks except `reproduce` run on one thread (`RAYON_NUM_THREADS=1`).
 //!
-//! | task | what |
+//! | task | computation |
 //! |---|---|
 //! | `arx` | ARX, na = 2, nb = 2, nk = 29, with covariance |
 //! | `bj` | Box-Jenkins, nb = 2, nd = 1, nf = 2, nk = 29, no start given, initial states estimated, with covariance |
-//! | `rls`, `rpem` | theta after each sample, lambda = 1 - 1/256, P = 0.1, nothing else |
+//! | `rls`, `rpem` | only theta after each sample, lambda = 1 - 1/256, P = 0.1 |
 //! | `rls trace`, `rpem trace` | `hoid track`: theta, its covariance, innovation and its variance after each sample |
-//! | `loop` | one run of C1 with its run-in, noise given, into memory that was used before |
-//! | `loop with noise` | the same with its normal deviates |
-//! | `cell` | 100 runs of C1, each simulated and fitted by ARX and Box-Jenkins, side by side |
-//! | `delays` | Box-Jenkins for nk = 20 to 40: the losses on common samples, and the best once more |
+//! | `loop` | one run of C1 with its run-in and given noise, written to existing memory |
+//! | `loop with noise` | the same, including the generation of the normal deviates |
+//! | `cell` | 100 runs of C1, simulated and fitted by ARX and Box-Jenkins, several runs at a time |
+//! | `delays` | Box-Jenkins for nk = 20 to 40: the losses on common samples, and a final fit with the best delay |
 //! | `reproduce` | `hoid reproduce` with M replications, on all cores |
 //!
-//! `-- DIRECTORY --growth NAME N` measures one point of the growth of the cost ([`growth`]).
+//! `-- DIRECTORY --growth NAME N` measures the cost at one problem size ([`growth`]).
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod data;
@@ -148,7 +148,7 @@ fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
             .map_answer(|()| Vec::new())
         }
         "cell" => {
-            // As many runs at a time as there are lanes, in existing memory.
+            // As many runs as there are lanes are computed at a time, in existing memory.
             let beside = InstructionSet::Best.lanes().unwrap();
             let (mut noises, mut runs) = (vec![shared.noise.clone(); beside], Vec::new());
             median(effort, || {
@@ -185,7 +185,7 @@ fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
     }
 }
 
-/// `hoid reproduce`: the time and the number of items.
+/// Runs `hoid reproduce`; returns the time and the number of items.
 fn whole_text(directory: &Path, replications: u64) -> (f64, Vec<f64>) {
     let out = directory.join("reproduction");
     let _ = std::fs::remove_dir_all(&out);
@@ -207,7 +207,7 @@ fn forgetting<const N: usize>() -> Covariance<N> {
     )
 }
 
-/// Recursive least squares from zero, theta after each sample.
+/// Recursive least squares from theta = 0; writes theta after each sample.
 pub fn rls(e: &[f64], u: &[f64], history: &mut Vec<[f64; 4]>) -> [f64; 4] {
     history.clear();
     let mut recursion = Rls::new(FixedShape::<2, 2, 0, 0, 0>, [0.0; 4], forgetting::<4>(), NoErrorBars).unwrap();
@@ -220,7 +220,7 @@ pub fn rls(e: &[f64], u: &[f64], history: &mut Vec<[f64; 4]>) -> [f64; 4] {
     *recursion.theta()
 }
 
-/// The recursive prediction-error method for Box-Jenkins, theta after each sample.
+/// The recursive prediction-error method for Box-Jenkins; writes theta after each sample.
 pub fn rpem(e: &[f64], u: &[f64], history: &mut Vec<[f64; 5]>) -> [f64; 5] {
     history.clear();
     let mut recursion = Rpem::<_, 5, 0, _, _>::new(
@@ -241,7 +241,7 @@ pub fn rpem(e: &[f64], u: &[f64], history: &mut Vec<[f64; 5]>) -> [f64; 5] {
     *recursion.theta()
 }
 
-/// The same start and memory through `track`.
+/// Returns options of `track` with the same start and memory length.
 pub fn traced(method: Method) -> TrackOptions {
     let structure = method.default_structure();
     let start = StartAt::Theta(match method == Method::rls() {

@@ -6,7 +6,7 @@ use hoid::prelude::*;
 pub struct Draw(pub u64);
 
 impl Draw {
-    /// The next deviate.
+    /// Returns the next deviate.
     pub fn normal(&mut self) -> f64 {
         (0..12)
             .map(|_| {
@@ -35,7 +35,7 @@ const POLES: &[f64] = &[-1.5, 0.7];
 const GAINS: &[f64] = &[1.0, 0.5];
 
 impl Truth<'_> {
-    /// The system of a structure.
+    /// Returns the system of a structure.
     pub fn of(structure: Structure) -> Self {
         let keep = |letter: char, p: &'static [f64]| {
             if structure.polynomials().contains(letter) {
@@ -54,7 +54,7 @@ impl Truth<'_> {
         }
     }
 
-    /// Its orders.
+    /// Returns the orders of the system.
     pub fn orders(&self) -> Orders {
         Orders {
             na: self.a.len(),
@@ -66,18 +66,18 @@ impl Truth<'_> {
         }
     }
 
-    /// Its coefficients in the order of theta.
+    /// Returns the coefficients of the system in the order of theta.
     pub fn theta(&self) -> Vec<f64> {
         [self.a, self.b, self.c, self.d, self.f].concat()
     }
 
-    /// A record of n samples that is cut out of a longer one.
+    /// Returns a record of n samples that is cut out of a longer record.
     pub fn record(&self, n: usize, noise: f64, seed: u64) -> Record {
         self.record_behind(500, n, noise, seed)
     }
 
-    /// A record of n samples after a run-in, with white input of unit variance and innovations of
-    /// the given size.
+    /// Returns a record of n samples after a run-in, with white input of unit variance and innovations of the given
+    /// size.
     pub fn record_behind(&self, run_in: usize, n: usize, noise: f64, seed: u64) -> Record {
         let mut draw = Draw(seed);
         let past = |x: &[f64], p: &[f64], first: usize| -> f64 {

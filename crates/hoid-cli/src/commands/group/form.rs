@@ -17,7 +17,7 @@ pub struct Finished<'a> {
 }
 
 impl Finished<'_> {
-    /// Returns the page: failures and doubtful results first, then the people.
+    /// Returns the page: failures and doubtful results, followed by the people.
     pub fn page(&self, verbose: bool) -> String {
         let GroupSummary {
             runs,

@@ -20,7 +20,7 @@ const LEAST_HALF_S: f64 = 0.007;
 /// is printed.
 const AT_RAD_S: [f64; 3] = [1.0, 2.5, 4.0];
 
-/// An identified operator with everything that its page shows.
+/// An identified operator with all data of its page.
 pub struct FamilyReport<'a> {
     pub identified: &'a Identified,
     pub fit: &'a FamilyFit,
@@ -227,8 +227,8 @@ impl FamilyReport<'_> {
         }
     }
 
-    /// Returns a table of the parameters from the other methods next to those by prediction error; empty if no other
-    /// method gave a result.
+    /// Returns a table of the parameters by prediction error and by the other methods; empty if no other method gave a
+    /// result.
     fn methods(&self) -> String {
         let fit = self.fit;
         let gain = self.records.first().map(GainUnit::of).unwrap_or_default();

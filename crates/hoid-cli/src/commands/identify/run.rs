@@ -42,7 +42,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let read = reading.files(&args.records, reading::report_problems)?;
     let (rate, counts) = (args.read.prepare.rate.decimate, asked.counts_samples());
     reading::report_kept_rate(read.kept_rate(rate, counts));
-    // The validation file is read before anything is written, so that an invalid file leaves no output.
+    // The validation file is read before anything is written, so an invalid file leaves no output.
     let other = args.validate.as_deref();
     let other = other
         .map(|path| reading.file(path, reading::report_problems))
@@ -256,7 +256,7 @@ fn details(found: &PolynomialAnswer<'_>) -> String {
     page.push_str(&text::quality(fit, &found.quality));
     page.push('\n');
     page.push_str(&text::roots(fit));
-    // Residuals of the size of rounding errors carry no information.
+    // Residuals of the size of rounding errors contain no information.
     if fit.covariance().is_some() {
         page.push_str(&text::residual_tests(found.files, &found.validations));
     }

@@ -65,7 +65,7 @@ fn trace(fit: &SigmoidFit, record: &Record) -> Result<Record, CliError> {
             });
         }
     }
-    // Every form has at least one gain, so that there is a trace.
+    // Every form has at least one gain, so there is a trace.
     Ok(trace.unwrap_or_else(|| record.clone()))
 }
 
@@ -84,7 +84,7 @@ fn before_and_after(fit: &SigmoidFit) -> String {
     rows.to_string()
 }
 
-/// An identified change with everything that its page shows.
+/// An identified change with all data of its page.
 struct SigmoidReport<'a> {
     fit: &'a SigmoidFit,
     verdict: &'a Verdict,
@@ -173,7 +173,7 @@ impl SigmoidReport<'_> {
             fit.residual_count(),
             numbers::plain(fit.innovation_variance())
         ));
-        // Residuals of the size of rounding errors carry no information.
+        // Residuals of the size of rounding errors contain no information.
         if fit.covariance().is_some() {
             let mut coloured = false;
             for (file, test) in files.iter().zip(tests) {

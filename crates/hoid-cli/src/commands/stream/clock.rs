@@ -1,4 +1,4 @@
-//! Comparison of the times of the lines with an evenly spaced grid, to find missing samples and late lines.
+//! Comparison of the times of the lines with an evenly spaced grid, to detect missing samples and late lines.
 //!
 //! Live times have jitter, and their rate differs slightly from `--fs`. The grid therefore follows the times with a
 //! small gain. Samples count as missing only if the time of a line deviates by more than half a sample from the
@@ -25,7 +25,7 @@ pub enum Arrival {
     /// The next sample, after `missing` samples that must be filled in. If the gap is longer than [`LONGEST_GAP_S`],
     /// `left_out` is true and `missing` is limited to that length.
     Sample { missing: usize, left_out: bool },
-    /// A line whose time is not later than that of the last line.
+    /// A line whose time is not later than the time of the last line.
     Behind { last_s: f64 },
 }
 
@@ -101,8 +101,8 @@ impl Clock {
     }
 
     /// Returns the rate of the times in Hz if it differs from `--fs`. Called after each line, this function returns a
-    /// value at most once in [`RATE_LINES`] lines. The median of the differences is insensitive to single gaps, and
-    /// their mean to rounded times; both have to deviate.
+    /// value at most once in [`RATE_LINES`] lines. Both the median and the mean of the differences must deviate: the
+    /// median is insensitive to single gaps, the mean to rounded times.
     pub fn other_rate(&mut self) -> Option<f64> {
         if self.steps.len() < RATE_LINES {
             return None;
@@ -192,7 +192,7 @@ mod tests {
                 "{hz}: {found:?}"
             );
         }
-        // One sample of ten is missing; then times in steps of 8 ms.
+        // First, one sample of ten is missing; then the times have steps of 8 ms.
         assert!(rates(&|k| 0.01 * (k + (k / 9.0).floor())).is_empty());
         assert!(rates(&|k| (0.01 * k / 0.008).floor() * 0.008 + 1e-6 * k).is_empty());
     }

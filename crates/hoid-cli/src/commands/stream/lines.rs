@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 
 use crate::error::CliError;
 
-/// Maximum length of a line in bytes. The rest of a longer line is skipped, so that memory stays bounded.
+/// Maximum length of a line in bytes. The rest of a longer line is skipped, so the use of memory is bounded.
 const LONGEST: usize = 1 << 16;
 /// Maximum number of characters of an invalid cell shown in messages.
 const SHOWN: usize = 24;

@@ -261,7 +261,7 @@ impl Session {
         self.innovation = taken.outcome.and_then(|outcome| outcome.innovation);
         self.counts.shortened += u64::from(taken.outcome.is_some_and(|outcome| outcome.shortened));
         if let Some(tracker) = self.live.tracker() {
-            // Time of the last sample that the recursion has processed.
+            // This is the time of the last sample that the recursion has processed.
             let t = self.t.map(|t| t - self.live.behind_s());
             (self.counts.held, self.counts.restarts) = (tracker.counts().held, tracker.counts().restarts);
             if let Some(event) = tracker.event() {

@@ -96,7 +96,7 @@ fn covariance(tracked: &Tracked) -> String {
     )
 }
 
-/// Returns the rows that are printed, evenly spaced over those in which the estimate moves.
+/// Returns the rows that are printed, evenly spaced over the rows in which the estimate is updated.
 fn picked_rows(tracked: &Tracked) -> Vec<usize> {
     let Some(last) = tracked.trace.len().checked_sub(1) else {
         return Vec::new();

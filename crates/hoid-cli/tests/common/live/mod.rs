@@ -1,10 +1,10 @@
-//! A running `hoid stream`: for its tests, and for `cargo xtask slow latency`.
+//! A running `hoid stream`, for its tests and for `cargo xtask slow latency`.
 //!
-//! | file | holds |
+//! | file | contents |
 //! |---|---|
-//! | `udp` | a stream over UDP and the socket of who asks it |
-//! | `paced` | samples at a rate, and how long their answers take |
-//! | `troubles` | readers that stop, either side started again, clocks that jump, hostile datagrams |
+//! | `udp` | a stream over UDP and the socket of its client |
+//! | `paced` | samples at a fixed rate, and the latency of their answers |
+//! | `troubles` | readers that stop, restarts of either side, clock jumps, hostile datagrams |
 
 #[path = "../draw.rs"]
 mod draw;
@@ -19,7 +19,7 @@ use std::{
 
 pub use draw::Draw;
 
-/// e and u at t: sinusoids with noise.
+/// Returns e and u at t: sinusoids with noise.
 pub fn sample(t_s: f64, draw: &mut Draw) -> (f64, f64) {
     let waves = |at: f64| (0.9 * at).sin() + 0.5 * (2.3 * at).sin() + 0.2 * (7.1 * at).sin();
     (waves(t_s), 0.1 * waves(t_s - 0.3) + 0.05 * (2.0 * draw.share() - 1.0))
@@ -66,7 +66,7 @@ pub fn signal(child: &Child, name: &str) {
     assert!(Command::new("kill").args([name, &id]).status().unwrap().success());
 }
 
-/// Remaining messages of a program that ends; it must succeed.
+/// Returns the remaining messages of a program, which must end successfully.
 pub fn last_words(child: &mut Child, said: &mut BufReader<ChildStderr>) -> String {
     let mut words = String::new();
     said.read_to_string(&mut words).unwrap();

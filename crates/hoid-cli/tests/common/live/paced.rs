@@ -1,8 +1,8 @@
 //! Samples at a fixed rate, and the latency of their answers.
 //!
-//! Each sample is sent at its time, regardless of earlier answers. The latency is the time from the call that sends it
-//! to the return of the call that receives its answer: both ways through the system, the estimate, and delays due to
-//! other processes.
+//! Each sample is sent at its time, regardless of earlier answers. The latency is the time from the call that sends a
+//! sample to the return of the call that receives its answer. It includes both ways through the system, the estimate,
+//! and delays due to other processes.
 
 use std::{
     io::{BufRead, BufReader, Write},
@@ -21,7 +21,7 @@ use super::{
 /// Timeout of an answer.
 const SILENCE: Duration = Duration::from_secs(5);
 
-/// Number of samples sent, and latencies of the answered ones.
+/// Number of samples sent, and latencies of the answered samples.
 pub struct Tally {
     pub sent: usize,
     pub trips: Vec<Duration>,
@@ -34,7 +34,7 @@ impl Tally {
         self.sent - self.trips.len()
     }
 
-    /// The time within which this share of the answers arrived.
+    /// Returns the time within which this share of the answers arrived.
     pub fn within(&self, share: f64) -> Duration {
         let mut sorted = self.trips.clone();
         sorted.sort_unstable();
@@ -43,7 +43,7 @@ impl Tally {
     }
 }
 
-/// Calls at each k/rate.
+/// Calls a function at each time k/rate.
 pub fn paced(rate_hz: usize, n: usize, mut call: impl FnMut(usize)) {
     let begin = Instant::now();
     for k in 0..n {
@@ -74,7 +74,7 @@ pub fn over_udp(program: &Path, rate_hz: usize, n: usize, draw: &mut Draw) -> Ta
     }
 }
 
-/// Receives answers until there are n, or until a timeout: their sequence numbers and arrival times.
+/// Receives up to n answers until a timeout; returns their sequence numbers and arrival times.
 pub fn received(socket: &UdpSocket, n: usize) -> Vec<(u32, Instant)> {
     socket.set_read_timeout(Some(SILENCE)).unwrap();
     let mut all = Vec::with_capacity(n);

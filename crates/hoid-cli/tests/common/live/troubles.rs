@@ -1,5 +1,5 @@
-//! Readers that stop, restarts of either side, clock jumps, hostile datagrams: no crash, and lost samples are counted.
-//! Each returns the samples sent, the answers, and the summary of the stream.
+//! Readers that stop, restarts of either side, clock jumps and hostile datagrams: nothing crashes, and lost samples are
+//! counted. Each function returns the samples sent, the answers, and the summary of the stream.
 
 use std::{net::UdpSocket, path::Path, time::Duration};
 
@@ -10,7 +10,7 @@ use super::{
     udp::{PATIENCE, Stream, as_struct},
 };
 
-/// Rate, Hz.
+/// Sampling rate, Hz.
 const RATE: usize = 1000;
 const SLOW: usize = 100;
 
@@ -44,7 +44,7 @@ pub fn all(program: &Path, pause: Duration, hostile: usize, draw: &mut Draw) -> 
     ]
 }
 
-/// Pipes block the sender: every sample is answered.
+/// A full pipe blocks the sender, so every sample is answered.
 pub fn reader_of_pipe_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome {
     let n = (2.0 * pause.as_secs_f64() * RATE as f64) as usize + 500;
     let tally = over_pipes(program, RATE, n, draw, pause);
@@ -84,7 +84,7 @@ fn until_answered(stream: &Stream, sent: usize, mut send: impl FnMut(usize)) -> 
     }
 }
 
-/// Answers that are not received are lost, samples are not.
+/// Answers that are not received are lost, but no samples are lost.
 pub fn reader_of_udp_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome {
     let stream = Stream::new(program, RATE, &[]);
     let mut send = |k: usize| {
@@ -134,7 +134,7 @@ pub fn sender_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
     };
     ask(&stream, draw);
     let place = stream.socket.local_addr().unwrap();
-    // Its port is free before it is used again.
+    // The old socket is closed before its port is used again.
     stream.socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     stream.socket = UdpSocket::bind(place).unwrap();
     stream.socket.connect(("127.0.0.1", stream.port)).unwrap();
@@ -159,11 +159,11 @@ pub fn stream_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
     let (port, socket) = stream.killed();
     let mut refused = 0;
     for k in 100..150 {
-        // The system reports at the next call that there is no listener.
+        // The system reports a missing listener only at the next call.
         refused += usize::from(socket.send(&datagram(k, draw)).is_err());
     }
     assert!(refused > 0);
-    // Errors that the system still has to report.
+    // This clears errors that the system has not reported yet.
     let _ = socket.take_error();
     let stream = Stream::at(program, SLOW, port, socket, &[]);
     for k in 150..250 {
@@ -175,11 +175,11 @@ pub fn stream_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
     outcome
 }
 
-/// Forward jumps of the time are a gap, backward jumps are accepted after ten samples.
+/// A forward jump of the time is a gap; a backward jump is accepted after ten samples.
 pub fn clock_jumps(program: &Path, draw: &mut Draw) -> Outcome {
     let stream = Stream::new(program, SLOW, &[]);
     let mut sequence = 0;
-    // By 5 s, back by 4 s, by an hour, of which 10 s are filled.
+    // The time jumps forward by 5 s, back by 4 s, and forward by an hour, of which 10 s are filled.
     for begin_s in [0.0, 6.0, 3.0, 3600.0] {
         for k in 0..100 {
             let (e, u) = sample(f64::from(k) / SLOW as f64, draw);

@@ -10,7 +10,7 @@ use std::{
 
 use super::{last_words, signal};
 
-/// Far beyond the latency of an answer.
+/// Timeout, much longer than the latency of an answer.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 const NUMBERS: usize = 19;
 
@@ -18,19 +18,19 @@ const NUMBERS: usize = 19;
 pub struct Stream {
     pub child: Child,
     said: BufReader<ChildStderr>,
-    /// The port at which it listens.
+    /// Port at which the stream listens.
     pub port: u16,
     pub socket: UdpSocket,
 }
 
 impl Stream {
-    /// Starts at a port that the system chooses.
+    /// Starts a stream at a port that the system selects.
     pub fn new(program: &Path, rate_hz: usize, arguments: &[&str]) -> Self {
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
         Self::at(program, rate_hz, 0, socket, arguments)
     }
 
-    /// Starts at this port, 0 for one that the system chooses, with answers to this socket.
+    /// Starts a stream at this port, with answers to this socket; for port 0 the system selects a port.
     pub fn at(program: &Path, rate_hz: usize, port: u16, socket: UdpSocket, arguments: &[&str]) -> Self {
         socket.set_read_timeout(Some(PATIENCE)).unwrap();
         let answers = socket.local_addr().unwrap().port();
@@ -44,7 +44,7 @@ impl Stream {
             .spawn()
             .unwrap();
         let mut said = BufReader::new(child.stderr.take().unwrap());
-        // If the system has chosen the port, it is reported.
+        // If the system selects the port, the stream reports the port.
         let port = loop {
             let mut line = String::new();
             assert!(said.read_line(&mut line).unwrap() > 0, "the stream has ended");
@@ -72,7 +72,7 @@ impl Stream {
         bytes
     }
 
-    /// Answers come from the listening port.
+    /// Receives an answer, which must come from the listening port.
     pub fn receive(&self, bytes: &mut [u8]) -> Option<usize> {
         self.socket.recv(bytes).ok()
     }
@@ -99,7 +99,7 @@ impl Stream {
     }
 }
 
-/// A sample as a struct; t is NaN if the sequence number gives the time.
+/// Returns a sample as a struct; t is NaN if the sequence number gives the time.
 pub fn as_struct(sequence: u32, t: f64, e: f64, u: f64) -> Vec<u8> {
     let mut bytes = b"hoid".to_vec();
     bytes.extend_from_slice(&sequence.to_le_bytes());

@@ -1,9 +1,9 @@
 //! Selection of the columns of a record from all arrays of a file.
 //!
-//! A name is a path (`data.run(3).e`), or the end of a path if only one path ends so (`run(3).e`, or `e`); a path equal
-//! to the name takes precedence. `run(1).e` also matches `run.e` if `run` has a single element. The time is `t`, or
-//! `time`, in the structure of the output or in the nearest enclosing structure. The other arrays in the structure of
-//! the output become channels if they have the same length.
+//! A name is a path (`data.run(3).e`), or the end of a path if no other path has this end (`run(3).e`, or `e`); a path
+//! equal to the name takes precedence. `run(1).e` also matches `run.e` if `run` has a single element. The time is `t`,
+//! or `time`, in the structure of the output or in the nearest enclosing structure. The other arrays in the structure
+//! of the output become channels if they have the same length.
 
 use std::ops::Range;
 
@@ -23,7 +23,7 @@ pub(crate) const TIMES: [&str; 2] = ["t", "time"];
 /// Unit of clock times, which are converted to seconds since the first clock time.
 pub(crate) const MOMENTS: &str = "s from the first";
 
-/// Maximum number of columns of a record; further columns are left out.
+/// Maximum number of columns of a record; further columns are omitted.
 const MOST_COLUMNS: usize = 1024;
 
 /// The arrays of a file as the source of the rows of a table, for messages.
@@ -53,7 +53,7 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
     let column_paths = contents.column_paths();
     let expressions: Vec<&ColumnExpression> = options.input.iter().chain([&options.output]).collect();
     let named = Named::of(&column_paths, &expressions, file)?;
-    // In `used`, the columns of the input come first and those of the output last.
+    // In `used`, the columns of the input are first and the columns of the output last.
     let mut used: Vec<usize> = Vec::new();
     for expression in &expressions {
         let resolved = expression.resolve(&named.names(), file).map_err(|error| {

@@ -1,7 +1,7 @@
-//! Limit of the length of a line, which is the same for all readers of text.
+//! Maximum length of a line, which is the same for all text readers.
 //!
-//! A recorder that was stopped by a full disk or a power cut may leave any number of bytes without a line end. A line has
-//! to be kept in memory as a whole, so a line that is too long ends the reading.
+//! A recorder that was stopped by a full disk or a power cut may leave any number of bytes without a line end. Because
+//! a whole line is kept in memory, reading stops at a line that is too long.
 
 use std::fs::File;
 use std::io::Read;

@@ -148,8 +148,7 @@ struct Text {
 }
 
 impl Text {
-    /// Reads the first lines like those of any other table; `None` unless the table contains only numbers with decimal
-    /// points.
+    /// Reads the first lines as for any other table; `None` unless the table contains only numbers with decimal points.
     fn head(&mut self, file: &str) -> io::Result<Option<Parsed>> {
         let mut bytes = self.bytes(0, HEAD)?;
         let Some(line) = bytes.iter().rposition(|byte| *byte == b'\n') else {
@@ -234,7 +233,8 @@ impl Text {
                 Cell::Missing | Cell::Text => f64::NAN,
             })
         };
-        // The fractional parts of multiples of the golden ratio are not periodic, unlike trials of equal length.
+        // The fractional parts of multiples of the golden ratio are not periodic, so they do not coincide with trials
+        // of equal length.
         let mut parts: Vec<f64> = (1..=PROBES)
             .map(|k| (f64::from(k) * 0.618_033_988_749_895).fract())
             .collect();
@@ -439,7 +439,7 @@ mod tests {
         assert!((1000..60_000).contains(&first), "{first}");
         assert_eq!(in_span, 1000);
         assert_eq!(rows(&text(200_000, 200_000), &wanting(&[], None)).0, 200_000);
-        // In trials of 1000 s, the requested span occurs in each trial, so that the whole file is read.
+        // In trials of 1000 s, each trial contains the requested span, so the whole file is read.
         assert_eq!(
             rows(&text(200_000, 100_000), &wanting(&[], Some(10.0))),
             (200_000, 2000)

@@ -29,7 +29,7 @@ pub(crate) use record::write_with_commas as write_record;
 
 use crate::formats::format::{Format, Reading, Writing};
 
-/// Written with commas; read with any separator.
+/// Format that is written with commas and read with any separator.
 pub(super) const CSV: Format = Format {
     name: "CSV",
     extensions: &["csv", "txt"],
@@ -38,7 +38,7 @@ pub(super) const CSV: Format = Format {
     record: Some(record::write_with_commas),
 };
 
-/// Written with tabs.
+/// Format that is written with tabs.
 pub(super) const TSV: Format = Format {
     name: "CSV",
     extensions: &["tsv"],

@@ -16,8 +16,8 @@ use crate::table::Precision;
 /// Size, in bytes, of a part that one thread reads: large enough to justify a thread, and small compared with the
 /// columns.
 const PART: usize = 4 << 20;
-/// Size in bytes of the first part, which is read without a thread: if rows that are not plain are frequent, this part
-/// contains one.
+/// Size in bytes of the first part, which is read without a thread; it contains a row that is not plain if such rows
+/// are frequent.
 const FIRST: usize = 64 << 10;
 /// Maximum number of threads.
 const THREADS: usize = 8;

@@ -314,7 +314,7 @@ impl Rows<'_> {
     }
 }
 
-/// Number of lines with whose last cells the last number of the file is compared.
+/// Number of lines whose last cells are compared with the last number of the file.
 const COMPARED: usize = 8;
 
 /// Detects a truncated last number and returns a note; `None` unless the last line has no line end, its last cell is at
@@ -374,8 +374,8 @@ fn header(
     Ok(names.into_iter().map(column).collect())
 }
 
-/// Makes names unique: columns with the same name are numbered by their position, so that each of them can be selected
-/// as a signal.
+/// Makes names unique: columns with the same name are numbered by their position, so each of them can be selected as a
+/// signal.
 fn with_unique_names(names: Vec<String>, notes: &mut Vec<String>) -> Vec<String> {
     let mut known: HashSet<&str> = HashSet::new();
     let named = names.iter().map(String::as_str).filter(|name| !name.is_empty());

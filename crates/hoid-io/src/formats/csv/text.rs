@@ -73,8 +73,9 @@ pub(super) fn is_unit(text: &str) -> bool {
         && !text.starts_with(|c: char| c.is_ascii_digit() || c == ':')
 }
 
-/// Returns the most frequent separator in the header, of those that are as frequent in the `row` below if there are
-/// any: names such as `e, deg` may contain commas. Returns the comma if the header contains no separator.
+/// Returns the most frequent separator in the header; separators that are equally frequent in the `row` below take
+/// precedence, because names such as `e, deg` may contain commas. Returns the comma if the header contains no
+/// separator.
 pub(crate) fn separator(header: &str, row: Option<&str>) -> u8 {
     let count = |line: &str, separator: u8| {
         let mut quoted = false;

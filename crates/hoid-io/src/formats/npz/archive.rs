@@ -1,8 +1,8 @@
 //! The zip archive around the arrays: each member `name.npy` is the array `name`.
 //!
-//! Reading accepts stored and deflated members. Writing stores the members without times, so that the same columns give
-//! the same bytes; `numpy.savez` also stores them uncompressed. Trailing null characters of texts are lost, since
-//! numpy's text type cannot hold them.
+//! Reading accepts stored and deflated members. Writing stores the members without times, so the same columns give the
+//! same bytes; `numpy.savez` also stores them uncompressed. Trailing null characters of texts are lost, since numpy's
+//! text type cannot hold them.
 
 use std::io::{self, Cursor, Read, Write};
 

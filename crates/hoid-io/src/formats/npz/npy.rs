@@ -227,7 +227,7 @@ fn plain(item: &Item, header: &Header, data: Vec<u8>) -> Result<Value, NpyError>
             dims: header.shape.clone(),
             last_fastest: !header.fortran_order,
         }),
-        // Items of length zero take no bytes, so that the data do not limit their number.
+        // Items of length zero take no bytes, so the data do not limit their number.
         Item::Unicode { length: 0, .. } | Item::Bytes { length: 0 } => Value::Texts(vec![String::new(); count]),
         Item::Unicode { big_endian, .. } => {
             Value::Texts(data.chunks_exact(size).map(|text| unicode(text, *big_endian)).collect())

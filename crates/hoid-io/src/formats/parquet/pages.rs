@@ -1,11 +1,11 @@
 //! Decompressed size of the pages of a column, determined before decompression.
 //!
-//! The footer states the decompressed size of a column, and the header of each page states that of the page. Neither is
-//! necessarily correct: a page of a few kB may state 2 GB, which Snappy and LZ4 then fill with zeros, and gzip
-//! decompresses to its end regardless of the stated size. The headers are therefore read here first, in the compact
-//! protocol of Thrift (<https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>): a field
-//! starts with a byte `delta << 4 | type`, numbers are zigzag varints, and a struct ends with a 0. These fields of
-//! `PageHeader` (<https://github.com/apache/parquet-format>, `parquet.thrift`) are read:
+//! The footer states the decompressed size of a column, and the header of each page the decompressed size of the page.
+//! Neither is necessarily correct: a page of a few kB may state 2 GB, which Snappy and LZ4 then fill with zeros, and
+//! gzip decompresses to its end regardless of the stated size. The headers are therefore read here first, in the
+//! compact protocol of Thrift (<https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>): a
+//! field starts with a byte `delta << 4 | type`, numbers are zigzag varints, and a struct ends with a 0. These fields
+//! of `PageHeader` (<https://github.com/apache/parquet-format>, `parquet.thrift`) are read:
 //!
 //! | field | contents |
 //! |---|---|
@@ -131,7 +131,7 @@ impl PageHeader {
         Some(())
     }
 
-    /// Skips a value that the decompressed size does not depend on.
+    /// Skips a value that does not affect the decompressed size.
     fn pass_over(&mut self, bytes: &mut &[u8], kind: u8, depth: usize) -> Option<()> {
         match kind {
             TRUE | FALSE | BYTE => drop(byte(bytes)?),
@@ -245,7 +245,7 @@ mod tests {
     fn pages_say_what_they_unpack_to_and_gzip_is_held_to_it() {
         let honest = page(800, 100, &zipped(&[0; 800]));
         assert_eq!(decompressed_size(&honest, GZIP(), 100), Some(800));
-        // The second of two pages lies after the last value and is not examined.
+        // The second page follows the last value and is not examined.
         let two = [honest.clone(), vec![0xff; 40]].concat();
         assert_eq!(decompressed_size(&two, GZIP(), 100), Some(800));
         assert_eq!(decompressed_size(&two, GZIP(), 101), None);

@@ -33,7 +33,7 @@ const TIME: &str = "a date or time";
 /// Number of ns in a µs and in a ms.
 const MICRO: i64 = 1_000;
 const MILLI: i64 = 1_000_000;
-/// Memory in bytes of a value (as a number and as the index of a missing value), and of a text without its characters.
+/// Memory in bytes of a value (as a number and as the index of a missing value), or of a text without its characters.
 const VALUE: u64 = 16;
 const TEXT: u64 = 24;
 /// Number of values read at a time.

@@ -3,7 +3,7 @@
 //!
 //! The offset `o_k` to the recorder's clock was measured at times `c_k`. A line `o = b_0 + b_1 c` is fitted with
 //! Huber's loss by the alternating direction method of multipliers (Boyd et al., 2011, section 6.1.1), in units of 1e-4
-//! s, so that measurements over a busy network have little weight. Then each time stamp t is replaced by
+//! s; measurements over a busy network then have little weight. Then each time stamp t is replaced by
 //! `t + b_0 + b_1 t`. If the clock was reset, each part between resets has its own line. Finally, in a stream with a
 //! nominal rate, the time stamps between two breaks are replaced by their least-squares line over the sample index.
 //!
@@ -249,7 +249,7 @@ mod tests {
             (b0 + b1 * 1e5 - 3.0).abs() < 1e-9 && (b1 + 1e-4).abs() < 1e-11,
             "{b0} {b1}"
         );
-        // An outlier of 0.5 s moves the line by less than a ten-thousandth of the outlier.
+        // An outlier of 0.5 s shifts the line by less than a ten-thousandth of the outlier.
         offsets[7].1 += 0.5;
         let (b0, b1) = line(&offsets);
         assert!(

@@ -13,7 +13,7 @@ pub const DOUBLE: u32 = 6;
 pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     let megabytes = 1 << (3 + draw.below(8));
     let bytes = megabytes * MEGABYTE;
-    // Stored types of numbers: 8 bytes, 4, 1.
+    // Types of stored numbers, with 8, 4 and 1 bytes.
     let (stored, size) = *draw.one_of(&[(9, 8), (7, 4), (2, 1), (1, 1)]);
     let class = *draw.one_of(&[DOUBLE, DOUBLE, CHARACTERS, 9, 5]);
     match draw.below(6) {
@@ -52,7 +52,7 @@ fn word(n: u32) -> [u8; 4] {
     n.to_le_bytes()
 }
 
-/// Flags, sizes and name of an array.
+/// Returns flags, sizes and name of an array.
 fn array(class: u32, sizes: [u32; 2], name: &str) -> Vec<u8> {
     let mut head = [word(6), word(8), word(class), word(0)].concat();
     head.extend([word(5), word(8), word(sizes[0]), word(sizes[1])].concat());
@@ -66,7 +66,7 @@ fn element(inside: &[u8]) -> Vec<u8> {
     [&word(MATRIX)[..], &word(inside.len() as u32), inside].concat()
 }
 
-/// The variable e, of zeros.
+/// Returns the variable e, which consists of zeros.
 pub fn variable(class: u32, sizes: [u32; 2], stored: u32, bytes: u32, megabytes: usize) -> Vec<u8> {
     let head = array(class, sizes, "e");
     let length = head.len() as u32 + 8 + bytes;
@@ -78,7 +78,7 @@ fn packed(element: &[u8]) -> Vec<u8> {
     zeros::zlib(element, 0)
 }
 
-/// A file of compressed variables.
+/// Returns a file of compressed variables.
 pub fn file(variables: &[Vec<u8>]) -> Vec<u8> {
     let mut file = vec![b' '; 128];
     file[..19].copy_from_slice(b"MATLAB 5.0 MAT-file");

@@ -1,11 +1,11 @@
 //! Files of a few bytes to two megabytes that unpack, or state that they unpack, to any size, and the required result
 //! of all readers: values or an error message, in bounded memory.
 //!
-//! Bomb `k` of a format is the same bytes on every machine.
+//! Bomb `k` of a format has the same bytes on every machine.
 //!
 //! | file | contents |
 //! |---|---|
-//! | `zeros` | zeros that are packed, of any length, in no time |
+//! | `zeros` | compressed zeros of any length, generated quickly |
 //! | `parquet`, `npz`, `mat`, `hdf5`, `xdf`, `texts` | the bombs of a format |
 
 pub mod hdf5;

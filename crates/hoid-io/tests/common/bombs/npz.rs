@@ -24,7 +24,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             let shape = *draw.one_of(&[[rows, 0], [1, rows], [rows / 4, 4], [1 << 40, 0]]);
             archive(&[member("e", &head(kind.0, &shape), megabytes)])
         }
-        // Two members, each of them small enough.
+        // Several members, each of them below the limit.
         3 => archive(&["e", "u", "x", "y", "z"].map(|name| member(name, &head("|b1", &[32 * MEGABYTE, 0]), 32))),
         // A structure with many fields.
         4 => {
@@ -79,7 +79,7 @@ pub fn member(name: &str, head: &str, megabytes: usize) -> Member {
     }
 }
 
-/// The archive (PKWARE, APPNOTE.TXT 4.3.7, 4.3.12, 4.3.16).
+/// Returns the archive (PKWARE, APPNOTE.TXT 4.3.7, 4.3.12, 4.3.16).
 pub fn archive(members: &[Member]) -> Vec<u8> {
     let (mut file, mut directory) = (Vec::new(), Vec::new());
     for of in members {

@@ -16,7 +16,7 @@ use parquet::{
 use super::zeros::{self, MEGABYTE};
 use crate::mutations::draw::Draw;
 
-/// Rows of a row group.
+/// Number of rows of a row group.
 pub const GROUP: usize = 1 << 18;
 /// Encodings of the format.
 const PLAIN: u64 = 0;
@@ -37,7 +37,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     let megabytes = 1 << (4 + draw.below(8));
     let values = 1 << (20 + draw.below(12));
     match draw.below(9) {
-        // It unpacks to more than stated.
+        // The data decompress to more than the stated size.
         0 => page(&Page {
             compression: gzip(),
             optional: false,
@@ -45,7 +45,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             unpacked: 800,
             packed: &zeros::gzip(megabytes),
         }),
-        // It states more than it contains.
+        // The stated size exceeds the data.
         1 => page(&Page {
             compression: *draw.one_of(&[
                 gzip(),
@@ -58,7 +58,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             unpacked: (8 * values).min(i32::MAX as u64),
             packed: &[0; 20],
         }),
-        // Its content matches its header.
+        // The data match the header.
         2 => page(&Page {
             compression: gzip(),
             optional: false,
@@ -96,7 +96,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     }
 }
 
-/// A given number of groups of the same values, which the format writes once.
+/// A file with a given number of groups with the same values, which are stored only once.
 pub fn groups(schema: &str, groups: usize, rows: usize) -> Vec<u8> {
     let mut writer = writer(schema, Compression::UNCOMPRESSED, true);
     for _ in 0..groups {
@@ -119,7 +119,7 @@ pub fn groups(schema: &str, groups: usize, rows: usize) -> Vec<u8> {
     writer.into_inner().unwrap()
 }
 
-/// A given number of columns without a row.
+/// A file with a given number of columns and no rows.
 pub fn columns(count: usize) -> Vec<u8> {
     let each: String = (0..count).map(|k| format!("required double c{k}; ")).collect();
     groups(&format!("message m {{ {each} }}"), 0, 0)
@@ -134,7 +134,8 @@ fn writer(schema: &str, compression: Compression, dictionary: bool) -> Serialize
     SerializedFileWriter::new(Vec::new(), schema, Arc::new(properties)).unwrap()
 }
 
-/// A number as in page headers (Thrift, compact: the sign in the lowest bit, seven bits per byte).
+/// Appends a number as in page headers (compact protocol of Thrift: the sign is in the lowest bit, with seven bits per
+/// byte).
 fn signed(page: &mut Vec<u8>, value: u64) {
     number(page, value << 1);
 }
@@ -147,7 +148,7 @@ fn number(page: &mut Vec<u8>, mut rest: u64) {
     page.push(rest as u8);
 }
 
-/// A file of one column, e, of one page.
+/// A file with one column, e, of one page.
 pub fn page(of: &Page) -> Vec<u8> {
     let schema = match of.optional {
         true => "message m { optional double e; }",

@@ -45,7 +45,7 @@ pub fn json(draw: &mut Draw) -> Vec<u8> {
     .into_bytes()
 }
 
-/// A kilobyte to sixteen megabytes.
+/// Draws a length from one kilobyte to sixteen megabytes.
 fn length(draw: &mut Draw) -> usize {
     1 << (10 + draw.below(15))
 }

@@ -13,7 +13,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     let many = 1 << (10 + draw.below(7));
     let kind = *draw.one_of(&["double64", "int8", "string", "float32"]);
     match draw.below(8) {
-        // Missing channels, and samples.
+        // The stated numbers of channels and samples exceed the contents.
         0 => {
             chunk(&mut file, HEADER, &header(1, large, kind, "100", ""));
             chunk(&mut file, SAMPLES, &samples(&large.to_le_bytes(), &[0; 64]));
@@ -22,7 +22,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             chunk(&mut file, HEADER, &header(1, 2, kind, "100", ""));
             chunk(&mut file, SAMPLES, &samples(&u64::MAX.to_le_bytes(), &[0; 64]));
         }
-        // Texts of any length, and empty ones.
+        // Texts of any length, and empty texts.
         2 => {
             chunk(&mut file, HEADER, &header(1, 1, "string", "0", ""));
             let text = [&[0, 8][..], &large.to_le_bytes()].concat();
@@ -37,7 +37,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
                 &samples(&(count as u64).to_le_bytes(), &[0, 1, 0].repeat(count)),
             );
         }
-        // One byte each.
+        // Each sample takes one byte.
         4 => {
             let count = 8 * many;
             chunk(&mut file, HEADER, &header(1, 2, "int8", "1e-3", ""));
@@ -53,7 +53,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             chunk(&mut file, HEADER, &header(1, 2, kind, "100", &nested));
         }
         6 => (0..many as u32 / 4).for_each(|id| chunk(&mut file, HEADER, &header(id, 2, kind, "100", ""))),
-        // A jump of years between two samples, and the same in the clock offsets.
+        // A jump of years between two samples, and the same jump in the clock offsets.
         _ => {
             chunk(&mut file, HEADER, &header(1, 2, "int8", "1e6", ""));
             let at = |t: f64| [&[8][..], &t.to_le_bytes(), &[1, 2]].concat();
@@ -80,7 +80,7 @@ fn chunk(file: &mut Vec<u8>, tag: u16, content: &[u8]) {
     file.extend(content);
 }
 
-/// Samples of stream 1 after their number.
+/// A chunk of samples of stream 1, preceded by their number.
 fn samples(count: &[u8; 8], bytes: &[u8]) -> Vec<u8> {
     [&1_u32.to_le_bytes()[..], &[8], count, bytes].concat()
 }

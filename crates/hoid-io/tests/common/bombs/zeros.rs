@@ -4,10 +4,10 @@ use flate2::{Compress, Compression, Crc, FlushCompress};
 
 /// A megabyte.
 pub const MEGABYTE: usize = 1 << 20;
-/// Data up to this size, MB, have a valid checksum: for larger ones no reader reaches the checksum.
+/// Largest size of data, in MB, with a valid checksum; readers refuse larger data before they reach the checksum.
 const SUMMED: usize = 100;
 
-/// Deflated: a number of megabytes of zeros after a start.
+/// Returns deflated data: the given start, followed by a number of megabytes of zeros.
 pub fn deflated(beginning: &[u8], megabytes: usize) -> Vec<u8> {
     let mut packer = Compress::new(Compression::default(), false);
     let mut packed = |bytes: &[u8]| {
@@ -19,7 +19,7 @@ pub fn deflated(beginning: &[u8], megabytes: usize) -> Vec<u8> {
     [first, block.repeat(megabytes), vec![3, 0]].concat()
 }
 
-/// In gzip.
+/// Returns the zeros in gzip format.
 pub fn gzip(megabytes: usize) -> Vec<u8> {
     let head = [0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 255];
     let length = (megabytes * MEGABYTE) as u32;
@@ -27,7 +27,7 @@ pub fn gzip(megabytes: usize) -> Vec<u8> {
     [&head[..], &deflated(&[], megabytes), &tail].concat()
 }
 
-/// In zlib, after a start.
+/// Returns the data in zlib format, with the given start.
 pub fn zlib(beginning: &[u8], megabytes: usize) -> Vec<u8> {
     // Adler-32 (RFC 1950, section 9): for zeros only the second sum grows.
     let (mut a, mut b) = (1_u64, 0_u64);
@@ -40,7 +40,7 @@ pub fn zlib(beginning: &[u8], megabytes: usize) -> Vec<u8> {
     [&[0x78, 0x9c][..], &deflated(beginning, megabytes), &sum.to_be_bytes()].concat()
 }
 
-/// The checksum of a zip archive.
+/// Returns the checksum of a member of a zip archive.
 pub fn crc(beginning: &[u8], megabytes: usize) -> u32 {
     let mut sum = Crc::new();
     sum.update(beginning);

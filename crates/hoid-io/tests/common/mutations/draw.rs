@@ -1,6 +1,5 @@
-//! Pseudo-random numbers: SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number
-//! generators", 2014). Each case has its own sequence, so that it can be reproduced without those
-//! before it.
+//! Pseudo-random numbers: SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014). Each
+//! case has its own sequence, so it can be reproduced without the preceding cases.
 
 /// A sequence.
 pub struct Draw(u64);

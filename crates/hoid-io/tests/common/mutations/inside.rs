@@ -6,7 +6,7 @@ use std::io::{Cursor, Read, Write};
 use flate2::{Compression, read::ZlibDecoder, write::ZlibEncoder};
 use zip::{CompressionMethod, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
-/// A file taken apart.
+/// The decompressed parts of a file.
 #[derive(Debug, Clone)]
 pub enum Inside {
     /// Name and bytes of each member.
@@ -36,7 +36,7 @@ impl Inside {
         }
     }
 
-    /// The file with valid checksums.
+    /// Returns the file with valid checksums.
     pub fn packed(&self) -> Vec<u8> {
         match self {
             Self::Zip(members) => {

@@ -1,18 +1,18 @@
 //! Damaged files, and the required result of each reader: values, or an error message, within a
 //! second and 300 MB, and never a panic.
 //!
-//! Case `k` of a seed is the same bytes on every machine: a valid file is drawn, then some
-//! mutations of it. Formats with checksums over compressed data are unpacked first and packed
-//! again, since otherwise only the checksum would be tested.
+//! Case `k` of a seed has the same bytes on every machine: a valid file is drawn, and then mutations of this file.
+//! Formats with checksums over compressed data are unpacked first and packed again, since otherwise only the checksum
+//! would be tested.
 //!
 //! | file | contents |
 //! |---|---|
-//! | `draw` | numbers that look like chance, from a seed |
-//! | `originals` | the good files |
-//! | `inside` | what is packed in them, out and in |
+//! | `draw` | pseudo-random numbers from a seed |
+//! | `originals` | the valid files |
+//! | `inside` | decompression and compression of their contents |
 //! | `mutate` | the mutations |
-//! | `readers` | all readers over one file, and what must hold |
-//! | `spent` | what a case costs |
+//! | `readers` | all readers applied to one file, and the required properties |
+//! | `spent` | cost of a case |
 
 pub mod draw;
 pub mod inside;
@@ -37,7 +37,7 @@ pub struct Case {
     pub choice: u64,
 }
 
-/// The case with a number.
+/// Returns the case with this number.
 pub fn case(originals: &[Original], seed: u64, number: u64) -> Case {
     let mut draw = Draw::new(seed, number);
     let original = &originals[draw.below(originals.len())];

@@ -31,7 +31,7 @@ const EDGES: [u64; 20] = [
     0xffff_ffff_ffff_fff8,
     0xffff_ffff_ffff_ffff,
 ];
-/// Decimal numbers of that kind.
+/// Decimal numbers at which counts, sizes and sums overflow.
 const NUMBERS: [&str; 16] = [
     "",
     "0",
@@ -53,7 +53,7 @@ const NUMBERS: [&str; 16] = [
 
 /// The bytes of a damaged file.
 pub fn mutated(original: &Original, other: &Original, draw: &mut Draw) -> Vec<u8> {
-    // Mostly one: with many mutations only the first checks are reached.
+    // Most cases have one mutation: with many mutations, only the first checks are reached.
     let count = 1 + draw.below(MOST).min(draw.below(MOST)).min(draw.below(MOST));
     if let Some(inside) = original.inside.as_ref().filter(|_| draw.below(3) > 0) {
         let mut inside = inside.clone();
@@ -75,7 +75,7 @@ pub fn mutated(original: &Original, other: &Original, draw: &mut Draw) -> Vec<u8
 
 /// One mutation.
 fn mutate(bytes: &mut Vec<u8>, other: &[u8], original: &Original, draw: &mut Draw) {
-    // With a byte too many or too few a file of numbers is refused at once.
+    // A binary file with a byte too many or too few is refused at once.
     let keeps_length = !original.is_text() && draw.below(3) > 0;
     let kind = if keeps_length {
         *draw.one_of(&[0, 1, 2, 7, 8, 9, 11])
@@ -150,7 +150,8 @@ fn mutate(bytes: &mut Vec<u8>, other: &[u8], original: &Original, draw: &mut Dra
     }
 }
 
-/// A place among a number of bytes: anywhere, or near the head or the end, which contain most of the structure.
+/// Draws a position within a number of bytes: anywhere, or near the start or the end, which contain most of the
+/// structure.
 fn place(length: usize, draw: &mut Draw) -> usize {
     match draw.below(4) {
         0 => draw.below(length.min(256)),
@@ -159,7 +160,7 @@ fn place(length: usize, draw: &mut Draw) -> usize {
     }
 }
 
-/// A part of a number of bytes, mostly short.
+/// Draws a range within a number of bytes, which is mostly short.
 fn part(length: usize, draw: &mut Draw) -> (usize, usize) {
     let at = place(length, draw).min(length);
     let most = if draw.below(4) == 0 { length } else { 64 };

@@ -1,4 +1,4 @@
-//! The valid files: those that hoid writes, those of other programs (`fixtures/`), and texts with all features of CSV.
+//! The valid files: files that hoid writes, files of other programs (`fixtures/`), and texts with all features of CSV.
 
 use std::{fs, path::Path};
 
@@ -70,7 +70,7 @@ pub fn originals() -> Vec<Original> {
                 continue;
             };
             let name = path.file_name().unwrap().to_str().unwrap().to_owned();
-            // Refused as a whole: hoid does not read Zstandard.
+            // This file is refused as a whole, because hoid does not read Zstandard.
             if name == "zstd.parquet" {
                 continue;
             }

@@ -1,6 +1,5 @@
-//! All readers applied to one file, and the required properties: a record is even, finite and not
-//! excessively long; an error names the file, is short, and contains no terminal control
-//! characters.
+//! All readers applied to one file, and the required properties: a record is evenly sampled, finite and not excessively
+//! long; an error names the file, is short, and contains no terminal control characters.
 
 use std::path::Path;
 
@@ -13,7 +12,7 @@ use super::draw::Draw;
 
 /// Maximum length of a message, characters.
 const LONGEST_MESSAGE: usize = 4000;
-/// Maximum number of samples per byte of a file: `--resample` makes several out of one.
+/// Maximum number of samples per byte of a file; `--resample` may create several samples per recorded sample.
 const SAMPLES_PER_BYTE: usize = 200;
 
 /// Numbers of successful and refused reads.

@@ -30,7 +30,7 @@ fn one_element_in_all_notations() {
         let found = read(text);
         assert_eq!(found.num().len(), 1, "{text}");
         for (a, b) in found.den().iter().zip(element.den()) {
-            // 1/6 has no exact binary digits.
+            // 1/6 has no exact binary representation.
             assert!((a - b).abs() < 1e-14, "{text}: {found:?}");
         }
         assert!(

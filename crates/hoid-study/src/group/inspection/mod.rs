@@ -93,7 +93,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
             manifest.conditions.insert(condition.clone(), settings);
         }
     }
-    // The span is entered only if it is the same in all conditions.
+    // The span is written only if it is the same in all conditions.
     if let (None, None, Some(first)) = (known.from_s, known.to_s, spans.first())
         && spans.iter().all(|span| span == first)
     {

@@ -3,14 +3,14 @@
 //! At each sample the probability of a hypothesis is multiplied by its predictive density of the innovation, and the
 //! probabilities are normalised. At every birth the likeliest hypothesis is the parent of new hypotheses:
 //!
-//! - **a change of the gains**, and at every few births a change of omega_nm and zeta_nm as well, with the prior
+//! - **a change of the gains**, and at every few births also a change of omega_nm and zeta_nm, with the prior
 //!   probability of such a change since the last birth;
 //! - **a neighbouring delay**, as an alternative that may have been true throughout: the hypothesis is as old as its
-//!   parent, and the variance of each parameter is increased by the error that the difference in delay causes in it;
-//!   the first hypotheses with neighbouring delays are created when the bank starts;
+//!   parent, and the variance of each parameter is increased by the error of this parameter that the difference in
+//!   delay causes; the first hypotheses with neighbouring delays are created when the bank starts;
 //! - **a change of the delay**: delays spread over all candidates, with the variances of the gains increased as in any
 //!   change, and probabilities proportional to the normal density of the step. The set of proposed delays is shifted by
-//!   one each time, so that each candidate has its turn, and the number of hypotheses is bounded for any number of
+//!   one each time, so each candidate is proposed in turn, and the number of hypotheses is bounded for any number of
 //!   delays.
 //!
 //! A new hypothesis replaces the least likely hypothesis that is old enough to be pruned.
@@ -67,7 +67,8 @@ pub struct Mixture {
 /// Number of delays on either side of the likeliest delay that are proposed as alternatives that may have been true
 /// throughout.
 const NEIGHBOURS: usize = 3;
-/// Smallest probability of a hypothesis relative to the likeliest, so that no hypothesis is lost permanently.
+/// Smallest probability of a hypothesis relative to the likeliest hypothesis, so that no hypothesis is lost
+/// permanently.
 const LEAST_PROBABILITY: f64 = 1e-12;
 
 impl<const M: usize> Bank<M> {

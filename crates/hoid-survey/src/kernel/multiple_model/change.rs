@@ -3,12 +3,12 @@
 //! `Lambda = ln((sum of P(h) over hypotheses born within the last T)/(sum of P(h) over older hypotheses))` is the
 //! logarithm of the posterior odds of a change. Lambda corresponds to the likelihood ratio of Willsky and Jones (A. S.
 //! Willsky and H. L. Jones, *IEEE Transactions on Automatic Control* 21 (1976) 108-112), but the size and the time of
-//! the change are averaged out instead of maximised, so that its expectation does not grow with the number of times
-//! that are tried. A change is declared if Lambda exceeds the threshold and the likeliest recent hypothesis is old
-//! enough to identify the changed parameters. The next change is declared only after Lambda has been below zero, when
-//! the new values have become the established ones, or if further parameters prove to have changed: the neuromuscular
-//! system, by the same odds of hypotheses in which it changed against all others, or the delay, by three standard
-//! errors.
+//! the change are averaged out instead of maximised. Its expectation therefore does not grow with the number of
+//! candidate times. A change is declared if Lambda exceeds the threshold and the likeliest recent hypothesis is old
+//! enough to identify the changed parameters. The next change is declared only after Lambda has been below zero, which
+//! means that the new values are established, or if further parameters have changed: the neuromuscular system, if the
+//! odds of the hypotheses in which it changed against all others exceed the same threshold, or the delay, if it changed
+//! by more than three standard errors.
 //!
 //! The likeliest recent hypothesis gives the time of the change and the estimate before it. The change of each
 //! parameter divided by its standard error shows which parameters changed. For the innovation variance this ratio is
@@ -84,7 +84,7 @@ impl Default for ChangeDetector {
 
 /// Threshold for declaring a change of the delay, in standard errors.
 const DELAY_THRESHOLD: f64 = 3.0;
-/// Number added to numerator and denominator of the odds, so that Lambda stays finite.
+/// Number added to numerator and denominator of the odds to keep Lambda finite.
 const REGULARISATION: f64 = 1e-12;
 
 impl ChangeDetector {
@@ -114,7 +114,7 @@ impl ChangeDetector {
             h.neuromuscular_changed && log_odds(sums.neuromuscular, others.max(0.0)) > prior.log_odds_threshold;
         let new_neuromuscular = neuromuscular_changed && !self.declared_neuromuscular;
         let delay_may_be_new = prior.delay.count > 1 && !self.declared_delay;
-        // At most samples after a change there is nothing further to declare, and the function returns here.
+        // At most samples, a change has already been declared and nothing new can be declared.
         if self.declared && !new_neuromuscular && !delay_may_be_new {
             return;
         }

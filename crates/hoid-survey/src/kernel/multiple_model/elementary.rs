@@ -5,8 +5,8 @@ const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
 /// Number of stored bits in the mantissa of an f64.
 const MANTISSA: u32 = 52;
 
-/// Returns `ln(1 + x)` for x >= 0. For small x it uses, in a third of the time of libm, the series
-/// `2 (z + z^3/3 + z^5/5 + ...)` with `z = x/(2 + x)`; the first omitted term is below 1e-16 of the first term.
+/// Returns `ln(1 + x)` for x >= 0. For small x it uses the series `2 (z + z^3/3 + z^5/5 + ...)` with `z = x/(2 + x)`,
+/// which takes a third of the time of libm; the first omitted term is below 1e-16 of the first term.
 #[inline(always)]
 pub(crate) fn log1p(x: f64) -> f64 {
     if x > 0.25 {

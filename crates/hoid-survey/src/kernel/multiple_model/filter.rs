@@ -1,7 +1,7 @@
 //! The recursion: filters for the signals, followed by the bank of hypotheses.
 //!
-//! A sample passes the [`Response`] to the held error, the whitening filter D and the ring buffer of delayed signals,
-//! and reaches the [`Bank`]. At regular intervals the linearisation point of the response is moved toward the estimate.
+//! A sample passes through the [`Response`] to the held error, the whitening filter D and the ring buffer of delayed
+//! signals to the [`Bank`]. At regular intervals the linearisation point of the response is moved toward the estimate.
 
 use super::{
     bank::Bank,

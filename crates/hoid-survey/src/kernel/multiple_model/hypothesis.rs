@@ -71,7 +71,8 @@ pub struct Snapshot {
 hoid_core::state!([] Hypothesis { eta, covariance, innovation_variance, probability, born, neuromuscular_changed, extra_delay, before, least_variance });
 hoid_core::state!([] Snapshot { eta, gain_covariance, neuromuscular_variance, innovation_variance, delay });
 
-/// Visits the numbers of a slot of the bank: whether it is occupied, and the numbers of its hypothesis.
+/// Visits the numbers of a slot of the bank: a number that indicates whether the slot is occupied, and the numbers of
+/// its hypothesis.
 pub(super) fn visit_slot(slot: &mut Option<Hypothesis>, each: &mut dyn FnMut(&mut f64)) {
     let mut is_there = slot.is_some();
     is_there.visit(each);

@@ -1,4 +1,4 @@
-//! Prior of an operator: rate and size of its changes, and which parameters change.
+//! Prior of an operator: rate and size of its changes, and selection of the parameters that change.
 //!
 //! Times are in samples. Changes of the gains are relative to `g = sqrt(K_e^2 + omega_c^2 K_e_dot^2)`, the gain of the
 //! operator's lead term at the crossover frequency omega_c: changes of K_e are in units of g, changes of K_e_dot in
@@ -79,7 +79,7 @@ pub struct DelayPrior {
     pub change_odds: f64,
     /// Standard deviation of a change of the delay, samples.
     pub jump: f64,
-    /// Prior probability of a delay one sample away from the likeliest.
+    /// Prior probability of a delay that differs by one sample from the likeliest delay.
     pub neighbour_probability: f64,
     /// Standard deviations of the errors of the parameters caused by a delay error of one sample: K_e and K_e_dot
     /// relative to g and `g/omega_c`, omega_nm and zeta_nm relative to their values.

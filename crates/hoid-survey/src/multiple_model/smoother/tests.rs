@@ -9,7 +9,7 @@ use hoid_sim::{RunSeed, Simulator};
 use hoid_track::{StartAt, TrackOptions, track};
 
 fn side(eta: [f64; OPERATOR], scale: f64, weight: f64) -> Side {
-    // Positive: a unit matrix and a rank-one matrix.
+    // The covariance is positive definite: the sum of a unit matrix and a rank-one matrix.
     let direction = [0.3, -0.5, 0.2, 0.7];
     Side {
         log_weight: weight.ln(),
@@ -17,7 +17,7 @@ fn side(eta: [f64; OPERATOR], scale: f64, weight: f64) -> Side {
         covariance: std::array::from_fn(|i| {
             std::array::from_fn(|j| scale * (f64::from(u8::from(i == j)) + direction[i] * direction[j]))
         }),
-        // 1 + |direction|^2 is the eigenvalue other than one.
+        // The only eigenvalue other than one is 1 + |direction|^2.
         size: 0.5 * (scale.powi(4) * 1.87 * 0.02).ln(),
         level: [0.1 * scale, 0.02],
     }
@@ -50,12 +50,12 @@ fn a_past_and_a_future_that_contradict_each_other_are_not_joined() {
     let (same, other) = (side([1.0; OPERATOR], 0.01, 0.5), side([9.0; OPERATOR], 0.01, 0.5));
     let joined = join(&[old], &[same, other]);
     assert!((joined.eta[0] - 1.0).abs() < 1e-9);
-    // The order of the two does not matter.
+    // The order of the two hypotheses does not matter.
     let mirrored = join(&[same, other], &[old]);
     for i in 0..OPERATOR {
         assert!((joined.eta[i] - mirrored.eta[i]).abs() < 1e-12);
     }
-    // With covariances that are not numbers only the past counts.
+    // If the covariances of the future are NaN, only the past is used.
     let broken = Side {
         covariance: [[f64::NAN; OPERATOR]; OPERATOR],
         ..old
@@ -94,7 +94,7 @@ fn without_a_change_all_rows_say_nearly_the_same() {
     for row in &rows {
         for ((_, _, a), (_, _, b)) in row.rows()[..5].iter().zip(last.rows()) {
             let se = b.standard_error.unwrap();
-            // The drift within half a run is less than the prior spread.
+            // The drift within half a run is smaller than the prior spread.
             assert!((a.value - b.value).abs() < 2.0 * se, "{a:?} {b:?}");
         }
     }

@@ -28,7 +28,7 @@ fn closed(condition: Condition, m0: usize, level: f64, replication: u64) -> Reco
     Simulator::new(&scenario).unwrap().run(run_seed, false).unwrap()
 }
 
-/// Continues from the prediction error fit of the first 30.72 s, from there or from 10 s.
+/// Starts from the prediction error fit of the first 30.72 s and tracks from the end of this span or from 10 s.
 fn track(record: &Record, lambda: f64, external: bool, from: f64, mut look: impl FnMut(usize, &RefinedRecursion)) {
     let orders = Structure::BoxJenkins.operator_orders(29);
     let start = Estimator::new(Structure::BoxJenkins, orders)
@@ -80,8 +80,8 @@ fn in_a_closed_loop_the_bias_is_small() {
                 square.map(|x: f64| 100.0 * x.sqrt())
             );
             for (k, (mean, square)) in mean.into_iter().zip(square).enumerate() {
-                // 3.5 errors of the mean; with m0 = 2 the order of the noise model is too low, which costs some per
-                // cent of b.
+                // The tolerance is 3.5 standard errors of the mean. With m0 = 2 the order of the noise model is too
+                // low, which biases b by a few per cent.
                 let share = if m0 == 1 { 0.0 } else { [0.03, 0.03, 0.002, 0.004][k] };
                 assert!(
                     mean.abs() < 3.5 * (square / runs as f64).sqrt() + share,
@@ -111,7 +111,7 @@ fn it_follows_the_change_of_the_reference_task() {
             "external {external}: rms of K_e {:.1} % (median), {:.1} % (largest)",
             errors[5], errors[9]
         );
-        // A recursive prediction error method reaches 15 % there.
+        // A recursive prediction error method has an error of 15 % in this case.
         assert!(errors[5] < 22.0 && errors[9] < 40.0, "{errors:?}");
     }
 }

@@ -152,7 +152,7 @@ fn over_time(
     for (t, [mean, median]) in times_s.iter().zip(&both) {
         data.row(&[name, RECURSIONS[method], subject], &[*t, *mean, *median]);
     }
-    // Higher levels are darker: the median is drawn first, and the mean on top of it.
+    // Higher levels are darker; the median is drawn first, and the mean over it.
     [1, 0]
         .into_iter()
         .enumerate()

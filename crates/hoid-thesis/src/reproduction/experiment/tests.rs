@@ -87,7 +87,7 @@ fn recorded_people_have_no_truth_and_may_have_runs_of_different_lengths() {
         svg.contains("anna") && !svg.contains("deg/deg"),
         "gains are in units of the recordings"
     );
-    // RLS of K_e, the longer run alone at the end; then OLS.
+    // K_e by RLS, where only the longer run contributes at the end, followed by K_e by OLS.
     assert_eq!(column(&made, "mean")[..3], [1.5, 1.5, 2.0]);
     let made = tables::delays(&item(), &runs, &["C4".to_owned()]);
     assert_eq!(
@@ -96,7 +96,7 @@ fn recorded_people_have_no_truth_and_may_have_runs_of_different_lengths() {
     );
     runs[0].outcome.batch[0][0].operator = [f64::NAN; 5];
     let made = tables::operators(&item(), &runs, &["C4".to_owned()]);
-    // OLS, PEM, RLS and RPEM in both spans.
+    // The rows are OLS, PEM, RLS and RPEM in both spans.
     assert_eq!(column(&made, "K_e"), [2.0, 1.5, 1.5, 1.5, 1.5, 2.0, 1.5, 2.0]);
     assert_eq!(column(&made, "determined")[..2], [0.5, 1.0]);
 }

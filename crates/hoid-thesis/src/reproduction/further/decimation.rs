@@ -1,4 +1,4 @@
-//! Error of the frequency response against the sample time, with whole, fractional and Padé delays.
+//! Error of the frequency response as a function of the sample time, with whole, fractional and Padé delays.
 
 use hoid_report::figures::{CurveGrid, CurvePanel, Shade, curves};
 use hoid_study::{Query, Results};

@@ -1,4 +1,4 @@
-//! Error and settling time of recursive estimates against the memory length.
+//! Error and settling time of recursive estimates as functions of the memory length.
 
 use hoid_report::figures::{Curve, CurveGrid, CurvePanel, LineKind, Shade, curves};
 use hoid_study::{Query, Results};

@@ -1,4 +1,4 @@
-//! Bias against the time constant of the remnant, and for the two definitions of the noise level.
+//! Bias as a function of the time constant of the remnant, and for the two definitions of the noise level.
 
 use hoid_report::figures::{BoxSeries, Shade};
 use hoid_study::{Query, Results};

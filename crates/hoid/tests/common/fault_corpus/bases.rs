@@ -1,8 +1,8 @@
 //! The runs without faults, and their true values.
 //!
-//! Each case has a run of condition C1 and one of C2 of the thesis, and a virtual person with one to three runs: form,
-//! remnant, plant, rate and whether the disturbance was recorded follow from the number of the case. People who change
-//! (C3 to C6) are left out: their true values are not constant.
+//! Each case has a run of condition C1 and one of C2 of the thesis, and a virtual person with one to three runs. The
+//! number of the case determines form, remnant, plant and rate, and whether the disturbance was recorded. People who
+//! change (C3 to C6) are omitted, because their true values are not constant.
 
 use hoid::{
     model::{FamilyOperator, Form},
@@ -38,7 +38,7 @@ impl Who {
     }
 }
 
-/// Runs of one operator, and one run of another for the fault that needs it.
+/// Runs of one operator, and one run of another operator for the fault that requires it.
 #[derive(Debug, Clone)]
 pub struct Base {
     pub who: Who,
@@ -52,13 +52,13 @@ pub struct Base {
 }
 
 impl Base {
-    /// Index of the run that gets the fault.
+    /// Returns the index of the run into which the fault is inserted.
     pub fn faulty(&self) -> usize {
         self.runs.len() / 2
     }
 }
 
-/// The runs of a case.
+/// Returns the runs of a case.
 ///
 /// # Errors
 /// The errors of the simulation.
@@ -108,14 +108,15 @@ fn of_text(who: Who, seed: u64, case: u64) -> Result<Base, SimError> {
 }
 
 fn of_person(seed: u64, case: u64) -> Result<Base, SimError> {
-    // A tenth of the corpus, every tenth case, must have all kinds of people too.
+    // A tenth of the corpus, which consists of every tenth case, must also have all kinds of people.
     let i = (case + case / 10) as usize;
     let task = Task {
         sample_time: SampleTime::new([1.0 / 60.0, 0.01][i / 2 % 2])?,
         ..Task::default()
     };
     let kind = RemnantKind::ALL[i % 5];
-    // Every other has a lead, which trackers and polynomials represent; an integrator has none.
+    // Every second person has a lead, which trackers and polynomials can represent; with an integrator as the plant,
+    // people have no lead.
     let lead = i.is_multiple_of(2);
     let plant = if lead {
         Plant::ALL[1 + i / 2 % 2]
@@ -145,7 +146,7 @@ fn of_person(seed: u64, case: u64) -> Result<Base, SimError> {
 
 fn named(operator: &FamilyOperator) -> Truth {
     let all = operator.named().into_iter();
-    // An infinite T_I has no error.
+    // An infinite T_I has no standard error.
     all.filter(|p| p.value.is_finite())
         .map(|p| (p.name.to_owned(), p.value))
         .collect()

@@ -11,10 +11,10 @@ use super::{
 #[derive(Debug, Clone)]
 pub struct Injected {
     pub table: Table,
-    /// Start of the fault, s from the first sample; for a lasting fault, its first moment.
+    /// Start of the fault, s from the first sample.
     pub from_s: f64,
     pub to_s: f64,
-    /// The first row that differs and the first after the last such row, by the rows of the recording without the
+    /// The first row that differs, and the first row after the last differing row, counted in the recording without the
     /// fault.
     pub rows: (usize, usize),
 }
@@ -30,7 +30,7 @@ pub fn uniform(seed: u64, case: u64, draw: u64) -> f64 {
     ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// Inserts a fault into a recording. `second` is that of another person.
+/// Inserts a fault into a recording. `second` is a recording of another person.
 pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64) -> Injected {
     let mut table = clean.clone();
     let n = clean.len();
@@ -48,7 +48,7 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
     let until = |length: usize| at.saturating_add(length).min(n);
     let (on, size) = (fault.kind.on, fault.size);
     let seconds = if size == WHOLE { n } else { samples(size) };
-    // Rows that differ; the printed text is the same except for lasting faults.
+    // Rows that differ from the recording without the fault.
     let mut rows = (at, n);
     let mut stays = false;
     match fault.kind.what {
@@ -90,7 +90,7 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
             each(&mut table, on, rows, |_, _, is_e| if is_e { e } else { u });
         }
         What::Idle | What::IdleNoisy => {
-            // Before, inside and after the run.
+            // The position is before, inside or after the run.
             let at = match fault.place {
                 FaultPosition::Start => 0,
                 FaultPosition::End => n,
@@ -195,7 +195,8 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
     }
 }
 
-/// Changes the values of the channels in some rows: `change` gets a value, its row and whether it is of e.
+/// Changes the values of the channels in some rows: `change` receives a value, its row, and true if the value belongs
+/// to e.
 fn each(table: &mut Table, on: On, rows: (usize, usize), change: impl Fn(f64, usize, bool) -> f64) {
     for k in rows.0..rows.1 {
         if on.e() {

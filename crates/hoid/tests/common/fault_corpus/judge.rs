@@ -1,19 +1,19 @@
 //! Judgement of a result, compared with the true values.
 //!
-//! The error of a parameter is its distance from the true value in its own standard errors; a delay that is found only
-//! on the grid of samples has an error of one sample. A parameter that is reported as not determined, or has no
-//! standard error, makes no claim.
+//! The error of a parameter is its distance from the true value in its own standard errors; a delay that is estimated
+//! only in whole samples has a standard error of one sample. A parameter that is reported as not determined, or has no
+//! standard error, is not judged.
 //!
-//! A trace is wrong if it is wrong at its last row or [`LATER_S`] after the fault. Its recovery is the time from the
-//! end of the fault to the last row at which a parameter is off by more than [`NEAR_ERRORS`] of its errors and by more
-//! than [`NEAR_SHARE`] of its true value. Its lasting error is the largest that it had for [`LASTING_S`] without
-//! interruption.
+//! A trace is wrong if it is wrong at its last row or [`LATER_S`] after the fault. Its recovery time is the time from
+//! the end of the fault to the last row in which a parameter differs by more than [`NEAR_ERRORS`] of its standard
+//! errors and by more than [`NEAR_SHARE`] of its true value. Its lasting error is the largest error that it had for
+//! [`LASTING_S`] without interruption.
 
 use serde_json::Value;
 
 use super::bases::Truth;
 
-/// Standard errors from which a number is wrong.
+/// Number of standard errors from which a value is wrong.
 pub const WRONG: f64 = 4.0;
 /// Largest distance of a report from its fault, s.
 pub const NEAR_S: f64 = 1.0;
@@ -29,7 +29,7 @@ const OF_FAULTS: [&str; 4] = ["faults", "held-back", "hostile-span", "restarted"
 #[derive(Debug, Clone)]
 pub struct CaseTruth {
     pub truth: Truth,
-    /// True values after the fault, if there is another person then.
+    /// True values after the fault, if another person acts from then on.
     pub then: Option<Truth>,
     /// Span of the fault, s; `None` in a clean run.
     pub span_s: Option<(f64, f64)>,
@@ -44,16 +44,16 @@ pub struct CaseOutcome {
     /// The parameter with the largest error, and its error in standard errors.
     pub worst: Option<(String, f64)>,
     pub wrong: bool,
-    /// The verdict in a word; "refused" without a result.
+    /// The verdict in one word; "refused" if there is no result.
     pub level: String,
-    /// Findings against the result, by kinds.
+    /// Kinds of the findings against the result.
     pub kinds: Vec<String>,
-    /// True if a finding that is more than a note reports faults.
+    /// True if a finding other than a note reports faults.
     pub of_faults: bool,
-    /// Number of reported faults, and whether one is at the right place.
+    /// Number of reported faults; `placed` is true if one of them is at the right place.
     pub told: usize,
     pub placed: bool,
-    /// For traces: time until it was near the true values for good, s; infinite if it never was.
+    /// For traces: time until the trace stayed near the true values, s; infinite if it never did.
     pub recovery_s: Option<f64>,
     /// For traces: the largest lasting error, in standard errors.
     pub lasting: Option<f64>,
@@ -73,7 +73,7 @@ impl CaseOutcome {
         self.level != "trustworthy" || self.placed
     }
 
-    /// True for the outcome that must not occur: wrong and not flagged.
+    /// True for the outcome that must not occur: a wrong result that is not flagged.
     pub fn silently_wrong(&self) -> bool {
         self.wrong && !self.flagged()
     }
@@ -89,7 +89,7 @@ pub struct Row {
     pub claims: Vec<Claim>,
 }
 
-/// Judges a fit by the output of the program.
+/// Judges a fit from the output of the program.
 pub fn of_fit(json: &Value, known: &CaseTruth) -> CaseOutcome {
     let claims = claims_of(json, known);
     let worst = worst_of(&claims, &known.truth);
@@ -123,7 +123,7 @@ pub fn of_trace(json: &Value, rows: &[Row], known: &CaseTruth) -> CaseOutcome {
         let after: Vec<&Row> = rows.iter().filter(|row| row.t >= behind).collect();
         let far = |row: &&&Row| !is_near(&row.claims, truth_at(row.t));
         let last = after.last()?.t;
-        // A trace that ends with the fault, or so soon after it that nothing can be reported.
+        // A trace that ends with the fault, or soon after it, has no recovery time.
         (last - behind > 1.0).then(|| match after.iter().rfind(far) {
             Some(row) if row.t >= last => f64::INFINITY,
             Some(row) => row.t - behind,
@@ -139,7 +139,7 @@ pub fn of_trace(json: &Value, rows: &[Row], known: &CaseTruth) -> CaseOutcome {
     }
 }
 
-/// Verdict and reported faults of any result.
+/// Returns the verdict and the reported faults of any result.
 fn reported(json: &Value, known: &CaseTruth) -> CaseOutcome {
     let verdict = &json["verdict"];
     let findings = verdict["findings"].as_array().map_or(&[][..], Vec::as_slice);
@@ -152,7 +152,7 @@ fn reported(json: &Value, known: &CaseTruth) -> CaseOutcome {
     };
     let meets = |fault: &Value| {
         let Some((from, to)) = known.span_s else { return false };
-        // A fault of the whole file, such as its unit of time, has no place.
+        // A fault of the whole file, such as a wrong unit of time, has no place.
         let begins = fault["from"].as_f64().unwrap_or(0.0);
         let ends = fault["to"].as_f64().unwrap_or(f64::INFINITY);
         begins <= to + NEAR_S && ends >= from - NEAR_S
@@ -205,7 +205,7 @@ fn is_near(claims: &[Claim], truth: &Truth) -> bool {
     !claims.is_empty() && claims.iter().all(near)
 }
 
-/// Returns the largest error that lasted for [`LASTING_S`], of (t, error).
+/// Returns the largest error that lasted for [`LASTING_S`], from pairs of time and error.
 fn lasting(errors: &[(f64, f64)]) -> Option<f64> {
     let (first, last) = (errors.first()?.0, errors.last()?.0);
     if last - first < LASTING_S {

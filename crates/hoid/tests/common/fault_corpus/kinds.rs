@@ -1,4 +1,4 @@
-//! The faults: kinds, sizes, places, and the cases in their order.
+//! The faults: kinds, sizes, places, and the order of the cases.
 
 /// Channel of a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,13 +23,13 @@ impl On {
 pub enum What {
     /// Nothing: a clean run.
     Nothing,
-    /// One sample off, in standard deviations of its channel.
+    /// One sample deviates; size in standard deviations of its channel.
     Spike,
-    /// Samples off by 10 standard deviations, of either sign; their number.
+    /// Samples deviate by 10 standard deviations with either sign; the size is their number.
     Burst,
-    /// Empty cells; their number.
+    /// Empty cells; the size is their number.
     Missing,
-    /// 360 deg added for some seconds.
+    /// 360 deg is added for some seconds.
     Wrap,
     /// A lasting change of the level, in percent of the standard deviation.
     Step,
@@ -41,33 +41,33 @@ pub enum What {
     Frozen,
     /// Some seconds of zeros inserted before, inside or after the run.
     Idle,
-    /// The same with a little noise: 0.001 standard deviations.
+    /// As `Idle`, with noise of 0.001 standard deviations.
     IdleNoisy,
     /// Zeros in place of the signal for some seconds.
     Dropout,
-    /// Both channels times a factor for 10 s.
+    /// Both channels are multiplied by a factor for 10 s.
     Scaled,
-    /// The same for 50 s, or 40 % of a shorter record.
+    /// As `Scaled`, for 50 s or for 40 % of a shorter record.
     ScaledLong,
-    /// The time in ms.
+    /// The time is in ms.
     Milliseconds,
-    /// e and u exchanged for some seconds, or throughout.
+    /// e and u are exchanged for some seconds, or throughout.
     Swapped,
-    /// The sign inverted for some seconds, or throughout.
+    /// The sign is inverted for some seconds, or throughout.
     Flipped,
-    /// Values limited to some standard deviations from the mean.
+    /// Values are limited to some standard deviations from the mean.
     Saturated,
-    /// Values rounded to steps of some standard deviations.
+    /// Values are rounded to steps of some standard deviations.
     Quantised,
-    /// Rows missing for some seconds, with the time counted as if none were.
+    /// Rows are missing for some seconds, but the time is counted without a gap.
     Lost,
-    /// Rows duplicated for some seconds, with the time counted on.
+    /// Rows are duplicated for some seconds, with the time continuing.
     Duplicated,
-    /// u delayed by some samples from here on.
+    /// u is delayed by some samples from here on.
     Late,
     /// A record of a given number of samples.
     Short,
-    /// Another person from two thirds of the record on.
+    /// Another person acts from two thirds of the record on.
     SecondOperator,
 }
 
@@ -81,13 +81,13 @@ pub struct Kind {
 /// Position in the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FaultPosition {
-    /// At 6 % of its length.
+    /// At 6 % of the length of the record.
     Start,
-    /// At a half.
+    /// At half the length.
     Middle,
-    /// At 90 %.
+    /// At 90 % of the length.
     End,
-    /// All of it, or as defined by the kind.
+    /// The whole record, or as defined by the kind.
     Whole,
 }
 
@@ -108,7 +108,7 @@ const ALL: &[FaultPosition] = &[FaultPosition::Whole];
 /// The whole record.
 pub const WHOLE: f64 = f64::INFINITY;
 
-/// A line per kind: name, unit of its size, channels, sizes, places.
+/// An entry for each kind: name, unit of its size, channels, sizes, places.
 type Line = (
     What,
     &'static str,
@@ -220,7 +220,7 @@ pub fn faults() -> Vec<Fault> {
     for (what, _, _, channels, sizes, places) in LINES {
         for &on in channels {
             for &size in sizes {
-                // A fault of the whole record has no position in it; a wrap starts somewhere.
+                // A fault of the whole record has no position, but a wrap has a start.
                 let places = if size == WHOLE && what != What::Wrap {
                     ALL
                 } else {

@@ -1,4 +1,4 @@
-//! The program, run on a case: the output for the user is judged.
+//! Runs of the program on a case; the output for the user is judged.
 
 use std::{
     fs::{self, File},
@@ -62,8 +62,8 @@ impl Way {
         !matches!(self, Self::GreyBox | Self::BoxJenkins)
     }
 
-    /// Methods for a run: the grey box represents all operators, the others a gain with a lead; for people, the three
-    /// methods that are intended for them.
+    /// Returns the methods for a run. The grey box represents all operators, the other methods a gain with a lead; for
+    /// people, only the three methods intended for people are used.
     pub fn of(base: &Base) -> &'static [Self] {
         const LEAD: [Way; 4] = [Way::GreyBox, Way::Adaptive, Way::MultipleModel, Way::Physical];
         match (base.who, base.form) {
@@ -84,11 +84,11 @@ pub struct Outcome {
     pub way: Way,
     pub seconds: f64,
     pub judged: CaseOutcome,
-    /// Message of the program without a result.
+    /// Message of the program if there is no result.
     pub refusal: Option<String>,
 }
 
-/// Evaluates a fault in the runs of `who` by each of the requested methods that apply.
+/// Evaluates a fault in the runs of `who` by each requested method that applies.
 ///
 /// # Errors
 /// Errors of the simulation or the file system.
@@ -128,7 +128,7 @@ pub fn outcomes(
     all
 }
 
-/// Writes the files of a case, the one with the fault last, and returns what is known of it.
+/// Writes the files of a case, with the faulty file last, and returns the known properties of the case.
 fn write(base: &Base, fault: &Fault, folder: &Path, seed: u64, case: u64) -> Result<(Vec<PathBuf>, CaseTruth), String> {
     let injected = inject(fault, &base.runs[base.faulty()], &base.second, seed, case);
     let mut files = Vec::new();
@@ -151,7 +151,7 @@ fn write(base: &Base, fault: &Fault, folder: &Path, seed: u64, case: u64) -> Res
     Ok((files.into_iter().map(|(file, _)| file).collect(), known))
 }
 
-/// The judgement, or the message of the program instead of a result.
+/// Returns the judgement, or the message of the program if there is no result.
 fn run(
     program: &Path,
     way: Way,
@@ -184,7 +184,7 @@ fn run(
     Ok(Ok(judge::of_trace(&json, &rows(&text), known)))
 }
 
-/// Returns the error stream and the output of a command; the message if it failed.
+/// Returns the error stream and the output of a command, or the message if the command failed.
 fn finished(command: &mut Command, folder: &Path) -> Result<(String, String), String> {
     let (output, errors) = (folder.join("output"), folder.join("errors"));
     let create = |path: &Path| File::create(path).map_err(|e| format!("{}: {e}", path.display()));
@@ -214,7 +214,7 @@ fn finished(command: &mut Command, folder: &Path) -> Result<(String, String), St
     Ok((said, if status.success() { printed } else { String::new() }))
 }
 
-/// The rows of a trace file: time, and each column that has one of the same name with `_se`.
+/// Returns the rows of a trace file: the time, and each column for which a column with the suffix `_se` exists.
 pub fn rows(text: &str) -> Vec<Row> {
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
     let names: Vec<&str> = lines.next().unwrap_or("").split(',').collect();

@@ -8,17 +8,17 @@ use super::{
     program::{Outcome, Way},
 };
 
-/// Numbers of some cases.
+/// Numbers of cases by outcome.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Numbers {
     pub all: usize,
     pub wrong: usize,
-    /// Wrong and not flagged.
+    /// Number of results that are wrong and not flagged.
     pub silent: usize,
-    /// Right but flagged.
+    /// Number of correct results that are flagged.
     pub useless: usize,
     pub refused: usize,
-    /// With a fault reported at the right place.
+    /// Number of results with a fault reported at the right place.
     pub placed: usize,
 }
 
@@ -58,7 +58,7 @@ pub fn median(mut all: Vec<f64>) -> Option<f64> {
     all.get(all.len() / 2).copied()
 }
 
-/// By method, for the runs of the thesis and for those of people: the acceptance test.
+/// Returns the table by method, for the runs of the thesis and for the runs of people: the acceptance test.
 pub fn by_way(all: &[Outcome]) -> String {
     let mut text = "| runs | method | results | wrong | wrong and not flagged | flagged, of those right | refused | \
                     fault reported at its place |\n|---|---|---|---|---|---|---|---|\n"
@@ -80,7 +80,7 @@ pub fn by_way(all: &[Outcome]) -> String {
         let such = |o: &&Outcome| (o.who == Who::Person) == of_people;
         for way in Way::ALL {
             let n = Numbers::of(all.iter().filter(such).filter(|o| o.way == way));
-            // Not all methods are for people.
+            // Not all methods are used for people.
             if !of_people || n.all > 0 {
                 put(runs, way.name(), n);
             }
@@ -90,7 +90,7 @@ pub fn by_way(all: &[Outcome]) -> String {
     text
 }
 
-/// By kind and size, a column per method.
+/// Returns the table by kind and size, with one column per method.
 pub fn by_fault(all: &[Outcome]) -> String {
     let mut text = format!(
         "| fault | size | {} |\n|---|---|{}\n",
@@ -106,7 +106,8 @@ pub fn by_fault(all: &[Outcome]) -> String {
     text
 }
 
-/// For trackers by kind and size: the median recovery time in s and the number that never recover.
+/// Returns the table for trackers by kind and size: the median recovery time in s, and the number of runs without
+/// recovery.
 pub fn recovery(all: &[Outcome]) -> String {
     let trackers: Vec<Way> = Way::ALL.into_iter().filter(|way| way.tracks()).collect();
     let names: Vec<&str> = trackers.iter().map(|way| way.name()).collect();
@@ -143,7 +144,7 @@ pub fn recovery(all: &[Outcome]) -> String {
     text
 }
 
-/// For clean runs: false flags, by kind of run and method.
+/// Returns the table of false flags in clean runs, by kind of run and method.
 pub fn clean(all: &[Outcome]) -> String {
     let mut text = "| runs | method | number | flagged by a fault | a fault reported | not trustworthy | wrong | wrong and not flagged |\n|---|---|---|---|---|---|---|---|\n".to_owned();
     let mut labels: Vec<&str> = all.iter().map(|o| o.label.as_str()).collect();
@@ -189,7 +190,7 @@ fn kinds_and_sizes(all: &[Outcome]) -> Vec<(Kind, f64)> {
     found
 }
 
-/// One row per result.
+/// Returns one row per result.
 pub fn to_csv(all: &[Outcome]) -> String {
     let mut text = "case,kind,size,place,run,method,wrong,flagged,silent,level,kinds,of_faults,told,placed,worst,errors,recovery_s,lasting,seconds,refusal\n".to_owned();
     for o in all {

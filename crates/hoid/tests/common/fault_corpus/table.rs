@@ -9,7 +9,7 @@ use hoid::model::Record;
 pub struct Table {
     /// Time between two samples, s.
     pub h: f64,
-    /// Time as in the file, s except for a fault of its unit.
+    /// Time as in the file, in s unless the fault is a wrong unit of time.
     pub t: Vec<f64>,
     pub e: Vec<f64>,
     pub u: Vec<f64>,
@@ -35,7 +35,7 @@ impl Table {
         self.t.len()
     }
 
-    /// Returns the time from the first sample to the end of the last, s.
+    /// Returns the time from the first sample to the end of the last sample, s.
     pub fn seconds(&self) -> f64 {
         self.len() as f64 * self.h
     }

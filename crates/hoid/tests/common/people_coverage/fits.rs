@@ -1,4 +1,4 @@
-//! The fits of a person, and the result of each for each quantity.
+//! The fits of a person, and their results for each quantity.
 
 use std::time::Instant;
 
@@ -16,14 +16,14 @@ const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
 /// Variant of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Variant {
-    /// With the recorded disturbance, so that there is a fit at its lines.
+    /// True if the recorded disturbance is used, which gives a fit at its lines.
     pub excitation: bool,
-    /// With the true form given instead of chosen.
+    /// True if the true form is given instead of selected.
     pub form_given: bool,
 }
 
 impl Variant {
-    /// All four.
+    /// All four variants.
     pub const ALL: [Self; 4] = [
         Self::new(true, false),
         Self::new(false, false),
@@ -89,7 +89,7 @@ pub struct Outcome {
     pub found: Result<FitOutcome, String>,
 }
 
-/// The fits of one person.
+/// Returns the fits of one person.
 ///
 /// # Errors
 /// The errors of the simulation.
@@ -122,7 +122,8 @@ fn found(fit: &FamilyFit, person: &Person, cell: Cell) -> FitOutcome {
     let truth = &person.state.operator;
     let of = fit.operator(0);
     let named = truth.named();
-    // The true values are those of the person: if their runs differ, so do the standard errors that are used.
+    // The true values are those of the person. If the runs of a person differ, the standard errors for the person are
+    // used.
     let of_person = cell.spread != Spread::None;
     let parameters = of.parameters.iter();
     let mut quantities: Vec<Quantity> = parameters

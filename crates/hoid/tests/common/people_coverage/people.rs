@@ -18,11 +18,11 @@ const MOST_DRAWS: usize = 50;
 /// Parameters that differ between the runs of a person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Spread {
-    /// Only the remnant.
+    /// Only the remnant differs.
     None,
-    /// The gain.
+    /// The gain differs.
     Gain,
-    /// All parameters, independently.
+    /// All parameters differ independently.
     All,
 }
 
@@ -49,7 +49,8 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// Returns the conditions of the person with this number: all 360 in turn, since 5 and 72 have no common divisor.
+    /// Returns the conditions of the person with this number. All 360 combinations occur in turn, since 5 and 72 have
+    /// no common divisor.
     pub fn of(person: u64) -> Self {
         let i = person as usize;
         Self {
@@ -82,10 +83,10 @@ pub fn recorded(seed: u64, number: u64) -> Result<(Cell, Person, Vec<Record>), S
     Ok((cell, person, records))
 }
 
-/// A run whose gain is the person's times `exp(b z)`.
+/// Simulates a run whose gain is the gain of the person multiplied by `exp(b z)`.
 fn run_with_gain(person: &Person, run: u64) -> Result<Record, SimError> {
     let streams = person.run_seed(run);
-    // With another seed than the rest of the run.
+    // The seed differs from the seed of the rest of the run.
     let deviates = RunSeed {
         seed: !streams.seed,
         ..streams

@@ -27,7 +27,7 @@ pub struct Share {
 }
 
 impl Share {
-    /// Counts the share of these answers.
+    /// Counts the share of true answers.
     pub fn over(answers: impl IntoIterator<Item = bool>) -> Self {
         answers.into_iter().fold(Self::default(), |share, yes| Self {
             of: share.of + usize::from(yes),
@@ -35,19 +35,19 @@ impl Share {
         })
     }
 
-    /// In percent.
+    /// Returns the share in percent.
     pub fn percent(self) -> f64 {
         100.0 * self.of as f64 / self.all as f64
     }
 
-    /// Standard error, percent.
+    /// Returns the standard error in percent.
     pub fn error(self) -> f64 {
         let n = self.all as f64 + 4.0;
         let p = (self.of as f64 + 2.0) / n;
         100.0 * (p * (1.0 - p) / n).sqrt()
     }
 
-    /// In the form of a table: share, standard error, number.
+    /// Formats the share for a table: share, standard error, number.
     pub fn text(self) -> String {
         if self.all == 0 {
             return "–".to_owned();
@@ -72,7 +72,7 @@ pub fn of_quantity<'a>(outcomes: &[&'a Outcome], name: &str) -> Vec<&'a Quantity
         .collect()
 }
 
-/// Returns how often intervals of quantities that are reported as determined contain the true value.
+/// Returns the share of intervals that contain the true value, over quantities that are reported as determined.
 pub fn coverage(quantities: &[&Quantity]) -> Share {
     let determined = quantities.iter().filter(|q| q.determined);
     Share::over(determined.map(|q| q.holds().unwrap_or(false)))

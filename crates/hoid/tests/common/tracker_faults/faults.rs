@@ -9,36 +9,37 @@ pub enum Signal {
     U,
 }
 
-/// A fault; sizes of outliers in standard deviations of the signal, of `Innovations` in those of the innovations.
+/// A fault. The size of an outlier is in standard deviations of the signal, the size of `Innovations` in standard
+/// deviations of the innovations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Fault {
-    /// One sample or a few.
+    /// One or a few deviating samples.
     Outlier { signal: Signal, size: f64, seconds: f64 },
-    /// One sample of u.
+    /// One deviating sample of u.
     Innovations { size: f64 },
     /// Alternating signs, as from a broken contact.
     Crackle { signal: Signal, size: f64, seconds: f64 },
-    /// e and u times a factor.
+    /// e and u are multiplied by a factor.
     Scaled { factor: f64, seconds: f64 },
-    /// One of them times a factor.
+    /// One of the signals is multiplied by a factor.
     ScaledOne { signal: Signal, factor: f64, seconds: f64 },
-    /// e in place of u and u in place of e.
+    /// e and u are exchanged.
     Swapped { seconds: f64 },
-    /// u with its sign changed.
+    /// The sign of u is inverted.
     Flipped { seconds: f64 },
-    /// Both zero; inserted.
+    /// Zeros are inserted into e and u.
     Silence { seconds: f64 },
-    /// Noise of a thousandth of the signals; inserted.
+    /// Noise with a thousandth of the size of the signals is inserted.
     NoisySilence { seconds: f64 },
-    /// A constant value: the last one.
+    /// The signal keeps its last value.
     Frozen { signal: Signal, seconds: f64 },
-    /// Both.
+    /// Both signals keep their last values.
     FrozenBoth { seconds: f64 },
-    /// Limited to a number of standard deviations.
+    /// The signal is limited to a number of standard deviations.
     Saturated { signal: Signal, at: f64, seconds: f64 },
-    /// NaN.
+    /// The signal is NaN.
     Missing { signal: Signal, seconds: f64 },
-    /// NaN in both.
+    /// Both signals are NaN.
     MissingBoth { seconds: f64 },
 }
 
@@ -161,7 +162,7 @@ impl fmt::Display for Fault {
     }
 }
 
-/// All faults of the study.
+/// Returns all faults of the study.
 #[allow(dead_code)]
 pub fn faults() -> Vec<Fault> {
     use Signal::{E, U};

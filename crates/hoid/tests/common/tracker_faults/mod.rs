@@ -1,4 +1,4 @@
-//! Faults in streams, and their effect on a tracker: for the test and for the slow study `tracker-faults`.
+//! Faults in streams and their effect on a tracker, for the test and for the slow study `tracker-faults`.
 
 mod faults;
 mod tracked;

@@ -1,4 +1,4 @@
-//! A tracker over a run with a fault, compared with the same over the run without.
+//! A tracker over a run with a fault, compared with the tracker over the run without the fault.
 
 use hoid::{
     model::{remnant_gain::NoiseDefinition, scenario::RemnantStrength},
@@ -12,10 +12,10 @@ use super::faults::Fault;
 const START_S: f64 = 30.72;
 /// Number of samples between two comparisons of the estimate.
 const EVERY: usize = 20;
-/// Number of consecutive comparisons that are more than a second.
+/// Number of consecutive comparisons that span more than a second.
 const LASTING: usize = 6;
 
-/// One person for some minutes.
+/// A run of one person that lasts some minutes.
 pub struct Run {
     pub e: Vec<f64>,
     pub u: Vec<f64>,
@@ -43,7 +43,7 @@ impl Run {
         }
     }
 
-    /// Takes all samples a number of times.
+    /// Processes all samples a number of times.
     #[allow(dead_code)]
     pub fn taken(&self, options: &TrackOptions, times: u64) {
         let mut tracker = Tracker::new(options, Some(&self.start), self.start.sample_time()).unwrap();
@@ -60,7 +60,7 @@ impl Run {
     }
 }
 
-/// The estimate at a sample: K_e, K_e_dot, omega_nm, zeta_nm with standard errors.
+/// Estimate at a sample: K_e, K_e_dot, omega_nm, zeta_nm with standard errors.
 type Estimate = [[f64; 2]; 4];
 
 fn estimate(tracker: &Tracker) -> Option<Estimate> {
@@ -77,7 +77,7 @@ fn estimate(tracker: &Tracker) -> Option<Estimate> {
 /// The tracker over the run without a fault.
 pub struct Reference {
     options: TrackOptions,
-    /// The estimates, one every [`EVERY`] samples.
+    /// Estimates at every [`EVERY`]-th sample.
     estimates: Vec<Option<Estimate>>,
     innovation: f64,
     pub held: u64,
@@ -89,21 +89,22 @@ pub struct Reference {
 /// Effect of a fault.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effect {
-    /// Largest difference from the estimate without the fault that lasts for more than a second, from one second after
-    /// it on, in the standard errors of that estimate.
+    /// Largest difference from the estimate without the fault that lasts for more than a second, evaluated from one
+    /// second after the fault on, in standard errors of the estimate without the fault.
     pub shift: f64,
-    /// Time after the fault from which on the difference is at most twice the larger standard error; none if that
-    /// never happens.
+    /// Time after the fault from which the difference is at most twice the larger standard error; `None` if this never
+    /// happens.
     pub recovery_s: Option<f64>,
     pub held: u64,
     pub skipped: u64,
     pub restarts: u64,
-    /// True if the guard reported an event within the fault or the time after it.
+    /// True if the guard reported an event during or after the fault.
     pub told: bool,
 }
 
 impl Reference {
-    /// `options` determine the guard of the compared method; the reference has no guard.
+    /// Tracks the run without a fault. `options` determine the guard of the compared method; the reference has no
+    /// guard.
     pub fn new(run: &Run, options: &TrackOptions) -> Self {
         let options = TrackOptions {
             start: StartAt::Span(Some((0.0, START_S))),
@@ -122,7 +123,7 @@ impl Reference {
         reference.innovation = tracker.innovation_variance().sqrt();
         let estimates = over(&mut tracker, run, &run.e, &run.u, &mut |_, _| {});
         reference.estimates = estimates;
-        // The same with the guard, to count its actions in a run without faults.
+        // The same run is tracked with the guard, to count the actions of the guard without faults.
         let mut guarded = Tracker::new(&reference.options, Some(&run.start), run.start.sample_time()).unwrap();
         let mut events = Vec::new();
         over(&mut guarded, run, &run.e, &run.u, &mut |_, t| events.extend(t.event()));
@@ -131,7 +132,7 @@ impl Reference {
         reference
     }
 
-    /// The effect of a fault at a time.
+    /// Returns the effect of a fault at a time.
     pub fn effect(&self, run: &Run, fault: &Fault, at_s: f64) -> Effect {
         let per_second = run.per_second();
         let at = (at_s * per_second) as usize;

@@ -23,8 +23,8 @@ pub(super) fn decode(bytes: &mut Vec<u8>) -> Option<String> {
     note.or(cut)
 }
 
-/// Removes the character of DOS that ends a text, and zero bytes that a recorder left when it lost power; returns a note
-/// on the zero bytes.
+/// Removes the end-of-file character of DOS, and zero bytes that a recorder left when it lost power; returns a note on
+/// the zero bytes.
 fn without_end(bytes: &mut Vec<u8>) -> Option<String> {
     let kept = bytes
         .iter()
@@ -67,7 +67,7 @@ fn is_latin(bytes: &[u8]) -> bool {
     bytes.iter().all(|byte| byte.is_ascii() || LATIN.contains(byte))
 }
 
-/// Returns the character of a byte; Windows has signs where Latin 1 has control characters.
+/// Returns the character of a byte; Windows assigns printable characters to the control characters of Latin 1.
 fn latin(byte: u8) -> char {
     match byte {
         0x91 | 0x92 => '\'',
@@ -77,8 +77,8 @@ fn latin(byte: u8) -> char {
     }
 }
 
-/// Replaces each carriage return that no line feed follows by a line feed: old programs of the Mac end lines so. The
-/// length of the text is unchanged.
+/// Replaces each carriage return that is not followed by a line feed by a line feed, because old Mac programs end lines
+/// with a carriage return. The length of the text is unchanged.
 fn end_with_line_feeds(bytes: &mut [u8]) {
     let mut rest = bytes;
     while let Some(at) = rest.iter().position(|byte| *byte == b'\r') {

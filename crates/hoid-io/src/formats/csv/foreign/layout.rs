@@ -1,8 +1,8 @@
-//! Where the header and the first row of a table are, and what separates its cells.
+//! Positions of the header and the first row of a table, and the separator of its cells.
 //!
-//! The first rows are the first lines of which more than half of the cells are numbers or clock times, in equal number
-//! in [`ROWS`] lines. The header is the line of words above them, or a comment directly above them. It must name the
-//! cells without doubt ([`super::names`]).
+//! The first rows are the first [`ROWS`] lines with equal numbers of cells, more than half of which are numbers or
+//! clock times. The header is the line of words above them, or a comment directly above them. It must name the cells
+//! unambiguously ([`super::names`]).
 
 use std::borrow::Cow;
 
@@ -12,10 +12,10 @@ use super::units;
 use crate::formats::csv::text::is_aside;
 use crate::wording::shown;
 
-/// Number of lines of equally many numbers with which a table starts, if it has so many lines.
+/// Number of lines with equally many numbers that are required at the start of a table, unless it has fewer lines.
 const ROWS: usize = 3;
 
-/// Comments that hoid writes itself above a table, and that are not headers.
+/// Comments that hoid itself writes above a table, and that are not headers.
 const OWN: [&str; 3] = ["units:", "roles:", "sample_time:"];
 
 /// Structure of the start of a table. Lines are counted from 0.
@@ -57,7 +57,7 @@ fn first_rows<'a>(filled: &[(usize, &'a str)], from: usize, mark: Mark) -> Optio
     })
 }
 
-/// Returns the names in a header that separates them by another mark than the rows separate their cells.
+/// Returns the names in a header whose separator differs from the separator of the rows.
 fn names_of_other<'a>(header: &'a str, rows: &[Vec<&str>]) -> Option<Names<'a>> {
     let marks = Mark::ALL.iter().filter(|mark| **mark != Mark::Blanks);
     let mut names = marks.filter_map(|mark| names_of(header, *mark, rows));
@@ -69,7 +69,7 @@ impl<'a> Layout<'a> {
     pub(super) fn of(text: &'a str) -> Option<Self> {
         let filled = filled(text);
         let found = Mark::ALL.iter().filter_map(|mark| Self::with(text, &filled, *mark));
-        // The first table counts; among marks that suit the same lines, the one that leaves numbers and nothing else.
+        // The first table is used; among separators that fit the same lines, the one whose cells are all numbers.
         found
             .min_by_key(|(layout, are_values)| (layout.row, !*are_values))
             .map(|(layout, _)| layout)
@@ -85,7 +85,7 @@ impl<'a> Layout<'a> {
             let (before, _) = filled.split_at_checked(at)?;
             let found =
                 Self::below(before, mark, &rows, row).or_else(|| Self::commented(text, before, mark, &rows, row));
-            // A line of numbers above the header is a sample, which must not be left out.
+            // A line of numbers above the header is a sample, which must not be omitted.
             let is_sample = |(at, line): &(usize, &str)| {
                 let cells = mark.cells(line);
                 found.as_ref().is_some_and(|layout| layout.above.contains(at))
@@ -129,7 +129,7 @@ impl<'a> Layout<'a> {
         }
         let names = names_of(line, mark, rows).or_else(|| names_of_other(line, rows))?;
         let filled = |names: &[&str]| names.iter().filter(|name| !unquoted(name).is_empty()).count();
-        // If another line above may be the header, the line found may be its units or damaged.
+        // If another line above may be the header, the line found may contain its units, or may be damaged.
         let is_rival = |(_, line): &(usize, &str)| {
             let cells = mark.cells(line);
             let same = cells.len() == names.names.len() && filled(&cells) >= filled(&names.names);
@@ -288,15 +288,15 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// Returns a cell without blanks before its quotation mark, with which the mark would be part of the text.
+    /// Returns a cell without blanks before its quotation mark; otherwise the mark would be part of the text.
     fn without_padding(&self, cell: &str) -> String {
         let inside = cell.trim();
         if inside.starts_with('"') { inside } else { cell }.to_owned()
     }
 }
 
-/// Returns the header and the cells of a table whose names are not certain; `None` for other text. Of a table whose
-/// separator is certain and whose header is the first line, each row is compared with the header later.
+/// Returns the header and the cells of a table whose names are not certain; `None` for other text. If the separator is
+/// certain and the header is the first line, each row is compared with the header later.
 pub(in crate::formats::csv) fn mismatch(text: &str) -> Option<Mismatch> {
     let filled = filled(text);
     let found = Mark::ALL.iter().filter_map(|mark| {

@@ -7,7 +7,7 @@ use crate::time::is_clock_time;
 /// Number of lines at the start of a file in which the header and the first rows are searched for.
 pub(super) const LINES: usize = 250;
 
-/// What separates the cells of a line.
+/// Separator of the cells of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Mark {
     Char(char),
@@ -15,7 +15,7 @@ pub(super) enum Mark {
 }
 
 impl Mark {
-    /// All marks; of marks that suit a table equally well, the first one is used.
+    /// All marks; if several fit a table equally well, the first one is used.
     pub(super) const ALL: [Self; 4] = [Self::Char('\t'), Self::Char(';'), Self::Char(','), Self::Blanks];
 
     fn is_at(self, character: char) -> bool {
@@ -25,7 +25,7 @@ impl Mark {
         }
     }
 
-    /// Splits a line into cells; marks within quotation marks do not separate cells.
+    /// Splits a line into cells; separators within quotation marks do not separate cells.
     pub(super) fn cells(self, line: &str) -> Vec<&str> {
         let mut quoted = false;
         let parts = line.split(|character: char| {
@@ -59,7 +59,7 @@ pub(super) fn is_missing(cell: &str) -> bool {
     Cell::parse(unquoted(cell)) == Cell::Missing
 }
 
-/// True if the cells can be those of a row: more of them are values than other texts.
+/// True if the cells can form a row: more of them are values than other texts.
 pub(super) fn is_row(cells: &[&str]) -> bool {
     let values = cells.iter().filter(|cell| is_value(cell)).count();
     let missing = cells.iter().filter(|cell| !is_value(cell) && is_missing(cell)).count();

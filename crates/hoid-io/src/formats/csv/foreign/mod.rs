@@ -1,6 +1,6 @@
 //! Conversion of text from other programs to text that the table reader accepts.
 //!
-//! The conversion keeps the order of the lines, so that messages still refer to lines of the file.
+//! The conversion keeps the order of the lines, so messages still refer to lines of the file.
 //!
 //! | module | contents |
 //! |---|---|
@@ -97,7 +97,7 @@ mod tests {
         let text = "Name;Session 4\nDate;05.03.2024\n\nRate;50 Hz\nt;e;u\n0,00;1;2\n";
         let found = "#Name;Session 4\n#Date;05.03.2024\n\n#Rate;50 Hz\nt;e;u\n0,00;1;2\n";
         assert_eq!(plain(text), (found.to_owned(), 1));
-        // The line of a spreadsheet that states its separator, and a title followed by empty cells.
+        // A spreadsheet line that states the separator, and a title followed by empty cells.
         assert_eq!(plain("sep=;\r\nt;e\r\n0;1\r\n").0, "#sep=;\r\nt;e\r\n0;1\r\n");
         assert_eq!(plain("Run 1,,\nt,e,u\n0,1,2\n").0, "#Run 1,,\nt,e,u\n0,1,2\n");
         assert_eq!(plain("Rate,50,Hz\nt,e,u\n0,1,2\n").0, "#Rate,50,Hz\nt,e,u\n0,1,2\n");
@@ -114,7 +114,7 @@ mod tests {
             "#\n",
             "1,2\n3,4\n",
             "a\nb\n",
-            // A sample above a repeated header is not left out.
+            // A sample above a repeated header is not omitted.
             "0,1\n1,2\nt,e\n2,3\n3,4\n4,5\n",
             "t,e,u\n0,1\n1,2,3\n2,3,4\n3,4,5\n",
             "\"t\",\"e\"\n\"0,02\",\"0,81\"\n\"0,04\",\"0,82\"\n",

@@ -9,7 +9,7 @@ pub(super) struct Names<'a> {
     pub(super) extra: Extra,
 }
 
-/// Difference between the cells of the header and those of the rows.
+/// Difference between the cells of the header and the cells of the rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Extra {
     None,
@@ -17,7 +17,7 @@ pub(super) enum Extra {
     SeparatorInRows,
     /// The rows start with their numbers, which have no name, as R writes them.
     RowNumbers,
-    /// The header ends with a name, empty or of comments, for which the rows have no cell.
+    /// The header ends with a name, which is empty or denotes comments, for which the rows have no cell.
     NameInHeader,
 }
 
@@ -74,8 +74,9 @@ fn counts_up(rows: &[Vec<&str>]) -> bool {
     rows.len() > 1 && (from(0) || from(1))
 }
 
-/// Divides a header of several words per name, separated by blanks, into `count` names: at tabs or gaps of several
-/// blanks, or behind brackets, as in `Time (s) Roll error (deg)`; `None` if that gives another number of names.
+/// Divides a header whose names may consist of several words, separated by blanks, into `count` names: at tabs or gaps
+/// of several blanks, or after brackets, as in `Time (s) Roll error (deg)`; `None` if this gives another number of
+/// names.
 fn in_groups(header: &str, count: usize) -> Option<Vec<&str>> {
     if header.contains('"') {
         return None;

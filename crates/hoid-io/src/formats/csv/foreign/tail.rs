@@ -11,8 +11,8 @@ const COMPARED: usize = 3;
 
 /// Returns the position at which words below a table start, and a note; `None` if the table ends with a row.
 ///
-/// A line belongs to the words if its first cell is a text, whereas the first cells of the rows above are numbers or
-/// clock times. A last line without a line end may be truncated, and is not left out.
+/// A line belongs to the words if its first cell is text while the first cells of the rows above are numbers or clock
+/// times. A last line without a line end may be truncated, and is not omitted.
 pub(super) fn words_below(text: &str, mark: Mark) -> Option<(usize, String)> {
     let mut end = text.len();
     let mut found: Vec<&str> = Vec::new();
