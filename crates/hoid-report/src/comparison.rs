@@ -7,7 +7,7 @@ use crate::figures::{PeopleGrid, PeoplePanel, people_by_condition};
 /// Name of a quantity in a figure: the symbol of a parameter, the description of any other quantity.
 fn name(quantity: &Quantity) -> String {
     match quantity {
-        Quantity::Parameter(name) => name.clone(),
+        Quantity::Parameter(_) | Quantity::OfInput { .. } => quantity.to_string(),
         other => other.words(),
     }
 }

@@ -24,8 +24,9 @@ pub struct CompareArgs {
     #[arg(long)]
     pub between: bool,
     /// Quantities to compare, comma-separated: crossover, phase_margin, tau_e, gain_db@W and phase_deg@W at W rad/s,
-    /// rms_e, rms_u, or parameters such as K, T_L (recordings are then analysed in one form, chosen on the evidence of
-    /// all people) [default: crossover,phase_margin,tau_e]
+    /// rms_e, rms_u, parameters such as K, T_L (recordings are then analysed in one form, chosen on the evidence of all
+    /// people), or parameters of the response to a further input, such as tau_f[f_t] [default:
+    /// crossover,phase_margin,tau_e]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub of: Vec<Quantity>,
     /// Remove the trend over this covariate from the estimates, and report its slope

@@ -83,7 +83,12 @@ impl Comparing {
             false => self.quantities.clone(),
         };
         if !group.has_runs() {
-            let from_runs = |q: &&Quantity| matches!(q.column(), None | Some("rms_e" | "rms_u"));
+            let from_runs = |q: &&Quantity| {
+                matches!(
+                    q,
+                    Quantity::Gain(_) | Quantity::Phase(_) | Quantity::RmsE | Quantity::RmsU
+                )
+            };
             let what = self.covariate.map(|_| "the value of each run".to_owned());
             if let Some(what) = what.or(quantities.iter().find(from_runs).map(Quantity::words)) {
                 return Err(CompareError::NotInJson { what });
@@ -226,13 +231,19 @@ impl Work<'_> {
 
     /// Returns true if the quantity can be compared; a parameter can be compared only within one form.
     fn is_comparable(&mut self, quantity: &Quantity, cells: &[OfCell]) -> bool {
+        let input = match quantity {
+            Quantity::Parameter(_) => None,
+            Quantity::OfInput { input, .. } => Some(input.as_str()),
+            _ => return true,
+        };
         let compared = cells.iter();
-        let forms = forms(compared.filter_map(|(subject, condition, _)| self.group.cell(subject, condition)));
-        if forms.len() < 2 || !matches!(quantity, Quantity::Parameter(_)) {
+        let compared = compared.filter_map(|(subject, condition, _)| self.group.cell(subject, condition));
+        let forms = forms(compared, input);
+        if forms.len() < 2 {
             return true;
         }
         let all = in_words(&forms);
-        if quantity.is_of_any_form() {
+        if input.is_none() && quantity.is_of_any_form() {
             self.findings.push(Finding::note(
                 "forms-differ",
                 format!("{} comes from fits of different forms ({all})", quantity.words()),
@@ -240,10 +251,20 @@ impl Work<'_> {
             return true;
         }
         let most = || forms.iter().max_by_key(|(_, names)| names.len()).map_or("", |f| f.0);
-        let form = self.group.common_form().map_or_else(most, |common| common.form.name());
-        let why = format!(
-            "a parameter has the same meaning only within one form ({all}); compare the manifest of the recordings instead of the results, or write form = \"{form}\" under [analysis] in group.toml and run the group again"
-        );
+        let remedy = match input {
+            None => {
+                let form = self.group.common_form().map_or_else(most, |common| common.form.name());
+                format!(
+                    "compare the manifest of the recordings instead of the results, or write form = \"{form}\" under \
+                     [analysis] in group.toml and run the group again"
+                )
+            }
+            Some(input) => format!(
+                "add the form to the role of {input} in group.toml, such as feedforward/{}, and run the group again",
+                most()
+            ),
+        };
+        let why = format!("a parameter has the same meaning only within one form ({all}); {remedy}");
         match self.apart.iter_mut().find(|(known, _)| *known == why) {
             Some((_, names)) => names.push(quantity.to_string()),
             None => self.apart.push((why, vec![quantity.to_string()])),

@@ -28,7 +28,7 @@ pub enum CompareError {
     NoScatter,
     /// The requested quantity does not exist.
     #[error(
-        "there is no quantity {found:?} to compare; expected crossover, phase_margin, tau_e, gain_db@W or phase_deg@W with W in rad/s, rms_e, rms_u, or a parameter of the operator such as K, T_L, omega_nm"
+        "there is no quantity {found:?} to compare; expected crossover, phase_margin, tau_e, gain_db@W or phase_deg@W with W in rad/s, rms_e, rms_u, a parameter of the operator such as K, T_L, omega_nm, or of the response to a further input such as tau_f[f_t]"
     )]
     Quantity {
         /// Name of the requested quantity.

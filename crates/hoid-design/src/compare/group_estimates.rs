@@ -11,6 +11,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use hoid_ident::family::Parameter;
 use hoid_model::{Finding, VerdictLevel, operator_family::PARAMETERS, uncertainty::Estimate};
 use hoid_numerics::statistics::{mean, sample_variance};
 use hoid_study::{
@@ -42,6 +43,8 @@ pub(super) struct Cell {
     pub doubtful: bool,
     /// Evidence for the forms; empty if it is not known.
     forms: Vec<FormEvidence>,
+    /// Form of the response to each further input; `None` if no response was found.
+    inputs: BTreeMap<String, Option<String>>,
     runs: usize,
     known: BTreeMap<String, EstimatedValue>,
 }
@@ -145,7 +148,7 @@ impl GroupEstimates {
 
     /// Replaces the parameters that belong to one form by those of the fits in the common form.
     pub(super) fn with_parameters_of(mut self, other: Self, common: CommonForm) -> Self {
-        let best = in_words(&forms(self.cells.iter()));
+        let best = in_words(&forms(self.cells.iter(), None));
         for cell in &mut self.cells {
             let of = other.cell(&cell.subject, &cell.condition);
             let of_form = |name: &String| !Quantity::Parameter(name.clone()).is_of_any_form();
@@ -182,7 +185,7 @@ impl GroupEstimates {
         if let Some(why) = &cell.missing {
             return Err(why.clone());
         }
-        let Some(name) = quantity.column() else {
+        let Some(name) = quantity.key() else {
             let response = self.response(cell, None, quantity);
             let value = response.ok_or_else(|| format!("its operator has no {}", quantity.words()))?;
             let scatter = of_runs().ok().filter(|runs| runs.runs > 1);
@@ -192,7 +195,7 @@ impl GroupEstimates {
                 ..over_runs(&vec![value; cell.runs.max(1)])
             });
         };
-        let known = cell.known.get(name).copied();
+        let known = cell.known.get(&name).copied();
         let known = known
             .filter(|k| k.value.is_finite() || !k.determined)
             .ok_or_else(|| match quantity {
@@ -200,6 +203,11 @@ impl GroupEstimates {
                     "it has no {}: its condition names no controlled element, or the loop gain does not cross 1",
                     quantity.words()
                 ),
+                Quantity::OfInput { parameter, input } => match cell.inputs.get(input) {
+                    None => format!("{input} is not an input of its model"),
+                    Some(None) => format!("it does not respond to {input}"),
+                    Some(Some(form)) => format!("the form {form} of its response to {input} has no {parameter}"),
+                },
                 _ => format!("its form {} has no {name}", cell.form),
             })?;
         if known.determined {
@@ -215,7 +223,8 @@ impl GroupEstimates {
         let Some(runs) = in_form.or(self.runs.as_ref()) else {
             return Vec::new();
         };
-        let one = |run: &str| match quantity.column() {
+        let key = quantity.key();
+        let one = |run: &str| match &key {
             Some(name) => runs.parameter([&cell.subject, &cell.condition, run], name),
             None => self.response(cell, Some(run), quantity).map(Estimate::fixed),
         };
@@ -257,6 +266,7 @@ impl Cell {
             missing: None,
             doubtful: false,
             forms: Vec::new(),
+            inputs: BTreeMap::new(),
             runs,
             known: BTreeMap::new(),
         }
@@ -282,23 +292,30 @@ impl Cell {
         cell.form.clone_from(&person.form);
         cell.forms.clone_from(&person.forms);
         let runs = if person.is_of_all_runs() { person.runs } else { 1 };
+        let of_parameter = |p: &Parameter| EstimatedValue {
+            value: p.value,
+            standard_error: p.standard_error_person.or(p.standard_error),
+            determined: p.determined,
+            prior_share: p.prior_share,
+            runs,
+        };
         for p in &person.parameters {
-            let known = EstimatedValue {
-                value: p.value,
-                standard_error: p.standard_error_person.or(p.standard_error),
-                determined: p.determined,
-                prior_share: p.prior_share,
-                runs,
-            };
-            cell.known.insert(p.name.clone(), known);
+            cell.known.insert(p.name.clone(), of_parameter(p));
+        }
+        for channel in &person.channels {
+            let form = channel.form.map(|form| form.name().to_owned());
+            cell.inputs.insert(channel.name.clone(), form);
+            for p in &channel.parameters {
+                cell.known
+                    .insert(format!("{}[{}]", p.name, channel.name), of_parameter(p));
+            }
         }
         for (quantity, estimate) in [
             (Quantity::Crossover, person.crossover_rad_s),
             (Quantity::PhaseMargin, person.phase_margin_deg),
         ] {
-            if let (Some(e), Some(name)) = (estimate, quantity.column()) {
-                cell.known
-                    .insert(name.to_owned(), known(e.value, e.standard_error, runs));
+            if let (Some(e), Some(name)) = (estimate, quantity.key()) {
+                cell.known.insert(name, known(e.value, e.standard_error, runs));
             }
         }
         cell
@@ -323,31 +340,45 @@ impl Cell {
         cell.judged(level, &reason);
         cell.form = text("form").to_owned();
         let runs = if text("run") == "all" { runs } else { 1 };
+        let estimated = |found: &Value| EstimatedValue {
+            determined: found["determined"] != false,
+            prior_share: found["prior_share"].as_f64().unwrap_or(0.0),
+            ..known(
+                found["value"].as_f64().unwrap_or(f64::NAN),
+                found["standard_error"].as_f64(),
+                runs,
+            )
+        };
         let parts = [&person["parameters"], &person["open_loop"]];
         for (name, found) in parts.into_iter().filter_map(Value::as_object).flatten() {
-            let one = EstimatedValue {
-                determined: found["determined"] != false,
-                prior_share: found["prior_share"].as_f64().unwrap_or(0.0),
-                ..known(
-                    found["value"].as_f64().unwrap_or(f64::NAN),
-                    found["standard_error"].as_f64(),
-                    runs,
-                )
-            };
-            cell.known.insert(name.clone(), one);
+            cell.known.insert(name.clone(), estimated(found));
+        }
+        for channel in person["channels"].as_array().into_iter().flatten() {
+            let input = channel["input"].as_str().unwrap_or_default();
+            let form = channel["form"].as_str().map(str::to_owned);
+            cell.inputs.insert(input.to_owned(), form);
+            for (name, found) in channel["parameters"].as_object().into_iter().flatten() {
+                cell.known.insert(format!("{name}[{input}]"), estimated(found));
+            }
         }
         cell
     }
 }
 
-/// Returns the forms that occur in some cells, with the names of the cells that have each form.
-pub(super) fn forms<'a>(cells: impl Iterator<Item = &'a Cell>) -> Vec<(&'a str, Vec<String>)> {
+/// Returns the forms that occur in some cells, of the operator or of the response to a further input, with the names of
+/// the cells that have each form.
+pub(super) fn forms<'a>(cells: impl Iterator<Item = &'a Cell>, input: Option<&str>) -> Vec<(&'a str, Vec<String>)> {
     let mut forms: Vec<(&str, Vec<String>)> = Vec::new();
-    for cell in cells.filter(|cell| !cell.form.is_empty()) {
+    for cell in cells {
+        let form = match input {
+            None => Some(cell.form.as_str()).filter(|form| !form.is_empty()),
+            Some(input) => cell.inputs.get(input).and_then(Option::as_deref),
+        };
+        let Some(form) = form else { continue };
         let name = format!("{} in {}", cell.subject, cell.condition);
-        match forms.iter_mut().find(|(known, _)| *known == cell.form) {
+        match forms.iter_mut().find(|(known, _)| *known == form) {
             Some((_, names)) => names.push(name),
-            None => forms.push((&cell.form, vec![name])),
+            None => forms.push((form, vec![name])),
         }
     }
     forms
@@ -461,6 +492,54 @@ pub(super) mod tests {
         assert!(of("R", "K_e").unwrap_err().ends_with("too short"));
         assert!(of("Q", "rms_e").is_err() && of("Q", "gain_db@1").is_err() && !group.has_runs());
         assert!(GroupEstimates::of_json(&json!({"kind": "operator"})).is_err());
+    }
+
+    #[test]
+    fn responses_to_further_inputs_are_compared_within_one_form() {
+        let person = |subject: &str, condition: &str, form: Option<&str>, tau: f64| {
+            let parameters = form.map_or(json!({}), |_| json!({"tau_f": {"value": tau, "standard_error": 0.01}}));
+            json!({"subject": subject, "condition": condition, "run": "all", "runs": 5, "form": "gain",
+                   "parameters": {}, "channels": [{"input": "r", "form": form, "parameters": parameters}],
+                   "verdict": {"level": "trustworthy", "reasons": []}})
+        };
+        let of = |forms: [Option<&str>; 2]| {
+            let people: Vec<Value> = (0..3)
+                .flat_map(|k| {
+                    let name = format!("P{k}");
+                    [
+                        person(&name, "a", Some("gain"), 0.2 + 0.01 * f64::from(k)),
+                        person(&name, "b", forms[usize::from(k == 2)], 0.3 + 0.02 * f64::from(k)),
+                    ]
+                })
+                .collect();
+            let group = GroupEstimates::of_json(&json!({"people": people})).unwrap();
+            let comparing = crate::compare::Comparing {
+                quantities: vec!["tau_f[r]".parse().unwrap()],
+                ..crate::compare::Comparing::default()
+            };
+            (comparing.run(&group).unwrap(), group)
+        };
+        let (same, group) = of([Some("gain"); 2]);
+        assert!(
+            (same.differences[0].estimate.value - 0.11).abs() < 0.01,
+            "{:?}",
+            same.differences
+        );
+        let none = group.estimate(&group.cells[0], &"K[r]".parse().unwrap()).unwrap_err();
+        assert_eq!(none, "the form gain of its response to r has no K");
+        let (without, group) = of([Some("gain"), None]);
+        assert_eq!(without.differences[0].people.len(), 2);
+        let cell = group.cell("P2", "b").unwrap();
+        let none = group.estimate(cell, &"tau_f[r]".parse().unwrap()).unwrap_err();
+        assert_eq!(none, "it does not respond to r");
+        let none = group.estimate(cell, &"tau_f[y]".parse().unwrap()).unwrap_err();
+        assert_eq!(none, "y is not an input of its model");
+        let (other, _) = of([Some("gain"), Some("lead")]);
+        let reasons: Vec<String> = other.verdict.reasons().map(ToString::to_string).collect();
+        assert!(
+            other.differences.is_empty() && reasons.iter().any(|r| r.contains("feedforward/gain")),
+            "{reasons:?}"
+        );
     }
 
     #[test]

@@ -9,6 +9,8 @@ use super::CompareError;
 
 /// The delay, a parameter of every form.
 const DELAY: &str = "tau_e";
+/// The delay of the response to a further input.
+const DELAY_TO_INPUT: (&str, &str) = ("tau_f", "s");
 
 /// A quantity to compare.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -28,6 +30,13 @@ pub enum Quantity {
     RmsU,
     /// A parameter of the operator, by its name.
     Parameter(String),
+    /// A parameter of the response to a further input, written `tau_f[INPUT]`.
+    OfInput {
+        /// Name of the parameter.
+        parameter: String,
+        /// Name of the input.
+        input: String,
+    },
 }
 
 impl Quantity {
@@ -43,7 +52,10 @@ impl Quantity {
             Self::PhaseMargin | Self::Phase(_) => "deg",
             Self::Gain(_) => "dB",
             Self::RmsE | Self::RmsU => "",
-            Self::Parameter(name) => PARAMETERS.iter().find(|(n, _)| n == name).map_or("", |(_, unit)| unit),
+            Self::Parameter(name) | Self::OfInput { parameter: name, .. } => {
+                let mut known = PARAMETERS.iter().chain([&DELAY_TO_INPUT]);
+                known.find(|(n, _)| n == name).map_or("", |(_, unit)| unit)
+            }
         }
     }
 
@@ -58,22 +70,22 @@ impl Quantity {
             Self::RmsU => "RMS of u".to_owned(),
             Self::Parameter(name) if name == DELAY => "delay tau_e".to_owned(),
             Self::Parameter(name) => name.clone(),
+            Self::OfInput { parameter, input } => format!("{parameter} of the response to {input}"),
         }
     }
 
-    /// True if the meaning of the quantity does not depend on the form; false for all parameters except the delay.
+    /// True if the meaning of the quantity does not depend on the form of the operator; false for all of its parameters
+    /// except the delay.
     pub fn is_of_any_form(&self) -> bool {
         !matches!(self, Self::Parameter(name) if name != DELAY)
     }
 
-    /// Returns the name of the quantity in the tables of a group; `None` for a gain or phase at a frequency.
-    pub(super) fn column(&self) -> Option<&str> {
+    /// Returns the name of the quantity among the estimates of a person; `None` for a gain or phase at a frequency.
+    pub(super) fn key(&self) -> Option<String> {
         match self {
-            Self::Crossover => Some("crossover_rad_s"),
-            Self::PhaseMargin => Some("phase_margin_deg"),
-            Self::RmsE => Some("rms_e"),
-            Self::RmsU => Some("rms_u"),
-            Self::Parameter(name) => Some(name),
+            Self::Crossover => Some("crossover_rad_s".to_owned()),
+            Self::PhaseMargin => Some("phase_margin_deg".to_owned()),
+            Self::RmsE | Self::RmsU | Self::Parameter(_) | Self::OfInput { .. } => Some(self.to_string()),
             Self::Gain(_) | Self::Phase(_) => None,
         }
     }
@@ -89,6 +101,7 @@ impl fmt::Display for Quantity {
             Self::RmsE => f.write_str("rms_e"),
             Self::RmsU => f.write_str("rms_u"),
             Self::Parameter(name) => f.write_str(name),
+            Self::OfInput { parameter, input } => write!(f, "{parameter}[{input}]"),
         }
     }
 }
@@ -99,6 +112,16 @@ impl FromStr for Quantity {
     fn from_str(text: &str) -> Result<Self, CompareError> {
         let text = text.trim();
         let unknown = || CompareError::Quantity { found: text.to_owned() };
+        if let Some((parameter, input)) = text.strip_suffix(']').and_then(|text| text.split_once('[')) {
+            let mut known = PARAMETERS.iter().chain([&DELAY_TO_INPUT]);
+            return match known.any(|(name, _)| *name == parameter) && !input.is_empty() {
+                true => Ok(Self::OfInput {
+                    parameter: parameter.to_owned(),
+                    input: input.to_owned(),
+                }),
+                false => Err(unknown()),
+            };
+        }
         if let Some((name, omega)) = text.split_once('@') {
             let omega: f64 = omega.parse().map_err(|_| unknown())?;
             return match name {
@@ -149,6 +172,8 @@ mod tests {
             "phase_deg@1",
             "rms_e",
             "omega_nm",
+            "tau_f[f_t]",
+            "K_d[r]",
         ] {
             assert_eq!(name.parse::<Quantity>().unwrap().to_string(), name);
         }
@@ -157,10 +182,22 @@ mod tests {
             Quantity::Parameter(DELAY.to_owned())
         );
         assert_eq!("margin".parse::<Quantity>().unwrap().unit(), "deg");
-        for bad in ["", "speed", "gain_db@", "gain_db@-1", "gain_db@nan", "tau_e@2"] {
+        for bad in [
+            "",
+            "speed",
+            "gain_db@",
+            "gain_db@-1",
+            "gain_db@nan",
+            "tau_e@2",
+            "tau_f",
+            "tau_f[]",
+            "speed[r]",
+        ] {
             let error = bad.parse::<Quantity>().unwrap_err().to_string();
             assert!(error.contains("crossover") && error.contains("gain_db@W"), "{error}");
         }
+        let of_input: Quantity = "tau_f[f_t]".parse().unwrap();
+        assert_eq!((of_input.unit(), of_input.is_of_any_form()), ("s", true));
         assert!(Quantity::Crossover.is_of_any_form() && !Quantity::Parameter("K".to_owned()).is_of_any_form());
     }
 }

@@ -28,7 +28,7 @@ impl Comparing {
         };
         let estimates = estimates_in(manifest, "group")?;
         let of_one_form = |quantity: &Quantity| !quantity.is_of_any_form();
-        if !self.quantities.iter().any(of_one_form) || forms(estimates.cells.iter()).len() < 2 {
+        if !self.quantities.iter().any(of_one_form) || forms(estimates.cells.iter(), None).len() < 2 {
             return Ok(estimates);
         }
         let Some(common) = estimates.common_form() else {
