@@ -149,6 +149,17 @@ pub enum DesignError {
         /// The problem with the file.
         reason: String,
     },
+    /// The file does not provide the variation of people from run to run.
+    #[error(
+        "{path} has no variation from run to run ({reason}); expected the directory of `hoid group` with three or more \
+         runs per person and condition, or a number, such as 0.13"
+    )]
+    NoRunToRun {
+        /// Path of the file.
+        path: String,
+        /// The problem with the file.
+        reason: String,
+    },
     /// The scenario is one of the thesis, which has no operator of the family.
     #[error("{path} is a scenario of the thesis; write one with the key form, such as form = \"lead\"")]
     OtherScenario {
