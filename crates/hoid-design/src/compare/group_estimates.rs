@@ -440,7 +440,7 @@ fn variation(cells: &[Vec<Observation>]) -> Option<f64> {
     (degrees > 0.0).then(|| (sum / degrees).max(0.0).sqrt())
 }
 
-/// Merges the cells of the single runs of a person in a condition into one cell.
+/// Merges the cells of the individual runs of a person in one condition into a single cell.
 fn merged(cells: Vec<Cell>) -> Vec<Cell> {
     let mut all: Vec<Vec<Cell>> = Vec::new();
     for cell in cells {

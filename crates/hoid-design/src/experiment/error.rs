@@ -109,7 +109,7 @@ pub enum DesignError {
     },
     /// The typical person cannot control this element.
     #[error(
-        "with {element} no gain of the form {form} makes a stable loop with a phase margin of 15 deg and a crossover of .3 to 5 rad/s: give another form, or a person who controls it (a scenario or a fit)"
+        "with {element}, no gain of the form {form} gives a stable loop with a phase margin of 15 deg and a crossover of .3 to 5 rad/s: give another form, or a person who controls it (a scenario or a fit)"
     )]
     NotControlled {
         /// The controlled element.
