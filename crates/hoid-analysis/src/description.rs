@@ -22,8 +22,10 @@ pub enum Excitation {
     Found,
     /// No channel: no describing function is computed.
     Nothing,
-    /// The named channel; if it has no lines, the result reports this.
+    /// The named channel, which one of the recordings must have; if it has no lines, the result reports this.
     Named(String),
+    /// The named channel of the recordings that have it.
+    IfRecorded(String),
 }
 
 impl Excitation {
@@ -39,7 +41,7 @@ impl Excitation {
     /// Returns the named channel, if there is one.
     pub fn named(&self) -> Option<&str> {
         match self {
-            Self::Named(name) => Some(name),
+            Self::Named(name) | Self::IfRecorded(name) => Some(name),
             Self::Found | Self::Nothing => None,
         }
     }

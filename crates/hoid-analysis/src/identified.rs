@@ -2,13 +2,20 @@
 
 use std::fmt;
 
-use hoid_ident::{Fit, diagnostics::response, family::FamilyFit, frequency::Description, validation::GoodnessOfFit};
+use hoid_ident::{
+    Fit,
+    diagnostics::response,
+    family::FamilyFit,
+    frequency::{Description, check_excitation},
+    validation::GoodnessOfFit,
+};
 use hoid_model::{ContinuousTransferFunction, Decimation, Detrend, Record, Verdict, uncertainty::Estimate};
 use serde_json::{Map, Value};
 
 use crate::{
     AnalysisError,
     answers::{self, Answered, Answers, of_answer},
+    description::Excitation,
     estimators::{BatchEstimator, Fitted},
     identification::Identification,
     quality::Of,
@@ -66,6 +73,9 @@ impl<E: BatchEstimator> Identification<E> {
     pub fn run(&self, recordings: Recordings) -> Result<Identified<E::Fit>, AnalysisError> {
         if recordings.is_empty() {
             return Err(AnalysisError::NoRecordings);
+        }
+        if let Excitation::Named(channel) = &self.excitation {
+            check_excitation(&recordings.records, channel)?;
         }
         let counts_samples = self.estimator.counts_samples();
         let mut data = recordings

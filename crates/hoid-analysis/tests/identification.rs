@@ -221,12 +221,15 @@ fn an_offset_is_a_phase_of_what_is_periodic() {
 }
 
 #[test]
-fn an_excitation_that_was_named_is_missed() {
-    let named = Identification {
-        excitation: Excitation::of_text(Some("f_t")),
-        ..quick()
+fn a_named_excitation_must_be_recorded() {
+    let with = |excitation| {
+        let of = Identification { excitation, ..quick() };
+        of.run(Recordings::of_records([recorded(1, |e, u| (e, u))]))
     };
-    let found = named.run(Recordings::of_records([recorded(1, |e, u| (e, u))])).unwrap();
+    let error = with(Excitation::of_text(Some("f_t"))).unwrap_err().to_string();
+    assert!(error.contains("found f_t; expected one of e, u"), "{error}");
+    // The excitation of a group is named for all recordings, of which some may lack it.
+    let found = with(Excitation::IfRecorded("f_t".to_owned())).unwrap();
     assert!(found.fit.no_lines.is_some_and(|why| why.contains("f_t")));
     let looked_for = quick()
         .run(Recordings::of_records([recorded(1, |e, u| (e, u))]))

@@ -7,6 +7,7 @@ use hoid::ident::{
     order_selection::Criterion,
     validation::{GoodnessOfFit, Validation},
 };
+use hoid::model::numbers::counted;
 use hoid::model::{
     GainUnit, NotConvertible, Record, Verdict,
     margins::Crossings,
@@ -65,7 +66,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
         }
         if account.faults.len() > FAULTS_SHOWN {
             let more = account.faults.len() - FAULTS_SHOWN;
-            lines.push_str(&format!("  and {}\n", counted(more as u64, "more fault")));
+            lines.push_str(&format!("  and {}\n", counted(more, "more fault")));
         }
         lines
     };
@@ -168,7 +169,7 @@ pub fn search(fit: &Fit) -> String {
     format!(
         "Search: {}, {}, start: {}.\n",
         t.reason,
-        counted(t.iterations as u64, "step"),
+        counted(t.iterations, "step"),
         fit.start()
     )
 }
@@ -188,14 +189,6 @@ pub fn p_value(p: f64) -> String {
         p if p > 0.99 => "p > 0.99".to_owned(),
         p if p < 0.01 => format!("p = {p:.0e}"),
         p => format!("p = {p:.2}"),
-    }
-}
-
-/// Formats a count, such as "1 step" or "2 steps".
-pub fn counted(n: u64, what: &str) -> String {
-    match n {
-        1 => format!("1 {what}"),
-        n => format!("{n} {what}s"),
     }
 }
 
@@ -532,7 +525,7 @@ pub fn candidates(choice: &Choice) -> String {
     if failed > 0 {
         text.push_str(&format!(
             "{} could not be fitted; --json lists the reasons.\n",
-            counted(failed as u64, "candidate")
+            counted(failed, "candidate")
         ));
     }
     text

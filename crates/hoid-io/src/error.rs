@@ -1,10 +1,10 @@
 //! All errors of files, described for the user who has to correct the file.
 
-use hoid_model::ModelError;
+use hoid_model::{ModelError, numbers::counted};
 use thiserror::Error;
 
 use crate::table::ColumnOption;
-use crate::wording::{counted, list, sparse_option};
+use crate::wording::{list, sparse_option};
 
 /// Reason why a file could not be read or written. Each message gives the file, the place in it, the contents found,
 /// the expected contents and the remedy. A `place` is "line 12" if the format has lines, otherwise "row 12".

@@ -149,15 +149,6 @@ pub(crate) fn short(value: f64) -> String {
     }
 }
 
-/// Formats a count and its noun, such as "1 row" or "7 rows".
-pub(crate) fn counted(n: usize, what: &str) -> String {
-    if n == 1 {
-        format!("1 {what}")
-    } else {
-        format!("{n} {what}s")
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

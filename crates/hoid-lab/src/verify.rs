@@ -246,17 +246,17 @@ fn frames_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
                 format!("was drawn at {:.1} ms and shows tick {}", frame.drawn_ms, frame.tick),
             );
         }
-        let (interval, age) = (frame.drawn_ms - last, frame.drawn_ms - frame.frame_ms);
+        let (interval, age) = (frame.drawn_ms - last, (frame.drawn_ms - frame.frame_ms).abs());
         if !(0.0..=limit).contains(&interval) {
             return wrong(
                 number,
                 format!("came {interval:.1} ms after the previous frame, expected 0 to {limit} ms"),
             );
         }
-        if !(0.0..=limit).contains(&age.abs()) {
+        if !(0.0..=limit).contains(&age) {
             return wrong(
                 number,
-                format!("was drawn {age:.1} ms after its own time, expected at most {limit} ms"),
+                format!("was drawn {age:.1} ms from its own time stamp, expected at most {limit} ms"),
             );
         }
         last = frame.drawn_ms;

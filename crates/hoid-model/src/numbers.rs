@@ -4,6 +4,8 @@
 //! and the value with the same number of decimals (ISO/IEC Guide 98-3, 7.2.6). Numbers without a standard error are
 //! given with five significant digits.
 
+use std::fmt;
+
 /// Text for a missing number.
 pub const DASH: &str = "\u{2013}";
 
@@ -47,6 +49,15 @@ pub fn interval(value: f64, standard_error: Option<f64>, factor: f64) -> String 
             let exponent = exponent_for(value.abs().max(error));
             format!("{} to {}", written(low, last, exponent), written(high, last, exponent))
         }
+    }
+}
+
+/// Returns a count with its noun, such as "1 row" or "7 rows".
+pub fn counted<N: PartialEq + From<u8> + fmt::Display>(n: N, noun: &str) -> String {
+    if n == N::from(1) {
+        format!("1 {noun}")
+    } else {
+        format!("{n} {noun}s")
     }
 }
 

@@ -254,7 +254,7 @@ impl Record {
         };
         if (first - second).abs() > 1e-6 * first {
             return Err(refuse(
-                format!("a sample time of {second} s after {first} s"),
+                format!("a sample time of {second} s, but the previous record has {first} s"),
                 "the same sample time: read both records at one rate",
             ));
         }

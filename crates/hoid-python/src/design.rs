@@ -1,7 +1,7 @@
 //! `pyhoid.design`: a forcing function and the expected errors; the package reads the JSON of the result.
 
 use hoid_design::experiment::{
-    Against, Between, DesignRequest, Designing, DifferenceRequest, Enters, ExperimentDesign, People, Remnant,
+    Against, DesignRequest, Designing, DifferenceRequest, Enters, ExperimentDesign, People, Remnant, SpreadSource,
 };
 use hoid_model::{Form, family_scenario::Display};
 use hoid_report::{design_figure, runs_figure};
@@ -31,7 +31,7 @@ pub fn design(
     limits: (Option<f64>, Option<f64>),
     against: Option<&str>,
     difference: Option<&str>,
-    run_to_run: f64,
+    run_to_run: Option<String>,
     statistics: (f64, f64, Option<String>),
     display: &str,
     seed: u64,
@@ -42,7 +42,7 @@ pub fn design(
             sought: text.parse()?,
             power,
             alpha,
-            between_people: between_people.as_deref().map(Between::of_text),
+            between_people: between_people.as_deref().map(SpreadSource::of_text),
         })
     };
     let request = DesignRequest {
@@ -70,9 +70,10 @@ pub fn design(
             band_rad_s: band,
             shelf,
             most_rms: [limits.0, limits.1],
-            run_to_run,
             seed,
+            ..Designing::default()
         },
+        run_to_run: run_to_run.as_deref().map(SpreadSource::of_text),
         runs,
         against: against.map(Against::of_text),
         difference: difference.map(sought).transpose()?,

@@ -2,7 +2,7 @@
 //! functions of the number of runs.
 
 use hoid_design::experiment::{DesignedLine, Enters, Expected, ExpectedResponse, ExperimentDesign, has_absolute_error};
-use hoid_model::uncertainty::Estimate;
+use hoid_model::{numbers::counted, uncertainty::Estimate};
 
 use crate::{
     figures::{Curve, CurveGrid, CurvePanel, LineKind, Shade, curves},
@@ -51,7 +51,7 @@ pub fn design_figure(design: &ExperimentDesign) -> String {
     let title = format!(
         "the forcing function, and the response of {} with the expected errors of {} of {} s",
         design.person,
-        counted(design.runs),
+        counted(design.runs, "run"),
         design.length_s
     );
     curves("design", &title, &grid)
@@ -172,13 +172,6 @@ fn shown(design: &ExperimentDesign) -> Vec<(String, f64)> {
         .filter(|name| !has_absolute_error(name))
         .map(|name| (name.to_owned(), 100.0))
         .collect()
-}
-
-fn counted(runs: usize) -> String {
-    match runs {
-        1 => "1 run".to_owned(),
-        runs => format!("{runs} runs"),
-    }
 }
 
 fn ends(e: &Estimate) -> (f64, f64) {

@@ -38,6 +38,8 @@ class ExperimentDesign(Written):
         self.runs_needed: int = found["runs_needed"]
         #: Standard deviation of one person from run to run, relative to the quantity.
         self.run_to_run: float = found["run_to_run"]
+        #: Source of this standard deviation.
+        self.run_to_run_source: str = found["run_to_run_source"]
         #: Ratio of peak to rms of the forcing function.
         self.crest_factor: float = found["crest_factor"]
         #: Each line: omega_rad_s, amplitude, phase_rad, and the response of the person with its errors.
@@ -185,7 +187,7 @@ def design(
     power: float = 0.8,
     alpha: float = 0.05,
     between_people: float | str | PathLike[str] | None = None,
-    run_to_run: float = 0.13,
+    run_to_run: float | str | PathLike[str] | None = None,
     condition: str | None = None,
     form: str | None = None,
     disturbance: bool = False,
@@ -224,9 +226,10 @@ def design(
         Relative standard deviation of the difference between people, or a file that contains it: a
         comparison as JSON, the result of a group with several conditions, or a ``population.json``. By
         default it comes from ``people`` if they provide it; otherwise it is 0.1.
-    run_to_run : float
-        Relative standard deviation of one person from run to run. It is part of the errors for the person,
-        which determine the number of runs.
+    run_to_run : float, str or path
+        Relative standard deviation of one person from run to run, or a directory that `group` wrote, whose
+        runs determine it. It is part of the errors for the person, which determine the number of runs. By
+        default it comes from ``people`` if they provide it; otherwise it is 0.13.
     condition : str
         Name of the condition, for a group with several conditions.
     form : str
@@ -287,7 +290,7 @@ def design(
         against=None if against is None else fspath(against),
         difference=None if difference is None else ",".join(_assignments(difference)),
         statistics=(power, alpha, None if between_people is None else str(between_people)),
-        run_to_run=run_to_run,
+        run_to_run=None if run_to_run is None else str(run_to_run),
         display=display,
         seed=seed,
     )

@@ -27,7 +27,7 @@ impl BatchEstimator for FamilyEstimator {
     fn specs() -> Vec<MethodSpec> {
         vec![MethodSpec {
             name: OPERATOR,
-            help: "the operator of a person: form, parameters with prior, errors by runs, a verdict",
+            help: "the operator of a person: form, parameters with a prior, standard errors from the scatter between runs, and a verdict",
             source: "McRuer and Jex 1967; the thesis, equation 2.2",
             structures: &[Structure::BoxJenkins],
             settings: known(Self::options_of_analysis()),

@@ -2,6 +2,7 @@
 //! from the delay between u and e in the recorded loop ([`recorded_element`]).
 
 use hoid_ident::diagnostics::recorded_element;
+use hoid_model::numbers::counted;
 use hoid_model::{ContinuousTransferFunction, Record};
 
 /// Lag of the recorded control.
@@ -37,13 +38,13 @@ pub(super) fn of_control(
     let ts_s = record.sample_time().s();
     // Adding 0.0 converts -0.0 to 0.0.
     let samples = (-found.delay_s / ts_s).round() + 0.0;
-    let plural = if samples == 1.0 { "" } else { "s" };
     Ok(Lag {
         samples,
         seconds: samples * ts_s,
         words: format!(
-            "e follows from u through the controlled element with the control {samples} sample{plural} late; {:.2} % \
+            "e follows from u through the controlled element with the control {} late; {:.2} % \
              of the power is unexplained",
+            counted(samples, "sample"),
             100.0 * found.unexplained
         ),
     })

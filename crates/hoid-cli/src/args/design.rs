@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use hoid::design::experiment::{
-    ALPHA, Against, Between, POWER, People, RUN_TO_RUN, Remnant, RequestedQuantity, TargetDifference,
+    ALPHA, Against, POWER, People, Remnant, RequestedQuantity, SpreadSource, TargetDifference,
 };
 use hoid::model::{ContinuousTransferFunction, Form, family_scenario::Display};
 
@@ -46,9 +46,10 @@ pub struct DesignArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub runs: Option<u32>,
     /// Run-to-run standard deviation of one person, as a fraction of the quantity (for phase margin: of the gain that
-    /// causes it)
-    #[arg(long, value_name = "PART", default_value_t = RUN_TO_RUN)]
-    pub run_to_run: f64,
+    /// causes it), or a directory of `hoid group` whose runs determine it [default: from --people if available, else
+    /// .13]
+    #[arg(long, value_name = "PART|DIR")]
+    pub run_to_run: Option<SpreadSource>,
     /// Lines per forcing function
     #[arg(long, value_name = "N", default_value_t = 10)]
     pub lines: usize,
@@ -82,10 +83,11 @@ pub struct DesignArgs {
     /// Two-sided significance level of the test
     #[arg(long, value_name = "P", default_value_t = ALPHA, requires = "difference")]
     pub alpha: f64,
-    /// Standard deviation of the difference across people, as a fraction like --run-to-run, or a file that contains it: output of `hoid compare --json`, the result of a group with several
-    /// conditions, or a population.json [default: from --people if available, else .1]
+    /// Standard deviation of the difference across people, as a fraction like --run-to-run, or a file that contains it:
+    /// output of `hoid compare --json`, the result of a group with several conditions, or a population.json [default:
+    /// from --people if available, else .1]
     #[arg(long, value_name = "PART|FILE", requires = "difference")]
-    pub between_people: Option<Between>,
+    pub between_people: Option<SpreadSource>,
     /// Display of the task: compensatory (error only), pursuit (target and output), preview (also the future target).
     /// For the last two, a target and a disturbance with different lines are designed, to separate the responses to
     /// error and target

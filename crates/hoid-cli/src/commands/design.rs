@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use hoid::design::experiment::{
-    Between, DesignRequest, Designing, DifferencePlan, DifferenceRequest, Enters, Expected, ExpectedQuantity,
-    ExperimentDesign, Remnant,
+    DesignRequest, Designing, DifferencePlan, DifferenceRequest, Enters, Expected, ExpectedQuantity, ExperimentDesign,
+    Remnant, SpreadSource,
 };
-use hoid::model::numbers::DASH;
+use hoid::model::numbers::{DASH, counted};
 use hoid::report::{PaperTable, design_figure, runs_figure};
 use serde_json::Value;
 
@@ -22,11 +22,12 @@ pub fn run(args: &DesignArgs) -> Result<(), CliError> {
         figure::check(figure)?;
     }
     paper_table::check(&args.show)?;
-    let spread = args.between_people.as_ref().and_then(|between| match between {
-        Between::File(path) => Some(path.as_path()),
-        Between::Part(_) => None,
+    let spreads = [&args.between_people, &args.run_to_run].into_iter().flatten();
+    let spreads = spreads.filter_map(|spread| match spread {
+        SpreadSource::File(path) => Some(path.as_path()),
+        SpreadSource::Part(_) => None,
     });
-    let inputs: Vec<&Path> = args.people.path().into_iter().chain(spread).collect();
+    let inputs: Vec<&Path> = args.people.path().into_iter().chain(spreads).collect();
     let files = [args.picture.figure.as_deref(), args.show.table.as_deref()];
     output_paths::check(&inputs, &files, &[])?;
     if let Some(out) = &args.out {
@@ -71,9 +72,10 @@ fn request(args: &DesignArgs) -> DesignRequest {
             band_rad_s: args.band,
             shelf: args.shelf,
             most_rms: [args.max_rms_e, args.max_u],
-            run_to_run: args.run_to_run,
             seed: args.seed,
+            ..Designing::default()
         },
+        run_to_run: args.run_to_run.clone(),
         runs: args.runs.map(|runs| runs as usize),
         against: args.against.clone(),
         display: args.display,
@@ -117,7 +119,7 @@ fn write_all(found: &ExperimentDesign, out: &Path) -> Result<(), CliError> {
 }
 
 fn page(found: &ExperimentDesign, verbose: bool) -> String {
-    let counted = text::counted(found.runs as u64, "run");
+    let counted = counted(found.runs, "run");
     let mut page = format!(
         "Expected errors of {counted} of {} s, {} ({})\n{}\n{}",
         found.length_s,
@@ -141,10 +143,11 @@ fn page(found: &ExperimentDesign, verbose: bool) -> String {
     page.push_str(&format!(
         "\nThe forcing function, crest factor {:.2}\n{}\n\
          The error of the runs follows from the information in these lines. The error for the person also contains their \
-         variation of {:.0} % from run to run (--run-to-run).\n",
+         variation of {} % from run to run ({}).\n",
         found.crest_factor,
         lines(found),
-        100.0 * found.run_to_run
+        text::significant(100.0 * found.run_to_run),
+        found.run_to_run_source,
     ));
     for reason in found.verdict.reasons().chain(found.verdict.notes()) {
         page.push_str(&format!("- {reason}\n"));
@@ -219,16 +222,13 @@ fn needed(found: &ExperimentDesign) -> String {
     if found.wanted.is_empty() {
         return String::new();
     }
-    let mut needed = format!(
-        "The requested errors require {}.\n",
-        text::counted(found.runs_needed as u64, "run")
-    );
+    let mut needed = format!("The requested errors require {}.\n", counted(found.runs_needed, "run"));
     if let Some(worst) = &found.worst {
-        let runs = text::counted(worst.runs_needed as u64, "run");
+        let runs = counted(worst.runs_needed, "run");
         needed.push_str(&format!("For {} they require {runs}.\n", worst.name));
     }
     if let Some(other) = &found.against {
-        let runs = text::counted(other.runs_needed as u64, "run");
+        let runs = counted(other.runs_needed, "run");
         needed.push_str(&format!("With {} they require {runs}.\n", other.name));
     }
     needed
@@ -245,7 +245,7 @@ fn difference(plan: &DifferencePlan) -> String {
     let size = format!("{sought} of {}{unit}", text::significant(plan.size));
     let answer = match plan.answer() {
         Some(row) => {
-            let runs = text::counted(row.runs as u64, "run");
+            let runs = counted(row.runs, "run");
             match row.people {
                 Some(people) => format!("{people} people, each with {runs} per condition"),
                 None => format!("more than 1000 people, each with {runs} per condition"),

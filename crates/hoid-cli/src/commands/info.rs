@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use hoid::analysis::{Look, Role};
 use hoid::ident::faults::repair;
 use hoid::io::{ColumnSurvey, FileSurvey, SamplingSurvey, ValueSurvey};
+use hoid::model::numbers::counted;
 use hoid::model::{Fault, FaultHandling};
 use hoid::report::numbers;
 use serde_json::{Value, json};
@@ -185,8 +186,8 @@ fn sampled(s: &SamplingSurvey) -> String {
     if let Some(first) = s.first_gap_s {
         line.push_str(&format!(
             ", {} ({}, the first after {first} s)",
-            text::counted(s.gaps as u64, "gap"),
-            text::counted(s.missing, "sample")
+            counted(s.gaps, "gap"),
+            counted(s.missing, "sample")
         ));
     } else {
         line.push_str(", no gaps");
@@ -194,13 +195,13 @@ fn sampled(s: &SamplingSurvey) -> String {
     if s.not_increasing > 0 {
         line.push_str(&format!(
             ", t does not increase in {}",
-            text::counted(s.not_increasing as u64, "row")
+            counted(s.not_increasing, "row")
         ));
     }
     if s.repeated > 0 {
         line.push_str(&format!(
             ", {} identical to the previous row",
-            text::counted(s.repeated as u64, "row")
+            counted(s.repeated, "row")
         ));
     }
     line.push('\n');
@@ -221,7 +222,7 @@ fn remarks(v: &ValueSurvey) -> String {
     }
     for (rows, end) in [(v.saturated_low, v.min), (v.saturated_high, v.max)] {
         if rows > 0 {
-            let rows = text::counted(rows as u64, "row");
+            let rows = counted(rows, "row");
             remarks.push(format!("saturated at {} in {rows}", numbers::plain(end)));
         }
     }

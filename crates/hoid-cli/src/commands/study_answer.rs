@@ -7,6 +7,7 @@
 use std::path::PathBuf;
 
 use hoid::io::{ColumnValues, OutputTable, read_table};
+use hoid::model::numbers::counted;
 use hoid::report::numbers;
 
 use crate::{error::CliError, text};
@@ -116,7 +117,7 @@ fn words(summary: &OutputTable) -> String {
     }
     let more = match rows.len().checked_sub(MOST_ROWS) {
         None | Some(0) => String::new(),
-        Some(more) => format!("and {}\n", text::counted(more as u64, "more row")),
+        Some(more) => format!("and {}\n", counted(more, "more row")),
     };
     format!(
         "{table}\n{more}Relative bias in %: median over the fits that give an operator (of all), and its Monte Carlo \

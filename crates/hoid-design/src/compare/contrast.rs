@@ -103,7 +103,7 @@ impl Resolved {
             (Some(Variation::Between), Some(subject)) => {
                 let both = resolved.levels_of(subject, group);
                 return Err(bad(format!(
-                    "{subject} is in {}: the factor varies within people",
+                    "{subject} has the levels {}: the factor varies within people",
                     both.join(" and ")
                 )));
             }

@@ -53,6 +53,8 @@ pub struct ExperimentDesign {
     pub crest_factor: f64,
     /// Standard deviation of one person from run to run, relative to the quantity.
     pub run_to_run: f64,
+    /// Source of `run_to_run`, in words.
+    pub run_to_run_source: String,
     /// Expected errors from all runs, for the typical person.
     pub expected: Expected,
     /// Expected errors for the other people, with the same forcing function.
@@ -93,6 +95,7 @@ impl ExperimentDesign {
         set("length_s", json::number(self.length_s));
         set("runs_needed", json!(self.runs_needed));
         set("run_to_run", json::number(self.run_to_run));
+        set("run_to_run_source", json!(self.run_to_run_source));
         set("crest_factor", json::number(self.crest_factor));
         for (key, value) in of_expected(&self.expected) {
             set(&key, value);

@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use super::{
-    Between, DesignError, Expected, People,
+    DesignError, Expected, People, SpreadSource,
     power::{MOST_PEOPLE, people_needed, power},
     wanted::named_number,
 };
@@ -64,7 +64,7 @@ pub struct DifferenceRequest {
     pub alpha: f64,
     /// Standard deviation, over people, of the difference. If `None`, it comes from the people of the design if they
     /// provide it; otherwise it is [`BETWEEN_PEOPLE`].
-    pub between_people: Option<Between>,
+    pub between_people: Option<SpreadSource>,
 }
 
 /// Default required probability of finding a difference.
@@ -155,7 +155,8 @@ impl DifferenceRequest {
             self.sought.size
         };
         let name = self.sought.name.as_str();
-        let between = Between::spread(self.between_people.as_ref(), people, (name, found.size), BETWEEN_PEOPLE)?;
+        let between =
+            SpreadSource::between_people(self.between_people.as_ref(), people, (name, found.size), BETWEEN_PEOPLE)?;
         let mut plan = DifferencePlan {
             request: self.clone(),
             size,
@@ -203,7 +204,7 @@ impl DifferenceRequest {
             self.alpha,
             "above 0 and below 1, such as 0.05",
         )?;
-        if let Some(Between::Part(part)) = self.between_people {
+        if let Some(SpreadSource::Part(part)) = self.between_people {
             check_spread("spread of the difference between people", part)?;
         }
         if !(self.sought.size.is_finite() && self.sought.size != 0.0) {

@@ -109,7 +109,7 @@ pub enum DesignError {
     },
     /// The typical person cannot control this element.
     #[error(
-        "with {element} no gain of the form {form} makes a stable loop with a phase margin of 15 deg and a crossover of .3 to 5 rad/s: give another form, or a person who controls it (a scenario or a fit)"
+        "with {element}, no gain of the form {form} gives a stable loop with a phase margin of 15 deg and a crossover of .3 to 5 rad/s: give another form, or a person who controls it (a scenario or a fit)"
     )]
     NotControlled {
         /// The controlled element.
@@ -146,6 +146,17 @@ pub enum DesignError {
         path: String,
         /// Name of the quantity.
         name: String,
+        /// The problem with the file.
+        reason: String,
+    },
+    /// The file does not provide the variation of people from run to run.
+    #[error(
+        "{path} has no variation from run to run ({reason}); expected the directory of `hoid group` with three or more \
+         runs per person and condition, or a number, such as 0.13"
+    )]
+    NoRunToRun {
+        /// Path of the file.
+        path: String,
         /// The problem with the file.
         reason: String,
     },

@@ -9,13 +9,13 @@
 //! | [`Designing`] | most informative amplitudes and frequencies of the lines within limits (`search`) |
 //! | [`crest_factor`] | lines without common harmonics, and their phases (`lines`) |
 //! | [`Against`] | another forcing function for comparison |
-//! | [`DifferenceRequest`] | number of people and runs needed to find a difference between conditions, from the [`power`](fn@power) of the test and the spread [`Between`] people |
+//! | [`DifferenceRequest`] | number of people and runs needed to find a difference between conditions, from the [`power`](fn@power) of the test and the spread between people |
+//! | [`SpreadSource`] | source of the spread between people and of the variation from run to run |
 //! | [`RequestedQuantity`] | requested quantities, and the number of runs needed for their accepted errors |
 
 mod adapted;
 mod against;
 mod answer;
-mod between;
 mod chosen;
 mod designing;
 mod difference;
@@ -32,12 +32,12 @@ mod power;
 mod request;
 mod response;
 mod search;
+mod spread;
 mod task;
 mod wanted;
 
 pub use against::Against;
 pub use answer::{ExperimentDesign, NamedExpected};
-pub use between::Between;
 pub use designing::{Designed, Designing};
 pub use difference::{
     ALPHA, BETWEEN_PEOPLE, DifferencePlan, DifferenceRequest, POWER, RunsAndPeople, TargetDifference,
@@ -51,5 +51,6 @@ pub use people::People;
 pub use power::{noncentral_t_cdf, people_needed, power};
 pub use request::DesignRequest;
 pub use response::{DesignedLine, ExpectedResponse};
+pub use spread::SpreadSource;
 pub use task::{Enters, Forcing, Remnant, Task};
 pub use wanted::{RequestedQuantity, periods};

@@ -7,12 +7,13 @@ use hoid_model::{
 };
 
 use super::{
-    Against, BETWEEN_PEOPLE, Between, DesignError, DesignedLine, Designing, DifferenceRequest, Enters, Expected,
-    ExperimentDesign, Forcing, NamedExpected, People, Remnant, RequestedQuantity, Task,
+    Against, BETWEEN_PEOPLE, DesignError, DesignedLine, Designing, DifferenceRequest, Enters, Expected,
+    ExperimentDesign, Forcing, NamedExpected, People, Remnant, RequestedQuantity, SpreadSource, Task,
     chosen::{Chosen, Given, NamedState, left_out},
     expected, feedforward, has_absolute_error,
     information::Loop,
     periods,
+    spread::run_to_run,
 };
 
 /// Request for the design of an experiment.
@@ -34,6 +35,9 @@ pub struct DesignRequest {
     pub remnant: Remnant,
     /// Options of the forcing function.
     pub designing: Designing,
+    /// Standard deviation of one person from run to run, relative to the quantity. If `None`, it comes from the people of
+    /// the design if they provide it; otherwise it is that of `designing`.
+    pub run_to_run: Option<SpreadSource>,
     /// Number of runs; if `None`, the number needed for the accepted errors of the requested quantities.
     pub runs: Option<usize>,
     /// Forcing function with which the designed one is compared.
@@ -49,6 +53,14 @@ impl DesignRequest {
     /// [`DesignError`] if the people cannot be read or the controlled element is not known, and as for
     /// [`Designing::run`].
     pub fn run(&self) -> Result<ExperimentDesign, DesignError> {
+        let spread = run_to_run(self.run_to_run.as_ref(), &self.people, self.designing.run_to_run)?;
+        let mut of_people = self.clone();
+        of_people.designing.run_to_run = spread.value;
+        of_people.with_run_to_run_from(spread.source)
+    }
+
+    /// Designs the experiment with the variation from run to run of `designing`, which comes from `source`.
+    fn with_run_to_run_from(&self, source: String) -> Result<ExperimentDesign, DesignError> {
         let given = Given {
             controlled_element: self.controlled_element.as_ref(),
             form: self.form,
@@ -94,6 +106,7 @@ impl DesignRequest {
             runs,
             runs_needed: designed.periods,
             run_to_run: self.designing.run_to_run,
+            run_to_run_source: source,
             wanted: self.designing.wanted.clone(),
             display: self.display,
             lines,
@@ -215,14 +228,14 @@ impl DesignRequest {
             Setting::new("band", format!("{}..{}", d.band_rad_s.0, d.band_rad_s.1))
                 .given(d.band_rad_s != of.band_rad_s),
             number("shelf", d.shelf, of.shelf),
-            number("run_to_run", d.run_to_run, of.run_to_run),
+            Setting::new("run_to_run", d.run_to_run.to_string()).given(self.run_to_run.is_some()),
             Setting::new("seed", d.seed.to_string()).given(d.seed != of.seed),
             limit("max_rms_e", d.most_rms[0]),
             limit("max_u", d.most_rms[1]),
         ];
         if let Some(of) = &self.difference {
             let default = DifferenceRequest::new(of.sought.clone());
-            let between = of.between_people.clone().unwrap_or(Between::Part(BETWEEN_PEOPLE));
+            let between = of.between_people.clone().unwrap_or(SpreadSource::Part(BETWEEN_PEOPLE));
             let size = format!(
                 "{}={}{}",
                 of.sought.name,

@@ -27,7 +27,7 @@ use super::{
 use crate::{
     IdentError, InitialState,
     criterion::{Data, Workspace},
-    frequency::{DescribingFunction, DescriptionOptions, EXCITATION_OPTION, channel_of, describe_runs},
+    frequency::{DescribingFunction, DescriptionOptions, describe_runs},
     informative_data, progress,
 };
 
@@ -176,13 +176,6 @@ impl FamilyEstimator {
     /// Returns the records with the trend of e and u removed, together with the further inputs.
     fn prepared(&self, records: &[Record]) -> Result<(Vec<Record>, FurtherInputs<'_>), IdentError> {
         informative_data::common_sample_time(records)?;
-        // A channel that no record has is a mistake in the option. A single record without it only excludes the fit at
-        // the lines.
-        if let (Some(channel), Some(first)) = (&self.excitation, records.first())
-            && records.iter().all(|record| record.channel(channel).is_none())
-        {
-            channel_of(first, channel, EXCITATION_OPTION)?;
-        }
         let records: Vec<Record> = records.iter().map(|r| r.clone().detrended(self.detrend)).collect();
         let (records, seen) = FurtherInputs::of(records, &self.channels, self.detrend)?;
         seen.check(&records)?;

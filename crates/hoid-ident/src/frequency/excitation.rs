@@ -203,11 +203,26 @@ pub(crate) fn greatest_common_divisor(a: usize, b: usize) -> usize {
 }
 
 /// Name of the excitation in messages.
-pub(crate) const EXCITATION_OPTION: &str = "the excitation (--excitation)";
+const EXCITATION_OPTION: &str = "the excitation (--excitation)";
+
+/// Checks that one of the records has the channel of the excitation. If only some records lack it, the fit at the lines
+/// is omitted.
+///
+/// # Errors
+/// [`IdentError::BadOption`] with the channels of the first record.
+pub fn check_excitation(records: &[Record], channel: &str) -> Result<(), IdentError> {
+    if records.iter().any(|record| record.channel(channel).is_some()) {
+        return Ok(());
+    }
+    let first = records
+        .first()
+        .map(|record| channel_of(record, channel, EXCITATION_OPTION));
+    first.map_or(Ok(()), |found| found.map(|_| ()))
+}
 
 /// Returns the values of a channel by its name. The error names the available channels; `what` describes the channel in
 /// the error.
-pub(crate) fn channel_of<'r>(record: &'r Record, channel: &str, what: &str) -> Result<&'r [f64], IdentError> {
+pub(super) fn channel_of<'r>(record: &'r Record, channel: &str, what: &str) -> Result<&'r [f64], IdentError> {
     match record.channel(channel) {
         Some(values) => Ok(values),
         None => {

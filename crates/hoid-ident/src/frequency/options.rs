@@ -56,7 +56,7 @@ pub struct DescribingOptions {
     /// Trend removed from e and u of each run before the analysis. A mean affects the rms but not the lines; a straight
     /// line has power at all lines. Default none.
     pub detrend: Detrend,
-    /// Number of bins of the shortest run that a band of the remnant spectrum covers. Default 8.
+    /// Width of a band of the remnant spectrum, in frequency bins of the shortest run. Default 8.
     pub smoothing_bins: usize,
     /// Channels for estimating the controlled element, if it is estimated.
     pub element: Option<MeasuredElement>,

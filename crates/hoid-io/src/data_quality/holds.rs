@@ -14,7 +14,9 @@ use super::grid::Grid;
 use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
 use super::signals::{Signal, Signals, one_row, runs};
 use super::values::Levels;
-use crate::wording::{counted, short};
+use hoid_model::numbers::counted;
+
+use crate::wording::short;
 
 /// Finds the rows whose time does not advance: rows that equal the row before, and rows with other values.
 pub(super) fn without_advance(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {

@@ -4,7 +4,9 @@ use super::grid::{Grid, slope};
 use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
 use super::signals::{Signals, one_row};
 use crate::table::Precision;
-use crate::wording::{counted, decimal, short};
+use hoid_model::numbers::counted;
+
+use crate::wording::{decimal, short};
 
 /// Deviation from the grid, in sample times, above which jitter is reported; the module `time::sampling` has the same
 /// limit.

@@ -16,7 +16,9 @@ use std::ops::Range;
 use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
 use super::signals::{Signal, Signals, runs};
 use crate::time::sampling::steps;
-use crate::wording::{counted, short};
+use hoid_model::numbers::counted;
+
+use crate::wording::short;
 
 /// Smallest reported quantisation step, relative to the standard deviation; its quantisation noise has 1e-5 of the
 /// power of the signal.

@@ -114,7 +114,7 @@ fn without_path(error: io::Error) -> io::Error {
     }
 }
 
-/// Removes the temporary files of ended processes from a directory the first time this process writes to it.
+/// Removes temporary files that processes left in a directory when they ended, the first time this process writes to it.
 fn sweep_once(directory: &Path) {
     let directory = fs::canonicalize(directory).unwrap_or_else(|_| directory.to_owned());
     if known().swept.insert(directory.clone()) {

@@ -126,7 +126,7 @@ impl FromStr for Scaling {
             return Err(refused(
                 text,
                 &format!(
-                    "a factor (12.5), a factor and a unit (12.5:deg) or two units (rad:deg) of {}",
+                    "a factor (12.5), a factor and a unit (12.5:deg), or two units (rad:deg) out of {}",
                     names.join(", ")
                 ),
             ));

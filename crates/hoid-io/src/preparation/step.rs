@@ -2,10 +2,10 @@
 
 use std::fmt;
 
-use hoid_model::{Decimated, Detrend};
+use hoid_model::{Decimated, Detrend, numbers::counted};
 use serde::Serialize;
 
-use crate::wording::{counted, decimal, short};
+use crate::wording::{decimal, short};
 
 /// A preparation step that was applied to a record, or a repair made in reading.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -19,7 +19,9 @@ use super::read_options::{ReadOptions, Sparse};
 use crate::IoError;
 use crate::preparation::Step;
 use crate::table::{Column, ColumnExpression, Signal, Table, kept};
-use crate::wording::{counted, list, named};
+use hoid_model::numbers::counted;
+
+use crate::wording::{list, named};
 
 const STEP: &str = "sparse";
 

@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
-use hoid_model::ModelError;
+use hoid_model::{ModelError, numbers::counted};
 
 use super::read_options::ReadOptions;
 use super::repair::{self, OpenEnd};
 use crate::IoError;
 use crate::preparation::Step;
 use crate::table::{Column, Table};
-use crate::wording::{counted, named, sparse_option};
+use crate::wording::{named, sparse_option};
 
 /// The table to be converted, and the steps applied to it.
 pub(super) struct TableReader<'a> {

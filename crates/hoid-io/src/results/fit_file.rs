@@ -203,7 +203,7 @@ impl FitObject {
         }
         let form = Form::of_name(&form).map_err(|error| error.to_string())?;
         let covariance = self.covariance.ok_or("it has no covariance")?;
-        let neuromuscular = self.neuromuscular.ok_or("it has no key neuromuscular")?;
+        let neuromuscular = self.neuromuscular.ok_or("it has no key `neuromuscular`")?;
         let names: Vec<&str> = form.coordinates(neuromuscular).iter().map(|c| c.name()).collect();
         if covariance.coordinates != names {
             return Err(format!(

@@ -31,7 +31,7 @@ pub(super) fn identification(
             channels: facts.channels()?,
             ..manifest.analysis.family()?
         },
-        excitation: (facts.excitation.clone()).map_or(Excitation::Nothing, Excitation::Named),
+        excitation: (facts.excitation.clone()).map_or(Excitation::Nothing, Excitation::IfRecorded),
         period_s: facts.period_s,
         faults: manifest.read.faults.handling(),
         rate: manifest.by_rate(condition)?,

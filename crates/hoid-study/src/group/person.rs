@@ -165,7 +165,7 @@ impl Person {
         self.parameters.iter().find(|p| p.name == name)
     }
 
-    /// Returns the name of person and condition, such as `P03 in fo`.
+    /// Returns a label with the person and the condition, such as `P03 in fo`.
     pub fn name(&self) -> String {
         let of_run = if self.is_of_all_runs() {
             String::new()

@@ -335,7 +335,7 @@ fn second_condition(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn poles_by_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("change of the median bias of omega_nm with m0 below 0");
+    let mut part = Part::new("change of the median bias of omega_nm from each m0 to the next, below 0");
     for at in settings(&["C1", "C2"], &HIGHER[1..], &LEVELS) {
         let [lower, higher] =
             [at.m0 - 1, at.m0].map(|m0| study.median(&Setting { m0, ..at }.arx("bias_omega_nm", TRUE_DELAY)));

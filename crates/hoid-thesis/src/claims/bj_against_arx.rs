@@ -62,7 +62,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "\"In remnant-free cases, BJ models present higher deviations than ARX models\" at wrong delays.",
         place: "6.1.2, Figs. D.5 to D.8",
-        measure: "response_error of BJ(m*) less that of ARX without remnant, n_k* = 25 to 28 and 30, C1, m* = 1 to 4, %.",
+        measure: "response_error of BJ(m*) minus that of ARX without remnant, n_k* = 25 to 28 and 30, C1, m* = 1 to 4, %.",
         plans: PLANS,
         source: Source::Data(worse_without_remnant),
     },
@@ -102,7 +102,7 @@ fn fifty_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn more_robust(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("|change| of BJ less that of ARX below 0");
+    let mut part = Part::new("|change| of BJ minus that of ARX below 0");
     for at in settings(&["C1"], &ORDERS, &[0.1]) {
         let noisy = Setting { level: 0.3, ..at };
         for name in DISCRETE {
@@ -142,7 +142,7 @@ fn half_the_error(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn outperforms(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("response_error of BJ less that of ARX below 0");
+    let mut part = Part::new("response_error of BJ minus that of ARX below 0");
     for at in settings(&["C1", "C2"], &ORDERS, &LEVELS) {
         let pair = [
             at.bj("response_error", at.m0, TRUE_DELAY),
@@ -155,7 +155,7 @@ fn outperforms(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn worse_without_remnant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("response_error of BJ less that of ARX above 0");
+    let mut part = Part::new("response_error of BJ minus that of ARX above 0");
     for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
         let arx = study.median(&WITHOUT_REMNANT.arx("response_error", nk))?;
         for m in ORDERS {

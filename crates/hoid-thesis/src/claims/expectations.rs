@@ -68,7 +68,7 @@ pub(super) const CLAIMS: &[Claim] = &[
 
 fn diminished(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
-    let mut part = Part::new("|bias| of RPEM less that of RLS below 0");
+    let mut part = Part::new("|bias| of RPEM minus that of RLS below 0");
     for at in settings(&["C3", "C4", "C5", "C6"], &[1], &RECURSIVE_LEVELS) {
         for name in DISCRETE {
             let rls = study.trace_bias(&at.rls(""), name)?.abs();
@@ -112,7 +112,9 @@ fn transitions(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut parts = Vec::new();
     for name in GAINS {
-        let mut part = Part::new(&format!("{name}: interquartile range of RPEM less that of RLS below 0"));
+        let mut part = Part::new(&format!(
+            "{name}: interquartile range of RPEM minus that of RLS below 0"
+        ));
         for at in settings(&["C3", "C4"], &ORDERS, &RECURSIVE_LEVELS) {
             let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.trace_range(&query, name, TRANSITION_S));
             part.below(at.label(""), rpem?.minus(rls?), 0.0);

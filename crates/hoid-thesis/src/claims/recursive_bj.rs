@@ -137,7 +137,7 @@ pub(super) const CLAIMS: &[Claim] = &[
 
 fn less_bias(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
-    let mut part = Part::new("|bias| of RLS less that of RPEM above 0");
+    let mut part = Part::new("|bias| of RLS minus that of RPEM above 0");
     for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
         for name in DISCRETE {
             let rls = study.trace_bias(&at.rls(""), name)?.abs();
@@ -217,8 +217,8 @@ fn less_rms(study: Study<'_>, one: Query, other: Query) -> Result<Value, String>
 
 fn better_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
-    let mut gains = Part::new("K_e, T_L, K_e_dot: RMS error of RPEM less that of RLS above 0");
-    let mut nms = Part::new("omega_nm, zeta_nm: RMS error of RPEM less that of RLS below 0");
+    let mut gains = Part::new("K_e, T_L, K_e_dot: RMS error of RPEM minus that of RLS above 0");
+    let mut nms = Part::new("omega_nm, zeta_nm: RMS error of RPEM minus that of RLS below 0");
     for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
         for name in GAINS {
             gains.above(at.label(name), rms(study, at, name)?, 0.0);
@@ -264,7 +264,7 @@ fn first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut parts = Vec::new();
     for (names, label) in [(&GAINS[..], "K_e, T_L, K_e_dot"), (&NMS[..], "omega_nm, zeta_nm")] {
-        let mut part = Part::new(&format!("{label}: RMS error of RPEM less that of RLS below 0"));
+        let mut part = Part::new(&format!("{label}: RMS error of RPEM minus that of RLS below 0"));
         for at in settings(&["C1", "C2", "C3", "C4", "C5", "C6"], &[1], &RECURSIVE_LEVELS) {
             for name in names {
                 part.below(at.label(name), rms(study, at, name)?, 0.0);

@@ -26,7 +26,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::RemnantOrder,
         statement: "At m0 = 1 \"a model remnant order equal to 4 (the simulation one is 1 for this case) provides lower VAF results\".",
         place: "V.A.2; 6.1.3, Figs. E.1, E.9",
-        measure: "Mean of the paired difference of VAF, m* = 4 less m* = 1, m0 = 1, C1 and C2, by n_k* and noise level: lower by more than 0.1 points.",
+        measure: "Mean paired difference in VAF, m* = 4 minus m* = 1, at m0 = 1 in C1 and C2, for each n_k* and noise level: below -0.1 points.",
         plans: PLANS,
         source: Source::Data(vaf_lower),
     },
@@ -53,7 +53,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::RemnantOrder,
         statement: "\"The use of a fixed model remnant order m* = 1 does not change the bias obtained by BJ.\"",
         place: "V.A.2, Fig. 9; VIII; 6.1.3, Figs. C.6, C.14",
-        measure: "Median of the paired difference of the bias, m* = 1 less m* = m0, m0 = 2 to 4, C1 and C2, n_k* = 29, percentage points.",
+        measure: "Median of the paired difference of the bias, m* = 1 minus m* = m0, m0 = 2 to 4, C1 and C2, n_k* = 29, percentage points.",
         plans: PLANS,
         source: Source::Data(same_bias),
     },
@@ -62,7 +62,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::RemnantOrder,
         statement: "With m* = 1 \"the bias in m0 = 4 is even slightly diminished\".",
         place: "V.A.2, Fig. 9",
-        measure: "Magnitude of the median bias of b0 and b1, m* = 1 less m* = 4, m0 = 4, C1, n_k* = 29, by noise level: at least 0.1 percentage points smaller.",
+        measure: "Magnitude of the median bias of b0 and b1, m* = 1 minus m* = 4, m0 = 4, C1, n_k* = 29, by noise level: at least 0.1 percentage points smaller.",
         plans: PLANS,
         source: Source::Data(better_at_fourth),
     },
@@ -71,7 +71,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::RemnantOrder,
         statement: "m* = 1 \"could imply a small decrease in accuracy estimation for high simulation remnant orders\".",
         place: "6.1.3",
-        measure: "Median of the paired difference of response_error, m* = 1 less m* = m0, mean over the noise levels, m0 = 3 and 4, C1 and C2, n_k* = 29: at least 0.1 percentage points.",
+        measure: "Median of the paired difference of response_error, m* = 1 minus m* = m0, mean over the noise levels, m0 = 3 and 4, C1 and C2, n_k* = 29: at least 0.1 percentage points.",
         plans: PLANS,
         source: Source::Data(loss_at_high_orders),
     },
@@ -181,7 +181,7 @@ fn mean(values: &[f64]) -> f64 {
 
 fn vaf_lower(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("VAF of m* = 4 less that of m* = 1 below -0.1 points");
+    let mut part = Part::new("VAF of m* = 4 minus that of m* = 1 below -0.1 points");
     for at in settings(&["C1", "C2"], &[1], &LEVELS) {
         for nk in DELAYS {
             let queries = [at.bj("vaf", 4, nk), at.bj("vaf", 1, nk)];
@@ -194,7 +194,7 @@ fn vaf_lower(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn vaf_of_arx(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("|VAF of BJ less that of ARX| within 1 point");
+    let mut part = Part::new("|VAF of BJ minus that of ARX| within 1 point");
     for at in settings(&["C1"], &[3], &LEVELS) {
         for nk in 28..=30 {
             for m in ORDERS {
@@ -209,7 +209,7 @@ fn vaf_of_arx(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn same_bias(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("|paired difference of the bias, m* = 1 less m* = m0| within 5 points");
+    let mut part = Part::new("|paired difference of the bias, m* = 1 minus m* = m0| within 5 points");
     for at in settings(&["C1", "C2"], &HIGHER, &LEVELS) {
         for name in DISCRETE {
             let fit = |m| at.bj(&bias_of(name), m, TRUE_DELAY);

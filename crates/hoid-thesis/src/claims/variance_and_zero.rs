@@ -43,7 +43,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "BJ biases can be \"considerable for b0 and b1 in scenarios with model time delays far from the reference one, but those ones are a bit smaller than in the ARX case\".",
         place: "6.1.2, Fig. C.3",
-        measure: "Magnitude of the median bias of b0 and b1, BJ(m* = m0), C1, n_k* = 25 and 26, by m0 and noise level; the same less that of ARX, m0 = 1 to 4.",
+        measure: "Magnitude of the median bias of b0 and b1, BJ(m* = m0), C1, n_k* = 25 and 26, by m0 and noise level; the same minus that of ARX, m0 = 1 to 4.",
         plans: PLANS,
         source: Source::Data(wrong_delay),
     },

@@ -17,7 +17,7 @@ pub enum GuardKind {
     Frozen,
     /// Neither signal moves noticeably.
     Idle,
-    /// e looks as u did before, and u as e did.
+    /// e now looks the way u did before, and u the way e did.
     Swapped,
     /// The model predicts u worse than the past of u does.
     Misfit,

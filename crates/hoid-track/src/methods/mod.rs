@@ -130,7 +130,7 @@ impl Method {
             false => Err(bad(
                 "prior",
                 source,
-                "the method adaptive, the only one that can start from an earlier fit",
+                "the method `adaptive`, the only one that can start from an earlier fit",
             )),
         }
     }

@@ -1,7 +1,7 @@
 //! Output for a finished group, as a page of text and as a JSON object.
 
 use hoid::ident::family::Parameter;
-use hoid::model::{Form, VerdictLevel};
+use hoid::model::{Form, VerdictLevel, numbers::counted};
 use hoid::report::{PeopleTable, people_table};
 use hoid::study::group::{GroupSummary, Person, PersonChannel, RunFailure};
 use serde_json::{Map, Value, json};
@@ -49,11 +49,10 @@ impl Finished<'_> {
                 page.push_str(&format!("  {file}\n"));
             }
         } else if let Some(first) = self.pages.first() {
-            let count = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
             page.push_str(&format!(
                 "Report: {first}; {} and {} in the same directory, listed with -v.\n",
-                count(self.pages.len() - 1, "page"),
-                count(self.tables.len(), "table")
+                counted(self.pages.len() - 1, "page"),
+                counted(self.tables.len(), "table")
             ));
         }
         page

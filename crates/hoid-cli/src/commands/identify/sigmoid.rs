@@ -6,6 +6,7 @@ use hoid::ident::{
     validation::{LjungBox, whiteness},
 };
 use hoid::io::write_record;
+use hoid::model::numbers::counted;
 use hoid::model::{Channel, Form, GainUnit, Record, Verdict};
 use hoid::report::numbers;
 use serde_json::Value;
@@ -164,7 +165,7 @@ impl SigmoidReport<'_> {
         page.push_str(&format!(
             "\nSearch: {}, {}, start: {}.\n",
             t.reason,
-            text::counted(t.iterations as u64, "step"),
+            counted(t.iterations, "step"),
             fit.start()
         ));
         page.push_str(&format!(

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use hoid::analysis::{Setting, settings_of_recursion};
 use hoid::ident::Choice;
+use hoid::model::numbers::counted;
 use hoid::model::{Finding, SampleTime};
 use hoid::track::{Change, Live, Sample, Stage, TrackFault, TrackOptions, TrackRequest};
 
@@ -197,7 +198,7 @@ impl Session {
                             "a gap before t = {t} s, of which {LONGEST_GAP_S} s are bridged"
                         ));
                     } else if missing > 0 {
-                        let missing = text::counted(missing as u64, "sample");
+                        let missing = counted(missing, "sample");
                         self.fault(format!("{missing} missing before t = {t} s, bridged"));
                     }
                     for _ in 0..missing {
@@ -315,7 +316,7 @@ impl Session {
             return Err(CliError::NotDetermined(format!(
                 "no line of the stream was a sample ({} dropped); expected e,u or t,e,u with decimal points, or a JSON \
                  object; the output lines contain the errors",
-                text::counted(c.dropped, "line")
+                counted(c.dropped, "line")
             )));
         }
         match self.live.stage() {
@@ -335,14 +336,14 @@ impl Session {
             c.samples,
             c.skipped,
             c.bridged,
-            text::counted(c.shortened, "step"),
-            text::counted(c.dropped, "line")
+            counted(c.shortened, "step"),
+            counted(c.dropped, "line")
         );
         if c.held > 0 || c.restarts > 0 {
             text.push_str(&format!(
                 " {} held back by the guard; the estimate was restarted {}.",
-                text::counted(c.held, "sample"),
-                text::counted(c.restarts, "time")
+                counted(c.held, "sample"),
+                counted(c.restarts, "time")
             ));
         }
         if let Stage::Collecting(warm_up) = self.live.stage() {

@@ -1,6 +1,7 @@
 //! Text output for a trace.
 
 use hoid::analysis::Tracked;
+use hoid::model::numbers::counted;
 use hoid::model::{GainUnit, uncertainty::Estimate};
 use hoid::report::numbers;
 use hoid::track::{Response, value_of};
@@ -255,13 +256,13 @@ fn counts(tracked: &Tracked) -> String {
         "{} samples; {} skipped for a fault in e or u; {} shortened to stay stable or within bounds.\n",
         c.samples,
         c.skipped,
-        text::counted(c.shortened, "step")
+        counted(c.shortened, "step")
     );
     if c.held > 0 || c.restarts > 0 {
         text.push_str(&format!(
             "{} held back by the guard; the estimate was restarted {}.\n",
-            text::counted(c.held, "sample"),
-            text::counted(c.restarts, "time")
+            counted(c.held, "sample"),
+            counted(c.restarts, "time")
         ));
     }
     if tracked.has_operator() {

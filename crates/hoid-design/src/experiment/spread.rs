@@ -1,5 +1,5 @@
-//! The standard deviation, over people, of the difference between two conditions, which determines how many people are
-//! needed to detect the difference.
+//! Two standard deviations that an experiment cannot reduce: of a difference between two conditions over people, which
+//! determines how many people are needed, and of one person from run to run, which determines how many runs.
 //!
 //! | source | standard deviation b of the difference between two conditions |
 //! |---|---|
@@ -10,6 +10,10 @@
 //!
 //! If rho is the correlation of two conditions over people, b is `sigma sqrt(2 (1 - rho))`, which is at most sigma if
 //! rho is one half or more. A population of one condition does not determine rho.
+//!
+//! The variation from run to run comes from a number, or from the crossover frequencies of the runs in the result of a
+//! group ([`GroupEstimates::run_to_run`]). It applies to all quantities: the prior of a fit reduces the scatter of other
+//! parameters.
 
 use std::{
     convert::Infallible,
@@ -24,16 +28,16 @@ use serde_json::Value;
 use super::{DesignError, People};
 use crate::compare::{Comparing, Comparison, GroupEstimates, Quantity, Variation};
 
-/// Source of the standard deviation, over people, of a difference between conditions.
+/// Source of a standard deviation over people or over the runs of a person.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Between {
+pub enum SpreadSource {
     /// A fraction of the quantity.
     Part(f64),
-    /// A file with a comparison, the result of a group, or a population.
+    /// The result of a group; for a difference between people also a file with a comparison or a population.
     File(PathBuf),
 }
 
-impl Between {
+impl SpreadSource {
     /// Parses a number or the path of a file.
     pub fn of_text(text: &str) -> Self {
         match text.parse() {
@@ -43,7 +47,7 @@ impl Between {
     }
 }
 
-impl FromStr for Between {
+impl FromStr for SpreadSource {
     type Err = Infallible;
 
     fn from_str(text: &str) -> Result<Self, Infallible> {
@@ -51,7 +55,7 @@ impl FromStr for Between {
     }
 }
 
-impl fmt::Display for Between {
+impl fmt::Display for SpreadSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Part(part) => part.fmt(f),
@@ -60,21 +64,21 @@ impl fmt::Display for Between {
     }
 }
 
-/// A standard deviation over people, in the unit of the quantity, with a text that names its source.
+/// A standard deviation with a text that names its source.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Spread {
     pub value: f64,
     pub source: String,
 }
 
-impl Between {
+impl SpreadSource {
     /// Returns the standard deviation, over people, of a difference in the quantity with this name and value. If no
     /// source is given, it comes from the people of the design if they provide it; otherwise it is the default fraction
     /// of the value.
     ///
     /// # Errors
     /// [`DesignError::NoSpread`] if a file does not provide a spread.
-    pub(super) fn spread(
+    pub(super) fn between_people(
         given: Option<&Self>,
         people: &People,
         (name, value): (&str, f64),
@@ -95,6 +99,39 @@ impl Between {
             value: default * value,
             source: "a default".to_owned(),
         }))
+    }
+}
+
+/// Reads the variation of people from run to run from the result of a group, for which `given` is a directory or file,
+/// or else `people`. If people do not provide it, it is the default.
+///
+/// # Errors
+/// [`DesignError::NoSpread`] if `given` does not provide it.
+pub(super) fn run_to_run(given: Option<&SpreadSource>, people: &People, default: f64) -> Result<Spread, DesignError> {
+    let of_group = |path: &Path| {
+        let group = GroupEstimates::read(path).map_err(|error| error.to_string())?;
+        let (value, people) = group
+            .run_to_run()
+            .ok_or("no person has the crossover of three runs in one condition")?;
+        let source = format!("of {people} people in {}", path.display());
+        Ok(Spread { value, source })
+    };
+    match given {
+        Some(SpreadSource::Part(value)) => Ok(Spread {
+            value: *value,
+            source: "as given".to_owned(),
+        }),
+        Some(SpreadSource::File(path)) => of_group(path).map_err(|reason: String| DesignError::NoRunToRun {
+            path: path.display().to_string(),
+            reason,
+        }),
+        None => {
+            let known = people.path().and_then(|path| of_group(path).ok());
+            Ok(known.unwrap_or_else(|| Spread {
+                value: default,
+                source: "a default".to_owned(),
+            }))
+        }
     }
 }
 
