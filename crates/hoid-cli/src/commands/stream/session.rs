@@ -14,7 +14,7 @@ use super::{
     line::{Counts, StreamStatus},
     lines::{Columns, ParsedLine, StreamSample, is_object},
 };
-use crate::{args::StreamArgs, commands::reading, error::CliError, output, recursion, text};
+use crate::{args::StreamArgs, commands::reading, error::CliError, output, recursion};
 
 /// Maximum number of faults kept for the next line of the output.
 const MAX_FAULTS: usize = 4;
