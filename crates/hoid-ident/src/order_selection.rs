@@ -514,7 +514,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn searches_have_an_end() {
+    fn number_of_order_combinations_is_limited() {
         let one = OrderRanges::from(Structure::BoxJenkins.operator_orders(29));
         for ranges in [
             OrderRanges {
@@ -538,7 +538,7 @@ mod tests {
     }
 
     #[test]
-    fn combinations_run_through_all_and_empty_ranges_are_refused() {
+    fn all_combinations_are_listed_and_empty_ranges_refused() {
         let mut ranges = OrderRanges::from(Structure::BoxJenkins.operator_orders(29));
         assert_eq!(
             ranges.combinations().unwrap(),
@@ -557,7 +557,7 @@ mod tests {
     }
 
     #[test]
-    fn default_delays_are_those_of_people() {
+    fn default_delay_range_covers_human_delays() {
         assert_eq!(default_delay_range(SampleTime::new(0.01).unwrap()), 6..=61);
         assert_eq!(default_delay_range(SampleTime::new(1.0 / 60.0).unwrap()), 4..=37);
     }

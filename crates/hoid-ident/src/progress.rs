@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_innermost_watcher_is_told_and_the_outer_one_comes_back() {
+    fn innermost_watcher_is_notified_and_outer_one_restored() {
         let told = Arc::new(Mutex::new(Vec::new()));
         let (outer, inner) = (told.clone(), told.clone());
         step("nobody", 0, 1);
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn what_other_threads_do_is_counted() {
+    fn progress_of_other_threads_is_counted() {
         let told = Arc::new(Mutex::new(Vec::new()));
         let seen = told.clone();
         watched(

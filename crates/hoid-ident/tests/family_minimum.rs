@@ -87,7 +87,7 @@ fn ended(record: &Record, form: Form, prior: OperatorPrior, delay_range_s: (f64,
 }
 
 #[test]
-fn the_searches_reach_the_minimum_of_the_operator() {
+fn searches_reach_the_global_minimum() {
     let forms = FamilyEstimator::default().forms;
     let missed = |number: u64| -> [u64; 2] {
         let mut random = Uniform(number.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 20_261_130);

@@ -96,7 +96,7 @@ fn truth() -> Vec<(&'static str, f64)> {
 }
 
 #[test]
-fn a_change_without_noise_is_recovered() {
+fn noise_free_change_is_recovered() {
     let record = run(&scenario(Form::LeadLag, 0.0), 0);
     let fit = estimator(Form::LeadLag).fit(std::slice::from_ref(&record)).unwrap();
     for (name, expected) in truth() {
@@ -120,7 +120,7 @@ fn a_change_without_noise_is_recovered() {
 }
 
 #[test]
-fn the_square_of_a_lead_is_recovered_over_its_kinks() {
+fn squared_lead_is_recovered() {
     // With a direct part: the squared lead has as many zeros as there are poles.
     let mut with = scenario(Form::Lag, 0.0);
     for (state, [gain, lead]) in [(&mut with.initial, [0.9, 0.1]), (&mut with.last, [0.5, 0.2])] {
@@ -145,7 +145,7 @@ fn the_square_of_a_lead_is_recovered_over_its_kinks() {
 }
 
 #[test]
-fn a_level_of_u_is_found_and_moves_nothing() {
+fn level_of_u_is_found_without_bias() {
     // Mean square of the level in standard errors, for records without a level and with a level in u.
     let (runs, level) = (6, 0.7);
     let with_level = SigmoidChange {
@@ -228,7 +228,7 @@ fn study(runs: u64) -> Vec<(String, Vec<f64>)> {
 }
 
 #[test]
-fn errors_hold_over_simulated_runs() {
+fn errors_have_nominal_coverage_over_simulated_runs() {
     let runs = 10;
     let (mut inside, mut count) = (0, 0);
     for (name, errors) in study(runs) {
@@ -246,7 +246,7 @@ fn errors_hold_over_simulated_runs() {
 }
 
 #[test]
-fn a_fit_with_noise_is_trustworthy_and_a_prior_alone_is_named() {
+fn parameter_determined_by_the_prior_alone_is_reported() {
     let record = run(&scenario(Form::LeadLag, 0.1), 3);
     let records = std::slice::from_ref(&record);
     let fit = estimator(Form::LeadLag).fit(records).unwrap();
@@ -272,7 +272,7 @@ fn a_fit_with_noise_is_trustworthy_and_a_prior_alone_is_named() {
 }
 
 #[test]
-fn a_start_and_bounds_are_those_of_the_form() {
+fn start_and_constraints_use_the_names_of_the_form() {
     let record = run(&scenario(Form::Lag, 0.1), 0);
     let records = std::slice::from_ref(&record);
     let names = estimator(Form::Lag).names();
@@ -307,7 +307,7 @@ fn a_start_and_bounds_are_those_of_the_form() {
 }
 
 #[test]
-fn nothing_to_see_is_said() {
+fn no_change_is_reported() {
     // The change comes after the record has ended.
     let mut late = scenario(Form::LeadLag, 0.1);
     late.schedule = Schedule::Sigmoid {

@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn e_answers_to_its_own_u_alone() {
+    fn e_responds_only_to_u_of_its_own_loop() {
         for seed in 0..10 {
             let ([e, u], [_, other]) = (loop_of(seed), loop_of(100 + seed));
             let (own, other) = (answer(&e, &u, 0, 0.02).unwrap(), answer(&e, &other, 0, 0.02).unwrap());
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn too_little_says_nothing() {
+    fn short_records_and_zero_output_give_no_result() {
         let [e, u] = loop_of(1);
         assert_eq!(answer(&e[..300], &u[..300], 0, 0.02), None);
         assert_eq!(answer(&e, &vec![0.0; u.len()], 0, 0.02), None);

@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn a_person_responds() {
+    fn simulated_operators_respond_to_the_error() {
         for condition in [Condition::C1, Condition::C2, Condition::C3] {
             let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
             let run = simulator.run(RunSeed::default(), false).unwrap();
@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn too_little_says_nothing() {
+    fn too_little_data_gives_no_result() {
         assert_eq!(response(&[record(vec![0.0; 4000], noise(1, [0.9, 0.9], 4000))]), None);
         assert_eq!(
             response(&[record(noise(1, [0.9, 0.9], 60), noise(2, [0.9, 0.9], 60))]),

@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn a_determined_operator_gives_no_finding_and_a_fixed_value_is_not_open() {
+    fn determined_operators_and_fixed_values_give_no_finding() {
         let o = operator();
         assert!(gain_findings(&[("", o)]).is_empty() && pole_findings(&o, ts()).is_empty());
         assert!(!is_open(&Estimate::fixed(0.0)));
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lead_that_nobody_has_is_named() {
+    fn negative_lead_is_reported() {
         let e = |value: f64, error: f64| Estimate::with_variance(value, error * error);
         let lag = OperatorEstimate {
             t_l_s: e(-0.2, 0.05),
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_as_large_as_values_are_named() {
+    fn undetermined_parameters_are_reported() {
         let lead = OperatorEstimate {
             k_e: wide(0.09),
             t_l_s: wide(0.4),
@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn poles_of_no_person_are_a_lag() {
+    fn implausible_neuromuscular_poles_are_reported() {
         for (omega, zeta, senseless) in [
             (11.25, 0.35, false),
             (11.25, 2.9, false),
@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_of_the_search_and_of_the_delay() {
+    fn search_termination_and_delay_bounds_are_reported() {
         let of = |reason| {
             search_finding(Termination { reason, iterations: 3 }).map(|finding| (finding.kind, finding.severity.name()))
         };

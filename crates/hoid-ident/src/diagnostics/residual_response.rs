@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn the_level_holds_also_where_the_remnant_is_not_steady() {
+    fn test_level_holds_for_unsteady_remnant() {
         // Share of 100 loops with p < 0.1: 0.1 with a standard error of 0.03; the larger of the two p-values is below
         // 0.1 less often.
         for loud in [
@@ -162,13 +162,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_is_found() {
+    fn unmodelled_response_is_found() {
         let missed = (0..20).filter(|seed| found(*seed, 0.2, |_| 1.0).p_value > 1e-3).count();
         assert!(missed <= 1, "{missed} of 20");
     }
 
     #[test]
-    fn too_little_or_no_number_says_nothing() {
+    fn insufficient_and_invalid_data_give_no_result() {
         let (e, known, mut u) = loop_of(3, 0.0, |_| 1.0);
         let short = |n: usize| residual_response(&[known[..n].to_vec()], &e[..n], &u[..n], 100, TS);
         assert!(short(900).is_none() && short(1400).is_some());

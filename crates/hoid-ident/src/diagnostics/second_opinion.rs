@@ -316,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_that_carries_a_fit_is_told_by_all_kinds_of_fits() {
+    fn influential_sample_is_reported_for_all_kinds_of_fits() {
         let record = simulated(Condition::C1);
         let (clean, bad) = ([record.clone()], spoilt(&record));
         let element = ContinuousTransferFunction::new(&[1.0], &[1.0, 0.0]).unwrap();
@@ -333,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_that_one_sample_makes_is_told() {
+    fn change_caused_by_one_sample_is_reported() {
         let record = simulated(Condition::C4);
         let estimator = SigmoidChange {
             likelihood_intervals: false,

@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_with_a_change_is_trustworthy_and_a_delay_at_its_bound_is_not() {
+    fn changing_run_is_trustworthy_and_delay_at_bound_is_doubtful() {
         let record = simulated(Condition::C4);
         let records = std::slice::from_ref(&record);
         let estimator = SigmoidChange {
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_without_a_change_says_so() {
+    fn missing_change_is_reported() {
         let record = simulated(Condition::C1);
         let records = std::slice::from_ref(&record);
         let estimator = SigmoidChange {

@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn the_response_to_a_few_sinusoids_contains_the_delay_at_every_rate() {
+    fn arx_response_includes_the_delay_at_every_sampling_rate() {
         let truth = FamilyOperator::new(Form::Lead, true, &[2.0, 0.5, 2.3, -1.2, 0.35]).unwrap();
         for rate_hz in [20.0, 50.0, 100.0, 200.0] {
             let ts = SampleTime::new(1.0 / rate_hz).unwrap();

@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn weights_are_akaikes_and_the_simplest_near_form_is_in_front() {
+    fn akaike_weights_and_preference_for_the_simplest_form() {
         let (front, weights) = weigh(&[Some(13.0), Some(2.5), Some(1.0), None]).unwrap();
         assert_eq!(front, 1);
         let of_second = 1.0 / (1.0 + (-0.75_f64).exp());
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn no_more_forms_than_are_worth_their_time() {
+    fn number_of_weighed_forms_is_limited() {
         let (_, weights) = weigh(&[Some(1.0); 8]).unwrap();
         assert_eq!(weights.iter().filter(|w| **w > 0.0).count(), 4);
         assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);

@@ -310,7 +310,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bias_along_a_ridge_is_that_of_the_responses() {
+    fn bias_along_a_ridge_matches_the_response_difference() {
         // Two leads and a lag, for which only K T_L^2/T_I is well known in the band: a pilot who controls an
         // integrator.
         let coordinates = Form::Lead2Lag.coordinates(true);

@@ -387,7 +387,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parameters_of_forms_that_are_not_settled_are_named_with_their_own_forms() {
+    fn findings_name_the_forms_that_have_a_parameter() {
         let weighed =
             [(Form::Lead, 0.45), (Form::LeadLag, 0.04), (Form::Lag, 0.51)].map(|(form, weight)| WeighedForm {
                 form,

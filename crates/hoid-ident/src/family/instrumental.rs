@@ -438,7 +438,7 @@ mod tests {
     const MEDIAN_OF_CHI2: f64 = 0.455;
 
     #[test]
-    fn the_truth_lies_within_its_errors() {
+    fn true_parameters_lie_within_their_errors() {
         // Medians are used because the first of these people has weak instruments (see above). The median of twelve
         // values of chi^2 has a standard error of 0.32: 1/(2 f sqrt(12)), with the density f = 0.45 at the median.
         let mut squares = [Vec::new(), Vec::new()];
@@ -461,7 +461,7 @@ mod tests {
     }
 
     #[test]
-    fn with_psi_for_instruments_its_zero_is_the_minimum_of_the_prediction_error() {
+    fn psi_as_instruments_gives_the_prediction_error_minimum() {
         // Z' eps + P (m - x) is then the descent of the loss, for the D of that fit.
         let (_, records) = person(3);
         let estimator = estimator();
@@ -534,7 +534,7 @@ mod tests {
     }
 
     #[test]
-    fn a_channel_that_cannot_be_an_instrument_is_told() {
+    fn unusable_instrument_channel_is_reported() {
         let (_, records) = person(4);
         let without = FamilyEstimator {
             excitation: Some("x".to_owned()),

@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn the_lines_take_away_what_a_wrong_noise_model_adds() {
+    fn lines_reduce_the_bias_of_a_wrong_noise_model() {
         let truth = FamilyOperator::new(Form::Lead, true, &TRUTH).unwrap();
         // If the remnant is modelled as white, the fit in the loop is biased.
         let fitted = |excitation: Option<&str>, nd: usize| {

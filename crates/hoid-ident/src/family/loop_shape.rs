@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn a_loop_that_rises_above_one_again_is_not_stable() {
+    fn loop_with_three_crossovers_is_unstable() {
         let found = shape(resonant, Some(1e-4));
         assert_eq!((found.crossovers.len(), found.unstable_poles), (3, Some(2)));
         let [low, middle, high] = [0, 1, 2].map(|k| found.crossovers[k]);
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_are_those_of_finite_differences() {
+    fn errors_match_finite_differences() {
         let l = |gain: f64, turn: f64| move |w: f64| Complex64::from_polar(gain, turn - 0.15 * w);
         let found = shape(l(1.0, 0.0), Some(1e-6));
         let moved = |gain: f64, turn: f64| shape(l(gain, turn), None);
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn a_loop_without_a_crossover_or_a_number_has_a_doubt() {
+    fn missing_crossover_and_reversed_sign_are_reported() {
         for of in [1e-6, f64::NAN] {
             let found = shape(|_| Complex64::new(of, 0.0), Some(1e-6));
             assert_eq!(found.doubt(0.0).unwrap().kind, "no-crossover");

@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn an_operator_without_noise_is_found_with_its_level_and_its_course() {
+    fn noise_free_operator_is_found_with_its_intersample_model() {
         let ts = SampleTime::new(0.025).unwrap();
         let held = fitted(record(&truth().zoh(ts).unwrap(), 0.0));
         assert!(worst(&held, 0.243) < 1e-10);
@@ -326,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn a_little_noise_is_modelled_and_says_no_more_than_it_can() {
+    fn small_noise_is_modelled_and_errors_cover_the_truth() {
         let ts = SampleTime::new(0.025).unwrap();
         let fit = fitted(record(&truth().zoh(ts).unwrap(), 1e-3));
         let c = fit.operator(0).covariance.clone().unwrap();
@@ -340,7 +340,7 @@ mod tests {
     /// A lead compensates for the hold: its values for the two intersample behaviours differ by more than the errors
     /// due to noise.
     #[test]
-    fn both_courses_of_the_error_are_within_the_errors_if_both_fit() {
+    fn errors_cover_both_intersample_models_if_both_fit() {
         let ts = SampleTime::new(0.025).unwrap();
         let record = record(&truth().zoh(ts).unwrap(), 3e-3);
         let of = |intersample| {
@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn the_noise_of_a_person_is_not_little() {
+    fn operator_remnant_is_not_treated_as_small_noise() {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();
         let fit = fitted(record.detrended(Detrend::Mean));
@@ -375,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quarter_of_the_squares_settles_nothing() {
+    fn quarter_of_the_sum_of_squares_decides_nothing() {
         let of = |share: f64, criterion: f64| LittleNoise {
             ends: Vec::new(),
             share,
@@ -399,7 +399,7 @@ mod tests {
 
     /// Removing the mean of e causes a ramp in u that is as large as u itself.
     #[test]
-    fn an_integration_of_an_error_with_a_mean_is_found() {
+    fn integration_of_a_nonzero_mean_error_is_found() {
         let ts = SampleTime::new(0.005).unwrap();
         let x = [3.4, 0.72, 0.333, 2.13, -0.775, 0.398];
         let truth = FamilyOperator::new(Form::QuadraticIntegral, true, &x).unwrap();

@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn one_form_is_itself_and_two_alike_are_one() {
+    fn mixture_of_equal_forms_equals_one_form() {
         let one = component(0.3, 2.0, 0.1, 8);
         let alone = Mixture::of(&[one], 8).unwrap();
         assert_eq!((alone.estimate, alone.interval), (one.estimate, one.interval));
@@ -183,7 +183,7 @@ mod tests {
 
     /// Two forms that are three standard errors apart: mean and variance by hand, the interval from its probability.
     #[test]
-    fn forms_that_differ_widen_the_error() {
+    fn differing_forms_increase_the_error() {
         let many = 1_000_000;
         let all = [component(0.75, 1.0, 0.1, many), component(0.25, 1.4, 0.2, many)];
         let found = Mixture::of(&all, many).unwrap();
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn an_end_that_is_open_in_a_form_with_weight_is_open() {
+    fn infinite_limit_of_a_weighted_form_is_kept() {
         let closed = component(0.9, 5.0, 0.5, 8);
         let open = |weight| Component {
             weight,

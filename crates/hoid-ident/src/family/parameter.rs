@@ -388,7 +388,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lag_that_is_known_has_a_time_constant() {
+    fn determined_lag_has_a_finite_interval() {
         let all = known(0.2, 0.02);
         let t_i = of(&all, "T_I");
         assert_eq!((t_i.value, t_i.determined), (5.0, true));
@@ -405,7 +405,7 @@ mod tests {
     }
 
     #[test]
-    fn the_gain_of_the_person_is_known_less_well_than_that_of_the_run() {
+    fn gain_error_for_the_person_includes_run_to_run_variation() {
         let all = known(0.2, 0.02);
         let (gain, tau) = (of(&all, "K_over_T_I"), of(&all, "tau_e"));
         assert!((gain.standard_error_person.unwrap() - 0.2_f64.hypot(0.25)).abs() < 1e-12);
@@ -419,7 +419,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parameter_is_averaged_over_the_forms_that_have_it() {
+    fn parameter_is_averaged_over_the_forms_that_have_it() {
         let near = known(0.2, 0.02);
         let mut far = of(&near, "tau_e").clone();
         far.value += 0.04;
@@ -445,7 +445,7 @@ mod tests {
 
     /// T_I of a pure integration has no error. It is not part of the mean, but the interval has no upper limit.
     #[test]
-    fn a_parameter_at_a_bound_in_a_form_with_weight_is_in_the_interval() {
+    fn interval_includes_a_weighted_form_at_a_bound() {
         let known = known(0.2, 0.02);
         let lag = of(&known, "T_I");
         let infinite = Parameter {
@@ -468,7 +468,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lag_that_is_not_known_is_open_above() {
+    fn undetermined_lag_has_no_upper_limit() {
         let all = known(0.02, 0.03);
         for name in ["T_I", "K"] {
             let open = of(&all, name);

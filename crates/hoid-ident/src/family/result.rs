@@ -341,7 +341,7 @@ mod tests {
     use crate::family::FamilyEstimator;
 
     #[test]
-    fn the_polynomials_have_the_title_of_the_operator() {
+    fn polynomial_fit_has_the_title_of_the_operator_fit() {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();
         let estimator = FamilyEstimator {

@@ -109,7 +109,7 @@ mod tests {
     use super::{super::test_signals::autoregressive, *};
 
     #[test]
-    fn outliers_do_not_carry_the_fit() {
+    fn outliers_do_not_affect_the_fit() {
         let clean = autoregressive(4000, 3);
         let fit = |x: &[f64]| Autoregression::of(x, 3.0).unwrap().a;
         let good = fit(&clean);
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn a_short_or_constant_channel_has_none() {
+    fn short_and_constant_channels_give_no_autoregression() {
         assert!(Autoregression::of(&[1.0; 10], 1.0).is_none());
         assert!(Autoregression::of(&[0.0; 400], 0.0).is_none());
     }

@@ -146,7 +146,7 @@ mod tests {
     use super::{super::test_signals::autoregressive, *};
 
     #[test]
-    fn a_frozen_channel_in_full_precision_and_in_steps() {
+    fn frozen_channels_are_found_with_and_without_quantisation() {
         let (e, u) = (autoregressive(4000, 1), autoregressive(4000, 2));
         assert!(frozen(&u, Some(&e), 0.01).is_empty());
         let mut held = u.clone();
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stick_in_its_dead_zone_is_not_frozen() {
+    fn stick_in_its_dead_zone_is_not_frozen() {
         let e = autoregressive(9000, 1);
         let zone = |v: &f64| v - v.clamp(-4.0, 4.0);
         // Slow, like a hand.
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dropout_is_a_hold_with_jumps() {
+    fn dropout_is_a_hold_with_jumps() {
         let mut u: Vec<f64> = autoregressive(4000, 2).iter().map(|v| v + 40.0).collect();
         u[700..740].fill(0.0);
         let found = frozen(&u, None, 0.01);
@@ -198,13 +198,13 @@ mod tests {
     }
 
     #[test]
-    fn a_rail_is_another_matter() {
+    fn saturation_is_not_reported_as_frozen() {
         let u: Vec<f64> = autoregressive(4000, 2).iter().map(|v| v.clamp(-3.0, 3.0)).collect();
         assert!(frozen(&u, None, 0.01).is_empty());
     }
 
     #[test]
-    fn what_comes_before_a_run() {
+    fn idle_span_before_a_run_is_found() {
         let mut state = 5_u64;
         let mut small = || {
             state = state

@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn seconds_in_a_dead_zone_and_out_of_it_are_in_one_unit() {
+    fn dead_zone_is_not_reported_as_a_change_of_scale() {
         let zone = |v: &f64| v - v.clamp(-4.0, 4.0);
         let u: Vec<f64> = channel(4).iter().map(zone).collect();
         let at_rest = u.iter().filter(|v| **v == 0.0).count();
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn a_good_channel_has_none_of_them() {
+    fn clean_channel_has_no_wraps_steps_or_scale_changes() {
         for seed in 1..8 {
             let x = channel(seed);
             assert!(wrap(&x, 0.01).is_none() && steps(&x, 0.01).is_empty() && scales(&x, 0.01).is_empty());
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn an_angle_is_unwrapped() {
+    fn wrapped_angle_is_unwrapped() {
         let x: Vec<f64> = channel(4).iter().map(|v| 5.0 * v + 132.0).collect();
         let wrapped: Vec<f64> = x.iter().map(|v| (v + 180.0).rem_euclid(360.0) - 180.0).collect();
         let found = wrap(&wrapped, 0.01).unwrap();
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn a_level_that_stays_and_a_pulse() {
+    fn permanent_step_is_found_and_pulse_is_not() {
         let mut x = channel(3);
         x[3000..].iter_mut().for_each(|v| *v += 80.0);
         let found = steps(&x, 0.01);
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn another_unit_for_a_while() {
+    fn temporary_scale_change_is_found() {
         let mut x = channel(6);
         x[2030..4777].iter_mut().for_each(|v| *v *= 1e6);
         let found = scales(&x, 0.01);

@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_sample_brings_is_bounded() {
+    fn influence_of_one_sample_is_bounded() {
         let clean = autoregressive(3000, 21);
         let mut held = Vec::new();
         for size in [10.0, 1e3, 1e5] {

@@ -59,7 +59,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_slow_goes_and_what_is_fast_stays() {
+    fn slow_components_are_removed_and_fast_ones_kept() {
         let gone = |e: &dyn Fn(f64) -> f64| {
             let before = record(8000, e);
             let after = &without_slow(std::slice::from_ref(&before), PERIOD_S).unwrap()[0];
@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn a_short_record_has_nothing_slow() {
+    fn short_records_give_no_result() {
         assert!(without_slow(&[record(900, f64::sin)], PERIOD_S).is_none());
         assert!(without_slow(&[], PERIOD_S).is_none());
     }

@@ -297,7 +297,7 @@ mod tests {
     use super::{super::test_signals::autoregressive, *};
 
     #[test]
-    fn a_fault_is_found_and_a_push_is_not() {
+    fn spike_is_found_and_response_to_a_push_is_not() {
         let clean = autoregressive(4000, 11);
         assert!(find(&mut clean.clone(), 0.01).is_empty());
         let mut faulty = clean.clone();
@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn patches_ends_and_neighbours() {
+    fn adjacent_and_boundary_spikes_are_found() {
         let clean = autoregressive(3000, 2);
         for places in [&[5_usize, 6, 7][..], &[2999], &[0], &[1000, 1004], &[1500, 1514, 1530]] {
             let mut faulty = clean.clone();
@@ -334,14 +334,14 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_look_at_is_no_fault() {
+    fn empty_constant_and_short_channels_have_no_spikes() {
         assert!(find(&mut [], 0.01).is_empty());
         assert!(find(&mut [1.0; 500], 0.01).is_empty());
         assert!(find(&mut [1.0, 2.0, 3.0], 0.01).is_empty());
     }
 
     #[test]
-    fn a_bridge_is_what_the_others_say() {
+    fn bridge_is_the_conditional_expectation() {
         let clean = autoregressive(2000, 8);
         let mut broken = clean.clone();
         broken[700..705].fill(1e3);

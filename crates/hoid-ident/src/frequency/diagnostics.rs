@@ -260,7 +260,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn coherence_by_chance_is_what_the_distribution_says() {
+    fn chance_coherence_matches_its_distribution() {
         assert_eq!(chance_coherence(1), None);
         assert!((chance_coherence(2).unwrap() - 0.95).abs() < 1e-15);
         let ten = chance_coherence(10).unwrap();

@@ -240,7 +240,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_model_is_returned() {
+    fn exact_gain_lead_and_delay_are_recovered() {
         let omega: Vec<f64> = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0].map(|n| n * TAU / 20.0).to_vec();
         let weights = [1.0, 0.9, 0.8, 0.7, 0.4, 0.3, 0.2];
         for (gain, lead, delay) in [(6.9, 0.31, 0.28), (-2.0, 0.0, 0.05), (1.5, -0.4, 0.6)] {

@@ -465,7 +465,7 @@ mod tests {
     }
 
     #[test]
-    fn the_loss_is_continuous_in_the_delay() {
+    fn loss_is_continuous_in_the_delay() {
         let signals = signals(600);
         let layout = Layout::new(2, 2, (0.05, 0.6), &BTreeMap::new(), &[], SampleTime::HUNDREDTH).unwrap();
         let first = first_residual(&super::super::layout::orders(2, 61), InitialState::Estimate);

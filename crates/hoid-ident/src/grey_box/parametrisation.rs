@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_covariance_of_a_linear_map_is_that_of_its_sums() {
+    fn covariance_of_a_linear_map_matches_hand_calculation() {
         // theta = [x + 2 y, x - y] of eta = [y, other, x].
         let mapped = Mapped {
             orders: Orders::default(),

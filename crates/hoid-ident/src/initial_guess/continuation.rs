@@ -261,7 +261,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_root_of_the_poles_undoes_their_power() {
+    fn root_of_poles_inverts_their_power() {
         let poles = [
             Complex64::new(0.95, 0.06),
             Complex64::new(0.95, -0.06),
@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn averages_leave_the_remainder_out() {
+    fn averages_omit_the_remainder() {
         assert_eq!(averaged(&[1.0, 3.0, 5.0, 7.0, 9.0], 2), [2.0, 6.0]);
         assert!(averaged(&[1.0], 2).is_empty());
     }

@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn every_proposal_for_the_poles_comes_near_them() {
+    fn reduced_high_order_model_finds_the_poles() {
         let (e, u) = record(4000, 0.5);
         let orders = Orders {
             nb: 2,
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn a_record_that_is_too_short_has_no_high_order_start() {
+    fn short_record_has_no_high_order_start() {
         let (e, u) = record(25, 0.1);
         let orders = Orders {
             nb: 1,

@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn an_invented_past_ends_where_the_record_begins() {
+    fn artificial_past_joins_the_record_smoothly() {
         let x = wave(2000, 0.01);
         let (extended, past) = with_past(&x);
         assert_eq!(past, PAST);
@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn dependent_columns_are_left_out_of_the_basis() {
+    fn dependent_columns_are_excluded_from_the_basis() {
         let (a, b) = (wave(100, 0.2), wave(100, 0.9));
         let sum: Vec<f64> = a.iter().zip(&b).map(|(x, y)| x - 3.0 * y).collect();
         let (basis, kept) = orthonormal(&[a, vec![0.0; 100], b, sum, vec![f64::NAN; 100]]);

@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn covariance_is_that_of_least_squares_for_white_residuals() {
+    fn white_residuals_give_the_least_squares_covariance() {
         let residual = white(5000);
         let z = vec![wave(5000, 0.1), wave(5000, 0.7)];
         let found = covariance(&z, &z, |_| true, &[residual]).unwrap();
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn covariance_knows_the_colour_at_the_frequency_of_the_instrument() {
+    fn covariance_uses_the_spectrum_at_the_instrument_frequency() {
         let mut residual = white(20_000);
         divide_in_place(&[-0.9], &mut residual);
         for w in [0.05_f64, 0.5, 2.5] {

@@ -188,7 +188,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn filters_are_orthonormal() {
+    fn laguerre_filters_are_orthonormal() {
         let mut impulse = vec![0.0; 4000];
         // The impulse comes after the samples from which the artificial past is computed.
         impulse[300] = 1.0;
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn the_part_of_a_delayed_response_is_found() {
+    fn delayed_response_to_the_signal_is_found() {
         let n = 4000;
         let x: Vec<f64> = (0..n)
             .map(|t| (0.05 * f64::from(t)).sin() + (0.31 * f64::from(t)).sin())

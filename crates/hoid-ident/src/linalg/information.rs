@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn inverse_information_is_the_inverse_whatever_the_units() {
+    fn inverse_information_is_the_inverse_in_any_units() {
         let g = gram(&columns());
         let inverse = inverse_information(&g, &names()).unwrap();
         for i in 0..3 {
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn an_undetermined_combination_is_named() {
+    fn undetermined_combination_is_reported() {
         let mut dependent = columns();
         dependent[2] = dependent[0].iter().map(|v| -1e-6 * v).collect();
         match inverse_information(&gram(&dependent), &names()) {
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn held_parameters_have_no_variance() {
+    fn fixed_parameters_have_no_variance() {
         let g = gram(&columns());
         let part = inverse_of_free(&g, &[0, 2], &names()).unwrap();
         let two = inverse_information(&[g[0], g[2], g[6], g[8]], &["b0", "f1"].map(String::from)).unwrap();

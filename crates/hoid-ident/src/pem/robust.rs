@@ -179,7 +179,7 @@ mod tests {
     use crate::{Estimator, Loss};
 
     #[test]
-    fn weights_fall_beyond_the_threshold_only() {
+    fn weights_decrease_only_beyond_the_threshold() {
         let mut rounds = Reweighting::new(1.345);
         let residuals = vec![vec![0.5, -1.0, 1.5], vec![100.0, -0.2]];
         let weights = rounds.next(&residuals).unwrap();
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn one_sample_moves_nothing_by_half_a_standard_error() {
+    fn one_outlier_moves_estimates_less_than_half_an_error() {
         let clean = simulated(1);
         let fit = |record: Record| box_jenkins(HUBER).fit(&[record]).unwrap().operator().unwrap();
         let before = fit(clean.clone());
@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_held_is_fitted_as_it_is() {
+    fn data_that_cannot_be_limited_are_fitted_unchanged() {
         // The neighbours of a sample carry no information about a constant error, and there is no response to find.
         let clean = simulated(2);
         let e = Channel::new("e", "", vec![1.0; clean.len()]);

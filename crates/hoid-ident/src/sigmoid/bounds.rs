@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn limits_hold_what_has_a_meaning() {
+    fn limits_are_checked_and_invalid_constraints_refused() {
         let none = BTreeMap::new();
         let layout = Layout::new(Form::Lead, true, 1);
         let default = limits(&layout, &frame(), &none).unwrap();
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lag_is_bounded_by_its_time_constant() {
+    fn lag_limits_follow_from_its_time_constant() {
         let layout = Layout::new(Form::LeadLag, true, 0);
         let with = |c: Constraint| limits(&layout, &frame(), &BTreeMap::from([("T_I".to_owned(), c)]));
         let place = layout.lag.unwrap();

@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sigmoid_is_that_of_the_schedule_to_the_last_bit() {
+    fn sigmoid_is_bit_identical_to_the_schedule() {
         let layout = lead(0);
         for rate in [0.5, 100.0] {
             let theta = [0.09, 0.07, 0.4, 1.2, 40.96, f64::ln(rate), 11.25, 0.35, 0.28];

@@ -232,7 +232,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parameters_are_those_that_made_the_numerator() {
+    fn parameters_are_recovered_from_the_numerator() {
         for form in Form::ALL {
             let x = [3.0, 0.02 * 1.12_f64.powi(20), 0.4];
             let (shape, _) = form.shape(&x[1..]);

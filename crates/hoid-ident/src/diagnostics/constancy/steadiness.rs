@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn jumps_drifts_and_sways_are_told_apart() {
+    fn jumps_drifts_and_oscillations_are_distinguished() {
         let step = |c| c == Course::Step;
         let drift = |c| c == Course::Drift;
         let sway = |c| matches!(c, Course::Sway(_));
@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_steady_is_called_so() {
+    fn constant_response_is_not_reported() {
         // With three time courses and 100 people, each p-value is below its limit in fewer than one in a hundred.
         let told = (0..100)
             .map(|seed| of(1000 + seed, |_| 1.0))
@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drift_that_stretches_share_is_found_and_a_jump_between_them_is_not() {
+    fn common_drift_is_found_and_jumps_between_stretches_are_not() {
         let halves = [0..N / 2, N / 2..N];
         let drift = |gain: &dyn Fn(f64) -> f64, seed| {
             let (z, u) = run(seed, gain);
@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn too_little_says_nothing() {
+    fn zero_columns_and_short_records_give_no_result() {
         let columns = [vec![0.0; N], vec![0.0; N]];
         assert!(unsteady(&[basis(&columns)], &vec![1.0; N], slice::from_ref(&WHOLE), TS).is_empty());
         assert!(unsteady(&[basis(&columns)], &vec![1.0; N], slice::from_ref(&(0..500)), TS).is_empty());

@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn the_move_is_that_of_the_fit_without_the_block() {
+    fn reported_change_equals_a_fit_without_the_block() {
         let mut means = vec![0.1, -0.1, 0.05, -0.05, 0.1, -0.1, 0.0, 0.0];
         assert_eq!(constancy(&means, 1.0), None);
         means[3] = 8.0;
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_that_all_scatter_are_no_stretch() {
+    fn scatter_of_all_blocks_is_not_a_stretch() {
         let means = [3.0, -2.0, 2.5, -3.0, 3.0, -2.5, 2.0, -3.0];
         assert_eq!(constancy(&means, 1.0), None);
         assert_eq!(constancy(&[5.0, 0.0, 0.0], 1.0), None);
