@@ -130,7 +130,7 @@ fn estimate(filter: &AdaptiveFilter<Vec<f64>>, omega: f64) -> ([f64; 2], [f64; 2
 }
 
 #[test]
-fn bands_cover_and_precision_grows() {
+fn bands_cover_the_truth_and_narrow_with_time() {
     let (mut inside, mut all) = (0.0, 0.0);
     let mut squares = [0.0; 2];
     for seed in 0..16 {
@@ -181,7 +181,7 @@ fn steep(poles: usize, samples: usize, seed: u64) -> (Vec<f64>, f64) {
 }
 
 #[test]
-fn a_steep_remnant_is_no_harder_than_a_flat_one() {
+fn steep_remnant_is_estimated_as_precisely_as_a_flat_one() {
     let mut precision = Vec::new();
     for poles in [1, 4] {
         let (v, variance) = steep(poles, 5000, 7);
@@ -231,7 +231,7 @@ fn neuromuscular_system_and_delay_are_found() {
 }
 
 #[test]
-fn one_who_is_far_from_what_is_usual_is_found() {
+fn operators_far_from_the_prior_are_found() {
     // A delay 100 ms longer than the prior, and a system of 16 rad/s with a delay that is 60 ms shorter: from the
     // default person alone, the corrections converge to another minimum.
     for (point, seed) in [
@@ -264,7 +264,7 @@ fn one_who_is_far_from_what_is_usual_is_found() {
 }
 
 #[test]
-fn a_change_of_the_delay_is_found_and_told_from_one_of_the_gains() {
+fn delay_change_is_distinguished_from_a_gain_change() {
     let later = Point {
         tau: 0.21,
         ..default_operator()
@@ -296,7 +296,7 @@ fn a_change_of_the_delay_is_found_and_told_from_one_of_the_gains() {
 }
 
 #[test]
-fn a_change_is_found_and_followed_and_a_louder_remnant_is_no_change() {
+fn change_is_tracked_and_a_larger_remnant_is_no_change() {
     let (mut found, mut errors) = (0, 0.0);
     for seed in 0..4 {
         let (mut person, mut filter) = (Person::new(100 + seed), filter(12.5));
@@ -333,7 +333,7 @@ fn a_change_is_found_and_followed_and_a_louder_remnant_is_no_change() {
 }
 
 #[test]
-fn what_stands_still_is_no_change_and_one_behind_it_is_found() {
+fn constant_span_is_no_change_and_a_later_change_is_found() {
     let (mut alarms, mut found) = (0, 0);
     for seed in 0..4 {
         let (mut person, mut filter) = (Person::new(300 + seed), filter(12.5));
@@ -358,7 +358,7 @@ fn what_stands_still_is_no_change_and_one_behind_it_is_found() {
 }
 
 #[test]
-fn a_copy_goes_on_with_the_same_digits() {
+fn restored_filter_continues_bit_identically() {
     let (mut person, mut first) = (Person::new(5), filter(12.5));
     for _ in 0..1234 {
         let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
@@ -382,7 +382,7 @@ fn a_copy_goes_on_with_the_same_digits() {
 }
 
 #[test]
-fn what_says_nothing_does_no_harm() {
+fn uninformative_data_keep_the_filter_finite() {
     let mut silent = filter(12.5);
     for _ in 0..500 {
         assert_eq!(silent.step(0.0, 0.0).innovation, 0.0);
@@ -418,7 +418,7 @@ fn what_says_nothing_does_no_harm() {
 }
 
 #[test]
-fn an_outlier_hardly_moves_the_estimate() {
+fn outlier_hardly_moves_the_estimate() {
     let (mut person, mut filter) = (Person::new(11), filter(12.5));
     for _ in 0..1500 {
         let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
@@ -434,7 +434,7 @@ fn an_outlier_hardly_moves_the_estimate() {
 }
 
 #[test]
-fn what_makes_no_sense_is_refused() {
+fn invalid_priors_and_memory_are_refused() {
     let memory = || vec![0.0; least_memory(TS)];
     assert!(AdaptiveFilter::new(prior(13.5), vec![0.0; 3]).is_none());
     let sound = prior(13.5);
@@ -483,7 +483,7 @@ fn what_makes_no_sense_is_refused() {
 }
 
 #[test]
-fn without_memory_nothing_is_replayed_and_the_person_is_followed() {
+fn operator_is_tracked_without_replay_memory() {
     let (mut lean, mut replayed) = (0.0, 0.0);
     for seed in 0..4 {
         let mut person = Person::new(700 + seed);
@@ -510,7 +510,7 @@ fn without_memory_nothing_is_replayed_and_the_person_is_followed() {
 }
 
 #[test]
-fn what_is_known_stands_at_the_beginning() {
+fn initial_estimate_is_used() {
     let mut state = [0.0; STATES];
     state[..GAINS].copy_from_slice(&GAINS_OF_A_PERSON);
     let mut covariance = [[0.0; STATES]; STATES];
@@ -573,7 +573,7 @@ fn what_is_known_stands_at_the_beginning() {
 }
 
 #[test]
-fn a_stick_that_ends_does_not_make_the_person_answer_less() {
+fn stick_limit_does_not_bias_the_response() {
     let (mut told, mut taken) = (0.0, 0.0);
     for seed in 0..4 {
         let (mut person, mut free) = (Person::new(400 + seed), filter(12.5));

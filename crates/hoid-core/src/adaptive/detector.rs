@@ -279,7 +279,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn chance_is_that_of_the_tables() {
+    fn significance_matches_chi_square_tables() {
         // Abramowitz and Stegun, table 26.8: percentage points of the chi-square for Q = .05 and .001.
         for (pairs, [five, one]) in [
             (1, [5.99147, 13.8155]),

@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn the_simplest_set_that_explains_is_told() {
+    fn smallest_explaining_set_of_changes_is_reported() {
         // Only the delay changed; compared with their own errors, neither the gains nor the delay differ by much.
         let told = Difference::of(&contrast([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5])).unwrap();
         assert_eq!(told.changed, [false, false, true]);
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_contrast_that_says_nothing_has_no_difference() {
+    fn empty_contrast_has_no_difference() {
         assert!(Difference::of(&Contrast::default()).is_none());
     }
 }

@@ -590,13 +590,13 @@ mod tests {
     }
 
     #[test]
-    fn a_child_does_not_take_the_step_of_a_change_for_its_response() {
+    fn child_ignores_the_transient_of_a_change() {
         let (with, without) = (off(4, 60), off(0, 60));
         assert!(with < 0.05 && with < 0.5 * without, "{with} {without}");
     }
 
     #[test]
-    fn blocks_shorter_than_the_whitening_filter_do_no_harm() {
+    fn blocks_shorter_than_the_whitening_filter_are_allowed() {
         // A child then skips its whole first block, and its variance is that of the next blocks.
         let all = off(32, 63);
         assert!(all < 0.2, "{all}");

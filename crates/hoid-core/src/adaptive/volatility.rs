@@ -86,7 +86,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn constant_power_has_none_and_bursts_have_some() {
+    fn dispersion_is_one_for_constant_power_and_larger_for_bursts() {
         let mut seed = 3_u64;
         let mut uniform = || {
             seed = seed
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_is_no_burst() {
+    fn zero_power_is_not_a_burst() {
         let mut v = Volatility::new(1);
         for energy in [0.0, 1.0, 0.0, 0.0, 1.0] {
             v.take(energy, 32.0);

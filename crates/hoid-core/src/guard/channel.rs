@@ -384,7 +384,7 @@ mod tests {
 
     /// Reference: a polynomial of degree j-1 through the last j samples, by Lagrange's formula.
     #[test]
-    fn errors_are_those_of_the_extrapolated_polynomials() {
+    fn errors_match_polynomial_extrapolation() {
         let signal = |t: f64| libm::sin(0.31 * t) + 0.2 * libm::cos(1.7 * t);
         let mut channel = ChannelGuard::new(0.01);
         for t in 0..40 {
@@ -418,7 +418,7 @@ mod tests {
     /// The 99 % quantile of a Gaussian first difference of a random walk is 2.576; this approximation has a standard
     /// error of about 8 %.
     #[test]
-    fn quantiles_are_found_from_far_off_and_one_outlier_hardly_moves_them() {
+    fn quantiles_converge_and_resist_outliers() {
         let (mut state, mut x) = (1, 0.0);
         let mut channel = ChannelGuard::new(0.01);
         channel.set_quantiles([0.01, 1.0, 1.0, 1.0]);
@@ -443,7 +443,7 @@ mod tests {
     }
 
     #[test]
-    fn an_outlier_is_held_back_until_the_signal_comes_back() {
+    fn outlier_is_replaced_until_the_signal_returns() {
         let signal = |t: i32| libm::sin(0.03 * f64::from(t));
         let mut channel = ChannelGuard::new(0.01);
         channel.set_quantiles([0.04, 0.002, 2e-4, 2e-5]);
@@ -471,7 +471,7 @@ mod tests {
     /// Weibull's distribution gives m = 4^(1/k): twice the quantile for k = 2, seven times for k = .7; the largest of
     /// 1e5 samples is within the limit, a spike is not. Rests have no effect.
     #[test]
-    fn who_moves_in_bursts_has_a_higher_limit_and_a_spike_is_still_one() {
+    fn bursts_raise_the_limit_and_spikes_are_still_detected() {
         for (shape, least, most) in [(2.0, 2.4, 2.6), (1.0, 3.0, 5.5), (0.7, 5.0, 10.5)] {
             let mut state = 7_u64;
             let mut uniform = || {
@@ -506,7 +506,7 @@ mod tests {
     }
 
     #[test]
-    fn behind_a_step_a_signal_moves_as_before_and_one_of_another_scale_does_not() {
+    fn offset_after_a_step_is_accepted_and_rescaling_is_not() {
         for order in 0..ORDERS {
             let mut channel = ChannelGuard::new(0.01);
             let mut state = 3;
@@ -531,7 +531,7 @@ mod tests {
     }
 
     #[test]
-    fn while_quantiles_are_learnt_nothing_is_held_back() {
+    fn no_outliers_are_detected_while_quantiles_are_estimated() {
         let mut channel = ChannelGuard::new(0.01);
         channel.follow(0.0, &[0.0; ORDERS]);
         channel.start_learning([0.0; ORDERS]);
@@ -544,7 +544,7 @@ mod tests {
     }
 
     #[test]
-    fn a_heavy_tail_is_learnt_after_blocks_without_knowledge() {
+    fn tail_ratio_is_set_after_empty_blocks() {
         let mut channel = ChannelGuard::new(0.01);
         channel.end_block();
         assert_eq!(channel.tail_ratio, [LIMIT; ORDERS]);
@@ -554,7 +554,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_known_lets_numbers_pass_and_nothing_else() {
+    fn unknown_channel_accepts_only_finite_values() {
         let mut channel = ChannelGuard::new(0.01);
         assert!(!channel.is_outlier(&channel.errors(1e9)));
         assert!(channel.is_outlier(&channel.errors(f64::NAN)));

@@ -452,7 +452,7 @@ mod tests {
 
     /// Squares that underflow: infinite innovations do not become a long-run value, and nothing panics afterwards.
     #[test]
-    fn numbers_without_a_size_are_not_learnt() {
+    fn non_finite_innovations_do_not_enter_the_profile() {
         let mut profile = known();
         for innovation in [f64::INFINITY, f64::NAN, 0.1] {
             let found = Block {
@@ -465,7 +465,7 @@ mod tests {
     }
 
     #[test]
-    fn each_trouble_has_its_name_and_ends() {
+    fn each_fault_is_identified_and_ends() {
         let typical = block([0.02, 0.1], [0.1, 1.1]);
         let cases = [
             (block([0.0, 0.1], [0.1, 1.1]), Fault::FrozenInput, 1),
@@ -498,7 +498,7 @@ mod tests {
     /// A constant u at its rest position is a fault only if e is constant too, or if the innovations during the rest
     /// are too large.
     #[test]
-    fn a_rest_is_not_frozen_but_a_rest_that_does_not_fit_is() {
+    fn rest_is_a_fault_only_with_constant_e_or_large_innovations() {
         let still = block([0.02, 0.0], [0.1, 1.1]);
         let quiet = |innovation: f64, e: f64| Block {
             innovation,
@@ -521,7 +521,7 @@ mod tests {
     }
 
     #[test]
-    fn a_block_moves_the_long_run_values_by_a_sixtieth() {
+    fn one_block_changes_long_run_values_by_at_most_two_percent() {
         let mut profile = known();
         let before = *profile.typical();
         profile.update(&block([20.0, 100.0], [0.1, 1.1]));
@@ -532,7 +532,7 @@ mod tests {
     }
 
     #[test]
-    fn channels_that_are_alike_are_never_swapped() {
+    fn similar_channels_are_never_reported_as_swapped() {
         let mut profile = Profile::new();
         let mut size = 0.1;
         for n in 0..200 {

@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stick_rests_where_it_often_did_and_not_for_ever() {
+    fn rest_is_accepted_at_known_values_for_a_limited_time() {
         let resting = person(&[60, 150, 80, 120]);
         assert!((rest_ends_after(resting, 0.0) - 8.0).abs() < 0.02);
         assert!((rest_ends_after(person(&[60, 600, 80, 120]), 0.0) - 12.0).abs() < 0.02);
@@ -183,7 +183,7 @@ mod tests {
 
     /// A signal that takes each of many values for a moment, as from a coarse converter.
     #[test]
-    fn values_of_a_coarse_signal_are_no_atoms() {
+    fn quantised_values_are_not_rest_values() {
         let mut resting = Resting::new(0.01);
         for k in 0_u32..400 {
             let value = f64::from(k.wrapping_mul(2_654_435_761) >> 26);
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn a_doubted_stand_is_not_learnt_and_no_number_is_no_rest() {
+    fn rejected_rests_and_nan_are_ignored() {
         let mut resting = person(&[60, 150, 80]);
         (0..3000).for_each(|_| resting.take(0.0));
         resting.reject();
