@@ -107,7 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_baseline_is_the_distance_in_standard_deviations() {
+    fn threshold_statistic_is_the_distance_in_standard_deviations() {
         let ts = SampleTime::HUNDREDTH;
         // Mean of the error 0, variance 8/7; its rates are +-200.
         let error = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0];
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn where_the_operator_changed_and_no_single_quantity_the_response_is_named() {
+    fn response_is_named_if_no_single_parameter_changed() {
         let estimate = Estimate::with_variance(1.0, 0.01);
         let of = |of_operator, z| Change {
             seconds_ago: 1.0,

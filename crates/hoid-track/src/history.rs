@@ -77,7 +77,7 @@ mod tests {
 
     /// The newest values remain within the buffer after invalid numbers were restored.
     #[test]
-    fn the_newest_ones_are_within() {
+    fn newest_values_stay_within_the_buffer() {
         let mut past = History::new(3);
         past.visit(&mut |number| *number = 1e18);
         assert_eq!(past.newest().len(), 3);
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn values_stay_numbers() {
+    fn stored_values_are_finite_and_limited() {
         let mut past = History::new(3);
         [f64::NAN, f64::INFINITY, -1e300].into_iter().for_each(|x| past.push(x));
         assert_eq!(past.newest(), [-LARGEST, LARGEST, 0.0]);

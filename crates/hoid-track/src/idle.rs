@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn the_head_ends_where_the_run_begins_and_runs_have_none() {
+    fn idle_head_ends_at_the_start_of_the_run() {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
         for seed in 0..20 {
             let seed = RunSeed {
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn what_never_moves_is_idle_throughout() {
+    fn constant_record_is_idle_throughout() {
         let still = |name: &str, x: f64| Channel::new(name, "", vec![x; 500]);
         let record = Record::new(hoid_model::SampleTime::HUNDREDTH, still("e", 0.0), still("u", 2.0)).unwrap();
         assert_eq!(idle_head(&record), 500);

@@ -124,7 +124,7 @@ mod tests {
 
     /// Crossover and margin are the same as for a batch fit of the family with the same operator and covariance.
     #[test]
-    fn measures_are_those_of_a_batch_fit() {
+    fn loop_measures_match_a_batch_fit() {
         let element = ContinuousTransferFunction::new(&[90.0], &[1.0, 6.0, 0.0]).unwrap();
         let operator = FamilyOperator::new(Form::LeadLag, true, &[0.4, 0.5, 0.25, 2.4, -1.4, 0.15]).unwrap();
         let sizes = [0.02, 0.03, 0.02, 0.05, 0.1, 0.01];
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_there_has_a_reason() {
+    fn missing_crossover_has_a_reason() {
         let element = ContinuousTransferFunction::new(&[1.0], &[1.0, 0.0]).unwrap();
         let with = |gain: f64, variance: f64| {
             let whole = |_: f64| {

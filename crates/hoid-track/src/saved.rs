@@ -164,17 +164,17 @@ mod tests {
     }
 
     #[test]
-    fn a_guard_takes_any_numbers() {
+    fn guard_restores_arbitrary_numbers_safely() {
         each_number_may_be_anything(Method::rpem(), &[("guard", "yes")], 2350, 2600);
     }
 
     #[test]
-    fn a_bank_of_delays_takes_any_numbers() {
+    fn delay_bank_restores_arbitrary_numbers_safely() {
         each_number_may_be_anything(Method::rpem(), &[("track_delay", "0.28..0.3")], 2050, 2060);
     }
 
     #[test]
-    fn a_window_takes_any_numbers() {
+    fn window_restores_arbitrary_numbers_safely() {
         let with = [("forgetting", "window"), ("memory", "40")];
         each_number_may_be_anything(Method::rpem(), &with, 2030, 2100);
     }

@@ -510,7 +510,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_in_memory_is_refused() {
+    fn requests_that_exceed_the_memory_are_refused() {
         for ts_s in [1e-7, 1e-12, f64::MIN_POSITIVE] {
             for guard in ["yes", "no"] {
                 let error = refused(Method::rpem(), &[("guard", guard)], ts_s);

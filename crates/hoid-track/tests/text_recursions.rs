@@ -150,7 +150,7 @@ fn from_equations(method: &Method, record: &Record, besides: &[(&str, &str)]) ->
 }
 
 #[test]
-fn by_the_settings_of_the_text_they_are_its_equations() {
+fn thesis_settings_reproduce_the_thesis_equations() {
     let mut with_a_guard = [0.0_f64; 2];
     for (condition, order, level) in [
         (Condition::C1, 1, 0.01),
@@ -180,7 +180,7 @@ fn by_the_settings_of_the_text_they_are_its_equations() {
 /// need not recover: after P has grown for minutes, the first samples change the estimate arbitrarily, which the windup
 /// guard prevents.
 #[test]
-fn an_hour_of_silence_leaves_every_number_finite() {
+fn estimates_stay_finite_during_an_hour_of_silence() {
     let run = run(Condition::C1, 1, 0.1, 1);
     let loud = run.len();
     let at = |signal: &[f64]| -> Vec<f64> {
@@ -216,7 +216,7 @@ fn an_hour_of_silence_leaves_every_number_finite() {
 }
 
 #[test]
-fn a_guard_that_is_none_is_refused_with_what_to_do() {
+fn invalid_windup_guard_is_refused_with_advice() {
     let refused = |method: Method, name: &str, text: &str| method.with(name, text).unwrap_err().to_string();
     for (text, says) in [
         ("0.5", "1 or more"),
@@ -243,7 +243,7 @@ fn a_guard_that_is_none_is_refused_with_what_to_do() {
 /// Settings other than those of the thesis keep the windup guard: a start with the covariance of the fit, limited
 /// innovations, and structures that the thesis does not have.
 #[test]
-fn other_settings_keep_their_guard() {
+fn settings_other_than_the_thesis_keep_the_guard() {
     let words = |options: TrackOptions| options.memory_as_text(hoid_model::SampleTime::HUNDREDTH);
     let is_off = |options: TrackOptions| words(options).ends_with("without a windup guard");
     assert!(is_off(of_the_text(Method::rls(), &[])));

@@ -133,7 +133,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_statistic_is_the_distance_in_errors() {
+    fn wald_statistic_is_the_squared_distance_in_errors() {
         let response = |re: f64, c: [[f64; 2]; 2]| Response {
             value: [re, 1.0],
             covariance: c,

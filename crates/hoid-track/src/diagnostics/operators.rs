@@ -181,7 +181,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_negative_lead_is_no_lead() {
+    fn negative_lead_is_reported() {
         let operator = |k_e: f64, k_e_dot: f64| OperatorEstimate {
             k_e: Estimate::with_variance(k_e, 0.01),
             t_l_s: Estimate::fixed(k_e_dot / k_e),

@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn chance_is_chance_and_another_response_is_seen() {
+    fn missed_response_is_found_without_false_alarms() {
         // Of 30 people of the right form, 1.5 are expected to have a p-value below .05 by chance, with a standard
         // deviation of 1.2.
         let clean: Vec<f64> = (0..30).map(|i| found(&run(i)).p_value).collect();
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn too_little_says_nothing() {
+    fn short_records_and_other_methods_give_no_result() {
         let record = run(0).span(0.0, 25.0).unwrap();
         let trace = track(&record, &TrackOptions::default_for(Method::adaptive(), 29), 50).unwrap();
         assert_eq!(trace.residual_response(&record), None);

@@ -345,7 +345,7 @@ mod tests {
 
     /// Before the first sample, gain and phase and their errors equal those of the fit.
     #[test]
-    fn the_estimate_begins_at_the_fit_with_its_errors() {
+    fn initial_estimate_matches_the_fit_and_its_errors() {
         for (form, x, near) in [
             (Form::Lead, vec![2.0, 0.4, 2.3, -1.2, 0.18], 0.001),
             (Form::LeadLag, vec![1.4, 0.5, 0.25, 2.4, -1.4, 0.153], 0.01),
@@ -385,7 +385,7 @@ mod tests {
     }
 
     #[test]
-    fn a_form_that_has_no_place_is_refused() {
+    fn unsupported_starting_fits_are_refused() {
         let none = fitted(Form::LeadDroop, &[1.4, 0.9, 6.0, 2.4, -1.4, 0.2]);
         let refused = tracker(none).err().map(|e| e.to_string());
         assert!(refused.is_none_or(|words| words.contains("--form")));
@@ -407,7 +407,7 @@ mod tests {
     }
 
     #[test]
-    fn the_remnant_of_a_fit_is_summed() {
+    fn remnant_autocovariances_of_a_fit_are_summed() {
         // For an autoregression of order 1 with the pole .8, `r_k = .8^k/(1 - .64)`.
         let fit = FittedOperator {
             noise: (Vec::new(), vec![-0.8]),
@@ -425,7 +425,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_named_moves_the_basis_and_the_rest_stays_usual() {
+    fn named_prior_values_replace_the_defaults() {
         let named = Method::adaptive()
             .with("prior", "omega_nm=9:0.2,tau_e=0.25:0.1")
             .unwrap();
