@@ -168,7 +168,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn drawn_many_at_a_time_the_numbers_are_the_same() {
+    fn buffered_generator_gives_the_same_numbers() {
         let mut alone = ChaCha8Rng::from_seed([7; 32]);
         let mut buffered = Buffered::new(ChaCha8Rng::from_seed([7; 32]));
         for round in 0..4000 {
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn deviates_are_those_of_the_library() {
+    fn deviates_match_the_library() {
         let edges = edges();
         assert!(edges.windows(2).all(|pair| pair[0] > pair[1]), "{edges:?}");
         // Many thousands of the deviates are not accepted directly, and some hundreds are in the tail.

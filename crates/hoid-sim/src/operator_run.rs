@@ -146,7 +146,7 @@ mod tests {
     /// For the error of a run from its run-in on, the control of the operator is bit-identical to the control of the
     /// run, for every order of the remnant and through a change of the task.
     #[test]
-    fn the_operator_of_a_run_gives_its_control() {
+    fn operator_run_reproduces_the_control_of_the_simulator() {
         for (condition, order) in [
             (Condition::C1, 1),
             (Condition::C4, 2),
@@ -177,7 +177,7 @@ mod tests {
 
     /// A saved operator continues in another operator, also after the end of its scenario.
     #[test]
-    fn a_saved_operator_goes_on_with_the_same_digits() {
+    fn restored_operator_continues_bit_identically() {
         let mut scenario = Scenario::condition(Condition::C4);
         scenario.measurement_s = 1.0;
         let new = || OperatorRun::new(Simulator::new(&scenario).unwrap(), RunSeed::default(), 0.0);
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn behind_its_end_a_scenario_goes_on() {
+    fn scenario_continues_after_its_end() {
         let mut scenario = Scenario::condition(Condition::C4);
         let long = Simulator::new(&scenario).unwrap();
         scenario.measurement_s = 1.0;
