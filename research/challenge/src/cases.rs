@@ -404,7 +404,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_their_own_and_changes_lie_within() {
+    fn case_names_are_unique_and_changes_lie_within_the_run() {
         let all = cases();
         for (i, case) in all.iter().enumerate() {
             assert!(all[..i].iter().all(|other| other.name != case.name), "{}", case.name);

@@ -205,7 +205,7 @@ mod tests {
     use crate::cases;
 
     #[test]
-    fn somebody_bears_every_case_and_nobody_twice() {
+    fn every_case_has_a_person_and_seeds_differ() {
         for case in cases() {
             let ts = SampleTime::new(1.0 / case.rate_hz).unwrap();
             let of = |seeds, number| {
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_share_the_work() {
+    fn portions_divide_the_work() {
         let parts: Vec<Portion> = ["1/3", "2/3", "3/3"].map(|t| t.parse().unwrap()).into();
         for i in 0..20 {
             assert_eq!(parts.iter().filter(|part| part.holds(i)).count(), 1);

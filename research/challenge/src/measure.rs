@@ -326,7 +326,7 @@ mod tests {
     use crate::entrant::Alarm;
 
     #[test]
-    fn what_is_asked_lies_between_changes() {
+    fn requested_times_lie_between_changes() {
         let all = asked(&[45.0], 30.0, 90.0, false);
         let labels: Vec<&str> = all.iter().map(|(l, _)| l.as_str()).collect();
         assert_eq!(labels, ["before", "+2", "+4", "+8", "+13", "+18", "+28"]);
@@ -351,7 +351,7 @@ mod tests {
 
     /// The true response has no error, and an alarm at the true time finds the change.
     #[test]
-    fn the_truth_has_no_error_and_silence_has_the_error_one() {
+    fn true_response_has_error_zero_and_no_response_error_one() {
         let case = super::super::cases()
             .into_iter()
             .find(|c| c.name == "change-K_e_dot-100")

@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn the_response_is_that_of_the_transfer_function() {
+    fn response_matches_the_transfer_function() {
         let operator = typical();
         let open_loop = operator.open_loop(Plant::Lagged).unwrap();
         for omega in [0.1, 1.0, 5.0, 20.0] {
@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stepped_system_answers_a_sine_with_its_response() {
+    fn integrated_sine_response_matches_the_frequency_response() {
         let operator = Operator {
             tau_e_s: 0.0,
             ..typical()
@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_of_one_parameter_leaves_the_others() {
+    fn change_of_one_parameter_keeps_the_others() {
         let lead = Operator {
             lag_s: 0.0,
             third_s: 0.0,

@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn a_large_change_is_certain_a_small_one_is_not() {
+    fn only_a_large_change_is_certain() {
         let (large, small) = (found("change-K_e_dot-100", 8.0), found("change-zeta-10", 8.0));
         assert!(large > CERTAIN && small < CERTAIN && large > small, "{large} {small}");
     }
@@ -133,7 +133,7 @@ mod tests {
     /// The mean of the log ratio is the divergence: half the power of the whitened difference divided by the variance.
     /// Its standard deviation over runs is the square root of twice the divergence.
     #[test]
-    fn the_evidence_of_a_normal_remnant_is_half_the_power_of_the_difference() {
+    fn evidence_for_a_gaussian_remnant_matches_the_divergence() {
         let case = cases().into_iter().find(|case| case.name == "change-omega-30").unwrap();
         let (mut sum, mut expected) = (0.0, 0.0);
         for number in 0..6 {

@@ -309,7 +309,7 @@ mod tests {
     /// The control of the trial is the error, delayed by one sample and multiplied by a gain: the describing function
     /// is this gain, and the sample is the shift of the recorder.
     #[test]
-    fn the_describing_function_of_a_gain_is_the_gain() {
+    fn describing_function_of_a_gain_is_the_gain() {
         let n = 2702;
         let sines = |k: usize, shift: f64| -> f64 {
             let t = (k as f64 - shift) / RATE_HZ;

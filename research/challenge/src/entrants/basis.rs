@@ -330,7 +330,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_inverse_is_one() {
+    fn inverse_times_matrix_is_the_identity() {
         let a: Square = std::array::from_fn(|i| {
             std::array::from_fn(|j| 10f64.powi((i + j) as i32) * if i == j { 2.0 } else { 0.5 })
         });

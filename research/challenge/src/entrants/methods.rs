@@ -160,7 +160,7 @@ mod tests {
 
     /// Processing sample by sample gives the same result as processing a record.
     #[test]
-    fn both_ways_say_the_same() {
+    fn samplewise_and_batch_processing_agree() {
         let task = task("change-K_e_dot-100");
         for method in [
             Method::rls(),
@@ -182,7 +182,7 @@ mod tests {
     /// In a loop with a small margin the error is nearly a sine, and drifting gains fit its phase as well as any delay
     /// does: a method whose gains drift from the start converges far from the operator.
     #[test]
-    fn a_loop_of_small_margin_leads_nobody_astray() {
+    fn adaptive_converges_in_a_loop_with_a_small_margin() {
         let case = cases().into_iter().find(|case| case.name == "change-omega-30").unwrap();
         let of = RunOf {
             seeds: Seeds::Open,
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_samples_are_no_end() {
+    fn estimates_continue_after_missing_samples() {
         let task = task("none-missing");
         let answer = OfMethod(hoid_survey::physical()).follow(&task).unwrap();
         assert_eq!(answer.estimates.len(), task.asked_s.len());
