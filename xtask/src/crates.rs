@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn expressions_of_licences() {
+    fn licence_expressions_are_evaluated() {
         for (expression, expected) in [
             ("MIT", Some(true)),
             ("MIT/Apache-2.0", Some(true)),
@@ -310,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn banned_crates_and_their_families() {
+    fn banned_crates_and_their_families_are_found() {
         for name in ["openssl-sys", "openssl", "arrow", "arrow-array", "lazy_static"] {
             assert!(ban_of(&package(name, "1.0.0", None)).is_some(), "{name}");
         }
@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn a_second_version_needs_a_statement() {
+    fn second_version_must_be_declared() {
         let two = [package("a", "1.0.0", None), package("a", "2.0.0", None)];
         let said = several(&two);
         assert!(

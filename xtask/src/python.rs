@@ -244,7 +244,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_requirements_of_an_extra_are_found() {
+    fn requirements_of_an_extra_are_found() {
         let project = "[project]\ntest = [\"no\"]\n\n[project.optional-dependencies]\nlsl = [\"pylsl\"]\n\
                        test = [\n    \"pytest\",\n    \"matplotlib>=3.7\",\n    \"dask[distributed]\",\n    \"pyxdf\",\n]\n\
                        last = [\"other\"]\n";

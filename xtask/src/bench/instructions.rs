@@ -132,7 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_are_read_and_compared() {
+    fn instruction_counts_are_parsed_and_compared() {
         assert_eq!(
             collected("==7== Events    : Ir\n==7== Collected : 4711\n==7=="),
             Some(4711)

@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn ratios_limits_and_answers_stand_in_the_table() {
+    fn table_contains_ratios_limits_and_answers() {
         let skipped = Line {
             task: "bj".to_owned(),
             peer: "z".to_owned(),
