@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_known_badly_is_drawn_to_all() {
+    fn imprecise_estimates_are_shrunk_to_the_mean() {
         let found = of(&[(0.0, 0.01), (0.2, 0.01), (0.4, 0.01), (1.5, 1.0)]);
         let shrinkage: Vec<f64> = found.people.iter().map(|p| p.shrinkage).collect();
         assert!(shrinkage[3] > 0.9 && shrinkage[0] < 0.4, "{shrinkage:?}");
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn pooled_people_are_nearer_to_the_truth_and_their_errors_hold() {
+    fn pooling_reduces_errors_and_intervals_have_nominal_coverage() {
         let (mut own, mut all, mut held, mut count) = (0.0, 0.0, 0, 0);
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn the_prior_is_taken_out_before() {
+    fn prior_is_removed_before_pooling() {
         let parameter = |value: f64, share: f64| Parameter {
             name: "tau_e".to_owned(),
             unit: "s",
@@ -343,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn a_population_is_a_prior() {
+    fn population_can_be_used_as_a_prior() {
         let own: Vec<(&str, Option<Observation>)> = [("A", -1.6, 0.01), ("B", -1.4, 0.02), ("C", -1.5, 0.01)]
             .iter()
             .map(|(who, value, variance)| {

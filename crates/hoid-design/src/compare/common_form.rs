@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn the_form_is_that_of_the_least_sum_and_the_simplest_near_it() {
+    fn common_form_is_the_simplest_near_the_smallest_sum() {
         use Form::{Gain, Lead, LeadLag};
         let one = person(&[(Gain, 0.0, 0.8), (Lead, 2.0, 0.2), (LeadLag, 2.5, 0.1)]);
         let two = person(&[(Gain, 30.0, 0.0), (Lead, 0.0, 0.6), (LeadLag, 1.0, 0.4)]);
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn a_form_that_most_leave_open_is_not_common() {
+    fn form_undetermined_for_most_people_is_not_common() {
         use Form::{Lead, LeadLag};
         let open = person(&[(Lead, 5.0, 1.0), (LeadLag, 0.0, 0.0)]);
         let closed = person(&[(Lead, 5.0, 0.1), (LeadLag, 0.0, 0.9)]);

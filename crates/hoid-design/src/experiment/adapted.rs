@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn the_loop_falls_by_twenty_decibels_a_decade() {
+    fn typical_loop_falls_by_20_db_per_decade() {
         for (element, form) in [
             ("4", Form::Lag),
             ("4/s", Form::Gain),
@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn people_differ_by_one_spread() {
+    fn people_differ_from_the_typical_one_by_one_spread() {
         let (typical, others) = population(&"4/s".parse().unwrap(), None).unwrap();
         assert_eq!(others.len(), 6);
         let slow = others.iter().find(|p| p.name == "tau_e = 0.40").unwrap();

@@ -301,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn more_runs_take_fewer_people_down_to_those_between() {
+    fn more_runs_need_fewer_people() {
         let plan = plan("crossover=0.3", None).unwrap();
         let people: Vec<usize> = plan.rows.iter().map(|row| row.people.unwrap()).collect();
         assert!(people.windows(2).all(|two| two[1] <= two[0]), "{people:?}");
@@ -331,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn simulated_experiments_find_it_as_often() {
+    fn simulated_experiments_confirm_the_power() {
         let plan = plan("crossover=8%", Some(2)).unwrap();
         let row = plan.answer().unwrap();
         let people = row.people.unwrap();

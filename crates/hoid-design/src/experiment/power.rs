@@ -90,7 +90,7 @@ mod tests {
     const REFERENCE_TABLE: &str = include_str!("../../../../fixtures/power/power.csv");
 
     #[test]
-    fn twin_of_scipy_and_statsmodels() {
+    fn power_matches_scipy_and_statsmodels() {
         let mut worst = [0.0_f64; 2];
         for row in REFERENCE_TABLE.lines().skip(1) {
             let (kind, numbers) = row.split_once(',').unwrap();
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn people_are_the_least_that_suffice() {
+    fn smallest_sufficient_number_of_people_is_found() {
         for (effect, wanted) in [(0.5, 0.8), (1.0, 0.8), (0.2, 0.9), (3.0, 0.8)] {
             let people = people_needed(effect, wanted, 0.05).unwrap();
             assert!(power(effect, people, 0.05).unwrap() >= wanted);
