@@ -26,7 +26,7 @@ const NOISE: f64 = 0.3;
 /// Time constant of the noise, s.
 const NOISE_S: f64 = 0.1;
 /// Difference of `n ln V` above which the search has ended in another minimum.
-const ANOTHER: f64 = 50.0;
+const OTHER_MINIMUM_DIFFERENCE: f64 = 50.0;
 
 fn operator(form: Form, random: &mut Uniform) -> FamilyOperator {
     let of = |coordinate: &Coordinate| match coordinate {
@@ -100,7 +100,7 @@ fn searches_reach_the_global_minimum() {
         let least = priors.map(|prior| ended(&record, form, prior(), near));
         let found = priors.map(|prior| ended(&record, form, prior(), (0.0, 0.8)));
         let least = least.into_iter().chain(found).fold(f64::INFINITY, f64::min);
-        found.map(|found| u64::from(found > least + ANOTHER))
+        found.map(|found| u64::from(found > least + OTHER_MINIMUM_DIFFERENCE))
     };
     let missed: Vec<[u64; 2]> = (0..OPERATORS).into_par_iter().map(missed).collect();
     let [without, with] = [0, 1].map(|i| missed.iter().map(|m| m[i]).sum::<u64>());

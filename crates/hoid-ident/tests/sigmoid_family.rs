@@ -19,7 +19,7 @@ const G: f64 = 2.0;
 /// K/T_I and T_L of a lead-lag operator before and after the change.
 const ENDS: [[f64; 2]; 2] = [[4.0, 0.3], [2.0, 1.0]];
 /// T_I, omega_nm, zeta_nm and tau_e, which is nine samples of 1/60 s.
-const STILL: [f64; 4] = [5.0, 12.0, 0.4, 0.15];
+const CONSTANT_PARAMETERS: [f64; 4] = [5.0, 12.0, 0.4, 0.15];
 
 fn element(text: &str) -> ContinuousTransferFunction {
     text.parse().unwrap()
@@ -29,7 +29,7 @@ fn element(text: &str) -> ContinuousTransferFunction {
 /// lead controls a gain.
 fn scenario(form: Form, share: f64) -> FamilyScenario {
     let state = |[gain, lead]: [f64; 2]| {
-        let [t_i, omega, zeta, tau] = STILL;
+        let [t_i, omega, zeta, tau] = CONSTANT_PARAMETERS;
         let mut x = vec![gain];
         if form != Form::Lag {
             x.push(lead);
@@ -88,10 +88,10 @@ fn truth() -> Vec<(&'static str, f64)> {
         ("T_L2", ENDS[1][1]),
         ("t_M", T_M),
         ("G", G),
-        ("T_I", STILL[0]),
-        ("omega_nm", STILL[1]),
-        ("zeta_nm", STILL[2]),
-        ("tau_e", STILL[3]),
+        ("T_I", CONSTANT_PARAMETERS[0]),
+        ("omega_nm", CONSTANT_PARAMETERS[1]),
+        ("zeta_nm", CONSTANT_PARAMETERS[2]),
+        ("tau_e", CONSTANT_PARAMETERS[3]),
     ]
 }
 
@@ -124,7 +124,7 @@ fn squared_lead_is_recovered() {
     // With a direct part: the squared lead has as many zeros as there are poles.
     let mut with = scenario(Form::Lag, 0.0);
     for (state, [gain, lead]) in [(&mut with.initial, [0.9, 0.1]), (&mut with.last, [0.5, 0.2])] {
-        let [_, omega, zeta, tau] = STILL;
+        let [_, omega, zeta, tau] = CONSTANT_PARAMETERS;
         let x = [gain, lead, omega.ln(), zeta.ln(), tau];
         state.operator = FamilyOperator::new(Form::Lead2, true, &x).unwrap();
         state.controlled_element = element("1/s");

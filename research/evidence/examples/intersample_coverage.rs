@@ -105,7 +105,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 fit.lead_s = lead_s;
                 let of = fit.operator(0);
                 let tau = of.parameters.iter().find(|p| p.name == "tau_e").ok_or("no delay")?;
-                let later = fit.delay_if_straight_s(0).map_or(0.0, |straight| straight - tau.value);
+                let later = fit.delay_if_linear_s(0).map_or(0.0, |straight| straight - tau.value);
                 let Some((low, high)) = tau.interval else {
                     none += 1;
                     continue;

@@ -6,7 +6,7 @@
 //! Multimodel Inference*, 2002, section 2.6). The common form is the simplest form within 2 of the smallest sum. A form
 //! that the data of most people leave open is not considered, because its parameters would not be determined.
 
-use hoid_ident::family::{LEAST_WEIGHT, NO_EVIDENCE};
+use hoid_ident::family::{MIN_WEIGHT, NO_EVIDENCE};
 use hoid_model::{Finding, Form};
 use hoid_study::group::FormEvidence;
 
@@ -23,7 +23,7 @@ pub struct CommonForm {
 
 /// True if the data leave the form open: its weight is zero, although its criterion is close to the smallest one.
 fn is_undetermined(of: &FormEvidence) -> bool {
-    of.weight == 0.0 && of.criterion < -2.0 * LEAST_WEIGHT.ln()
+    of.weight == 0.0 && of.criterion < -2.0 * MIN_WEIGHT.ln()
 }
 
 /// Returns the simplest form within 2 of the smallest sum of criteria; `None` if no form has a criterion for all people

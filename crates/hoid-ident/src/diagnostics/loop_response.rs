@@ -24,7 +24,7 @@ pub struct LoopResponse {
 
 /// Tests whether e responds to u in the samples from `from` on. `None` if there are too few data, a value is not a
 /// number or a signal is constant.
-pub fn answer(e: &[f64], u: &[f64], from: usize, sample_time_s: f64) -> Option<LoopResponse> {
+pub fn loop_response(e: &[f64], u: &[f64], from: usize, sample_time_s: f64) -> Option<LoopResponse> {
     let thin = thinning(sample_time_s);
     let latest = (LATEST_S / (thin as f64 * sample_time_s)).round().max(1.0) as usize;
     let longest = latest + NOISE;
@@ -92,7 +92,10 @@ mod tests {
     fn e_responds_only_to_u_of_its_own_loop() {
         for seed in 0..10 {
             let ([e, u], [_, other]) = (loop_of(seed), loop_of(100 + seed));
-            let (own, other) = (answer(&e, &u, 0, 0.02).unwrap(), answer(&e, &other, 0, 0.02).unwrap());
+            let (own, other) = (
+                loop_response(&e, &u, 0, 0.02).unwrap(),
+                loop_response(&e, &other, 0, 0.02).unwrap(),
+            );
             assert!(own.share > 0.2 && own.p_value < 1e-6, "{own:?}");
             assert!(other.share < 0.05, "{other:?}");
         }
@@ -101,7 +104,7 @@ mod tests {
     #[test]
     fn short_records_and_zero_output_give_no_result() {
         let [e, u] = loop_of(1);
-        assert_eq!(answer(&e[..300], &u[..300], 0, 0.02), None);
-        assert_eq!(answer(&e, &vec![0.0; u.len()], 0, 0.02), None);
+        assert_eq!(loop_response(&e[..300], &u[..300], 0, 0.02), None);
+        assert_eq!(loop_response(&e, &vec![0.0; u.len()], 0, 0.02), None);
     }
 }

@@ -29,7 +29,7 @@ pub(crate) const TAPS: usize = 6;
 pub(crate) const TAP_S: f64 = 0.15;
 /// Length of a block in s, and minimum number of blocks for the test.
 const BLOCK_S: f64 = 2.0;
-const FEWEST: usize = 10;
+const MIN_BLOCKS: usize = 10;
 
 /// Result of the test for a missing response.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,7 +58,7 @@ pub fn residual_response(
     let rows: Vec<usize> = (first..u.len()).step_by(thin).collect();
     let block = (BLOCK_S / every_s).round() as usize;
     let blocks = rows.len().saturating_sub(NOISE) / block.max(1);
-    if blocks < FEWEST || columns.iter().any(|c| c.len() != u.len()) || e.len() != u.len() {
+    if blocks < MIN_BLOCKS || columns.iter().any(|c| c.len() != u.len()) || e.len() != u.len() {
         return None;
     }
     let n = rows.len();

@@ -49,7 +49,7 @@ use crate::{
 };
 
 /// Maximum number of steps for given instruments.
-const STEPS: usize = 25;
+const MAX_STEPS: usize = 25;
 /// Length of a step, in standard errors, below which the iteration ends.
 const CONVERGED: f64 = 0.01;
 /// Maximum number of halvings of a step.
@@ -284,7 +284,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
             let covariance = self.covariance(&x, &a, &held.products, variance);
             let (free, step) = self.step(&x, &a, &g).ok_or(IdentError::NoFiniteLoss)?;
             let moved = length(&step, &metric, variance);
-            if moved <= CONVERGED || steps == STEPS {
+            if moved <= CONVERGED || steps == MAX_STEPS {
                 let found = moved <= CONVERGED;
                 return Ok(Zero {
                     x,
@@ -480,7 +480,7 @@ mod tests {
             sample_time: SampleTime::SIXTIETH,
             intersample: Intersample::Auto,
             course_is_known: false,
-            other_course: Vec::new(),
+            other_intersample: Vec::new(),
             little_noise: None,
             initial: estimator.initial_state,
             first: first.unwrap(),
@@ -503,7 +503,7 @@ mod tests {
             order: NOISE_ORDER,
         };
         let minimum = fit.layout().coordinates_of(fit.eta(), 0);
-        let d = fit.eta()[fit.layout().noise_begins()..].to_vec();
+        let d = fit.eta()[fit.layout().noise_offset()..].to_vec();
         let (_, z) = method.equation(&minimum, &d, &mut workspace).unwrap();
         let products = z.iter().flat_map(|a| z.iter().map(move |b| dot(a, b))).collect();
         let of_held = method.instruments_of(&minimum, &mut workspace).unwrap();

@@ -139,7 +139,7 @@ impl FamilyLayout {
     }
 
     /// Returns the index in eta of the first coefficient of the noise model.
-    pub fn noise_begins(&self) -> usize {
+    pub fn noise_offset(&self) -> usize {
         self.elements.len() + self.channels.iter().map(|channel| channel.limits.len()).sum::<usize>()
     }
 
@@ -214,7 +214,7 @@ impl Parametrisation for FamilyLayout {
         self.sample_time
     }
 
-    fn first_sample_begins(&self) -> f64 {
+    fn first_interval_start(&self) -> f64 {
         if self.intersample == Intersample::Auto {
             -0.5
         } else {
@@ -234,7 +234,7 @@ impl Parametrisation for FamilyLayout {
     }
 
     fn stable_blocks(&self) -> Vec<Range<usize>> {
-        let first = self.noise_begins();
+        let first = self.noise_offset();
         Vec::from_iter((self.nc > 0).then_some(first..first + self.nc))
     }
 
@@ -256,7 +256,7 @@ impl Parametrisation for FamilyLayout {
         let found = self
             .intersample
             .discrete(&operator, held.of(self.delay_of(record)), self.sample_time)?;
-        let noise = &eta[self.noise_begins()..];
+        let noise = &eta[self.noise_offset()..];
         let orders = self.orders(found.nk);
         let mut theta = found.b.clone();
         theta.extend_from_slice(noise);

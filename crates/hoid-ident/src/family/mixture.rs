@@ -21,7 +21,7 @@ use super::clusters::{freedom, quantile};
 const HALVINGS: usize = 80;
 /// Distance from the intervals, in widths of their union, beyond which Student's distribution leaves less than a
 /// hundredth of [`TAIL`].
-const FAR: f64 = 50.0;
+const TAIL_DISTANCE: f64 = 50.0;
 /// Probability in each tail outside the interval.
 const TAIL: f64 = 0.025;
 
@@ -80,7 +80,7 @@ type Part = (f64, f64, (f64, f64));
 
 /// Returns the 95 % interval of the mixture; `None` if a form has no interval.
 fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f64, f64)> {
-    let student = StudentsT::new(0.0, 1.0, freedom(clusters)).ok()?;
+    let student = StudentsT::new(0.0, 1.0, degrees_of_freedom(clusters)).ok()?;
     let quantile = quantile(clusters);
     let parts: Option<Vec<Part>> = (components.iter())
         .map(|c| Some((c.weight / total, c.estimate.value, c.interval?)))
@@ -103,7 +103,7 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
     };
     let (least, most) = (finite(f64::min, f64::INFINITY), finite(f64::max, f64::NEG_INFINITY));
     // Far beyond the finite ends, only forms with an infinite end have any remaining probability.
-    let reach = FAR * (most - least).max(most.abs().max(least.abs()) * f64::EPSILON);
+    let reach = TAIL_DISTANCE * (most - least).max(most.abs().max(least.abs()) * f64::EPSILON);
     let place = |wanted: f64| {
         let (mut low, mut high) = (least - reach, most + reach);
         for _ in 0..HALVINGS {

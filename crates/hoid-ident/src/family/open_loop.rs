@@ -50,9 +50,9 @@ impl LoopMeasures {
         let [crossover_rad_s, phase_margin_deg] = both;
         Self {
             crossover_rad_s,
-            crossover_interval: reaching(crossover_rad_s, NORMAL),
+            crossover_interval: symmetric_interval(crossover_rad_s, NORMAL),
             phase_margin_deg,
-            phase_margin_interval: reaching(phase_margin_deg, NORMAL),
+            phase_margin_interval: symmetric_interval(phase_margin_deg, NORMAL),
             by_gain,
             of_person: both.map(|e| e.standard_error),
         }
@@ -62,8 +62,8 @@ impl LoopMeasures {
     /// number of clusters.
     pub(super) fn with_student_intervals(self, clusters: usize) -> Self {
         Self {
-            crossover_interval: reaching(self.crossover_rad_s, quantile(clusters)),
-            phase_margin_interval: reaching(self.phase_margin_deg, quantile(clusters)),
+            crossover_interval: symmetric_interval(self.crossover_rad_s, quantile(clusters)),
+            phase_margin_interval: symmetric_interval(self.phase_margin_deg, quantile(clusters)),
             ..self
         }
     }
@@ -132,7 +132,7 @@ impl LoopMeasures {
 }
 
 /// Returns the interval that extends `quantile` standard errors to each side of an estimate.
-fn reaching(of: Estimate, quantile: f64) -> Option<(f64, f64)> {
+fn symmetric_interval(of: Estimate, quantile: f64) -> Option<(f64, f64)> {
     let reach = quantile * of.standard_error?;
     Some((of.value - reach, of.value + reach))
 }

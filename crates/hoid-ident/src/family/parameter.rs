@@ -18,22 +18,22 @@ use hoid_model::{
 use super::mixture::{Component, Mixture, widened};
 
 /// Total weight of the forms with a parameter up to which the parameter counts as undetermined.
-const LEAST_WEIGHT: f64 = 0.5;
+const MIN_WEIGHT: f64 = 0.5;
 /// Name of the gain (at zero frequency in forms with a lag, in the band in other forms), and the total weight of the
 /// forms with the same meaning up to which it counts as undetermined.
 pub(super) const DC_GAIN: &str = "K";
-const LEAST_WEIGHT_OF_DC_GAIN: f64 = 0.95;
+const MIN_WEIGHT_OF_DC_GAIN: f64 = 0.95;
 /// Largest ratio of the posterior to the prior variance of a determined parameter.
 const LARGEST_PRIOR_SHARE: f64 = 0.5;
 /// Largest standard error of the logarithm of a determined parameter.
 const LARGEST_LOG_ERROR: f64 = 0.35;
 
 /// Returns the total weight of the forms with a parameter up to which the parameter counts as undetermined.
-pub(super) fn least_weight(name: &str) -> f64 {
+pub(super) fn min_weight(name: &str) -> f64 {
     if name == DC_GAIN {
-        LEAST_WEIGHT_OF_DC_GAIN
+        MIN_WEIGHT_OF_DC_GAIN
     } else {
-        LEAST_WEIGHT
+        MIN_WEIGHT
     }
 }
 
@@ -95,7 +95,7 @@ impl Parameter {
         if all.len() == 1 {
             let (_, weight, only) = all[0];
             return Some(Self {
-                determined: only.determined && weight > LEAST_WEIGHT,
+                determined: only.determined && weight > MIN_WEIGHT,
                 ..only.clone()
             });
         }
@@ -142,7 +142,7 @@ impl Parameter {
             interval,
             prior_share: share(&|p| p.prior_share),
             // The parameter is not determined if the forms without it are more likely than the forms with it.
-            determined: total > LEAST_WEIGHT && share(&|p| f64::from(p.determined)) > 0.5 && one_sign && known,
+            determined: total > MIN_WEIGHT && share(&|p| f64::from(p.determined)) > 0.5 && one_sign && known,
             averaged_over: each.iter().map(|(form, ..)| *form).collect(),
             ..front.clone()
         })

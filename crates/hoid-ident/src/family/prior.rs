@@ -44,7 +44,7 @@ pub struct OperatorPrior {
 }
 
 /// Coordinates whose parameters can have a prior.
-const KNOWN: [Coordinate; 5] = [
+const COORDINATES_WITH_PRIOR: [Coordinate; 5] = [
     Coordinate::LogOmega,
     Coordinate::LogZeta,
     Coordinate::Delay,
@@ -54,7 +54,7 @@ const KNOWN: [Coordinate; 5] = [
 
 /// Returns the coordinate of a parameter; `None` if the parameter cannot have a prior.
 fn coordinate_of(parameter: &str) -> Option<Coordinate> {
-    KNOWN.into_iter().find(|c| c.parameter() == parameter)
+    COORDINATES_WITH_PRIOR.into_iter().find(|c| c.parameter() == parameter)
 }
 
 /// Source of the population prior.
@@ -100,7 +100,7 @@ impl OperatorPrior {
                 })
             };
             if coordinate_of(&entry.parameter).is_none() {
-                let names = KNOWN.map(Coordinate::parameter).join(", ");
+                let names = COORDINATES_WITH_PRIOR.map(Coordinate::parameter).join(", ");
                 return refuse(entry.parameter.clone(), &format!("one of {names}"));
             }
             if entries[..i].iter().any(|other| other.parameter == entry.parameter) {

@@ -15,12 +15,12 @@ use hoid_model::{Detrend, Record};
 /// Period above which a component is slow for a person, s.
 pub const PERIOD_S: f64 = 20.0;
 /// Largest number of cosines that are removed; it limits the computing time for long records.
-const MOST: usize = 64;
+const MAX_COSINES: usize = 64;
 
 /// Returns the records without components slower than `period_s`; `None` if all records are too short for such
 /// components.
 pub fn without_slow(records: &[Record], period_s: f64) -> Option<Vec<Record>> {
-    let count = |r: &Record| ((2.0 * r.len() as f64 * r.sample_time().s() / period_s) as usize).min(MOST);
+    let count = |r: &Record| ((2.0 * r.len() as f64 * r.sample_time().s() / period_s) as usize).min(MAX_COSINES);
     records.iter().any(|r| count(r) > 0).then(|| {
         let each = records.iter().map(|record| {
             let flat = record.clone().detrended(Detrend::Linear);

@@ -95,9 +95,9 @@ fn spike_of_the_error_is_found_and_bridged() {
         assert!((found.segments[0].input()[place] - clean.input()[place]).abs() < 0.05);
         assert_eq!(found.findings[0].severity, Severity::Note);
         // The faults are reported and not repaired.
-        let told = repair(&record, FaultHandling::Report).unwrap();
-        assert_eq!(told.segments[0].input(), record.input());
-        assert_eq!(told.findings[0].severity, Severity::Doubt);
+        let reported = repair(&record, FaultHandling::Report).unwrap();
+        assert_eq!(reported.segments[0].input(), record.input());
+        assert_eq!(reported.findings[0].severity, Severity::Doubt);
         assert!(repair(&record, FaultHandling::Keep).unwrap().faults.is_empty());
         let cut = repair(&record, FaultHandling::Cut).unwrap();
         assert_eq!((cut.segments.len(), cut.faults[0].action), (2, FaultAction::Cut));

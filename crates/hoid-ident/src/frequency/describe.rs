@@ -14,7 +14,7 @@ use crate::{IdentError, informative_data::common_sample_time};
 
 /// Amplitude of a line, relative to the root sum of squares of all coefficients of its channel, up to which it is only
 /// rounding.
-const LEAST_LINE: f64 = 1e-12;
+const MIN_LINE_AMPLITUDE: f64 = 1e-12;
 
 /// Number of bins at non-excited frequencies from which the remnant at a line is estimated.
 const NEIGHBOURS: usize = 8;
@@ -298,7 +298,7 @@ impl Run {
             let whole: f64 = x.iter().map(|c| c.norm_sqr()).sum();
             for (n, omega_rad_s) in excitation.harmonics().iter().zip(excitation.omega_rad_s()) {
                 let size = x[n * self.window.periods].norm();
-                if size.is_nan() || size <= LEAST_LINE * whole.sqrt() {
+                if size.is_nan() || size <= MIN_LINE_AMPLITUDE * whole.sqrt() {
                     return Err(IdentError::NoLinePower {
                         channel: name.to_owned(),
                         label: self.label.clone(),

@@ -260,7 +260,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
     /// loss decreases.
     fn search_by_samples(&self, minimum: Minimum, options: &SearchOptions, workspace: &mut Workspace) -> Minimum {
         let (delays, ts) = (self.layout.delays(), self.layout.sample_time().s());
-        let begin = self.layout.first_sample_begins();
+        let begin = self.layout.first_interval_start();
         let place = |delay_s: f64| delay_s / ts - begin;
         let border = |n: usize| (n as f64 + begin) * ts;
         let mut samples: Vec<usize> = delays

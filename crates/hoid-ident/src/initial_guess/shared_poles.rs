@@ -32,7 +32,7 @@ const STEPS: usize = 8;
 const MAX_GROUPS: usize = 6;
 
 /// True if the model has A together with other polynomials that could contain its poles.
-pub(crate) fn concerns(o: &Orders) -> bool {
+pub(crate) fn may_share_poles(o: &Orders) -> bool {
     o.na > 0 && o.nb > 0 && o.nc + o.nd + o.nf > 0
 }
 

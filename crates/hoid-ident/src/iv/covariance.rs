@@ -14,13 +14,13 @@ use super::columns::{Columns, cut};
 use crate::{linalg::least_squares::dot, noise_model::noise_model};
 
 /// Largest order of the autoregression that describes the spectrum of a residual.
-const LONGEST: usize = 30;
+const MAX_ORDER: usize = 30;
 
 /// Fits a long autoregression `D r = eps` to a residual and returns D and the variance of eps.
 fn coloured_noise(residual: &[Vec<f64>], parameters: usize) -> (Vec<f64>, f64) {
     let n: usize = residual.iter().map(Vec::len).sum();
     let shortest = residual.iter().map(Vec::len).min().unwrap_or(0);
-    let order = LONGEST.min(shortest / 10);
+    let order = MAX_ORDER.min(shortest / 10);
     let (_, d) = noise_model(residual, 0, order);
     let d = reflected_inside(&d).unwrap_or_default();
     let mut total = 0.0;
@@ -58,7 +58,7 @@ pub(super) fn covariance(
                 return column.clone();
             }
             let rows: Vec<usize> = residual.iter().map(Vec::len).collect();
-            let mut backwards = cut(column, &rows);
+            let mut backwards = split_by_record(column, &rows);
             for part in &mut backwards {
                 part.reverse();
                 divide_in_place(&d, part);

@@ -103,7 +103,7 @@ pub(super) fn noise_free<'a>(external: &[&[f64]], data: &[Data<'a>]) -> Vec<Sour
             let weights = weights_of_others(&basis, &whole, &target, block.clone()).unwrap_or_else(|| whole.clone());
             let sum = combination(&basis, &weights, samples);
             Source {
-                inputs: cut(&sum, &lengths).into_iter().map(Cow::Owned).collect(),
+                inputs: split_by_record(&sum, &lengths).into_iter().map(Cow::Owned).collect(),
                 samples: block,
             }
         })
@@ -134,7 +134,7 @@ pub(super) fn following(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>>
     let target = targets.concat();
     let basis = best_basis(driving, targets);
     let weights: Vec<f64> = basis.iter().map(|q| dot(q, &target)).collect();
-    cut(&combination(&basis, &weights, target.len()), &lengths)
+    split_by_record(&combination(&basis, &weights, target.len()), &lengths)
 }
 
 fn combination(basis: &[Vec<f64>], weights: &[f64], samples: usize) -> Vec<f64> {

@@ -10,7 +10,7 @@ use crate::IdentError;
 
 /// A combination of parameters counts as undetermined by the data if its eigenvalue of the information matrix (scaled
 /// to a unit diagonal) is below this limit. Rounding leaves about 1e-15 times the number of parameters.
-const SINGULAR: f64 = 1e-13;
+const MIN_EIGENVALUE: f64 = 1e-13;
 
 /// Returns the inverse of the information matrix by rows; `names` are the names of the parameters.
 ///
@@ -30,7 +30,7 @@ pub(crate) fn inverse_information(gram: &[f64], names: &[String]) -> Result<Vec<
     let scale: Vec<f64> = (0..p).map(|i| gram[i * p + i].sqrt()).collect();
     let scaled = DMatrix::from_fn(p, p, |i, j| gram[i * p + j] / (scale[i] * scale[j]));
     let eigen = SymmetricEigen::new(scaled);
-    if let Some(k) = (0..p).find(|&k| eigen.eigenvalues[k] < SINGULAR) {
+    if let Some(k) = (0..p).find(|&k| eigen.eigenvalues[k] < MIN_EIGENVALUE) {
         let direction = eigen.eigenvectors.column(k);
         let largest = direction.amax();
         let involved: Vec<&str> = (0..p)

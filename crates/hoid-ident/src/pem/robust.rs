@@ -3,7 +3,7 @@
 //! Huber's loss ([`Loss`](crate::Loss)) with the threshold k is minimised by iteratively reweighted least squares (P.
 //! J. Huber, *Robust Statistics*, 1981, section 7.8): the weights `w = min(1, k/|r|)` of a search are computed from the
 //! residuals r of the previous search, in units of the scale s. Each round lowers the loss. The scale is the median
-//! absolute residual of the previous round divided by 0.6745; it is kept constant after [`SCALES`] rounds, so the
+//! absolute residual of the previous round divided by 0.6745; it is kept constant after [`SCALE_ROUNDS`] rounds, so the
 //! rounds converge.
 //!
 //! A bounded loss bounds the weight of a residual but not the effect of a sample on the regressors. A single wrong
@@ -30,7 +30,7 @@ use crate::{
 };
 
 /// Number of rounds in which the scale is estimated; in later rounds it is constant.
-const SCALES: usize = 10;
+const SCALE_ROUNDS: usize = 10;
 
 /// Largest number of rounds of reweighting.
 const ROUNDS: usize = 50;
@@ -61,7 +61,7 @@ impl Reweighting {
     pub fn next(&mut self, residuals: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
         // If the scale is estimated in every round, it can alternate with the weights; with a fixed scale each round
         // decreases Huber's loss.
-        if self.round < SCALES {
+        if self.round < SCALE_ROUNDS {
             self.scale = median_absolute(residuals) / 0.674_489_750_196_081_7;
         }
         self.round += 1;

@@ -146,22 +146,22 @@ fn one_input_matches_the_single_input_estimator() {
 #[test]
 fn invalid_inputs_and_orders_are_refused() {
     let data = [record(200, 0.1, 1)];
-    let said = |how: SeveralInputs| how.fit(&data).unwrap_err().to_string();
+    let refusal = |how: SeveralInputs| how.fit(&data).unwrap_err().to_string();
     let twice = SeveralInputs {
         inputs: vec![box_jenkins().inputs[0].clone(); 2],
         ..box_jenkins()
     };
-    assert!(said(twice).contains("e twice"));
+    assert!(refusal(twice).contains("e twice"));
     let none = SeveralInputs {
         inputs: Vec::new(),
         ..box_jenkins()
     };
-    assert!(said(none).contains("at least one"));
+    assert!(refusal(none).contains("at least one"));
     let mut unknown = box_jenkins();
     unknown.inputs[1].0 = "q".to_owned();
-    assert!(said(unknown).contains("no channel q"));
+    assert!(refusal(unknown).contains("no channel q"));
     assert!(
-        said(SeveralInputs {
+        refusal(SeveralInputs {
             structure: Structure::Ar,
             ..box_jenkins()
         })
@@ -169,7 +169,7 @@ fn invalid_inputs_and_orders_are_refused() {
     );
     let mut late = box_jenkins();
     late.inputs[1].1.nk = 400;
-    let needs = said(late);
+    let needs = refusal(late);
     assert!(needs.contains("needs more than 401"), "{needs}");
     // Enough samples for the coefficients of one input, but too few for those of two inputs.
     let few = [record(14, 0.1, 1)];

@@ -8,7 +8,7 @@ use hoid_model::{
 
 use super::{
     instant::Instant,
-    layout::{Layout, MOST_VARYING},
+    layout::{Layout, MAX_VARYING},
 };
 
 /// A parameter with its name, unit and estimate.
@@ -72,7 +72,7 @@ pub(super) struct ThetaEstimate<'a> {
 impl ThetaEstimate<'_> {
     /// Returns the operator before (0) or after (1) the change.
     pub fn end(&self, end: usize) -> Result<ChangedOperator, ModelError> {
-        let mut values = [0.0; MOST_VARYING];
+        let mut values = [0.0; MAX_VARYING];
         for (i, value) in values.iter_mut().enumerate().take(self.layout.varying) {
             *value = self.theta[Layout::ends(i)[end]];
         }

@@ -31,7 +31,7 @@ pub const SIGMOID_NAMES: [(&str, &str); 9] = [
 ];
 
 /// Largest number of parameters of a numerator.
-pub(crate) const MOST_VARYING: usize = 3;
+pub(crate) const MAX_VARYING: usize = 3;
 
 /// Indices of the parameters in theta.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]

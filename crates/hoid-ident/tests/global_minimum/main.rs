@@ -21,11 +21,11 @@ use rayon::prelude::*;
 use systems::System;
 
 /// Largest relative loss above the reference at which the reference counts as reached.
-const REACHED: f64 = 1e-6;
+const MAX_EXCESS_LOSS: f64 = 1e-6;
 /// Modulus above which a root counts as being on the unit circle.
 const ON_CIRCLE: f64 = 1.0 - 1e-4;
 /// Distance below which two roots cancel each other.
-const CANCELS: f64 = 0.01;
+const CANCELLATION_DISTANCE: f64 = 0.01;
 
 /// Results of the starts of one system.
 struct Outcome {
@@ -71,18 +71,22 @@ impl Outcome {
 
     /// Returns the relative loss of the automatic starts above the reference; not positive if their loss is the
     /// smallest.
-    fn above(&self) -> f64 {
+    fn excess_loss(&self) -> f64 {
         let loss = |fit: &Option<Fit>| fit.as_ref().map_or(f64::INFINITY, Fit::loss);
         loss(&self.own) / loss(&self.lowest) - 1.0
     }
 
-    fn reached(&self) -> bool {
-        self.above() <= REACHED
+    fn is_reached(&self) -> bool {
+        self.excess_loss() <= MAX_EXCESS_LOSS
     }
 
     /// True if the reference is not an excluded case.
-    fn counts(&self) -> bool {
-        let reference = if self.above() <= 0.0 { &self.own } else { &self.lowest };
+    fn is_counted(&self) -> bool {
+        let reference = if self.excess_loss() <= 0.0 {
+            &self.own
+        } else {
+            &self.lowest
+        };
         reference.as_ref().is_some_and(is_regular)
     }
 }
@@ -98,7 +102,10 @@ fn is_regular(fit: &Fit) -> bool {
         roots(&monic(m.f())),
     );
     let inside = c.iter().chain(&f).all(|z| z.norm() < ON_CIRCLE);
-    let apart = |p: &[Complex64], q: &[Complex64]| p.iter().all(|z| q.iter().all(|w| (z - w).norm() > CANCELS));
+    let apart = |p: &[Complex64], q: &[Complex64]| {
+        p.iter()
+            .all(|z| q.iter().all(|w| (z - w).norm() > CANCELLATION_DISTANCE))
+    };
     fit.termination().reason != Reason::Border && inside && apart(&b, &f) && apart(&c, &d)
 }
 
@@ -111,10 +118,10 @@ fn study(numbers: std::ops::Range<u64>, restarts: usize) -> [usize; 4] {
         .map(|number| Outcome::of(number, restarts))
         .collect();
     let count = |counts: bool| {
-        let these = outcomes.iter().filter(|o| o.counts() == counts);
-        [these.clone().count(), these.filter(|o| o.reached()).count()]
+        let these = outcomes.iter().filter(|o| o.is_counted() == counts);
+        [these.clone().count(), these.filter(|o| o.is_reached()).count()]
     };
-    for o in outcomes.iter().filter(|o| !o.reached()) {
+    for o in outcomes.iter().filter(|o| !o.is_reached()) {
         let reason = |fit: &Option<Fit>| {
             fit.as_ref().map(|fit| {
                 (
@@ -124,11 +131,11 @@ fn study(numbers: std::ops::Range<u64>, restarts: usize) -> [usize; 4] {
                 )
             })
         };
-        let kind = if o.counts() { "missed" } else { "missed (apart)" };
+        let kind = if o.is_counted() { "missed" } else { "missed (apart)" };
         println!(
             "{kind} {} by {:.2e}: {:?} {:?}",
             o.number,
-            o.above(),
+            o.excess_loss(),
             reason(&o.own),
             reason(&o.lowest)
         );

@@ -1,7 +1,7 @@
 //! Findings about the operators of the rows of a trace: the share of rows that have an operator, the significance and
 //! sign of the gains, the lead, and the plausibility of poles and delay.
 
-use hoid_ident::diagnostics::{is_open, leads_backwards, neuromuscular_finding};
+use hoid_ident::diagnostics::{has_negative_lead, is_undetermined, neuromuscular_finding};
 use hoid_model::{
     Finding, NotConvertible, Severity,
     uncertainty::{Estimate, OperatorEstimate},
@@ -119,7 +119,7 @@ fn sign_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
 /// Finding about a negative lead: people have no negative lead, but gain and lead that approximate a lag can include
 /// one.
 fn lead_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
-    let negative = rows_with(&leads_backwards);
+    let negative = rows_with(&has_negative_lead);
     (negative > NEGATIVE_LEAD).then(|| {
         Finding::doubt(
             "negative-lead",
@@ -140,7 +140,7 @@ type ShareOfRows<'a> = dyn Fn(&dyn Fn(&OperatorEstimate) -> bool) -> f64 + 'a;
 /// one.
 fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Finding> {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
-    let both = rows_with(&|o| is_open(&o.k_e) && is_open(&o.k_e_dot));
+    let both = rows_with(&|o| is_undetermined(&o.k_e) && is_undetermined(&o.k_e_dot));
     if both > MOST {
         let why = if remembers { " for the memory in use" } else { "" };
         return Some(Finding::undetermined(
@@ -151,8 +151,8 @@ fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Findi
             ),
         ));
     }
-    let no_gain = rows_with(&|o| is_open(&o.k_e) && !is_open(&o.k_e_dot));
-    let no_lead = rows_with(&|o| is_open(&o.k_e_dot) && !is_open(&o.k_e));
+    let no_gain = rows_with(&|o| is_undetermined(&o.k_e) && !is_undetermined(&o.k_e_dot));
+    let no_lead = rows_with(&|o| is_undetermined(&o.k_e_dot) && !is_undetermined(&o.k_e));
     if no_gain > MOST {
         let remedy = if remembers { "; use a longer memory" } else { "" };
         return Some(Finding::doubt(
@@ -199,7 +199,7 @@ mod tests {
             (0.1, -0.3, false),
             (-1.0, -0.3, false),
         ] {
-            assert_eq!(leads_backwards(&operator(k_e, k_e_dot)), expected, "{k_e}, {k_e_dot}");
+            assert_eq!(has_negative_lead(&operator(k_e, k_e_dot)), expected, "{k_e}, {k_e_dot}");
         }
         let share = |negative: f64| move |_: &dyn Fn(&OperatorEstimate) -> bool| negative;
         assert!(lead_finding(&share(0.05)).is_none());

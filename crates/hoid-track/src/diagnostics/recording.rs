@@ -1,7 +1,7 @@
 //! Findings about a trace that follow from the recording: the actions of the guard, an idle head, and agreement of the
 //! last row with the last few seconds.
 
-use hoid_ident::diagnostics::{is_open, leads_backwards, operator_step};
+use hoid_ident::diagnostics::{has_negative_lead, is_undetermined, operator_step};
 use hoid_model::{Finding, Record};
 
 use crate::{
@@ -106,7 +106,7 @@ impl Trace {
         if self.options().further.is_some() {
             return None;
         }
-        if self.response_is_known && (is_open(&operator.k_e) || leads_backwards(&operator)) {
+        if self.response_is_known && (is_undetermined(&operator.k_e) || has_negative_lead(&operator)) {
             return None;
         }
         let end = self.times_s()[row] + self.sample_time().s();
@@ -152,7 +152,7 @@ impl Trace {
     /// Finding that neither gain is determined in the last row, regardless of earlier rows.
     pub(super) fn last_row_finding(&self) -> Option<Finding> {
         let operator = self.operator(self.len().checked_sub(1)?).ok()?;
-        let nothing = is_open(&operator.k_e) && is_open(&operator.k_e_dot) && !self.response_is_known;
+        let nothing = is_undetermined(&operator.k_e) && is_undetermined(&operator.k_e_dot) && !self.response_is_known;
         nothing.then(|| {
             Finding::doubt(
                 "last-row",

@@ -2,12 +2,12 @@
 //!
 //! The gains of the basis and the delay are fitted to each stretch between two declared changes and are tested for
 //! steps, drifts and slow oscillations, and all stretches together for a drift that they share: the method may declare
-//! a change somewhere within a long drift ([`hoid_ident::diagnostics::unsteady`]).
+//! a change somewhere within a long drift ([`hoid_ident::diagnostics::response_changes`]).
 
 use std::ops::Range;
 
 use hoid_core::adaptive::{GAINS, STATES};
-use hoid_ident::diagnostics::{Course, LoopResponse, ResponseBasis, Unsteady, answer, unsteady};
+use hoid_ident::diagnostics::{Course, LoopResponse, ResponseBasis, ResponseChange, loop_response, response_changes};
 use hoid_model::{Finding, Record};
 
 use super::structure::columns;
@@ -18,7 +18,7 @@ use crate::trace::Trace;
 /// a step: of simulated people who do not change, about 1 % are below each of these limits.
 const UNLIKELY_STEP: f64 = 0.03;
 const UNLIKELY_DRIFT: f64 = 0.01;
-const UNLIKELY_SWAY: f64 = 0.05;
+const UNLIKELY_OSCILLATION: f64 = 0.05;
 /// Lag of a second basis, s, for people with a long lag, who respond like an integrator. The basis that explains u
 /// better is used.
 const LONG_LAG_S: f64 = 10.0;
@@ -73,13 +73,13 @@ impl Trace {
 
     /// Returns the test results of all stretches, the most significant first; the p-values account for the number of
     /// stretches.
-    pub(super) fn unsteady(&self, record: &Record) -> Vec<Unsteady> {
+    pub(super) fn response_changes(&self, record: &Record) -> Vec<ResponseChange> {
         let spanned: Vec<Spanned> = [self.lag_s(), LONG_LAG_S]
             .into_iter()
             .filter_map(|lag_s| self.spanned(record, lag_s))
             .collect();
         let bases: Vec<ResponseBasis<'_>> = spanned.iter().map(Spanned::basis).collect();
-        let mut all = unsteady(&bases, record.output(), &self.stretches(record), self.sample_time().s());
+        let mut all = response_changes(&bases, record.output(), &self.stretches(record), self.sample_time().s());
         all.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
         all
     }
@@ -103,12 +103,15 @@ impl Trace {
     /// changes.
     pub(super) fn unsteady_finding(&self, record: &Record) -> Option<Finding> {
         self.options().method.lag_of_basis_s()?;
-        let unlikely = |found: &Unsteady| match found.course {
-            Course::Sway(_) => found.p_value / UNLIKELY_SWAY,
+        let unlikely = |found: &ResponseChange| match found.course {
+            Course::Oscillation(_) => found.p_value / UNLIKELY_OSCILLATION,
             Course::Step => found.p_value / UNLIKELY_STEP,
             Course::Drift => found.p_value / UNLIKELY_DRIFT,
         };
-        let found = self.unsteady(record).into_iter().filter(|found| unlikely(found) < 1.0);
+        let found = self
+            .response_changes(record)
+            .into_iter()
+            .filter(|found| unlikely(found) < 1.0);
         let found = found.min_by(|a, b| unlikely(a).total_cmp(&unlikely(b)))?;
         let [by, error] = found.by;
         let size = match found.name {
@@ -129,7 +132,7 @@ impl Trace {
                 "drifting",
                 format!("the {name} of the person drifts by {size} where the trace declares no change (p = {p:.0e})"),
             ),
-            Course::Sway(period) => (
+            Course::Oscillation(period) => (
                 "swaying",
                 format!(
                     "the {name} of the person oscillates by {size} with a period of about {period:.0} s (p = \
@@ -144,13 +147,13 @@ impl Trace {
     }
 
     /// Estimates how e responds to u.
-    pub(super) fn answer(&self, record: &Record) -> Option<LoopResponse> {
-        answer(record.input(), record.output(), 0, self.sample_time().s())
+    pub(super) fn loop_response(&self, record: &Record) -> Option<LoopResponse> {
+        loop_response(record.input(), record.output(), 0, self.sample_time().s())
     }
 
     /// Finding that e does not respond to u.
     pub(super) fn answer_finding(&self, record: &Record) -> Option<Finding> {
-        let found = self.answer(record).filter(|found| found.share < NO_ANSWER)?;
+        let found = self.loop_response(record).filter(|found| found.share < NO_ANSWER)?;
         Some(Finding::doubt(
             "no-answer",
             format!(

@@ -6,7 +6,7 @@ use rand_chacha::{
     rand_core::{Rng, SeedableRng},
 };
 
-use super::{choice::BY_CHANCE, *};
+use super::{choice::SIGNIFICANCE_LEVEL, *};
 use crate::{
     diagnostics::other_inputs,
     family::{ChannelRole, FamilyEstimator},
@@ -177,11 +177,12 @@ fn responses_to_error_and_target_are_found() {
         ..estimator()
     };
     let one_input = one.fit(std::slice::from_ref(&record)).unwrap();
-    let said = other_inputs::of_family(&one, &one_input, std::slice::from_ref(&record));
+    let findings = other_inputs::of_family(&one, &one_input, std::slice::from_ref(&record));
     assert!(
-        said.iter()
+        findings
+            .iter()
             .any(|f| f.kind == "other-input" && f.message.contains("to r")),
-        "{said:?}"
+        "{findings:?}"
     );
     let gain = one_input.operators[0]
         .parameters
@@ -225,14 +226,14 @@ fn absent_target_response_is_not_found() {
         let record = run(&operator, None, 0, seed);
         let fit = estimator().fit(std::slice::from_ref(&record)).unwrap();
         assert!(fit.channels[0].response.is_none(), "{:?}", fit.channels[0]);
-        assert!(fit.channels[0].p_value >= BY_CHANCE);
+        assert!(fit.channels[0].p_value >= SIGNIFICANCE_LEVEL);
         let one = FamilyEstimator {
             channels: Vec::new(),
             ..estimator()
         };
         let records = [record];
-        let said = other_inputs::of_family(&one, &one.fit(&records).unwrap(), &records);
-        assert!(said.is_empty(), "{said:?}");
+        let findings = other_inputs::of_family(&one, &one.fit(&records).unwrap(), &records);
+        assert!(findings.is_empty(), "{findings:?}");
     }
 }
 

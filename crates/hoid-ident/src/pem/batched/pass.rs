@@ -74,7 +74,7 @@ impl LaneTask for Pass<'_> {
         let states = InitialStateResponses::of(zero, [d, f], n - first, signals, &mut sums.dependent);
         let begin = o.nk;
         let mut to = first + states.rows;
-        signals.begin(history, (to - begin).max(SPAN), width);
+        signals.prepare(history, (to - begin).max(SPAN), width);
         sums.products.clear();
         sums.products.resize(columns.count() * columns.count() * width, 0.0);
         let products = &mut sums.products;
