@@ -26,9 +26,9 @@ use serde_json::{Value, json};
 use crate::compare::{CompareError, Observation, Weights, meta_mean, variance_between_people};
 
 /// Parameters with the same meaning in every form.
-const OF_ANY_FORM: [&str; 3] = ["omega_nm", "zeta_nm", "tau_e"];
+const FORM_INDEPENDENT_NAMES: [&str; 3] = ["omega_nm", "zeta_nm", "tau_e"];
 /// Smallest number of people with information for which a parameter is pooled.
-const LEAST_PEOPLE: usize = 3;
+const MIN_PEOPLE: usize = 3;
 /// Share of the prior above which the data of a person are regarded as uninformative.
 const UNINFORMATIVE_PRIOR_SHARE: f64 = 0.9;
 
@@ -108,7 +108,7 @@ fn population(condition: &str, people: &[&Person], prior: &OperatorPrior) -> Pop
         if !people.iter().any(|p| p.parameter(name).is_some()) {
             continue;
         }
-        if form.is_none() && !OF_ANY_FORM.contains(&name) {
+        if form.is_none() && !FORM_INDEPENDENT_NAMES.contains(&name) {
             let why = "the forms of people differ; name a form under [analysis] in group.toml".to_owned();
             found.left_out.push((name.to_owned(), why));
             continue;
@@ -150,10 +150,10 @@ fn data(parameter: &Parameter, prior: &OperatorPrior) -> Option<Observation> {
 fn pooled((name, unit): (&str, &str), own: &[(&str, Option<Observation>)]) -> Result<PooledParameter, CompareError> {
     let known: Vec<Observation> = own.iter().filter_map(|(_, o)| *o).collect();
     // With only two people, the variance between them is practically unknown.
-    if known.len() < LEAST_PEOPLE {
+    if known.len() < MIN_PEOPLE {
         return Err(CompareError::TooFew {
             found: known.len(),
-            expected: LEAST_PEOPLE,
+            expected: MIN_PEOPLE,
         });
     }
     let mean = meta_mean(&known, Weights::default())?.coefficients[0];

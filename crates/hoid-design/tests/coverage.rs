@@ -25,14 +25,14 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
 fn person(rng: &mut ChaCha8Rng, share: f64, mean: f64, tau: f64, estimated: bool) -> Observation {
     let error = 0.1 + 0.4 * share;
     let value = mean + tau * normal(rng) + error * normal(rng);
-    let told = if estimated {
+    let variance_factor = if estimated {
         ChiSquared::new(4.0).unwrap().sample(rng) / 4.0
     } else {
         1.0
     };
     Observation {
         value,
-        variance: error * error * told,
+        variance: error * error * variance_factor,
     }
 }
 

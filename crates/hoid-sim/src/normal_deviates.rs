@@ -85,12 +85,12 @@ impl TryRng for Middle {
 }
 
 /// Number of bytes that are drawn at a time.
-const DRAWN: usize = 2048;
+const DRAWN_BYTES: usize = 2048;
 
 /// Random numbers of a generator, drawn many at a time: the numbers are the same, but take half the time.
 struct Buffered {
     generator: ChaCha8Rng,
-    bytes: [u8; DRAWN],
+    bytes: [u8; DRAWN_BYTES],
     at: usize,
 }
 
@@ -98,8 +98,8 @@ impl Buffered {
     fn new(generator: ChaCha8Rng) -> Self {
         Self {
             generator,
-            bytes: [0; DRAWN],
-            at: DRAWN,
+            bytes: [0; DRAWN_BYTES],
+            at: DRAWN_BYTES,
         }
     }
 
@@ -132,7 +132,7 @@ impl Buffered {
     #[inline(never)]
     fn over_the_end(&mut self, next: &mut [u8]) {
         for byte in next {
-            if self.at == DRAWN {
+            if self.at == DRAWN_BYTES {
                 self.generator.fill_bytes(&mut self.bytes);
                 self.at = 0;
             }

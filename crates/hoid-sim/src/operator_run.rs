@@ -9,11 +9,11 @@ use crate::{RunSeed, Simulator, cascade::HIGHEST_ORDER};
 
 /// Largest accepted index of a sample in a saved state: eight hours at 1 kHz. The random numbers up to this sample are
 /// drawn again, and an invalid larger index must not exhaust the memory.
-const MOST_SAMPLES: f64 = 3e7;
+const MAX_SAMPLES: f64 = 3e7;
 
 /// Returns the index of the next sample from a saved state; `None` if it is not valid.
 pub(crate) fn saved_sample(k: f64) -> Option<usize> {
-    ((0.0..=MOST_SAMPLES).contains(&k) && k.fract() == 0.0).then_some(k as usize)
+    ((0.0..=MAX_SAMPLES).contains(&k) && k.fract() == 0.0).then_some(k as usize)
 }
 
 /// Running operator of a scenario of the thesis.

@@ -2,7 +2,7 @@
 //! then the tracker runs.
 //!
 //! Rates above 200 Hz are decimated to about 100 Hz ([`Decimation::Auto`]), unless orders, delay or memory of the
-//! request are in samples. The estimate then lags the last sample of the stream by [`Live::behind_s`].
+//! request are in samples. The estimate then lags the last sample of the stream by [`Live::lag_s`].
 
 use hoid_model::{Decimated, Decimation, Decimator, Orders, Record, SampleTime};
 
@@ -188,7 +188,7 @@ impl Live {
     }
 
     /// Returns the time from the last sample that the tracker received to the last sample of the stream, s.
-    pub fn behind_s(&self) -> f64 {
+    pub fn lag_s(&self) -> f64 {
         let samples = self.decimator.as_ref().map_or(0, Decimator::lag_samples);
         samples as f64 * self.sample_time.s()
     }
@@ -280,7 +280,7 @@ mod tests {
         let advanced = (samples(&record))
             .filter(|sample| !live.update(*sample, true, &choose).between)
             .count();
-        assert!((live.behind_s() - 0.15).abs() < 0.02, "{}", live.behind_s());
+        assert!((live.lag_s() - 0.15).abs() < 0.02, "{}", live.lag_s());
         assert_eq!(live.decimated().map(|done| done.factor), Some(10));
 
         let (lower, _) = record.decimated(10).unwrap();

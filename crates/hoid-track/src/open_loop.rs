@@ -13,7 +13,7 @@ use hoid_model::{Complex64, ContinuousTransferFunction, SampleTime, uncertainty:
 use crate::response::Response;
 
 /// Largest standard error of the crossover, relative to the crossover.
-const MOST: f64 = 0.5;
+const MAX_CROSSOVER_ERROR: f64 = 0.5;
 
 /// Crossover frequency and phase margin.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,7 +79,7 @@ impl OpenLoop {
         };
         let crossover_rad_s = estimate(found.omega_rad_s, 0);
         match crossover_rad_s.standard_error {
-            Some(error) if error > MOST * found.omega_rad_s => Err(NoCrossover::NotDetermined),
+            Some(error) if error > MAX_CROSSOVER_ERROR * found.omega_rad_s => Err(NoCrossover::NotDetermined),
             _ => Ok(Self {
                 crossover_rad_s,
                 phase_margin_deg: estimate(found.margin_deg, 1),

@@ -9,14 +9,14 @@ use super::{
     operator::{Parameter, Plant},
 };
 
-/// Default start of a change, s; `TAKES_S` is its default duration.
+/// Default start of a change, s; `CHANGE_DURATION_S` is its default duration.
 const AT_S: f64 = 45.0;
-const TAKES_S: f64 = 0.5;
+const CHANGE_DURATION_S: f64 = 0.5;
 
 fn shift(parameter: Parameter, factor: f64) -> OperatorChange {
     OperatorChange {
         at_s: AT_S,
-        takes_s: TAKES_S,
+        takes_s: CHANGE_DURATION_S,
         parameter,
         factor,
     }

@@ -24,10 +24,10 @@ use super::{
 /// Logarithm of the likelihood ratio above which a change is certain.
 pub const CERTAIN: f64 = 12.0;
 /// Lower limit of the strength; without it the remnant would vanish where the error is zero and reveal the response.
-const LEAST_LEVEL: f64 = 0.05;
-/// Order of the noise model of the batch fit; `LEAST_S` is the shortest span of the fit, s.
+const MIN_LEVEL: f64 = 0.05;
+/// Order of the noise model of the batch fit; `MIN_SPAN_S` is the shortest span of the fit, s.
 const ND: usize = 4;
-const LEAST_S: f64 = 7.5;
+const MIN_SPAN_S: f64 = 7.5;
 
 /// Returns the logarithm of the likelihood ratio over the first `seconds` after the change with this index.
 pub fn evidence(case: &Case, run: &Run, change: usize, seconds: f64) -> f64 {
@@ -52,7 +52,7 @@ pub fn evidence(case: &Case, run: &Run, change: usize, seconds: f64) -> f64 {
     };
     (*first..end)
         .map(|k| {
-            let scale = hidden.innovation * hidden.level[k].max(LEAST_LEVEL);
+            let scale = hidden.innovation * hidden.level[k].max(MIN_LEVEL);
             let (mut now, mut old) = (0.0, 0.0);
             for (lag, a) in hidden.whitening.iter().enumerate().take(k + 1) {
                 now += a * hidden.n[k - lag];
@@ -76,7 +76,7 @@ pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<ReportedRespon
     let at = |t_s: &f64| -> Option<ReportedResponse> {
         // A change takes half a second.
         let from = (changes_s.iter().rev().find(|c| *c < t_s)).map_or(task.start_s.0, |c| c + 0.5);
-        if t_s - from < LEAST_S {
+        if t_s - from < MIN_SPAN_S {
             return None;
         }
         let fit = estimator

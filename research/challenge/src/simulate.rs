@@ -118,7 +118,7 @@ pub struct OracleData {
 
 const RUN_IN_S: f64 = 15.0;
 /// Maximum number of people who may lose control in the simulation before it fails.
-const MOST_ATTEMPTS: usize = 20;
+const MAX_ATTEMPTS: usize = 20;
 /// Limit of u beyond which control is lost, standard deviations of u.
 const LOSS_LIMIT: f64 = 30.0;
 
@@ -137,7 +137,7 @@ pub fn simulate(case: &Case, run: RunOf) -> Result<Run, SimError> {
         time_s: 0.0,
         scenario: case.name.clone(),
     });
-    for attempt in 0..MOST_ATTEMPTS {
+    for attempt in 0..MAX_ATTEMPTS {
         let operator = person(case, run, sample_time, attempt)?;
         outcome = of_person(case, run, operator, sample_time);
         if !matches!(outcome, Err(SimError::Diverged { .. })) {

@@ -120,16 +120,16 @@ fn main() -> Result<(), Box<dyn Error>> {
                 off += of_error;
                 errors += error;
             }
-            let told = (people - none) as f64;
-            let share = |n: u64| 100.0 * n as f64 / told;
+            let determined = (people - none) as f64;
+            let share = |n: u64| 100.0 * n as f64 / determined;
             let kind = if is_held { "held" } else { "logged" };
             println!(
                 "{rate_hz:5} {kind:6} {:5.1} % {:5.1} % {:5.1} % {:+.2} {:.4}, {none} without",
                 share(right),
                 share(other),
                 share(near),
-                off / told,
-                errors / told
+                off / determined,
+                errors / determined
             );
         }
     }

@@ -29,7 +29,7 @@ struct Point {
 }
 
 /// Interval between measurements of a child's memory.
-const LOOK: Duration = Duration::from_millis(2);
+const MEMORY_POLL_INTERVAL: Duration = Duration::from_millis(2);
 
 const PLAN: &str = "name = \"growth\"
 title = \"One cell: ARX and Box-Jenkins in condition C1\"
@@ -210,7 +210,7 @@ fn watched(command: &mut Command) -> Result<(f64, Option<u64>), String> {
         match child.try_wait().map_err(|e| format!("{shown}: {e}"))? {
             Some(ended) if ended.success() => return Ok((begun.elapsed().as_secs_f64(), peak)),
             Some(ended) => return Err(format!("failed ({ended}): {shown}")),
-            None => thread::sleep(LOOK),
+            None => thread::sleep(MEMORY_POLL_INTERVAL),
         }
     }
 }

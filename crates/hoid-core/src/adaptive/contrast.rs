@@ -32,7 +32,7 @@ const BLOCKS_PER_SCORE: usize = 2;
 pub(super) const EMPIRICAL_SHARE: f64 = 2.0 / 3.0;
 pub(super) const MODEL_ONLY: f64 = 0.0;
 /// Lower limit of the divisor of S.
-const LEAST_FREE: f64 = 0.3;
+const MIN_DIVISOR: f64 = 0.3;
 
 /// Difference between present and past in gains, level, natural frequency, damping and delay.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -76,7 +76,7 @@ impl Contrast {
                 stretches += 1.0;
             }
         }
-        let free = (1.0 - (STATES + 3) as f64 / stretches).max(LEAST_FREE);
+        let free = (1.0 - (STATES + 3) as f64 / stretches).max(MIN_DIVISOR);
         let samples = sums.map(|s| s.samples);
         let all = samples[0] + samples[1];
         let residual_squares = before.residual_squares + now.residual_squares;

@@ -124,18 +124,18 @@ mod tests {
     #[test]
     fn smallest_explaining_set_of_changes_is_reported() {
         // Only the delay changed; compared with their own errors, neither the gains nor the delay differ by much.
-        let told = Difference::of(&contrast([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5])).unwrap();
-        assert_eq!(told.changed, [false, false, true]);
-        assert!((told.value[6] - 1.5).abs() < 1e-9 && told.value[0] == 0.0);
+        let reported = Difference::of(&contrast([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5])).unwrap();
+        assert_eq!(reported.changed, [false, false, true]);
+        assert!((reported.value[6] - 1.5).abs() < 1e-9 && reported.value[0] == 0.0);
         // The variance of the delay for known gains is far less than its marginal variance, 1.82.
-        assert!(told.covariance[6][6] < 0.1, "{}", told.covariance[6][6]);
-        let told = Difference::of(&contrast([0.0, 1.5, 0.0, 0.0, 2.0, 0.0, 0.0])).unwrap();
-        assert_eq!(told.changed, [true, true, false]);
+        assert!(reported.covariance[6][6] < 0.1, "{}", reported.covariance[6][6]);
+        let reported = Difference::of(&contrast([0.0, 1.5, 0.0, 0.0, 2.0, 0.0, 0.0])).unwrap();
+        assert_eq!(reported.changed, [true, true, false]);
         // If all groups changed, the difference itself is reported.
         let difference = [2.0, 2.0, 2.0, 2.0, 2.0, 2.0, -12.0];
-        let told = Difference::of(&contrast(difference)).unwrap();
-        assert_eq!(told.changed, [true; 3]);
-        for (i, value) in told.value.iter().enumerate() {
+        let reported = Difference::of(&contrast(difference)).unwrap();
+        assert_eq!(reported.changed, [true; 3]);
+        for (i, value) in reported.value.iter().enumerate() {
             assert!((value - difference[i]).abs() < 1e-9);
         }
     }

@@ -28,7 +28,7 @@ const DEFAULT_TIME_CONSTANTS_S: [f64; 2] = [0.3, 0.06];
 const PRIOR_DEVIATION: f64 = 10.0;
 
 /// Lower limit of the ridge, for residuals that vanish.
-const LEAST: f64 = 1e-300;
+const MIN_RIDGE: f64 = 1e-300;
 
 /// Fading factor below which the sums are rescaled.
 const RESCALE_BELOW: f64 = 0.5;
@@ -172,7 +172,7 @@ impl NoiseModel {
 
     /// Weight of the prior in the units of the sums.
     fn ridge(&self) -> f64 {
-        self.variance() / (PRIOR_DEVIATION * PRIOR_DEVIATION) + LEAST
+        self.variance() / (PRIOR_DEVIATION * PRIOR_DEVIATION) + MIN_RIDGE
     }
 
     /// Upper triangle of the sums over the lags 1 to p, plus the ridge.

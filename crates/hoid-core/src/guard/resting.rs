@@ -3,7 +3,7 @@
 //!
 //! A stick with a dead zone rests at its centre, and a stick that is pushed to its end rests there. Such values are
 //! atoms of the distribution of u: u often returns to them and stays there. The last [`ATOMS`] values at which u stayed
-//! for `LEAST_S` or longer are stored, each with the number n of its rests, their total duration S and the duration l
+//! for `MIN_REST_S` or longer are stored, each with the number n of its rests, their total duration S and the duration l
 //! of the longest rest. A constant span of length T is a **rest**, and no fault, if
 //!
 //! `n >= 3`, `S >= .05 t`, `T < max(8 s, 2 l)`,
@@ -22,11 +22,11 @@
 /// Number of stored values.
 pub const ATOMS: usize = 4;
 /// Minimum duration of a rest in s.
-const LEAST_S: f64 = 0.1;
-/// Minimum number of rests at a value for it to count as an atom; `SHARE` is the minimum fraction of the time spent
+const MIN_REST_S: f64 = 0.1;
+/// Minimum number of rests at a value for it to count as an atom; `MIN_TIME_SHARE` is the minimum fraction of the time spent
 /// there.
-const RESTS: u32 = 3;
-const SHARE: f64 = 0.05;
+const MIN_RESTS: u32 = 3;
+const MIN_TIME_SHARE: f64 = 0.05;
 /// A rest at an atom is accepted if it is shorter than `ACCEPTED_REST_S` seconds or than `LONGEST_REST_FACTOR` times
 /// the longest rest so far.
 const ACCEPTED_REST_S: f64 = 8.0;
@@ -87,8 +87,8 @@ impl Resting {
         if self.constant_samples > 0 && (u - self.value).abs() <= self.tolerance {
             self.constant_samples += 1;
         } else {
-            if self.constant_samples as f64 * self.sample_time >= LEAST_S && !self.rejected {
-                self.learn();
+            if self.constant_samples as f64 * self.sample_time >= MIN_REST_S && !self.rejected {
+                self.record_rest();
             }
             (self.value, self.constant_samples) = if u.is_finite() { (u, 1) } else { (0.0, 0) };
             self.rejected = false;
@@ -102,7 +102,7 @@ impl Resting {
 
     /// Learns the constant span that has just ended. If the list of atoms is full and does not contain the value of the
     /// span, this value replaces the atom with the shortest total duration.
-    fn learn(&mut self) {
+    fn record_rest(&mut self) {
         let place = self.place().unwrap_or_else(|| {
             let least = (0..ATOMS).min_by_key(|i| self.atoms[*i].samples).unwrap_or(0);
             self.atoms[least] = Atom {
@@ -139,8 +139,8 @@ impl Resting {
         // Number of samples before this constant span.
         let time = self.samples.saturating_sub(self.constant_samples) as f64;
         self.constant_samples > 0
-            && rests >= RESTS
-            && samples as f64 >= SHARE * time
+            && rests >= MIN_RESTS
+            && samples as f64 >= MIN_TIME_SHARE * time
             && duration_s < believed
             && !self.rejected
     }

@@ -24,7 +24,7 @@ use serde_json::{Map, Value, json};
 
 use super::{
     Between, DesignError, Expected, People,
-    power::{MOST_PEOPLE, people_needed, power},
+    power::{MAX_PEOPLE, people_needed, power},
     wanted::named_number,
 };
 
@@ -234,7 +234,7 @@ fn answer(rows: &[RunsAndPeople], runs: Option<usize>) -> usize {
     if let Some(place) = rows.iter().position(|row| Some(row.runs) == runs) {
         return place;
     }
-    let cost = |row: &RunsAndPeople| row.people.unwrap_or(MOST_PEOPLE) * (2 * row.runs + COST_OF_PERSON);
+    let cost = |row: &RunsAndPeople| row.people.unwrap_or(MAX_PEOPLE) * (2 * row.runs + COST_OF_PERSON);
     let least = rows.iter().enumerate().min_by_key(|(_, row)| cost(row));
     least.map_or(0, |(place, _)| place)
 }

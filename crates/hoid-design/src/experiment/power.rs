@@ -61,16 +61,16 @@ pub fn power(effect: f64, people: usize, alpha: f64) -> Option<f64> {
 }
 
 /// Largest number of people considered.
-pub const MOST_PEOPLE: usize = 1000;
+pub const MAX_PEOPLE: usize = 1000;
 
 /// Returns the smallest number of people with at least this power; `None` if it exceeds a thousand.
 pub fn people_needed(effect: f64, wanted: f64, alpha: f64) -> Option<usize> {
     let suffices = |people: usize| power(effect, people, alpha).is_some_and(|found| found >= wanted);
-    if !suffices(MOST_PEOPLE) {
+    if !suffices(MAX_PEOPLE) {
         return None;
     }
     // The power increases with the number of people, so the number is found by bisection.
-    let (mut few, mut enough) = (1, MOST_PEOPLE);
+    let (mut few, mut enough) = (1, MAX_PEOPLE);
     while enough - few > 1 {
         let middle = few.midpoint(enough);
         match suffices(middle) {

@@ -253,7 +253,7 @@ mod tests {
 
     #[test]
     fn implausible_neuromuscular_poles_are_reported() {
-        for (omega, zeta, senseless) in [
+        for (omega, zeta, implausible) in [
             (11.25, 0.35, false),
             (11.25, 2.9, false),
             (11.25, 3.1, true),
@@ -261,7 +261,7 @@ mod tests {
             (315.0, 1.0, true),
         ] {
             let found = neuromuscular_finding(omega, zeta, ts());
-            assert_eq!(found.is_some(), senseless, "{omega}, {zeta}");
+            assert_eq!(found.is_some(), implausible, "{omega}, {zeta}");
             assert!(found.is_none_or(|f| f.kind == "neuromuscular-lag"));
         }
     }

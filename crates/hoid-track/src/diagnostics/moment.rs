@@ -68,11 +68,11 @@ fn level_of_operator(operator: &OperatorEstimate, sample_time: SampleTime) -> Ve
     if !is_undetermined(&operator.k_e) && is_undetermined(&operator.k_e_dot) {
         gains.retain(|finding| finding.kind != "undetermined-parameter");
     }
-    let senseless = neuromuscular_finding(operator.omega_nm_rad_s.value, operator.zeta_nm.value, sample_time);
+    let implausible = neuromuscular_finding(operator.omega_nm_rad_s.value, operator.zeta_nm.value, sample_time);
     let open = gains.iter().any(|finding| finding.severity == Severity::Undetermined);
     if open {
         VerdictLevel::NotDetermined
-    } else if !gains.is_empty() || senseless.is_some() || !operator.parameters().is_stable() {
+    } else if !gains.is_empty() || implausible.is_some() || !operator.parameters().is_stable() {
         VerdictLevel::Doubtful
     } else {
         VerdictLevel::Trustworthy

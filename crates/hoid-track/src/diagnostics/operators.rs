@@ -22,12 +22,12 @@ pub(super) fn is_other(operator: &Operator) -> bool {
 
 /// Shares of the rows beyond which a finding is reported.
 const NOT_CONVERTIBLE: f64 = 0.05;
-const MOST: f64 = 0.5;
-const QUARTER: f64 = 0.25;
-const SIGN: f64 = 0.02;
+const UNDETERMINED_SHARE: f64 = 0.5;
+const IMPLAUSIBLE_SHARE: f64 = 0.25;
+const SIGN_SHARE: f64 = 0.02;
 const NEGATIVE_LEAD: f64 = 0.1;
 /// Upper bound of omega_nm in the physical recursions as a share of the Nyquist frequency, less rounding.
-const AT_FASTEST: f64 = 0.4999;
+const OMEGA_BOUND_SHARE: f64 = 0.4999;
 
 /// Returns the findings about the operators of the rows of a trace.
 pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Finding> {
@@ -67,25 +67,25 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
     all.extend(lead_finding(&rows_with).map(of_response));
     let nyquist = trace.sample_time().nyquist_rad_s();
     let bounded = trace.options().method.is_physical();
-    let senseless = rows_with(&|o| {
+    let implausible = rows_with(&|o| {
         let omega = o.omega_nm_rad_s.value;
         neuromuscular_finding(omega, o.zeta_nm.value, trace.sample_time()).is_some()
-            || (bounded && omega >= AT_FASTEST * nyquist)
+            || (bounded && omega >= OMEGA_BOUND_SHARE * nyquist)
     });
-    if senseless > QUARTER {
+    if implausible > IMPLAUSIBLE_SHARE {
         all.push(Finding::doubt(
             "neuromuscular-lag",
             format!(
                 "in {:.0} % of the rows the two poles are a lag and carry no information about the neuromuscular system (omega_nm near \
                  or above the Nyquist frequency, or zeta_nm above 3)",
-                100.0 * senseless
+                100.0 * implausible
             ),
         ));
     }
     if let Some((low, high)) = trace.options().method.track_delay_s().filter(|(low, high)| high > low) {
         let near = 1e-6 * (high - low);
         let at_end = rows_with(&|o| o.tau_e_s.value <= low + near || o.tau_e_s.value >= high - near);
-        if at_end > QUARTER {
+        if at_end > IMPLAUSIBLE_SHARE {
             all.push(Finding::doubt(
                 "delay-at-bound",
                 format!(
@@ -104,7 +104,7 @@ fn sign_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
     let beyond = |e: &Estimate, sign: f64| e.standard_error.is_some_and(|s| sign * e.value > 3.0 * s);
     let positive = rows_with(&|o| beyond(&o.k_e, 1.0));
     let negative = rows_with(&|o| beyond(&o.k_e, -1.0));
-    (positive > SIGN && negative > SIGN).then(|| {
+    (positive > SIGN_SHARE && negative > SIGN_SHARE).then(|| {
         Finding::doubt(
             "gain-sign",
             format!(
@@ -141,7 +141,7 @@ type ShareOfRows<'a> = dyn Fn(&dyn Fn(&OperatorEstimate) -> bool) -> f64 + 'a;
 fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Finding> {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let both = rows_with(&|o| is_undetermined(&o.k_e) && is_undetermined(&o.k_e_dot));
-    if both > MOST {
+    if both > UNDETERMINED_SHARE {
         let why = if remembers { " for the memory in use" } else { "" };
         return Some(Finding::undetermined(
             "gain",
@@ -153,7 +153,7 @@ fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Findi
     }
     let no_gain = rows_with(&|o| is_undetermined(&o.k_e) && !is_undetermined(&o.k_e_dot));
     let no_lead = rows_with(&|o| is_undetermined(&o.k_e_dot) && !is_undetermined(&o.k_e));
-    if no_gain > MOST {
+    if no_gain > UNDETERMINED_SHARE {
         let remedy = if remembers { "; use a longer memory" } else { "" };
         return Some(Finding::doubt(
             "undetermined-parameter",
@@ -163,7 +163,7 @@ fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Findi
             ),
         ));
     }
-    (no_lead > MOST).then(|| {
+    (no_lead > UNDETERMINED_SHARE).then(|| {
         Finding::note(
             "undetermined-parameter",
             format!(

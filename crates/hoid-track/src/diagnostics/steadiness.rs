@@ -28,7 +28,7 @@ const SETTLING_S: f64 = 3.0;
 /// Smallest share of the innovations of e (the part of e that older e and u do not explain) that the latest u explains
 /// if e responds to u. The share is above one half in closed loops, and below 0.03 if e and u are from two runs with
 /// the same forcing function.
-const NO_ANSWER: f64 = 0.05;
+const MIN_RESPONSE_SHARE: f64 = 0.05;
 /// Time before and after a declared change that is excluded from the stretches, s.
 const EXCLUDED_S: f64 = 5.0;
 
@@ -101,7 +101,7 @@ impl Trace {
     /// Finding that the response varies in a way that the trace does not report. The test is limited to methods with a
     /// basis; other methods forget, or model how people drift, and do not assume that a person is constant between
     /// changes.
-    pub(super) fn unsteady_finding(&self, record: &Record) -> Option<Finding> {
+    pub(super) fn response_change_finding(&self, record: &Record) -> Option<Finding> {
         self.options().method.lag_of_basis_s()?;
         let unlikely = |found: &ResponseChange| match found.course {
             Course::Oscillation(_) => found.p_value / UNLIKELY_OSCILLATION,
@@ -152,8 +152,10 @@ impl Trace {
     }
 
     /// Finding that e does not respond to u.
-    pub(super) fn answer_finding(&self, record: &Record) -> Option<Finding> {
-        let found = self.loop_response(record).filter(|found| found.share < NO_ANSWER)?;
+    pub(super) fn loop_response_finding(&self, record: &Record) -> Option<Finding> {
+        let found = self
+            .loop_response(record)
+            .filter(|found| found.share < MIN_RESPONSE_SHARE)?;
         Some(Finding::doubt(
             "no-answer",
             format!(

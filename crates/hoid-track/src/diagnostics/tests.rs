@@ -87,7 +87,7 @@ fn zero_output_is_not_determined() {
 }
 
 /// Returns a trace with an operator in each row, as from a recursion in physical parameters.
-fn in_the_operators_parameters(record: &Record, every: usize) -> Trace {
+fn tracked_in_physical_parameters(record: &Record, every: usize) -> Trace {
     let options = TrackOptions::default_for(Method::rpem(), 29)
         .with(&[("memory", "20s")])
         .unwrap();
@@ -99,7 +99,7 @@ fn in_the_operators_parameters(record: &Record, every: usize) -> Trace {
 /// Returns the kinds of the findings about a trace of C1 with changed rows.
 fn changed(change: impl FnOnce(&mut Trace)) -> Vec<&'static str> {
     let record = simulated(Condition::C1);
-    let mut trace = in_the_operators_parameters(&record, 100);
+    let mut trace = tracked_in_physical_parameters(&record, 100);
     change(&mut trace);
     kinds(&trace.verdict(&record, None).unwrap())
 }
@@ -230,7 +230,7 @@ fn pure_gain_is_trustworthy_and_remedies_are_valid_options() {
         }
         trace.verdict(&record, None).unwrap()
     };
-    let verdict = lead_is_open(in_the_operators_parameters(&record, 10));
+    let verdict = lead_is_open(tracked_in_physical_parameters(&record, 10));
     let found = verdict.findings().iter().find(|f| f.kind == "undetermined-parameter");
     assert_eq!(found.map(|f| f.severity), Some(Severity::Note), "{verdict}");
     // For a method without a memory length, a longer one is not recommended.

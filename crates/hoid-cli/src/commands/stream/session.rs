@@ -262,7 +262,7 @@ impl Session {
         self.counts.shortened += u64::from(taken.outcome.is_some_and(|outcome| outcome.shortened));
         if let Some(tracker) = self.live.tracker() {
             // Time of the last sample that the recursion has processed.
-            let t = self.t.map(|t| t - self.live.behind_s());
+            let t = self.t.map(|t| t - self.live.lag_s());
             (self.counts.held, self.counts.restarts) = (tracker.counts().held, tracker.counts().restarts);
             if let Some(event) = tracker.event() {
                 self.event = Some(event.at(t.unwrap_or(f64::NAN), self.live.plan().sample_time()));
