@@ -9,12 +9,12 @@
 //! Wittenmark, *Adaptive Control*, 2nd ed. 1995, section 11.5, conditional updating). They therefore enter only the
 //! filters:
 //!
-//! - A signal is **stationary** while it stays within [`STATIONARY_SHARE`] of its typical size from its value at the start of the
-//!   stationary span. The typical size is the geometric mean, over blocks of one second, of the largest distance from
-//!   the value at the start of the block. Before ten blocks are known, a span is stationary only if all its values are
-//!   equal.
-//! - There is **no information** if both e and u are stationary for [`MIN_BOTH_S`], or one of the two for [`MIN_ONE_S`]: a
-//!   frozen channel, or a resting hand, whose response cannot be distinguished from no response.
+//! - A signal is **stationary** while it stays within [`STATIONARY_SHARE`] of its typical size from its value at the
+//!   start of the stationary span. The typical size is the geometric mean, over blocks of one second, of the largest
+//!   distance from the value at the start of the block. Before ten blocks are known, a span is stationary only if all
+//!   its values are equal.
+//! - There is **no information** if both e and u are stationary for [`MIN_BOTH_S`], or one of the two for
+//!   [`MIN_ONE_S`]: a frozen channel, or a resting hand, whose response cannot be distinguished from no response.
 //! - The recursion is then restored exactly to its state before the first sample of the span (or before a jump to the
 //!   value of the span): a stored state is restored, and the recursion takes the samples from then on again. Estimate,
 //!   covariance and innovation variance keep their values of that time for the whole span.

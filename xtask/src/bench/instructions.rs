@@ -3,8 +3,8 @@
 //! Times measured on a shared machine carry little information. The number of instructions of a program is reproducible
 //! to a few parts in a thousand, regardless of what else runs. Callgrind (Valgrind) counts the instructions for one run
 //! and for three runs of a task in the example `tasks`; half of the difference is the number for one run. The stored
-//! numbers are in [`STORED_COUNTS`] with the version of the compiler. The check fails if a number exceeds its stored value by
-//! more than [`ALLOWED_INCREASE`]; with a different compiler version the excess is only reported.
+//! numbers are in [`STORED_COUNTS`] with the version of the compiler. The check fails if a number exceeds its stored
+//! value by more than [`ALLOWED_INCREASE`]; with a different compiler version the excess is only reported.
 
 use std::{
     collections::BTreeMap,
@@ -54,8 +54,8 @@ pub fn gate(program: &Path, data: &Path, keep: bool) -> Result<(), String> {
     match (over, same_compiler) {
         (false, _) => Ok(()),
         (true, true) => Err(format!(
-            "a task takes more than {:.0} % more instructions than {STORED_COUNTS} states; repair it, or keep the new numbers with \
-             `cargo xtask bench --instructions --keep` and give the reason",
+            "a task takes more than {:.0} % more instructions than {STORED_COUNTS} states; repair it, or keep the \
+             new numbers with `cargo xtask bench --instructions --keep` and give the reason",
             100.0 * ALLOWED_INCREASE
         )),
         (true, false) => {

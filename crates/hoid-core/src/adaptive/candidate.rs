@@ -29,8 +29,8 @@ use crate::state::{State, visit_all};
 
 /// Magnitude of a signal beyond which the filters are reset.
 pub(super) const MAX_SIGNAL: f64 = 1e100;
-/// `BASIS_POINT_RANGE` limits the basis point (omega in rad/s, zeta, tau in s), and `LARGEST_STEP` limits the change of the basis
-/// point in one step (relative for omega and zeta, in s for tau).
+/// `BASIS_POINT_RANGE` limits the basis point (omega in rad/s, zeta, tau in s), and `LARGEST_STEP` limits the change of
+/// the basis point in one step (relative for omega and zeta, in s for tau).
 const BASIS_POINT_RANGE: [[f64; 2]; DYNAMICS] = [[3.0, 35.0], [0.05, 1.4], [0.01, 0.85]];
 const LARGEST_STEP: [[f64; 2]; DYNAMICS] = [[-0.3, 0.4], [-0.4, 0.6], [-0.05, 0.05]];
 /// Longest delay in s.

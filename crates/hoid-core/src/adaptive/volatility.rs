@@ -4,9 +4,9 @@
 //! variance 2/n. People who act in pulses have innovations in bursts, and the variance of the log energies is tens of
 //! times larger. A likelihood that treats their samples as independent is too sharp and splits the data of a constant
 //! operator into many segments. Each sample therefore counts as `1/c` of a sample, the quasi-likelihood of
-//! overdispersed data (R. W. M. Wedderburn, *Biometrika* 61 (1974) 439-447), with `c = v^DISPERSION_EXPONENT`, where v is the
-//! variance of the log energies divided by its value for constant power. Differences between successive blocks remove
-//! slow drifts of the power:
+//! overdispersed data (R. W. M. Wedderburn, *Biometrika* 61 (1974) 439-447), with `c = v^DISPERSION_EXPONENT`, where v
+//! is the variance of the log energies divided by its value for constant power. Differences between successive blocks
+//! remove slow drifts of the power:
 //!
 //! `v = (pi/2) (mean |ln E_k - ln E_{k-1}|)^2/(4/n)`,
 //!

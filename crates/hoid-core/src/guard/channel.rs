@@ -286,9 +286,9 @@ impl ChannelGuard {
         let weight = 1.0 / f64::from(self.averaged);
         for ((tail_ratio, q), p) in self.tail_ratio.iter_mut().zip(&self.quantiles).zip(&self.inner) {
             let quotient = q / p;
-            // Unknown quantiles give 0/0; the limit of a signal with such quantiles is the lower bound `MIN_TAIL_RATIO`, which
-            // is about the limit for a Gaussian tail. `clamp` would return NaN, which would stay in the average for
-            // ever.
+            // Unknown quantiles give 0/0; the limit of a signal with such quantiles is the lower bound
+            // `MIN_TAIL_RATIO`, which is about the limit for a Gaussian tail. `clamp` would return NaN, which would
+            // stay in the average for ever.
             let square = match quotient.is_nan() {
                 true => MIN_TAIL_RATIO,
                 false => (quotient * quotient).clamp(MIN_TAIL_RATIO, LARGEST_TAIL_RATIO),

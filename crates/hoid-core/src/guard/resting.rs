@@ -3,8 +3,8 @@
 //!
 //! A stick with a dead zone rests at its centre, and a stick that is pushed to its end rests there. Such values are
 //! atoms of the distribution of u: u often returns to them and stays there. The last [`ATOMS`] values at which u stayed
-//! for `MIN_REST_S` or longer are stored, each with the number n of its rests, their total duration S and the duration l
-//! of the longest rest. A constant span of length T is a **rest**, and no fault, if
+//! for `MIN_REST_S` or longer are stored, each with the number n of its rests, their total duration S and the duration
+//! l of the longest rest. A constant span of length T is a **rest**, and no fault, if
 //!
 //! `n >= 3`, `S >= .05 t`, `T < max(8 s, 2 l)`,
 //!
@@ -23,8 +23,8 @@
 pub const ATOMS: usize = 4;
 /// Minimum duration of a rest in s.
 const MIN_REST_S: f64 = 0.1;
-/// Minimum number of rests at a value for it to count as an atom; `MIN_TIME_SHARE` is the minimum fraction of the time spent
-/// there.
+/// Minimum number of rests at a value for it to count as an atom; `MIN_TIME_SHARE` is the minimum fraction of the time
+/// spent there.
 const MIN_RESTS: u32 = 3;
 const MIN_TIME_SHARE: f64 = 0.05;
 /// A rest at an atom is accepted if it is shorter than `ACCEPTED_REST_S` seconds or than `LONGEST_REST_FACTOR` times

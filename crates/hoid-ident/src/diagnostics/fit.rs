@@ -17,7 +17,7 @@ use crate::{Choice, Fit, IdentError};
 /// Residuals are only rounding errors of the data if their power is below this share of the power of u.
 const ROUNDING: f64 = 1e-22;
 /// Minimum number of residuals per unknown; with fewer residuals a fit carries no information.
-const MIN_RESIDUALS_PER_UNKNOWN: usize = 5;
+const MIN_RESIDUALS: usize = 5;
 /// Significance level of the test of b against zero.
 const LEVEL: f64 = 0.05;
 
@@ -59,11 +59,11 @@ impl Fit {
     /// Returns a finding if there are too few residuals for the number of unknowns.
     fn too_few(&self) -> Option<Finding> {
         let unknowns = self.model.theta().len() + self.states;
-        (self.covariance.is_some() && self.residuals < MIN_RESIDUALS_PER_UNKNOWN * unknowns).then(|| {
+        (self.covariance.is_some() && self.residuals < MIN_RESIDUALS * unknowns).then(|| {
             Finding::undetermined(
                 "too-few",
                 format!(
-                    "{} residuals for {unknowns} unknowns with nk = {}, fewer than {MIN_RESIDUALS_PER_UNKNOWN} for each; use a \
+                    "{} residuals for {unknowns} unknowns with nk = {}, fewer than {MIN_RESIDUALS} for each; use a \
                      longer record or lower orders",
                     self.residuals,
                     self.orders().nk

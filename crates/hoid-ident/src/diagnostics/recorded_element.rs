@@ -19,8 +19,8 @@
 //! | `equations` | the least-squares fit of an element |
 //!
 //! If a disturbance was not recorded, the person responds to it, so u is not independent of it. The element is
-//! therefore judged only if the recorded signals explain all but [`MAX_UNEXPLAINED_SHARE`] of the power, as they do if all
-//! signals of the loop were recorded. C is free, since it equals A only if e is not scaled.
+//! therefore judged only if the recorded signals explain all but [`MAX_UNEXPLAINED_SHARE`] of the power, as they do if
+//! all signals of the loop were recorded. C is free, since it equals A only if e is not scaled.
 
 mod equations;
 mod spectra;

@@ -62,8 +62,8 @@ impl Covariances {
     ///
     /// The errors are linearised, but the other estimate may be far along a ridge of the criterion, for example if gain
     /// and lag increase together. The linearised change `J d`, where J is the gradient of the response, is then not the
-    /// difference of the responses. In this case d is replaced by the [least squares difference](differences_from_response) that
-    /// explains the difference of the responses.
+    /// difference of the responses. In this case d is replaced by the [least squares
+    /// difference](differences_from_response) that explains the difference of the responses.
     pub fn add_bias(&mut self, fit: &PredictionFit<'_>, other: &[f64]) {
         let p = fit.parameters();
         let mut difference = vec![0.0; p];

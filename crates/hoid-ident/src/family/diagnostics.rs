@@ -171,14 +171,14 @@ fn describe_pull(parameter: &Parameter, prior: &OperatorPrior) -> Option<String>
 }
 
 /// Parameters that would be determined if the forms that have them were more likely than the others.
-struct OfSomeForms<'a> {
+struct FormParameters<'a> {
     names: Vec<&'a str>,
     forms: Vec<Form>,
     /// Total weight of these forms.
     weight: f64,
 }
 
-impl<'a> OfSomeForms<'a> {
+impl<'a> FormParameters<'a> {
     /// Returns these parameters, grouped by the forms that have them.
     fn all(parameters: &'a [Parameter], weighed: &[WeighedForm]) -> Vec<Self> {
         let mut all: Vec<Self> = Vec::new();
@@ -223,13 +223,13 @@ impl<'a> OfSomeForms<'a> {
 }
 
 fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
-    let of_some_forms = OfSomeForms::all(judged.parameters, judged.weighed);
+    let form_parameters = FormParameters::all(judged.parameters, judged.weighed);
     let is_explained = |parameter: &Parameter| {
-        of_some_forms
+        form_parameters
             .iter()
             .any(|of| of.names.contains(&parameter.name.as_str()))
     };
-    all.extend(of_some_forms.iter().map(OfSomeForms::finding));
+    all.extend(form_parameters.iter().map(FormParameters::finding));
     let find = |name: &str| {
         judged
             .parameters
@@ -412,7 +412,7 @@ mod tests {
             // This parameter is undetermined for another reason; the forms that have it are more likely than not.
             parameter("tau_e", &[Form::Lead, Form::Lag]),
         ];
-        let messages: Vec<String> = OfSomeForms::all(&all, &weighed)
+        let messages: Vec<String> = FormParameters::all(&all, &weighed)
             .iter()
             .map(|of| of.finding().message)
             .collect();

@@ -15,7 +15,7 @@
 use hoid_model::uncertainty::Estimate;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::clusters::{freedom, quantile};
+use super::clusters::{degrees_of_freedom, quantile};
 
 /// Number of bisection steps for each end of an interval.
 const HALVINGS: usize = 80;

@@ -1,11 +1,11 @@
 //! Prediction of a channel from its own past, by a fit that is robust to faults.
 //!
 //! `x(t) = -a_1 x(t-1) - ... - a_p x(t-p) + eps(t)` is fitted by least squares with bounded influence: a row counts
-//! only if neither x(t) nor any of its p past values exceeds [`OUTLIER_LIMIT`] robust deviations (Mallows' weights on the
-//! regressors) and, in later rounds, if eps does not exceed [`LARGEST_RESIDUAL`] times its robust scale (R. A. Maronna,
-//! R. D. Martin, V. J. Yohai, *Robust Statistics*, 2006, sections 5.11 and 8.4). White noise of [`NOISE_FLOOR`] deviations of
-//! x is assumed in addition: it keeps the normal equations of a smooth channel regular, and smaller deviations are not
-//! faults.
+//! only if neither x(t) nor any of its p past values exceeds [`OUTLIER_LIMIT`] robust deviations (Mallows' weights on
+//! the regressors) and, in later rounds, if eps does not exceed [`LARGEST_RESIDUAL`] times its robust scale (R. A.
+//! Maronna, R. D. Martin, V. J. Yohai, *Robust Statistics*, 2006, sections 5.11 and 8.4). White noise of
+//! [`NOISE_FLOOR`] deviations of x is assumed in addition: it keeps the normal equations of a smooth channel regular,
+//! and smaller deviations are not faults.
 
 use super::robust::quantile;
 use crate::linalg::{gram::Gram, least_squares::solve_symmetric};

@@ -11,8 +11,8 @@
 //! **Exchanged.** A person responds only after a delay of a tenth of a second or more; a controlled element responds
 //! immediately. The significance of lag j is the relative increase of the loss without it: for b_1,
 //! `R = (V_without - V)/V`. If e responds to u with a delay and u responds to e immediately, i.e. if `R` of u exceeds
-//! both [`IMMEDIATE_INCREASE`] and [`MIN_INCREASE_RATIO`] times `R` of e, input and output are exchanged. If neither responds
-//! immediately, nothing is reported.
+//! both [`IMMEDIATE_INCREASE`] and [`MIN_INCREASE_RATIO`] times `R` of e, input and output are exchanged. If neither
+//! responds immediately, nothing is reported.
 //!
 //! **Sign.** A person's response to an error initially has the sign of the error: `sum_j b_j` is positive. The sign is
 //! wrong if the sum is more than [`SIGNIFICANTLY_NEGATIVE`] standard errors below zero.

@@ -1,12 +1,12 @@
 //! Stretches in which a channel is constant: frozen channels, dropouts and idle stretches.
 //!
 //! A *hold* is a run of equal values. A channel in full precision has no holds except at its largest or smallest value
-//! (a rail, which is treated separately), so [`MIN_EQUAL_SAMPLES`] equal samples already count as frozen. A quantised channel or a
-//! resting hand has holds in normal operation. Such a hold is frozen if it lasts at least [`RESTING_S`] and [`MIN_RELATIVE_LENGTH`]
-//! times the length that nine of ten holds do not exceed, and if the other channel moves by more than half of its
-//! deviation in the meantime. Holds at the [rest](super::rest) of a stick are compared only with each other. A hold is
-//! a dropout if the channel jumps to its value and back, each time by more than twice the change that 999 of 1000
-//! changes do not exceed.
+//! (a rail, which is treated separately), so [`MIN_EQUAL_SAMPLES`] equal samples already count as frozen. A quantised
+//! channel or a resting hand has holds in normal operation. Such a hold is frozen if it lasts at least [`RESTING_S`]
+//! and [`MIN_RELATIVE_LENGTH`] times the length that nine of ten holds do not exceed, and if the other channel moves by
+//! more than half of its deviation in the meantime. Holds at the [rest](super::rest) of a stick are compared only with
+//! each other. A hold is a dropout if the channel jumps to its value and back, each time by more than twice the change
+//! that 999 of 1000 changes do not exceed.
 //!
 //! *Idle* is a stretch of [`IDLE_S`] or more in which both e and u stay within [`IDLE_RANGE`] of their deviations in
 //! each half second, such as before the start or after the end of a run. This does not happen while a person tracks,

@@ -13,11 +13,12 @@
 //!
 //! Each explanation has m unknowns. The faulty samples are the smallest set whose interpolation
 //!
-//! 1. reduces the sum by more than [`ROOT_OF_MIN_REDUCTION`]^2, which happens once in 1e15 samples for normal innovations;
+//! 1. reduces the sum by more than [`ROOT_OF_MIN_REDUCTION`]^2, which happens once in 1e15 samples for normal
+//!    innovations;
 //! 2. leaves less of the sum than m pushes leave, by more than [`ROOT_OF_MIN_ADVANTAGE`]^2; the advantage is also more
-//!    than [`MIN_ADVANTAGE_SHARE`] of the reduction, or the pushes leave more than [`MIN_SUM_RATIO`] times as much (several faulty
-//!    samples of a smooth channel give a few more large innovations than there are pushes, and their squares make up
-//!    nearly all of S);
+//!    than [`MIN_ADVANTAGE_SHARE`] of the reduction, or the pushes leave more than [`MIN_SUM_RATIO`] times as much
+//!    (several faulty samples of a smooth channel give a few more large innovations than there are pushes, and their
+//!    squares make up nearly all of S);
 //! 3. leaves no innovation beyond [`LARGEST_INNOVATION`] sigma (or at most a twentieth of S);
 //! 4. moves a sample by more than [`MIN_CHANGE`] deviations of the channel, and by more than two of its quantisation
 //!    steps.

@@ -10,7 +10,7 @@ use hoid_core::filter::{divide_in_place, multiply};
 use hoid_model::polynomial::reflected_inside;
 use nalgebra::DMatrix;
 
-use super::columns::{Columns, cut};
+use super::columns::{Columns, split_by_record};
 use crate::{linalg::least_squares::dot, noise_model::noise_model};
 
 /// Largest order of the autoregression that describes the spectrum of a residual.

@@ -31,7 +31,7 @@ use crate::{
 };
 
 use super::{
-    columns::{cut, orthonormal, with_past},
+    columns::{orthonormal, split_by_record, with_past},
     equation::Source,
 };
 

@@ -20,8 +20,8 @@ use crate::{
     optimize::Reason,
 };
 
-/// Largest order of the noise model in an automatic choice (`MAX_NOISE_ORDER`), and the order without a choice, i.e. for
-/// exact data or a given start (`DEFAULT_NOISE_ORDER`).
+/// Largest order of the noise model in an automatic choice (`MAX_NOISE_ORDER`), and the order without a choice, i.e.
+/// for exact data or a given start (`DEFAULT_NOISE_ORDER`).
 const MAX_NOISE_ORDER: usize = 12;
 const DEFAULT_NOISE_ORDER: usize = 1;
 /// Number of lower minima along t_M or G that the fit accepts before it stays at the last one.

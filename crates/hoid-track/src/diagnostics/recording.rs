@@ -96,8 +96,8 @@ impl Trace {
 
     /// Compares the last few seconds of the record with the last row: the delay may have changed, or the estimate may
     /// not have recovered. A step of a parameter ([`operator_step`]) gives a finding if its p-value, given the errors
-    /// of the step and of the row, is below [`P_VALUE_LIMIT`]. For a delay in whole samples, the step must also exceed one
-    /// and a half samples.
+    /// of the step and of the row, is below [`P_VALUE_LIMIT`]. For a delay in whole samples, the step must also exceed
+    /// one and a half samples.
     pub(super) fn not_followed(&self, record: &Record) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self.operator(row).ok()?;

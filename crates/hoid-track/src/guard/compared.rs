@@ -1,7 +1,7 @@
-//! Schedule of the comparison between the estimate and the start model. In every round of [`ROUND_BLOCKS`] blocks only the
-//! first [`COMPARED_BLOCKS`] are compared, which keeps the cost low; after something unusual, all of the next
-//! [`SUSPECT_BLOCKS`] blocks are compared. In a round, the first [`SETTLING_BLOCKS`] blocks do not count, because the filters
-//! of the start model start at rest.
+//! Schedule of the comparison between the estimate and the start model. In every round of [`ROUND_BLOCKS`] blocks only
+//! the first [`COMPARED_BLOCKS`] are compared, which keeps the cost low; after something unusual, all of the next
+//! [`SUSPECT_BLOCKS`] blocks are compared. In a round, the first [`SETTLING_BLOCKS`] blocks do not count, because the
+//! filters of the start model start at rest.
 
 use hoid_core::{
     delay::DelayLine,

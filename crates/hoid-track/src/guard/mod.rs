@@ -14,15 +14,15 @@
 //! continue smoothly, since the person responds only after the delay. A lasting jump of e, after which e moves as
 //! before while u continues as predicted, is therefore tracking and is not reported. A disturbed sensor recovers as
 //! fast as it failed: an excursion that ends with a jump is an outlier. A fast hand leaves a dead zone at once but
-//! returns over several samples: an excursion of u of [`PULSE_S`] or more within [`MAX_PULSE_SIZE`] times its mean magnitude,
-//! whose last step is within the normal moves of u, is a pulse and is used as recorded.
+//! returns over several samples: an excursion of u of [`PULSE_S`] or more within [`MAX_PULSE_SIZE`] times its mean
+//! magnitude, whose last step is within the normal moves of u, is a pulse and is used as recorded.
 //!
 //! **Restoring.** The state of a recursion consists of few numbers ([`hoid_core::state`]). It is stored at the start,
-//! when a sample is first held back, and every [`SNAPSHOT_INTERVAL`] blocks without a fault. Of the snapshots after such
-//! blocks, the last two are kept, and the newest one that is older than the time in which the rules detect a fault is
-//! restored. The ring of samples that may have to be taken again is twice [`LONGEST_S`] long, because both signals may
-//! be held back one after the other. Memory is bounded, and nothing is allocated once the snapshots have reached their
-//! size.
+//! when a sample is first held back, and every [`SNAPSHOT_INTERVAL`] blocks without a fault. Of the snapshots after
+//! such blocks, the last two are kept, and the newest one that is older than the time in which the rules detect a fault
+//! is restored. The ring of samples that may have to be taken again is twice [`LONGEST_S`] long, because both signals
+//! may be held back one after the other. Memory is bounded, and nothing is allocated once the snapshots have reached
+//! their size.
 //!
 //! **Filters have settled** when the delay and [`SETTLE_S`] have passed: after that time the slowest poles of people's
 //! neuromuscular systems (omega zeta of 2 to 4 rad/s) leave less than 2 %.

@@ -1,8 +1,8 @@
 //! Scores `g_c = sum psi eps` and information `G_c = sum psi psi'` of blocks of records.
 //!
-//! Blocks have the length [`BLOCK_S`], or a greater length if this would give more than [`MAX_BLOCKS`] blocks in all records.
-//! A long record is processed in pieces of whole blocks, each with its own initial states, so the memory for the
-//! columns of psi does not grow with the length of the record.
+//! Blocks have the length [`BLOCK_S`], or a greater length if this would give more than [`MAX_BLOCKS`] blocks in all
+//! records. A long record is processed in pieces of whole blocks, each with its own initial states, so the memory for
+//! the columns of psi does not grow with the length of the record.
 
 use std::ops::Range;
 

@@ -205,8 +205,8 @@ pub(super) fn drifts(blocks: &[ScoreBlock]) -> Vec<Candidate> {
 }
 
 /// Returns sinusoidal changes over the blocks of one record, where `block_s` is the duration of a block: periods from
-/// [`MIN_PERIOD_BLOCKS`] blocks to two thirds of the record, with frequencies spaced by half the frequency resolution, each in
-/// four phases.
+/// [`MIN_PERIOD_BLOCKS`] blocks to two thirds of the record, with frequencies spaced by half the frequency resolution,
+/// each in four phases.
 pub(super) fn periodic_changes(blocks: &[ScoreBlock], block_s: f64) -> Vec<Candidate> {
     let n = blocks.len();
     let frequencies = (3..)
