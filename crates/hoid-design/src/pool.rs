@@ -358,8 +358,12 @@ mod tests {
             .chain([("D", None)])
             .collect();
         let parameter = pooled(("tau_e", "s"), &own).unwrap();
-        let nobody = &parameter.people[3];
-        assert!(nobody.shrinkage == 1.0 && nobody.own.is_none() && (nobody.value - parameter.centre).abs() < 1e-12);
+        let unmeasured = &parameter.people[3];
+        assert!(
+            unmeasured.shrinkage == 1.0
+                && unmeasured.own.is_none()
+                && (unmeasured.value - parameter.centre).abs() < 1e-12
+        );
         let population = Population {
             condition: "fo".to_owned(),
             form: None,

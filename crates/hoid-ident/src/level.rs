@@ -210,8 +210,8 @@ mod tests {
                 assert!((found + taken - level).abs() < 1e-8, "{structure} {found} {taken}");
             }
             // If a lag responds to a step, removing the means alone biases the static gain.
-            let beside = Estimator::new(structure, orders).fit(&without).unwrap();
-            let missed = (beside.model().response(0.0).re - 2.0).abs();
+            let without_level_term = Estimator::new(structure, orders).fit(&without).unwrap();
+            let missed = (without_level_term.model().response(0.0).re - 2.0).abs();
             assert!(structure != Structure::Arx || missed > 1e-4, "{structure} {missed}");
         }
     }
@@ -225,9 +225,9 @@ mod tests {
             level: true,
             ..plain.clone()
         };
-        let (beside, unknown) = (plain.fit(&without).unwrap(), with.fit(&without).unwrap());
-        assert_eq!(unknown.state_count(), beside.state_count() + 1);
-        for ((name, a), (_, b)) in beside.parameters().iter().zip(unknown.parameters()) {
+        let (without_level_term, unknown) = (plain.fit(&without).unwrap(), with.fit(&without).unwrap());
+        assert_eq!(unknown.state_count(), without_level_term.state_count() + 1);
+        for ((name, a), (_, b)) in without_level_term.parameters().iter().zip(unknown.parameters()) {
             let off = (a.value - b.value).abs() / a.standard_error.unwrap();
             assert!(off < 0.2, "{name} {off}");
         }

@@ -164,7 +164,7 @@ pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<
     }
     let within: Vec<&Resolved> = factors.iter().filter(|f| f.variation == Variation::Within).collect();
     let mut all = Vec::new();
-    let everybody = |weights: &BTreeMap<String, f64>| -> Vec<_> {
+    let people_with = |weights: &BTreeMap<String, f64>| -> Vec<_> {
         let of = |subject: &String| weights.keys().any(|c| group.cell(subject, c).is_some());
         let subjects = group.subjects().into_iter().filter(of);
         subjects.map(|subject| (subject, weights.clone(), 0)).collect()
@@ -178,7 +178,7 @@ pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<
                 from: a.name.clone(),
                 to: b.name.clone(),
                 effect: None,
-                people: everybody(&weights),
+                people: people_with(&weights),
             });
         }
     }
@@ -203,7 +203,7 @@ pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<
                         from: c.name.clone(),
                         to: d.name.clone(),
                         effect: Some([first.name.clone(), a.name.clone(), b.name.clone()]),
-                        people: everybody(&weights),
+                        people: people_with(&weights),
                     });
                 }
             }

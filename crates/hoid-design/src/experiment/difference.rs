@@ -171,7 +171,7 @@ impl DifferenceRequest {
         all.extend(runs.filter(|runs| !RUNS.contains(runs)));
         all.sort_unstable();
         plan.rows = all.into_iter().map(|runs| self.row(&plan, runs)).collect();
-        plan.answer = answer(&plan.rows, runs);
+        plan.answer = chosen_row(&plan.rows, runs);
         Ok(plan)
     }
 
@@ -230,7 +230,7 @@ pub(super) fn check_spread(quantity: &'static str, found: f64) -> Result<(), Des
 }
 
 /// Returns the index of the row with the given number of runs or, if there is none, of the row with the lowest cost.
-fn answer(rows: &[RunsAndPeople], runs: Option<usize>) -> usize {
+fn chosen_row(rows: &[RunsAndPeople], runs: Option<usize>) -> usize {
     if let Some(place) = rows.iter().position(|row| Some(row.runs) == runs) {
         return place;
     }

@@ -41,15 +41,15 @@ pub fn loop_response(e: &[f64], u: &[f64], from: usize, sample_time_s: f64) -> O
         j if j <= NOISE => past(e, t, j),
         j => past(u, t, latest + j - NOISE),
     });
-    let asked = DMatrix::from_fn(n, latest, |t, j| past(u, t, j + 1));
-    if !before.iter().chain(&asked).chain(&y).all(|v| v.is_finite()) {
+    let latest_columns = DMatrix::from_fn(n, latest, |t, j| past(u, t, j + 1));
+    if !before.iter().chain(&latest_columns).chain(&y).all(|v| v.is_finite()) {
         return None;
     }
     let q = orthogonal(&before)?;
     let left = &y - &q * (q.transpose() * &y);
-    let asked = &asked - &q * (q.transpose() * &asked);
-    let of_asked = orthogonal(&asked)?;
-    let explained = (of_asked.transpose() * &left).norm_squared();
+    let latest_columns = &latest_columns - &q * (q.transpose() * &latest_columns);
+    let of_latest = orthogonal(&latest_columns)?;
+    let explained = (of_latest.transpose() * &left).norm_squared();
     let (whole, rest) = (left.norm_squared(), left.norm_squared() - explained);
     if whole <= 0.0 {
         return None;

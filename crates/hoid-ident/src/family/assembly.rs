@@ -306,13 +306,13 @@ fn add_bias(
     };
     match lines {
         Some(lines) if separate == 1 => {
-            let owes: Vec<bool> = (lines.prior_shares.iter())
+            let is_from_prior: Vec<bool> = (lines.prior_shares.iter())
                 .map(|share| *share > LARGEST_SHARE_AT_LINES)
                 .collect();
             covariances.add_bias(fit, &lines.elements());
-            if owes.contains(&true) {
+            if is_from_prior.contains(&true) {
                 for other in others {
-                    covariances.add_extra_variance(fit, other, 1.0, |place| owes.get(place) == Some(&true));
+                    covariances.add_extra_variance(fit, other, 1.0, |place| is_from_prior.get(place) == Some(&true));
                 }
             }
         }

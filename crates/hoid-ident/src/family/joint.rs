@@ -225,9 +225,9 @@ mod tests {
         let eta = [&TRUTH[..4], &[0.2837, -0.9, 0.1]].concat();
         let mut workspace = Workspace::default();
         let at = criterion.linearise(&eta, &mut workspace);
-        let beside = criterion.additional_at(&eta, &mut workspace);
-        assert!(beside.sum_of_squares > 0.0 && beside.sum_of_squares < at.sum_of_squares);
-        assert_eq!((beside.descent[5], beside.descent[6]), (0.0, 0.0));
+        let additional = criterion.additional_at(&eta, &mut workspace);
+        assert!(additional.sum_of_squares > 0.0 && additional.sum_of_squares < at.sum_of_squares);
+        assert_eq!((additional.descent[5], additional.descent[6]), (0.0, 0.0));
         for i in 0..eta.len() {
             let mut value = |by: f64| {
                 let mut moved = eta.clone();

@@ -263,13 +263,13 @@ impl Parametrisation for FamilyLayout {
         theta.extend_from_slice(&found.f);
         // For each parameter: the derivatives of theta with respect to it, each with its index in theta.
         let mut slopes: Vec<Vec<(usize, f64)>> = Vec::new();
-        let (nb, behind) = (found.b.len(), found.b.len() + noise.len());
+        let (nb, noise_end) = (found.b.len(), found.b.len() + noise.len());
         for i in 0..self.coordinates() {
             let rows = found.jacobian.iter().enumerate();
-            let at = |row: usize| if row < nb { row } else { behind + row - nb };
+            let at = |row: usize| if row < nb { row } else { noise_end + row - nb };
             slopes.push(rows.map(|(row, slope)| (at(row), slope[i])).collect());
         }
-        slopes.extend((nb..behind).map(|place| vec![(place, 1.0)]));
+        slopes.extend((nb..noise_end).map(|place| vec![(place, 1.0)]));
         let mut further = Vec::with_capacity(self.channels.len());
         for channel in &self.channels {
             let operator = self.channel(eta, channel, record)?;

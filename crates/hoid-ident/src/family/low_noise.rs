@@ -106,13 +106,13 @@ impl LittleNoise {
             // form is also wrong, and this form is searched again.
             let none_is_found = clean && round > 0 && share >= ROUNDING_POWER;
             // A form whose residual is close to the smallest one is not searched again.
-            let beside = (starts[best].0, ends[best].clone()?.coordinates);
+            let best_known = (starts[best].0, ends[best].clone()?.coordinates);
             for ((form, _), end) in starts.iter().zip(&mut ends) {
                 let known = end.as_ref().map_or(f64::INFINITY, |end| end.share);
                 if known < ROUNDING_POWER || (known < OTHER_MINIMUM_RATIO * share && !none_is_found) {
                     continue;
                 }
-                let more = search.more_starts(*form, &beside, workspace);
+                let more = search.more_starts(*form, &best_known, workspace);
                 *end = search
                     .least(*form, &more, workspace)
                     .filter(|end| end.share < known)
@@ -206,14 +206,14 @@ impl Search<'_, '_> {
     /// Returns those grid points of a form that leave the smallest residuals, each with its best gain. The grid is used
     /// as it is, and also with the neuromuscular system and the delay of another operator. Since u is linear in the
     /// gain, one step from a gain of zero gives the best gain.
-    fn more_starts(&self, form: Form, beside: &(Form, Vec<f64>), workspace: &mut Workspace) -> Vec<Vec<f64>> {
+    fn more_starts(&self, form: Form, best_known: &(Form, Vec<f64>), workspace: &mut Workspace) -> Vec<Vec<f64>> {
         let (prediction, neuromuscular) = (self.prediction, self.neuromuscular);
         let criterion = prediction.criterion((form, neuromuscular), (0, 0));
         let limits = coordinates::limits(form, neuromuscular, prediction.delay_range_s, prediction.sample_time);
         let mut grid = coordinates::start_grid(form, neuromuscular, &limits, Grid::Default);
         // The neuromuscular system and the delay are the last coordinates of every form.
         let tail = 1 + if neuromuscular { 2 } else { 0 };
-        let of_other = &beside.1[beside.1.len() - tail..];
+        let of_other = &best_known.1[best_known.1.len() - tail..];
         let mut moved: Vec<Vec<f64>> = (grid.iter())
             .map(|point| [&point[..point.len() - tail], of_other].concat())
             .collect();

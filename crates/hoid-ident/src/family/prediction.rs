@@ -257,9 +257,9 @@ impl<'a> Prediction<'a> {
     ) -> Result<PredictionFit<'a>, IdentError> {
         let (n, states) = (criterion.residuals(), criterion.states());
         let penalty: f64 = criterion.penalty.iter().map(|p| p.at(&minimum.theta)).sum();
-        let beside = criterion.additional_at(&minimum.theta, workspace).sum_of_squares;
+        let additional = criterion.additional_at(&minimum.theta, workspace).sum_of_squares;
         // The noise variance is computed from the residuals alone, without the prior and the lines.
-        let mut squares = minimum.at.sum_of_squares - penalty - beside;
+        let mut squares = minimum.at.sum_of_squares - penalty - additional;
         if self.noise_free().is_some() {
             squares = squares.max(self.rounding() * n as f64);
         }

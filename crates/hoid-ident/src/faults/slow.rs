@@ -60,7 +60,7 @@ mod tests {
 
     #[test]
     fn slow_components_are_removed_and_fast_ones_kept() {
-        let gone = |e: &dyn Fn(f64) -> f64| {
+        let remaining = |e: &dyn Fn(f64) -> f64| {
             let before = record(8000, e);
             let after = &without_slow(std::slice::from_ref(&before), PERIOD_S).unwrap()[0];
             // u is .3 e before and after.
@@ -68,12 +68,12 @@ mod tests {
             assert!(same.clone().all(|(e, u)| (0.3 * e - u).abs() < 1e-9));
             root_mean_square(after.input()) / root_mean_square(before.input())
         };
-        assert!(gone(&|t| 3.0 + 0.2 * t) < 1e-9);
-        assert!(gone(&|t| (2.0 * PI * t / 60.0).sin()) < 0.1);
+        assert!(remaining(&|t| 3.0 + 0.2 * t) < 1e-9);
+        assert!(remaining(&|t| (2.0 * PI * t / 60.0).sin()) < 0.1);
         // A step keeps its edge.
-        assert!(gone(&|t| f64::from(u8::from(t > 31.0))) < 0.25);
+        assert!(remaining(&|t| f64::from(u8::from(t > 31.0))) < 0.25);
         for period in [10.0, 2.0, 0.5] {
-            let left = gone(&|t| (2.0 * PI * t / period + 0.3).sin());
+            let left = remaining(&|t| (2.0 * PI * t / period + 0.3).sin());
             assert!((left - 1.0).abs() < 0.05, "{period} s: {left}");
         }
     }

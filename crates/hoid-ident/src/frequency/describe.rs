@@ -376,11 +376,11 @@ fn neighbour_error(runs: &[Run], line: &Line, harmonics: &[usize]) -> f64 {
         let periods = run.window.periods;
         let is_line = |k: usize| k.is_multiple_of(periods) && harmonics.binary_search(&(k / periods)).is_ok();
         let at = line.harmonic * periods;
-        let mut beside: Vec<usize> = (1..run.e.len()).filter(|&k| !is_line(k)).collect();
-        beside.sort_by_key(|k| k.abs_diff(at));
-        beside.truncate(NEIGHBOURS);
+        let mut nearby_bins: Vec<usize> = (1..run.e.len()).filter(|&k| !is_line(k)).collect();
+        nearby_bins.sort_by_key(|k| k.abs_diff(at));
+        nearby_bins.truncate(NEIGHBOURS);
         let power = |k: &usize| (run.u[*k] - line.response * run.e[*k]).norm_sqr();
-        let mean = beside.iter().map(power).sum::<f64>() / beside.len() as f64;
+        let mean = nearby_bins.iter().map(power).sum::<f64>() / nearby_bins.len() as f64;
         // Squared modulus of the weight of the run in the average, such as |D_i|^2.
         let d = b.norm_sqr() / run.e[at].norm_sqr();
         squares += d * mean;

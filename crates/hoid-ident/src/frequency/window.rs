@@ -80,10 +80,10 @@ impl Window {
     /// offset that remains after the shift.
     pub fn samples_of(self, values: &[f64], offset: f64) -> (&[f64], f64) {
         let whole = offset.floor();
-        let begin = self.first as f64 + whole;
-        if begin >= 0.0 && begin + self.samples as f64 <= values.len() as f64 {
-            let begin = begin as usize;
-            return (&values[begin..begin + self.samples], offset - whole);
+        let start = self.first as f64 + whole;
+        if start >= 0.0 && start + self.samples as f64 <= values.len() as f64 {
+            let start = start as usize;
+            return (&values[start..start + self.samples], offset - whole);
         }
         (&values[self.first..self.first + self.samples], offset)
     }

@@ -260,9 +260,9 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
     /// loss decreases.
     fn search_by_samples(&self, minimum: Minimum, options: &SearchOptions, workspace: &mut Workspace) -> Minimum {
         let (delays, ts) = (self.layout.delays(), self.layout.sample_time().s());
-        let begin = self.layout.first_interval_start();
-        let place = |delay_s: f64| delay_s / ts - begin;
-        let border = |n: usize| (n as f64 + begin) * ts;
+        let interval_start = self.layout.first_interval_start();
+        let place = |delay_s: f64| delay_s / ts - interval_start;
+        let border = |n: usize| (n as f64 + interval_start) * ts;
         let mut samples: Vec<usize> = delays
             .iter()
             .map(|&i| place(minimum.theta[i]).floor().max(0.0) as usize)

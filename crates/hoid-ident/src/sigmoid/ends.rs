@@ -144,7 +144,7 @@ impl ThetaEstimate<'_> {
         let all = operator.named_gradients().into_iter();
         all.filter(|(_, gradient)| wanted(gradient))
             .map(|(parameter, gradient)| {
-                let (mut whole, beside) = of(&gradient);
+                let (mut whole, extra_variance) = of(&gradient);
                 let mut value = parameter.value;
                 // omega_nm and zeta_nm are elements of theta, so no logarithm is involved.
                 let own = match (parameter.coordinate, self.layout.neuromuscular_indices) {
@@ -159,7 +159,7 @@ impl ThetaEstimate<'_> {
                     name: parameter.name,
                     unit: parameter.unit,
                     estimate: match self.covariance {
-                        Some(covariance) => estimate(value, variance_along(&whole, covariance) + beside),
+                        Some(covariance) => estimate(value, variance_along(&whole, covariance) + extra_variance),
                         None => Estimate::fixed(value),
                     },
                 }

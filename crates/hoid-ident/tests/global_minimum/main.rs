@@ -41,9 +41,9 @@ impl Outcome {
         let mut system = System::numbered(number);
         let record = std::slice::from_ref(&system.record);
         let estimator = Estimator::new(Structure::BoxJenkins, system.orders);
-        let began = Instant::now();
+        let started = Instant::now();
         let own = estimator.fit(record).ok();
-        let own_s = began.elapsed().as_secs_f64();
+        let own_s = started.elapsed().as_secs_f64();
         let starts: Vec<Vec<f64>> = std::iter::once(system.theta.clone())
             .chain((0..restarts).map(|_| system.random_start()))
             .collect();
@@ -112,7 +112,7 @@ fn is_regular(fit: &Fit) -> bool {
 /// Returns the number of systems that are not excluded and the number of these whose reference is reached, followed by
 /// the same numbers for the excluded systems.
 fn study(numbers: std::ops::Range<u64>, restarts: usize) -> [usize; 4] {
-    let began = Instant::now();
+    let started = Instant::now();
     let outcomes: Vec<Outcome> = numbers
         .into_par_iter()
         .map(|number| Outcome::of(number, restarts))
@@ -149,7 +149,7 @@ fn study(numbers: std::ops::Range<u64>, restarts: usize) -> [usize; 4] {
         100.0 * reached as f64 / counted as f64,
         times[times.len() / 2],
         times.iter().sum::<f64>() / times.len() as f64,
-        began.elapsed().as_secs_f64(),
+        started.elapsed().as_secs_f64(),
     );
     [counted, reached, apart, apart_reached]
 }

@@ -80,8 +80,11 @@ impl FamilyOperatorRun {
 
     /// Returns the state as numbers.
     pub fn saved(&mut self) -> Vec<f64> {
-        let beside = [self.k as f64, self.n];
-        beside.into_iter().chain(self.numbers().map(|number| *number)).collect()
+        let own_state = [self.k as f64, self.n];
+        own_state
+            .into_iter()
+            .chain(self.numbers().map(|number| *number))
+            .collect()
     }
 
     /// Restores the state that [`FamilyOperatorRun::saved`] returned for an operator with the same scenario and run, so

@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn the_basis_that_explains_u_better_is_used() {
+    fn best_fitting_basis_is_used() {
         let (z, u) = run(7, |t| 1.0 - 0.3 * t / 80.0);
         let (other, _) = run(8, |_| 1.0);
         let alone = response_changes(&[basis(&z)], &u, slice::from_ref(&WHOLE), TS);

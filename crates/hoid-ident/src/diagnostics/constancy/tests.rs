@@ -172,10 +172,10 @@ fn change_equals_the_coefficient_of_its_regressor() {
     let found = regression.strongest();
     assert!(found.at.abs_diff(2000) <= 200 && found.p_value < 1e-4, "{found:?}");
     // Reference: least squares with the regressor of the change as an additional column.
-    let behind: Vec<f64> = (0..4000)
+    let changed_input: Vec<f64> = (0..4000)
         .map(|t| if t >= found.at { regression.x[0][t] } else { 0.0 })
         .collect();
-    let theta = regression.solved(&[&regression.x[0], &regression.x[1], &behind]);
+    let theta = regression.solved(&[&regression.x[0], &regression.x[1], &changed_input]);
     assert!((found.by - theta[2]).abs() < 1e-9, "{} and {}", found.by, theta[2]);
 }
 
